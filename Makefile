@@ -1,0 +1,33 @@
+# Two commands: `make run` and `make test`. Each sets up all that it needs by itself.
+
+PYTHON := .venv/bin/python
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run test test-all lint wheel clean
+
+help: ## print this list
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+
+setup: ## system libraries, and .venv with all dependencies; what is there is left alone
+	@tools/setup.sh
+
+run: setup ## open the demo scan, or yours: make run SCAN=path (without a display: into out/)
+	.venv/bin/scan4d view $(if $(SCAN),"$(SCAN)") --fallback out
+
+test: setup ## the tests, without the slow ones
+	$(PYTHON) -m pytest -m "not slow"
+
+test-all: setup ## all tests
+	$(PYTHON) -m pytest
+
+lint: setup ## ruff and mypy
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
+
+wheel: setup ## build the wheel into dist/
+	$(PYTHON) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+
+clean: ## remove what make has made, except your pictures in out/
+	rm -rf .venv dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find viewer tests -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,26 @@
+// Geometry-shader feed: the template lives here, a point in, a triangle strip out.
+#include "amplify/point.glsl"
+#include "common/view.glsl"
+
+// CORNERS, bool begin_shape(Point) and Corner corner(int).
+#include <shape>
+
+layout(points) in;
+layout(triangle_strip, max_vertices = CORNERS) out;
+
+in Forwarded { Point point; } forwarded[];
+
+flat out uint row;
+out vec2 local;
+
+void main() {
+    if (!begin_shape(forwarded[0].point)) return;
+    for (int i = 0; i < CORNERS; ++i) {
+        Corner c = corner(i);
+        gl_Position = to_clip(c.view);
+        local = c.local;
+        row = forwarded[0].point.row;
+        EmitVertex();
+    }
+    EndPrimitive();
+}

@@ -1,0 +1,13 @@
+// A point as every feed hands it to a shape.
+struct Point {
+    vec3 position;  // relative to the pose's origin
+    vec3 normal;    // as stored
+    float radius;   // as stored, 0 where the scan has none
+    uint row;
+};
+
+// A corner of the amplified shape.
+struct Corner {
+    vec3 view;   // view space
+    vec2 local;  // within the shape, -1..1
+};

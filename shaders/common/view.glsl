@@ -1,0 +1,49 @@
+// The camera as shaders see it: viewer/gpu/view.py fills this block.
+layout(std140, binding = 0) uniform View {
+    mat4 world_to_view;  // from positions relative to the pose's origin
+    float view_scale;    // pixels per unit of x / depth, or of x
+    float view_near;     // scan units along the view axis
+    float view_far;      // infinite where nothing was said
+    float view_reach;    // what an orthographic depth buffer ends at
+    ivec2 view_size;     // pixels
+    bool view_perspective;
+};
+
+const uint NONE = 0xFFFFFFFFu;
+
+vec3 to_view(vec3 position) {
+    return (world_to_view * vec4(position, 1.0)).xyz;
+}
+
+// Pixels per scan unit at this depth.
+float scale_at(float depth) {
+    return view_perspective ? view_scale / depth : view_scale;
+}
+
+// Pixel coordinates of a point in view space; row 0 is the top.
+vec2 to_pixel(vec3 view) {
+    return 0.5 * vec2(view_size) + vec2(view.x, -view.y) * scale_at(-view.z);
+}
+
+// View-space position of a pixel coordinate at a depth.
+vec3 from_pixel(vec2 pixel, float depth) {
+    vec2 offset = (pixel - 0.5 * vec2(view_size)) / scale_at(depth);
+    return vec3(offset.x, -offset.y, -depth);
+}
+
+bool in_depth_range(float depth) {
+    return depth >= view_near && depth <= view_far;
+}
+
+// Clip coordinates with reversed depth: near 1, far 0.
+vec4 to_clip(vec3 view) {
+    vec2 half_size = 0.5 * vec2(view_size);
+    float depth = -view.z;
+    if (view_perspective) return vec4(view.xy * view_scale / half_size, view_near, depth);
+    return vec4(view.xy * view_scale / half_size, (view_reach - depth) / (view_reach - view_near), 1.0);
+}
+
+// The depth (scan units) that a reversed depth-buffer value stands for.
+float linear_depth(float stored) {
+    return view_perspective ? view_near / stored : view_reach - stored * (view_reach - view_near);
+}

@@ -1,0 +1,27 @@
+// A point's cells are the pixels of its square, its key is its depth.
+#include "common/view.glsl"
+
+layout(binding = 2) uniform samplerBuffer positions;
+uniform int point_size;
+
+void scatter(uint i) {
+    vec3 view = to_view(texelFetch(positions, int(i)).xyz);
+    float depth = -view.z;
+    // Depths are positive, so their bits are in the order of their values.
+    uint key = floatBitsToUint(depth);
+    vec2 pixel = to_pixel(view);
+    if (!in_depth_range(depth)) return;
+#if POINT_SIZE == 1
+    if (any(lessThan(pixel, vec2(0.0))) || any(greaterThanEqual(pixel, vec2(view_size)))) return;
+    ivec2 at = ivec2(pixel);
+    visit(uint(at.y * view_size.x + at.x), key, i);
+#else
+    // Beyond this a float cannot be turned into an int; such a point is out of view anyway.
+    if (any(greaterThan(abs(pixel), vec2(1e9)))) return;
+    ivec2 low = ivec2(floor(pixel - 0.5 * float(point_size - 1)));
+    ivec2 first = max(low, ivec2(0));
+    ivec2 last = min(low + point_size, view_size);
+    for (int y = first.y; y < last.y; ++y)
+        for (int x = first.x; x < last.x; ++x) visit(uint(y * view_size.x + x), key, i);
+#endif
+}

@@ -1,0 +1,113 @@
+// From a Surface to a picture: colour, light, eye-dome lighting, background.
+// COLOR_BY 0 plain, 1 own, 2 normal, 3 value, 4 id. LIGHT 0 flat, 1 head, 2 fixed.
+// One invocation for each listed pixel; the others hold the background already.
+#include "common/view.glsl"
+#include "common/color.glsl"
+#include "common/item.glsl"
+#include "common/list.glsl"
+
+layout(binding = 0) uniform usamplerBuffer depths;  // float bits, +inf where nothing is
+layout(binding = 1) uniform usamplerBuffer rows;
+layout(binding = 2) uniform samplerBuffer colors;
+layout(binding = 3) uniform samplerBuffer normals;
+layout(binding = 4) uniform samplerBuffer values;
+layout(binding = 5) uniform samplerBuffer color_map;
+layout(binding = 6) uniform samplerBuffer positions;
+layout(std430, binding = 0) writeonly buffer Picture { uint picture[]; };
+
+uniform vec3 plain;          // sRGB
+uniform vec2 value_range;
+uniform vec4 height_axis;    // dot with (position, 1) is the height
+uniform vec3 light;          // to the light, view space
+uniform vec4 phong;          // ambient, diffuse, specular, shininess
+uniform float eye_dome_strength;
+uniform int eye_dome_radius;
+
+float depth_at(ivec2 pixel) {
+    return uintBitsToFloat(texelFetch(depths, pixel.y * view_size.x + pixel.x).r);
+}
+
+vec3 base_color(uint row, float depth, vec3 normal) {
+#if COLOR_BY == 0
+    return plain;
+#elif COLOR_BY == 1
+    return texelFetch(colors, int(row)).rgb;
+#elif COLOR_BY == 2
+    return 0.5 * normal + 0.5;
+#elif COLOR_BY == 3
+#if VALUE == 0
+    float value = depth;
+#elif VALUE == 1
+    float value = dot(height_axis, vec4(texelFetch(positions, int(row)).xyz, 1.0));
+#else
+    float value = texelFetch(values, int(row)).r;
+#endif
+    if (isnan(value)) return plain;
+    float t = (value - value_range.x) / max(value_range.y - value_range.x, 1e-30);
+    return texelFetch(color_map, int(clamp(t, 0.0, 1.0) * 255.0 + 0.5)).rgb;
+#else
+    // Knuth's multiplicative hash: neighbouring ids get colours far apart.
+    uint h = row * 2654435761u;
+    h ^= h >> 16;
+    return vec3(64u + (uvec3(h, h >> 8, h >> 16) & 127u) * 3u / 2u) / 255.0;
+#endif
+}
+
+vec3 lit(vec3 color, ivec2 pixel, float depth, vec3 normal) {
+#if LIGHT == 0
+    return color;
+#else
+    vec3 to_eye = view_perspective
+        ? -normalize(from_pixel(vec2(pixel) + 0.5, depth)) : vec3(0.0, 0.0, 1.0);
+#if LIGHT == 1
+    vec3 to_light = to_eye;
+#else
+    vec3 to_light = light;
+#endif
+    vec3 n = mat3(world_to_view) * normal;
+    // A scan's normals need not agree in sign: light the side that is seen.
+    n = dot(n, to_eye) < 0.0 ? -n : n;
+    float facing = dot(n, to_light);
+    float highlight = facing > 0.0 ? pow(max(dot(reflect(-to_light, n), to_eye), 0.0), phong.w) : 0.0;
+    return color * (phong.x + phong.y * max(facing, 0.0)) + phong.z * highlight;
+#endif
+}
+
+// Eye-dome lighting (Boucheny 2009): the obscurance by nearer neighbours, from depth alone.
+float eye_dome(ivec2 pixel, float depth) {
+    float sum = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 step = ivec2(i < 2 ? 1 - 2 * i : 0, i < 2 ? 0 : 5 - 2 * i) * eye_dome_radius;
+        float other = depth_at(clamp(pixel + step, ivec2(0), view_size - 1));
+        sum += max(0.0, 1.0 - other / depth);
+    }
+    return exp(-100.0 * eye_dome_strength * sum);
+}
+
+vec3 shade(int index) {
+    ivec2 pixel = ivec2(index % view_size.x, index / view_size.x);
+    uint row = texelFetch(rows, index).r;
+    float depth = uintBitsToFloat(texelFetch(depths, index).r);
+    vec3 normal = vec3(0.0);
+#if LIGHT != 0 || COLOR_BY == 2
+    normal = texelFetch(normals, int(row)).xyz;
+    float len = length(normal);
+    // A missing normal faces the eye.
+    normal = len > 0.0 && len < 3e38
+        ? normal / len : vec3(world_to_view[0].z, world_to_view[1].z, world_to_view[2].z);
+#endif
+    vec3 color = base_color(row, depth, normal);
+#if LIGHT != 0 || EYE_DOME
+    color = lit(to_linear(color), pixel, depth, normal);
+#if EYE_DOME
+    color *= eye_dome(pixel, depth);
+#endif
+    color = to_srgb(color);
+#endif
+    return color;
+}
+
+void main() {
+    uint i = item();
+    if (i < list_count) picture[list[i]] = packUnorm4x8(vec4(shade(int(list[i])), 1.0));
+}

@@ -1,0 +1,17 @@
+// The round Gaussian mask of a splat, cut off (Slomp 2014, V-B), opaque.
+#include "common/view.glsl"
+
+uniform float mask_limit;  // squared distance from the centre at which the mask is cut off
+
+flat in uint row;
+in vec2 local;
+
+layout(location = 0) out uint out_row;
+layout(location = 1) out float out_depth;
+
+void main() {
+    float depth = linear_depth(gl_FragCoord.z);
+    if (dot(local, local) > mask_limit || depth > view_far) discard;
+    out_row = row;
+    out_depth = depth;
+}

@@ -1,0 +1,47 @@
+// A surfel's template quad, T(p) S(r, r, 1) R(u, v, n) (Slomp 2014, V-A).
+#define CORNERS 4
+
+uniform float radius_scale;
+uniform float uniform_radius;  // scan units, for points without one of their own
+uniform bool cull_back;
+
+Point surfel;
+vec3 surfel_u, surfel_v;  // half edges, view space
+vec3 surfel_center;
+
+bool begin_shape(Point point) {
+    surfel = point;
+    surfel_center = to_view(point.position);
+    float depth = -surfel_center.z;
+    float radius = point.radius > 0.0 && point.radius < 3e38 ? point.radius : uniform_radius;
+    // Below this a splat can fall between pixel centres, and a far scan would flicker away.
+    radius = max(radius * radius_scale, 0.7072 / scale_at(max(depth, view_near)));
+
+    vec3 to_eye = view_perspective ? -surfel_center : vec3(0.0, 0.0, 1.0);
+    float len = length(point.normal);
+    // A missing normal faces the eye.
+    vec3 n = len > 0.0 && len < 3e38 ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
+    if (cull_back && dot(mat3(world_to_view) * n, to_eye) <= 0.0) return false;
+
+    // Out of view: not even the sphere around the splat's corners reaches the picture.
+    float reach = 1.4142136 * radius;
+    if (depth + reach < view_near) return false;
+    if (depth > reach) {
+        vec2 pixel = to_pixel(surfel_center);
+        float margin = reach * scale_at(depth - reach) * (1.0 + length(surfel_center.xy) / depth) + 1.0;
+        if (any(lessThan(pixel, vec2(-margin))) || any(greaterThan(pixel, vec2(view_size) + margin))) return false;
+    }
+
+    vec3 u = cross(vec3(0.0, 1.0, 0.0), n);
+    if (dot(u, u) < 1e-8) u = cross(vec3(0.0, 0.0, -1.0), n);  // n is parallel to (0, 1, 0)
+    u = normalize(u);
+    vec3 v = cross(n, u);  // the paper prints n x a, which is -u
+    surfel_u = mat3(world_to_view) * u * radius;
+    surfel_v = mat3(world_to_view) * v * radius;
+    return true;
+}
+
+Corner corner(int i) {
+    vec2 local = vec2((i & 1) * 2 - 1, (i >> 1) * 2 - 1);
+    return Corner(surfel_center + local.x * surfel_u + local.y * surfel_v, local);
+}

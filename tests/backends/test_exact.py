@@ -1,0 +1,223 @@
+"""Scenes with exactly known answers, for every backend or for one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scenes import NOTHING, looking_down_z, plane, sphere, sphere_hits, zbuffer
+
+from viewer.backends import backends
+from viewer.camera import Camera
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.scan.points import PointCloud
+
+Draw = Callable[..., Surface]
+every_backend = pytest.mark.parametrize("name", list(backends()))
+PROJECTIONS = ("perspective", "orthographic")
+
+
+def test_one_point_on_its_pixel_with_its_depth(draw: Draw) -> None:
+    # Half the height of the picture is tan(45 deg) = 1 at depth 1: 24 pixels a unit at depth 1.
+    camera = looking_down_z(fov_y=90)
+    cloud = PointCloud.from_arrays([[0.5, 0.25, -2.0]])
+    surface = draw(cloud, camera, (64, 48))
+    x, y = 32 + 0.5 * 24 / 2, 24 - 0.25 * 24 / 2
+    assert np.argwhere(surface.id == 0).tolist() == [[int(y), int(x)]]
+    assert (surface.id != NOTHING).sum() == 1
+    assert surface.depth[int(y), int(x)] == 2.0
+    assert np.isinf(surface.depth).sum() == 64 * 48 - 1
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 8])
+def test_a_point_is_a_square_of_its_size(draw: Draw, size: int) -> None:
+    cloud = PointCloud.from_arrays([[0.01, -0.01, -2.0]])
+    surface = draw(cloud, looking_down_z(fov_y=90), params={"size": size})
+    rows, columns = np.nonzero(surface.id == 0)
+    assert len(rows) == size * size
+    assert np.ptp(rows) == np.ptp(columns) == size - 1
+    assert abs(rows.mean() + 0.5 - 24.12) <= 0.51
+    assert abs(columns.mean() + 0.5 - 32.12) <= 0.51
+
+
+@every_backend
+def test_the_nearer_wins_whatever_the_order(draw: Draw, name: str) -> None:
+    normals, radii = [[0, 0, 1]] * 2, [0.3, 0.3]
+    for order in ([-2.0, -3.0], [-3.0, -2.0]):
+        cloud = PointCloud.from_arrays([[0, 0, z] for z in order], normals=normals, radii=radii)
+        surface = draw(cloud, looking_down_z(fov_y=60), (33, 33), name)
+        assert surface.id[16, 16] == order.index(-2.0)
+        assert surface.depth[16, 16] == pytest.approx(2.0, rel=1e-6)
+
+
+@every_backend
+def test_ties_go_to_the_lowest_id(draw: Draw, name: str) -> None:
+    cloud = PointCloud.from_arrays([[0, 0, -2.0]] * 500, normals=[[0, 0, 1]] * 500, radii=[0.5] * 500)
+    surface = draw(cloud, looking_down_z(fov_y=60), (33, 33), name)
+    assert set(np.unique(surface.id)) == {0, NOTHING}
+
+
+@every_backend
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_a_plane_has_constant_depth(draw: Draw, name: str, projection: str) -> None:
+    camera = looking_down_z(fov_y=40, projection=projection, height=2.0)
+    surface = draw(plane(120, 3.0), camera, (64, 48), name)
+    covered = surface.id != NOTHING
+    assert covered.sum() > 1000
+    np.testing.assert_allclose(surface.depth[covered], 3.0, rtol=3e-7)
+    if name == "surfels":
+        assert covered.all()
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+@pytest.mark.parametrize("size", [(97, 61), (1, 1), (640, 3)])
+def test_points_equal_the_plain_renderer(draw: Draw, projection: str, size: tuple[int, int]) -> None:
+    cloud = sphere(4000)
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=1.5, projection=projection)
+    surface = draw(cloud, camera, size)
+    depth, row = zbuffer(cloud, camera, size)
+    # float32 may put a point that lies on the edge of two pixels into the other one.
+    assert (surface.row != row).mean() <= 0.002
+    same = (surface.row == row) & (row != NOTHING)
+    np.testing.assert_allclose(surface.depth[same], depth[same], rtol=1e-6)
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_surfels_of_a_sphere(draw: Draw, projection: str) -> None:
+    cloud, size = sphere(20_000), (160, 120)
+    camera = Camera.orbit(cloud.bounds(), 40, 25, aspect=4 / 3, projection=projection)
+    surface = draw(cloud, camera, size, "surfels")
+    depth, normal = sphere_hits(camera, size)
+    inside, covered = np.isfinite(depth), surface.id != NOTHING
+    assert not (inside & ~covered).any(), "a hole"
+    # Discs touch the sphere from outside: they pass its silhouette by their sagitta at most.
+    assert (covered & ~inside).sum() <= 0.35 * np.count_nonzero(np.diff(inside, axis=1))
+    both = inside & covered
+    radius = float(cloud.radii[0])
+    sagitta = 1 - np.sqrt(1 - radius**2)
+    # A disc seen at a grazing angle is off by sagitta / cos; compare where it faces the eye.
+    facing = both & (normal @ camera.rotation()[2] > 0.5)
+    assert np.abs(surface.depth - np.where(inside, depth, 0))[facing].max() < 4 * sagitta
+    expected = cloud.normals[surface.row[covered]]
+    np.testing.assert_allclose(surface.normal[covered], expected, atol=2e-7)
+    # The disc that a pixel shows belongs to a point within a radius of the true hit.
+    assert np.einsum("ij,ij->i", surface.normal[facing], normal[facing]).min() > np.cos(1.5 * radius)
+
+
+@pytest.mark.parametrize(
+    "normal", [(0, 1, 0), (0, -1, 0), (1e-7, 1, 0), (0, 1, -1e-7), (0, 0, -1), (1, 0, 0)]
+)
+def test_a_surfel_is_a_whole_disc_for_every_normal(draw: Draw, normal: tuple[float, float, float]) -> None:
+    """Slomp's template collapses where the normal is parallel to (0, 1, 0); ours must not."""
+    axis = np.array(normal) / np.linalg.norm(normal)
+    up = (0.0, 0.0, 1.0) if abs(axis[1]) > 0.5 else (0.0, 1.0, 0.0)
+    camera = Camera(eye=tuple(axis * 4), target=(0, 0, 0), up=up, projection="orthographic", height=4.0)
+    cloud = PointCloud.from_arrays([[0, 0, 0]], normals=[normal], radii=[1.0])
+    covered = draw(cloud, camera, (200, 200), "surfels").id == 0
+    assert covered.sum() * (4 / 200) ** 2 == pytest.approx(np.pi, rel=0.01)
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 0), (np.nan, 0, 0)])
+def test_a_surfel_without_a_normal_faces_the_eye(draw: Draw, normal: tuple[float, float, float]) -> None:
+    cloud = PointCloud.from_arrays([[0, 0, -3]], normals=[normal], radii=[0.5])
+    surface = draw(cloud, looking_down_z(fov_y=40), (101, 101), "surfels", Look(light="head"))
+    assert (surface.id == 0).sum() == pytest.approx(
+        np.pi * (0.5 / 3 * 101 / 2 / np.tan(np.radians(20))) ** 2, rel=0.03
+    )
+    assert surface.image()[50, 50, :3].min() > 100, "lit as if facing the eye"
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan])
+def test_an_unusable_radius_counts_as_unknown(draw: Draw, radius: float) -> None:
+    cloud = sphere(2000)
+    bad = PointCloud.from_arrays(cloud.positions, normals=cloud.normals, radii=np.full(2000, radius))
+    none = PointCloud.from_arrays(cloud.positions, normals=cloud.normals)
+    camera = Camera.orbit(cloud.bounds())
+    one, other = (draw(c, camera, (80, 60), "surfels") for c in (bad, none))
+    assert (one.id != NOTHING).mean() > 0.3
+    np.testing.assert_array_equal(one.id, other.id)
+
+
+@every_backend
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), (1, 240), (641, 1), (255, 257)])
+def test_odd_sizes(draw: Draw, name: str, size: tuple[int, int]) -> None:
+    cloud = sphere(3000)
+    surface = draw(cloud, Camera.orbit(cloud.bounds(), aspect=size[0] / size[1]), size, name)
+    for channel, values in surface.arrays().items():
+        assert values.shape[:2] == size[::-1], channel
+    assert surface.image().shape == (size[1], size[0], 4)
+    assert (surface.id != NOTHING).any()
+
+
+@every_backend
+def test_an_empty_pose_is_background(draw: Draw, name: str) -> None:
+    cloud = PointCloud.from_arrays(np.zeros((0, 3)), normals=np.zeros((0, 3)))
+    surface = draw(cloud, Camera(eye=(0, 0, 5)), (20, 10), name, Look(background="#102030"))
+    assert (surface.id == NOTHING).all()
+    assert (surface.level == 255).all()
+    assert (surface.image() == [0x10, 0x20, 0x30, 255]).all()
+
+
+@every_backend
+def test_one_point(draw: Draw, name: str) -> None:
+    cloud = PointCloud.from_arrays([[1e6, -2e6, 3e6]], normals=[[0, 0, 1]], radii=[1.0])
+    surface = draw(cloud, Camera.orbit(cloud.bounds()), (31, 31), name)
+    assert surface.id[15, 15] == 0
+
+
+@every_backend
+def test_points_behind_the_eye_are_not_seen(draw: Draw, name: str) -> None:
+    cloud = PointCloud.from_arrays([[0, 0, 1.0], [0, 0, 0.0]], normals=[[0, 0, 1]] * 2, radii=[0.1] * 2)
+    assert (draw(cloud, looking_down_z(), (32, 32), name).id == NOTHING).all()
+
+
+@every_backend
+def test_near_and_far_planes_cut(draw: Draw, name: str) -> None:
+    cloud = PointCloud.from_arrays(
+        [[0.0, 0, -z] for z in (1, 2, 3)], normals=[[0, 0, 1]] * 3, radii=[0.5] * 3
+    )
+    for projection in PROJECTIONS:
+        fields = {"projection": projection, "height": 2.0}
+        assert draw(cloud, looking_down_z(near=1.5, **fields), (33, 33), name).id[16, 16] == 1
+        assert draw(cloud, looking_down_z(near=2.5, **fields), (33, 33), name).id[16, 16] == 2
+        far = draw(cloud, looking_down_z(near=1.5, far=1.8, **fields), (33, 33), name)
+        assert (far.id == NOTHING).all()
+
+
+@every_backend
+def test_switching_there_and_back_gives_the_same_picture(draw: Draw, name: str) -> None:
+    cloud = sphere(5000)
+    camera = Camera.orbit(cloud.bounds(), 10, 10)
+    first = draw(cloud, camera, (90, 70), name)
+    for other in backends():
+        draw(cloud, camera, (90, 70), other)
+    again = draw(cloud, camera, (90, 70), name)
+    np.testing.assert_array_equal(first.id, again.id)
+    np.testing.assert_array_equal(first.image(), again.image())
+
+
+@every_backend
+def test_a_far_away_scan_looks_as_it_does_at_the_origin(draw: Draw, name: str) -> None:
+    shift = np.array([4.5e6, 5.6e6, -1.2e6])
+    near, far = sphere(5000), sphere(5000, center=tuple(shift))
+    assert np.abs(far.positions).max() < 1e6, "stored relative to its own origin"
+    camera = Camera.orbit(near.bounds(), 25, 15)
+    moved = Camera(
+        eye=tuple(np.array(camera.eye) + shift),
+        target=tuple(np.array(camera.target) + shift),
+        fov_y=camera.fov_y,
+    )
+    one, other = draw(near, camera, (160, 120), name), draw(far, moved, (160, 120), name)
+    # float64 itself resolves 1e-9 at this distance: a few points sit on pixel edges.
+    assert (one.id != other.id).mean() < 0.005
+
+
+@every_backend
+def test_ids_are_those_of_the_file(draw: Draw, name: str) -> None:
+    points = np.array([[np.nan, 0, 0], [0, 0, -2.0], [np.inf, 0, 0], [0.5, 0, -2.0]])
+    cloud = PointCloud.from_arrays(points, normals=[[0, 0, 1]] * 4, radii=[0.2] * 4)
+    assert cloud.dropped == 2
+    surface = draw(cloud, looking_down_z(fov_y=60), (65, 65), name)
+    assert set(np.unique(surface.id)) == {1, 3, NOTHING}

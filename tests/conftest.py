@@ -1,0 +1,83 @@
+"""Shared by all tests: determinism, numpy errors that raise, and the real scans."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+
+from viewer.camera import Camera
+from viewer.look import Look
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+if TYPE_CHECKING:
+    from viewer.gpu.surface import Surface
+    from viewer.renderer import Renderer
+
+settings.register_profile(
+    "deterministic", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("deterministic")
+
+
+@pytest.fixture(autouse=True)
+def numpy_errors_raise() -> Iterator[None]:
+    """Overflow, invalid values and division by zero fail the test; underflow to zero is fine."""
+    with np.errstate(all="raise", under="ignore"):
+        yield
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The folder of real scans: SCAN4D_DATA, or shared/data beside the checkout."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("SCAN4D_DATA", beside))
+    if not folder.is_dir():
+        pytest.skip(f"no real scans in {folder}; set SCAN4D_DATA to their folder")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def renderer() -> Iterator[Renderer]:
+    """A headless renderer on whatever OpenGL there is; all GPU tests share it."""
+    from viewer.renderer import Renderer
+
+    renderer = Renderer()
+    yield renderer
+    renderer.release()
+
+
+@pytest.fixture
+def draw(renderer: Renderer) -> Callable[..., Surface]:
+    """draw(cloud, camera, size, backend, look, params): one finished Surface."""
+    from viewer.backends import backend
+    from viewer.frame import Request, render_frame
+    from viewer.gpu.surface import Surface
+
+    def draw(
+        cloud: PointCloud,
+        camera: Camera,
+        size: tuple[int, int] = (64, 48),
+        name: str = "points",
+        look: Look | None = None,
+        params: dict[str, object] | None = None,
+    ) -> Surface:
+        request = Request(
+            Pose(0, 0.0, "test", cloud),
+            camera,
+            name,
+            backend(name).params(params),
+            look or Look(light="flat"),
+        )
+        surface = Surface(renderer.gpu, size)
+        while render_frame(renderer, request, surface):
+            pass
+        return surface
+
+    return draw

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from viewer.gpu import shader
+from viewer.gpu.shader import ShaderError, Source
+from viewer.renderer import Renderer
+
+
+@pytest.fixture
+def shaders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A shader folder of the test's own."""
+    monkeypatch.setattr(shader, "resource_path", lambda *parts: tmp_path.joinpath(*parts[1:]))
+    (tmp_path / "common").mkdir()
+    (tmp_path / "common" / "one.glsl").write_text("float one() { return 1.0; }\n")
+    return tmp_path
+
+
+def test_includes_are_expanded_once_with_line_numbers(shaders: Path) -> None:
+    (shaders / "a.comp").write_text('#include "common/one.glsl"\n#include <part>\nfloat last;\n')
+    (shaders / "b.glsl").write_text('#include "common/one.glsl"\nfloat b;\n')
+    source = Source("a.comp", {"SIZE": 3}, {"part": "b.glsl"})
+    assert source.files == ["a.comp", "common/one.glsl", "b.glsl"]
+    assert source.text.count("float one()") == 1
+    assert source.text.startswith("#version 430 core\n#define SIZE 3\n#line 1 0\n#line 1 1\n")
+    assert source.text.rstrip().endswith("#line 3 0\nfloat last;")
+
+
+def test_a_compile_error_names_file_and_line(shaders: Path, renderer: Renderer) -> None:
+    (shaders / "common" / "bad.glsl").write_text("float fine;\nflaot wrong;\n")
+    (shaders / "bad.comp").write_text(
+        'layout(local_size_x = 1) in;\n#include "common/bad.glsl"\nvoid main() {}\n'
+    )
+    with pytest.raises(ShaderError, match=r"common/bad\.glsl:2") as caught:
+        renderer.gpu.compute("bad.comp")
+    assert str(caught.value).startswith("shaders/bad.comp")
+
+
+@pytest.mark.parametrize("log", ["0:12(5): error: x", "0(12) : error C0000: x", "ERROR: 0:12: 'x' : y"])
+def test_places_of_every_vendor_are_understood(shaders: Path, log: str) -> None:
+    (shaders / "a.comp").write_text("\n")
+    assert "a.comp:12" in Source("a.comp").explain(log)
+
+
+def test_programs_are_built_once(renderer: Renderer) -> None:
+    one = renderer.gpu.compute("compact/covered.comp")
+    assert renderer.gpu.compute("compact/covered.comp") is one

@@ -1,0 +1,74 @@
+"""Scenes with exactly known answers, and a slow, obvious renderer to compare with."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.camera import Camera
+from viewer.gpu.view import View
+from viewer.scan.points import PointCloud
+
+NOTHING = 0xFFFFFFFF
+
+
+def sphere(count: int, radius: float = 1.0, center: tuple[float, float, float] = (0, 0, 0)) -> PointCloud:
+    """A Fibonacci sphere with exact normals, and radii of 1.5 times the spacing."""
+    i = np.arange(count) + 0.5
+    polar, turn = np.arccos(1 - 2 * i / count), np.pi * (1 + 5**0.5) * i
+    normals = np.stack([np.cos(turn) * np.sin(polar), np.cos(polar), np.sin(turn) * np.sin(polar)], axis=1)
+    spacing = radius * np.sqrt(4 * np.pi / count)
+    return PointCloud.from_arrays(
+        normals * radius + np.array(center),
+        normals=normals,
+        colors=normals * 0.5 + 0.5,
+        radii=np.full(count, 1.5 * spacing),
+        scalars={"height": normals[:, 1]},
+    )
+
+
+def plane(edge: int, depth: float, spacing: float = 0.05) -> PointCloud:
+    """edge x edge points on z = -depth, facing +z."""
+    x, y = np.meshgrid(np.arange(edge) - (edge - 1) / 2, np.arange(edge) - (edge - 1) / 2)
+    points = np.stack([x.ravel() * spacing, y.ravel() * spacing, np.full(edge * edge, -depth)], axis=1)
+    normals = np.tile([0.0, 0.0, 1.0], (edge * edge, 1))
+    return PointCloud.from_arrays(points, normals=normals, radii=np.full(edge * edge, 1.5 * spacing))
+
+
+def looking_down_z(**fields: object) -> Camera:
+    """At the origin, looking along -z."""
+    return Camera(eye=(0, 0, 0), target=(0, 0, -1), **fields)  # type: ignore[arg-type]
+
+
+def zbuffer(
+    cloud: PointCloud, camera: Camera, size: tuple[int, int]
+) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
+    """Depth and row of the nearest point of each pixel, point by point in float64."""
+    view = View.of(camera, size, cloud.origin, cloud.bounds())
+    pixels, depths = view.project(cloud.positions.astype(np.float64))
+    depth = np.full(size[::-1], np.inf)
+    row = np.full(size[::-1], NOTHING, np.uint32)
+    for i, ((x, y), d) in enumerate(zip(pixels, depths, strict=True)):
+        if d >= view.near and 0 <= x < size[0] and 0 <= y < size[1] and d < depth[int(y), int(x)]:
+            depth[int(y), int(x)], row[int(y), int(x)] = d, i
+    return depth, row
+
+
+def sphere_hits(
+    camera: Camera, size: tuple[int, int], radius: float = 1.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Exact depth (inf: no hit) and world normal of a sphere at the origin, per pixel centre."""
+    view = View.of(camera, size, np.zeros(3), sphere(8, radius).bounds())
+    x, y = np.meshgrid(np.arange(size[0]) + 0.5 - size[0] / 2, np.arange(size[1]) + 0.5 - size[1] / 2)
+    flat = np.stack([x / view.scale, -y / view.scale, np.zeros_like(x)], axis=-1)
+    if view.perspective:
+        start, step = np.zeros(3), flat + np.array([0, 0, -1.0])
+    else:
+        start, step = flat, np.broadcast_to([0, 0, -1.0], flat.shape)
+    center = view.translation
+    a, b = (step**2).sum(-1), (step * (start - center)).sum(-1)
+    c = ((start - center) ** 2).sum(-1) - radius**2
+    root = b * b - a * c
+    t = np.where(root >= 0, (-b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
+    hit = np.where(np.isfinite(t), t, 0)[..., None] * step + start
+    return -hit[..., 2] + np.where(np.isfinite(t), 0, np.inf), (hit - center) / radius @ view.rotation

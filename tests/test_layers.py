@@ -1,0 +1,120 @@
+"""The layers of the design, read from the imports: scan <- gpu <- backends <- frame <- app, bench, cli."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
+
+# A part of the package may import its own layer and those before it.
+LAYERS = (
+    {"errors", "params", "resources", "camera", "look", "scan"},
+    {"gpu"},
+    {"backends"},
+    {"renderer", "frame", "export"},
+    {"app", "bench", "__init__"},
+    {"cli"},
+)
+LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}
+
+WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
+GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
+SLOW = {"open3d", "OpenEXR", "av", "plyfile", "PIL", "tqdm", "cmap"} | WINDOW
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def part_of(path: Path) -> str:
+    """The part of the package that a module belongs to: `scan` for viewer/scan/points.py."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(nodes: Iterable[ast.AST], path: Path) -> Iterator[str]:
+    """Absolute dotted names of all that the nodes import; `from a import b` gives a.b."""
+    package = ["viewer", *path.relative_to(PACKAGE).parent.parts]
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) + 1 - node.level] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def run_at_import(node: ast.AST) -> Iterator[ast.AST]:
+    """The node and what below it runs when the module is imported: all but function bodies."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            yield from run_at_import(child)
+
+
+def parse(path: Path) -> ast.AST:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def all_imports(path: Path) -> set[str]:
+    return set(imports(ast.walk(parse(path)), path))
+
+
+def libraries(names: Iterable[str]) -> set[str]:
+    return {name.partition(".")[0] for name in names}
+
+
+def test_every_part_has_a_layer() -> None:
+    assert {part_of(path) for path in modules()} <= set(LAYER_OF)
+
+
+def test_imports_point_down_the_layers() -> None:
+    upward = [
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for path in modules()
+        for name in all_imports(path)
+        if name.startswith("viewer.")
+        and LAYER_OF.get(name.split(".")[1], LAYER_OF["__init__"]) > LAYER_OF[part_of(path)]
+    ]
+    assert upward == []
+
+
+def test_scan_and_plain_geometry_know_no_gl() -> None:
+    knowing = {
+        f"{path.relative_to(PACKAGE)} imports {library}"
+        for path in modules()
+        if LAYER_OF[part_of(path)] == 0
+        for library in libraries(all_imports(path)) & GL
+    }
+    assert knowing == set()
+
+
+def test_raw_gl_calls_are_in_one_file() -> None:
+    assert {
+        path.relative_to(PACKAGE).as_posix() for path in modules() if "OpenGL" in libraries(all_imports(path))
+    } <= {"gpu/gl.py"}
+
+
+def test_only_the_app_knows_a_window() -> None:
+    assert {part_of(path) for path in modules() if libraries(all_imports(path)) & WINDOW} <= {"app"}
+
+
+def test_slow_libraries_are_imported_where_they_are_used() -> None:
+    early = {
+        f"{path.relative_to(PACKAGE)} imports {library}"
+        for path in modules()
+        if part_of(path) != "app"
+        for library in libraries(imports(run_at_import(parse(path)), path)) & SLOW
+    }
+    assert early == set()
+
+
+def test_importing_viewer_imports_no_slow_library() -> None:
+    code = "import sys, viewer; print(*{name.partition('.')[0] for name in sys.modules})"
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=True
+    )
+    assert set(result.stdout.split()) & SLOW == set()

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from viewer.backends import backend, backends
+from viewer.errors import InputError
+from viewer.look import COLOR_MAPS, Look, color_table
+from viewer.params import AFFECTS, describe, param, parse
+
+
+@dataclass(frozen=True)
+class Example:
+    size: int = param(2, "size", low=1, high=9, sweep=(1, 2))
+    scale: float = param(1.5, "scale")
+    on: bool = param(True, "on")
+    mode: str = param("one", "mode", choices=("one", "two"), affects="shader")
+    limit: float | None = param(None, "limit", type=float)
+
+
+def test_values_are_parsed_by_their_declaration() -> None:
+    given = {"size": "3", "scale": "2.5", "on": "off", "mode": "two", "limit": "7"}
+    assert parse(Example, given) == Example(3, 2.5, False, "two", 7.0)
+    assert parse(Example, {"limit": "auto"}) == Example()
+    assert parse(Example, {"size": 4, "on": False, "limit": None}) == Example(size=4, on=False)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"sise": 1}, "unknown parameter 'sise'. Known: limit, mode, on, scale, size"),
+        ({"size": "x"}, "'x' is no int"),
+        ({"size": 10}, "outside 1 to 9"),
+        ({"scale": "nan"}, "'nan' is no float"),
+        ({"on": "maybe"}, "'maybe' is no bool"),
+        ({"mode": "three"}, "Known: one, two"),
+    ],
+)
+def test_bad_values_are_explained(given: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse(Example, given)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("name", list(backends()))
+def test_backends_keep_the_contract(name: str) -> None:
+    chosen = backend(name)
+    assert chosen.title
+    assert chosen.help.endswith(".")
+    assert chosen.params() == chosen.module.Params()
+    for p in chosen.parameters:
+        assert p.help
+        assert p.affects in AFFECTS
+        assert p.parse(p.default) == p.default
+        for value in p.sweep:
+            assert p.parse(value) == value
+        for choice in p.choices:
+            assert p.parse(choice) == choice
+    assert all(n in ("normals", "radii", "colors") for n in chosen.needs(_cloud(), chosen.params()))
+
+
+def _cloud() -> object:
+    from viewer.scan.points import PointCloud
+
+    return PointCloud.from_arrays([[0.0, 0, 0]])
+
+
+def test_unknown_backend_lists_the_known() -> None:
+    with pytest.raises(InputError, match=r"unknown backend 'nerf'. Known: points, surfels"):
+        backend("nerf")
+
+
+def test_look_is_declared_like_a_backend() -> None:
+    look = parse(Look, {"light": "fixed", "eye_dome": "on", "low": "0.5", "background": "#ffffff80"})
+    assert look == Look(light="fixed", eye_dome=True, low=0.5, background="#ffffff80")
+    assert {p.name for p in describe(Look)} >= {"color_by", "light", "color_map"}
+    with pytest.raises(InputError, match="no colour"):
+        Look(background="white")
+
+
+@pytest.mark.parametrize("name", COLOR_MAPS)
+def test_color_maps_are_monotonic_in_lightness(name: str) -> None:
+    """Perceptually uniform maps rise or fall steadily in luminance (vik, diverging, peaks once)."""
+    table = color_table(name)
+    assert table.shape == (256, 4)
+    luminance = table[:, :3].astype(float) @ [0.2126, 0.7152, 0.0722]
+    turns = 1 if name == "vik" else 0
+    steps = np.diff(luminance[::8])
+    assert np.count_nonzero(np.diff(np.sign(steps[np.abs(steps) > 1]))) <= turns

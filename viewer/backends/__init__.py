@@ -1,0 +1,123 @@
+"""Renderer backends: one file each, found by scanning this folder.
+
+A backend answers one question: which surface does each pixel see? Its module has
+
+    a docstring          the first line says in the panel what it is
+    TITLE                its name in the panel
+    Params               a frozen dataclass of parameters (see viewer/params.py)
+    needs(cloud, params) -> attributes the cloud must have; missing ones are estimated
+    draw(pose, frame, surface) -> bool
+                         on the GL thread: write `surface.depths` and `surface.rows`;
+                         True if a later call would refine the picture
+
+and, where it prepares something for a pose,
+
+    derive(cloud, params) -> arrays     CPU only, on any thread
+    upload(gpu, arrays) -> derived      GL thread; `derived.nbytes` and `derived.release()`
+
+which `draw` then finds as `frame.derived`. No list of backends exists anywhere else.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
+from typing import Any, Protocol
+
+from ..errors import unknown_name
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
+from ..gpu.view import View
+from ..params import Parameter, describe, parse
+from ..scan.points import PointCloud
+
+
+class Derived(Protocol):
+    """What a backend prepared for a pose and put on the GPU."""
+
+    nbytes: int
+
+    def release(self) -> None:
+        """Delete it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameView:
+    """What a backend is asked to draw: a view, its own parameters, and what it derived.
+
+    budget_ms: how long it may take before it says that more calls would refine; None: finish.
+    moving: the camera or the pose moves, so a coarser picture may do.
+    """
+
+    view: View
+    params: Any
+    derived: Any = None
+    budget_ms: float | None = None
+    moving: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Backend:
+    """One backend module, by its declarations."""
+
+    name: str
+    module: ModuleType
+
+    @property
+    def title(self) -> str:
+        """Its name in the panel."""
+        return self.module.TITLE
+
+    @property
+    def help(self) -> str:
+        """One line on what it does."""
+        return (self.module.__doc__ or "").splitlines()[0]
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """Its parameters as declared."""
+        return describe(self.module.Params)
+
+    def params(self, values: dict[str, object] | None = None) -> Any:
+        """Its parameters, with these values in place of defaults; raises InputError."""
+        return parse(self.module.Params, values or {}, f"parameter of '{self.name}'")
+
+    def needs(self, cloud: PointCloud, params: Any) -> tuple[str, ...]:
+        """The attributes it needs of this cloud."""
+        return self.module.needs(cloud, params)
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Draw; True if a later call would refine the picture."""
+        return self.module.draw(pose, frame, surface)
+
+    @property
+    def derive(self) -> Callable[[PointCloud, Any], Any] | None:
+        """Its derive function, None where it prepares nothing."""
+        return getattr(self.module, "derive", None)
+
+    def upload(self, gpu: Gpu, arrays: Any) -> Derived:
+        """Put what `derive` gave on the GPU."""
+        return self.module.upload(gpu, arrays)
+
+    def derive_key(self, params: Any) -> tuple[Any, ...]:
+        """The parameter values that what it derives depends on."""
+        return tuple(getattr(params, p.name) for p in self.parameters if p.affects == "derive")
+
+
+@cache
+def backends() -> dict[str, Backend]:
+    """All backends by name, in alphabetical order."""
+    names = sorted(m.name for m in pkgutil.iter_modules(__path__))
+    return {name: Backend(name, importlib.import_module(f"{__name__}.{name}")) for name in names}
+
+
+def backend(name: str) -> Backend:
+    """The backend of this name; raises InputError that lists the known ones."""
+    if name not in backends():
+        raise unknown_name("backend", name, list(backends()))
+    return backends()[name]

@@ -1,0 +1,250 @@
+"""The camera: float64, right-handed, looks down -z in view space. Plain geometry, no GL."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError, unknown_name
+from .scan.points import Bounds
+
+PROJECTIONS = ("perspective", "orthographic")
+Vector = tuple[float, float, float]
+_FIT_MARGIN = 1.04
+
+_UPS: dict[str, Vector] = {
+    "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
+}  # fmt: skip
+# Where azimuth 0 looks from, for each up axis: the front, at right angles to up.
+_FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the picture is taken from.
+
+    eye, target, up: scan units (up: any length). fov_y: degrees. height: scan units that
+    the picture shows from bottom to top (orthographic only). near, far: scan units along
+    the view axis; None: fitted (see `clip_range`).
+    """
+
+    eye: Vector = (0.0, 0.0, 1.0)
+    target: Vector = (0.0, 0.0, 0.0)
+    up: Vector = (0.0, 1.0, 0.0)
+    projection: str = "perspective"
+    fov_y: float = 30.0
+    height: float | None = None
+    near: float | None = None
+    far: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("eye", "target", "up"):
+            value = tuple(float(v) for v in getattr(self, name))
+            if len(value) != 3 or not all(map(math.isfinite, value)):
+                raise InputError(f"the camera's {name} is not three finite numbers")
+            object.__setattr__(self, name, value)
+        if self.projection not in PROJECTIONS:
+            raise unknown_name("projection", str(self.projection), PROJECTIONS)
+        if not 0 < self.fov_y < 180:
+            raise InputError(f"the camera's fov_y is {self.fov_y}, expected 0 to 180 degrees")
+        for name in ("height", "near", "far"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(f"the camera's {name} is {value}, expected a positive number")
+        if self.near is not None and self.far is not None and self.near >= self.far:
+            raise InputError("the camera's near plane is not in front of its far plane")
+        if self.distance == 0:
+            raise InputError("the camera's eye and target are the same point")
+
+    # --- making one -------------------------------------------------------------------
+
+    @classmethod
+    def orbit(
+        cls,
+        bounds: Bounds,
+        azimuth: float = 0.0,
+        elevation: float = 0.0,
+        distance: float | None = None,
+        *,
+        aspect: float = 1.0,
+        up: str = "+y",
+        fov_y: float = 30.0,
+        projection: str = "perspective",
+    ) -> Camera:
+        """A camera that circles the centre of `bounds`.
+
+        azimuth: degrees; 0 looks from the front (+z for up +y), positive moves the eye
+        towards +x. elevation: degrees, positive is above. distance: scan units; None: as
+        near as shows all of the bounds at this aspect (width / height).
+        """
+        above = np.array(up_vector(up), float)
+        front = np.array(_FRONTS[up[1]])
+        right = np.cross(above, front)
+        a, e = math.radians(azimuth), math.radians(elevation)
+        direction = (
+            math.cos(e) * (math.cos(a) * front + math.sin(a) * right) + math.sin(e) * above
+        )  # from the target to the eye
+        # At the poles the view axis is parallel to up: keep the picture's up continuous there.
+        screen_up = math.cos(e) * above - math.sin(e) * (math.cos(a) * front + math.sin(a) * right)
+        camera = cls(
+            eye=_vector(bounds.center + direction * (bounds.radius or 1.0)),
+            target=_vector(bounds.center),
+            up=_vector(screen_up if abs(math.cos(e)) < 1e-6 else above),
+            projection=projection,
+            fov_y=fov_y,
+        )
+        camera = camera.fit(bounds, aspect)
+        return camera if distance is None else camera.at_distance(distance)
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Camera:
+        """The camera of a JSON object as `to_json` gives it; raises InputError."""
+        if not isinstance(data, dict):
+            raise InputError("a camera is a JSON object")
+        known = list(cls.__dataclass_fields__)
+        for name in data:
+            if name not in known:
+                raise unknown_name("camera field", name, known)
+        try:
+            return cls(**data)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"a camera field has a wrong type: {error}") from error
+
+    @classmethod
+    def load(cls, path: str | Path) -> Camera:
+        """Read a camera's JSON file; raises InputError naming the file."""
+        try:
+            return cls.from_json(json.loads(Path(path).read_text(encoding="utf-8")))
+        except OSError as error:
+            raise InputError(f"cannot read the camera: {error.strerror}", path) from error
+        except (ValueError, UnicodeDecodeError) as error:
+            raise InputError(f"not a JSON file: {error}", path) from error
+        except InputError as error:
+            raise InputError(error.what, path, error.hint) from error
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object with every field, vectors as lists."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+    def save(self, path: str | Path) -> None:
+        """Write `to_json` as a file."""
+        Path(path).write_text(json.dumps(self.to_json(), indent=2) + "\n", encoding="utf-8")
+
+    # --- reading it -------------------------------------------------------------------
+
+    @property
+    def distance(self) -> float:
+        """From eye to target, scan units."""
+        return math.dist(self.eye, self.target)
+
+    @property
+    def view_height(self) -> float:
+        """Scan units from the bottom to the top of the picture, at the target's depth."""
+        if self.projection == "orthographic" and self.height is not None:
+            return self.height
+        return 2 * self.distance * math.tan(math.radians(self.fov_y) / 2)
+
+    def rotation(self) -> NDArray[np.float64]:
+        """World to view rotation, (3, 3): its rows are the picture's right, up and backward axes."""
+        back = np.subtract(self.eye, self.target)
+        back /= np.linalg.norm(back)
+        right = np.cross(self.up, back)
+        length = np.linalg.norm(right)
+        if length <= 1e-12 * np.linalg.norm(self.up):
+            # Up is parallel to the view axis: any right will do; take the most orthogonal axis.
+            right = np.cross(np.eye(3)[np.abs(back).argmin()], back)
+            length = np.linalg.norm(right)
+        right = right / length
+        return np.stack([right, np.cross(back, right), back])
+
+    def clip_range(self) -> tuple[float, float]:
+        """(near, far) along the view axis, scan units: what is outside is not drawn.
+
+        A missing near is a thousandth of the distance to the target, a missing far infinite.
+        """
+        near = self.near if self.near is not None else 1e-3 * self.distance
+        return near, math.inf if self.far is None else self.far
+
+    def reach(self, bounds: Bounds) -> float:
+        """A depth that nothing near the bounds lies behind, scan units.
+
+        An orthographic depth buffer is scaled to it.
+        """
+        return 2 * (self.distance + math.dist(self.target, bounds.center) + 4 * bounds.radius)
+
+    # --- moving it --------------------------------------------------------------------
+
+    def fit(self, bounds: Bounds, aspect: float = 1.0) -> Camera:
+        """The same direction, as near as shows the box of `bounds` whole, with a small margin."""
+        if bounds.radius == 0:
+            bounds = bounds.grown(max(1e-6 * float(np.abs(bounds.center).max()), 0.5))
+        x, y, z = self.rotation() @ (bounds.corners() - bounds.center).T
+        tangent = math.tan(math.radians(self.fov_y) / 2) / _FIT_MARGIN
+        # Each corner must lie within the picture's edges: |y| <= tangent * (distance - z).
+        reach = np.maximum(np.abs(y), np.abs(x) / aspect)
+        distance = float((z + reach / tangent).max())
+        height = 2 * _FIT_MARGIN * float(reach.max()) if self.projection == "orthographic" else self.height
+        eye = _vector(bounds.center + self.rotation()[2] * distance)
+        return replace(self, eye=eye, target=_vector(bounds.center), height=height)
+
+    def at_distance(self, distance: float) -> Camera:
+        """The same direction and target from another distance (scan units)."""
+        if not (math.isfinite(distance) and distance > 0):
+            raise InputError(f"a camera's distance is positive, not {distance}")
+        eye = np.array(self.target) + self.rotation()[2] * distance
+        height = self.height and self.height * distance / self.distance
+        return replace(self, eye=_vector(eye), height=height)
+
+    def orbited(self, azimuth: float, elevation: float) -> Camera:
+        """Turned about the target: azimuth about up, then elevation, in degrees.
+
+        Elevation stops short of the poles, so that the picture never flips.
+        """
+        up = np.array(self.up) / np.linalg.norm(self.up)
+        offset = np.subtract(self.eye, self.target)
+        offset = _rotate(offset, up, math.radians(azimuth))
+        now = math.degrees(math.asin(np.clip(offset @ up / np.linalg.norm(offset), -1, 1)))
+        step = float(np.clip(now + elevation, -89.5, 89.5)) - now
+        axis = np.cross(up, offset)
+        if np.linalg.norm(axis) > 1e-9 * np.linalg.norm(offset):
+            offset = _rotate(offset, axis / np.linalg.norm(axis), -math.radians(step))
+        return replace(self, eye=_vector(np.array(self.target) + offset))
+
+    def panned(self, right: float, up: float) -> Camera:
+        """Moved with its target along the picture's axes, in heights of the picture."""
+        axes = self.rotation()
+        shift = (axes[0] * right + axes[1] * up) * self.view_height
+        eye, target = np.array(self.eye) + shift, np.array(self.target) + shift
+        return replace(self, eye=_vector(eye), target=_vector(target))
+
+    def zoomed(self, factor: float) -> Camera:
+        """Nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
+        return self.at_distance(self.distance / factor)
+
+    def projected(self, projection: str) -> Camera:
+        """The same view in the other projection: what is at the target keeps its size."""
+        return replace(self, projection=projection, height=self.view_height)
+
+
+def up_vector(name: str) -> Vector:
+    """The unit vector of an axis name such as '+y' or '-z'; raises InputError."""
+    if name not in _UPS:
+        raise unknown_name("up axis", name, list(_UPS))
+    return _UPS[name]
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
+
+def _rotate(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Rodrigues' rotation of v about a unit axis, angle in radians."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return v * cos + np.cross(axis, v) * sin + axis * (axis @ v) * (1 - cos)

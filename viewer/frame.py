@@ -1,0 +1,122 @@
+"""The life of one frame."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
+
+from .backends import FrameView
+from .backends import backend as find_backend
+from .camera import Camera
+from .gpu.shade import shade
+from .gpu.surface import Surface
+from .gpu.view import View
+from .look import Look
+from .renderer import Renderer
+from .scan.points import PointCloud
+from .scan.pose import Pose
+
+FALLBACK = "points"
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What a picture shows. backend: None for the default of the scan (see `default_backend`).
+
+    params: the backend's own `Params`; None for its defaults.
+    """
+
+    pose: Pose
+    camera: Camera
+    backend: str | None = None
+    params: Any = None
+    look: Look = field(default_factory=Look)
+
+
+def render_frame(
+    renderer: Renderer,
+    request: Request,
+    surface: Surface,
+    *,
+    wait: bool = True,
+    budget_ms: float | None = None,
+    moving: bool = False,
+) -> bool:
+    """Draw what is asked for into `surface`; True if a later call would refine it.
+
+    wait: whether to wait for estimated attributes and derived data; while they are made on
+    a worker, plain points are drawn instead. Raises InputError for what the scan or the
+    parameters do not allow.
+    """
+    start = time.perf_counter()
+    timers = renderer.gpu.timers
+    timers.start_frame()
+
+    pose = renderer.resident(request.pose)
+    name = request.backend or default_backend(pose.cloud)
+    params = request.params if request.params is not None else find_backend(name).params()
+    prepared = renderer.prepare(pose, find_backend(name), params, request.look, wait)
+    if prepared is None:
+        name, params, look = FALLBACK, find_backend(FALLBACK).params(), _unlit(request.look)
+    else:
+        look = request.look
+
+    surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds))
+    if prepared is None:
+        surface.stats.skipped[request.backend or "look"] = "what it needs is being prepared"
+    frame = FrameView(surface.view, params, prepared and prepared.derived, budget_ms, moving)
+    refinable = find_backend(name).draw(pose, frame, surface)
+    shade(surface, look)
+
+    stats = surface.stats
+    stats.backend, stats.upload_ms = name, pose.take_upload_ms()
+    stats.derive_ms = prepared.derive_ms if prepared else 0.0
+    stats.passes = timers.passes()
+    stats.gpu_ms = sum(ms for _, ms in stats.passes)
+    stats.cpu_ms = (time.perf_counter() - start) * 1e3
+    return refinable or prepared is None
+
+
+def _unlit(look: Look) -> Look:
+    """The look without what needs normals, for as long as they are being estimated."""
+    color_by = "auto" if look.color_by == "normal" else look.color_by
+    return replace(look, light="auto", color_by=color_by)
+
+
+def default_backend(cloud: PointCloud) -> str:
+    """Surfels where the scan has normals, else points: a default never waits for an estimate."""
+    return "points" if cloud.normals is None else "surfels"
+
+
+def render(
+    pose: Pose | PointCloud,
+    camera: Camera | None,
+    size: tuple[int, int],
+    backend: str | None,
+    look: Look | None,
+    params: dict[str, Any],
+) -> Surface:
+    """The work of `viewer.render`: one picture, on a headless context that later calls share."""
+    if isinstance(pose, PointCloud):
+        pose = Pose(0, 0.0, "points", pose)
+    renderer = _shared_renderer()
+    resident = renderer.resident(pose)
+    name = backend or default_backend(pose.cloud)
+    request = Request(
+        pose=pose,
+        camera=camera or Camera.orbit(resident.bounds, aspect=size[0] / size[1]),
+        backend=name,
+        params=find_backend(name).params(params),
+        look=look or Look(),
+    )
+    surface = Surface(renderer.gpu, size)
+    while render_frame(renderer, request, surface):
+        pass
+    return surface
+
+
+@cache
+def _shared_renderer() -> Renderer:
+    return Renderer()

@@ -1,0 +1,1 @@
+"""A thin layer over moderngl: context, shader files, buffers, Surface, primitives, timers."""

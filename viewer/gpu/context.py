@@ -1,0 +1,162 @@
+"""The OpenGL context, headless or a window's, and what was learnt about its driver."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import moderngl
+
+from ..errors import InputError, NoOpenGLError
+from . import gl
+from .shader import Source, shader_error
+from .timers import Timers
+
+T = TypeVar("T")
+REQUIRED_VERSION = 430
+REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
+_GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
+
+
+@dataclass
+class Attempts:
+    """What was tried to get a context: (how, what came of it)."""
+
+    log: list[tuple[str, str]] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return "; ".join(f"{how}: {outcome}" for how, outcome in self.log)
+
+
+class Gpu:
+    """A context with its shader programs and timers.
+
+    Make one with `headless()`, or give it the context of a window. Raises NoOpenGLError
+    where the context lacks what the project needs.
+    """
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        missing = [name for name in REQUIRED_EXTENSIONS if name not in ctx.extensions]
+        if ctx.version_code >= 450:
+            missing = []  # clip control is core since 4.5
+        if ctx.version_code < REQUIRED_VERSION or missing:
+            raise NoOpenGLError(
+                f"OpenGL {ctx.version_code / 100:.1f} on '{ctx.info['GL_RENDERER']}' is not enough"
+                + (f" (no {', '.join(missing)})" if missing else ""),
+                hint="Scan4D needs OpenGL 4.3 with ARB_clip_control. Update the graphics driver, or run "
+                "'scan4d doctor' to see what there is",
+            )
+        self.ctx = ctx
+        self.device: str = ctx.info["GL_RENDERER"]
+        self.driver: str = ctx.info["GL_VERSION"]
+        self.software = any(word in self.device.lower() for word in _SOFTWARE)
+        self.timers = Timers(ctx, self.software)
+        self.max_pixels = gl.integer(0x90DE) // 4  # MAX_SHADER_STORAGE_BLOCK_SIZE, 4 bytes a pixel
+        self.max_points = gl.max_texture_buffer_texels()
+        self._kept: dict[object, Any] = {}
+        gl.reverse_depth()
+
+    def compute(
+        self, name: str, defines: Mapping[str, object] | None = None, parts: Mapping[str, str] | None = None
+    ) -> moderngl.ComputeShader:
+        """The compute program of a shader file, built once for each set of defines and parts."""
+        return self._build((name,), defines, parts)
+
+    def program(
+        self,
+        stages: tuple[str, ...],
+        defines: Mapping[str, object] | None = None,
+        parts: Mapping[str, str] | None = None,
+    ) -> moderngl.Program:
+        """The program of a `.vert`, an optional `.geom` and a `.frag` file, built once."""
+        return self._build(stages, defines, parts)
+
+    def _build(
+        self,
+        names: tuple[str, ...],
+        defines: Mapping[str, object] | None,
+        parts: Mapping[str, str] | None,
+    ) -> Any:
+        key = (names, tuple((defines or {}).items()), tuple((parts or {}).items()))
+        return self.keep(key, lambda: self._compile([Source(name, defines, parts) for name in names]))
+
+    def _compile(self, sources: list[Source]) -> Any:
+        texts = {s.name.rsplit(".", 1)[-1]: s.text for s in sources}
+        try:
+            if "comp" in texts:
+                return self.ctx.compute_shader(texts["comp"])
+            return self.ctx.program(
+                vertex_shader=texts["vert"],
+                geometry_shader=texts.get("geom"),
+                fragment_shader=texts["frag"],
+            )
+        except moderngl.Error as error:
+            raise shader_error(sources, error) from error
+
+    def keep(self, key: object, make: Callable[[], T]) -> T:
+        """What `make` returned the first time for this key: small things that live as long as this."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def set(self, program: moderngl.Program | moderngl.ComputeShader, **values: Any) -> None:
+        """Set uniforms by name; those that the compiler found unused are passed over."""
+        for name, value in values.items():
+            if name in program:
+                program[name] = value
+
+    def dispatch(self, program: moderngl.ComputeShader, count: int, group: int = 256) -> None:
+        """Run one invocation for each of `count` items; shaders find theirs with `item()`."""
+        groups = -(-count // group)
+        if groups:
+            rows = -(-groups // _GROUP_LIMIT)
+            program.run(-(-groups // rows), rows)
+            self.ctx.memory_barrier()
+
+
+def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu:
+    """A context without a window: EGL on Linux, a hidden window elsewhere.
+
+    device: which of several GPUs (EGL's order); None: the environment's SCAN4D_DEVICE,
+    else the driver's choice. Raises NoOpenGLError (with what was tried), InputError.
+    """
+    attempts = attempts if attempts is not None else Attempts()
+    if device is None:
+        device = device_from_environment()
+    options: list[tuple[str, dict[str, Any]]] = []
+    if sys.platform.startswith("linux"):
+        name = "EGL" if device is None else f"EGL device {device}"
+        options.append((name, {"backend": "egl", "device_index": device or 0}))
+        if device is None and os.environ.get("DISPLAY"):
+            options.append(("GLX, hidden window", {}))
+    else:
+        options.append(("hidden window", {}))
+    for how, settings in options:
+        try:
+            gpu = Gpu(moderngl.create_context(standalone=True, require=REQUIRED_VERSION, **settings))
+        except NoOpenGLError as error:
+            attempts.log.append((how, str(error)))
+        except Exception as error:  # moderngl and glcontext raise bare Exceptions
+            attempts.log.append((how, str(error) or type(error).__name__))
+        else:
+            attempts.log.append((how, f"{gpu.device}, OpenGL {gpu.driver}"))
+            return gpu
+    raise NoOpenGLError(
+        f"no usable OpenGL ({attempts})",
+        hint="Install a graphics driver, or Mesa's software OpenGL (Debian: apt-get install libegl1 "
+        "libgl1 libgl1-mesa-dri libegl-mesa0); 'scan4d doctor' tells more",
+    )
+
+
+def device_from_environment() -> int | None:
+    """SCAN4D_DEVICE as a number, None where it is not set; raises InputError."""
+    text = os.environ.get("SCAN4D_DEVICE", "")
+    if not text:
+        return None
+    if not text.isdigit():
+        raise InputError(f"'{text}' is no device number", "SCAN4D_DEVICE", "Use 0, 1, ...")
+    return int(text)

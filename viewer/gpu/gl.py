@@ -1,0 +1,164 @@
+"""Every raw OpenGL call of the project: what moderngl does not reach.
+
+Through PyOpenGL's raw modules, which import in a quarter of the time of OpenGL.GL.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+
+import moderngl
+import numpy as np
+
+if sys.platform.startswith("linux"):
+    # PyOpenGL finds no current context under EGL unless told so. A window sets its own
+    # platform before this module is imported.
+    os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+
+import OpenGL
+
+OpenGL.ERROR_CHECKING = False
+OpenGL.ERROR_LOGGING = False
+
+from OpenGL.raw.GL.VERSION import GL_1_0, GL_1_1, GL_1_3, GL_1_5, GL_2_0, GL_3_0, GL_3_1, GL_4_3  # noqa: E402
+from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
+
+RGB32F = 0x8815
+R32F = 0x822E
+RGBA8 = 0x8058
+R32UI = 0x8236
+_RED_INTEGER = 0x8D94
+_RED = 0x1903
+_UNSIGNED_INT = 0x1405
+_FLOAT = 0x1406
+_COPY_WRITE_BUFFER = 0x8F37
+_PIXEL_PACK_BUFFER = 0x88EB
+_TEXTURE_BUFFER = 0x8C2A
+_FRAMEBUFFER = 0x8D40
+_RENDERBUFFER = 0x8D41
+_COLOR_ATTACHMENT0 = 0x8CE0
+_DEPTH_ATTACHMENT = 0x8D00
+_DEPTH_COMPONENT32F = 0x8CAC
+_MAX_TEXTURE_BUFFER_SIZE = 0x8C2B
+_READ_FRAMEBUFFER = 0x8CA8
+_SCRATCH_UNIT = 15
+
+
+def integer(name: int) -> int:
+    """An integer limit or state of the current context."""
+    value = ctypes.c_int64(0)  # some drivers write 64 bits for large limits
+    GL_1_0.glGetIntegerv(name, ctypes.cast(ctypes.byref(value), ctypes.POINTER(ctypes.c_int)))
+    return int(ctypes.c_int32(value.value & 0xFFFFFFFF).value)
+
+
+def max_texture_buffer_texels() -> int:
+    """How many texels a buffer texture may have."""
+    return integer(_MAX_TEXTURE_BUFFER_SIZE)
+
+
+def reverse_depth() -> None:
+    """Clip space as the project uses it: depth 0..1, row 0 of a picture at its top."""
+    _clip.glClipControl(_clip.GL_UPPER_LEFT, _clip.GL_ZERO_TO_ONE)
+
+
+def default_clip_space() -> None:
+    """OpenGL's own clip space, which other libraries expect."""
+    _clip.glClipControl(_clip.GL_LOWER_LEFT, _clip.GL_NEGATIVE_ONE_TO_ONE)
+
+
+def clear_words(buffer: moderngl.Buffer, word: int) -> None:
+    """Fill a buffer with one 32-bit word."""
+    value = np.array([word], np.uint32)
+    GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, buffer.glo)
+    GL_4_3.glClearBufferData(
+        _COPY_WRITE_BUFFER, R32UI, _RED_INTEGER, _UNSIGNED_INT, ctypes.c_void_p(value.ctypes.data)
+    )
+
+
+class BufferTexture:
+    """A buffer seen as texels, for `texelFetch`: on software drivers twice as fast as an SSBO."""
+
+    def __init__(self, buffer: moderngl.Buffer, texel_format: int) -> None:
+        name = ctypes.c_uint(0)
+        GL_1_1.glGenTextures(1, ctypes.byref(name))
+        self.glo = name.value
+        self.buffer = buffer
+        self.bind(_SCRATCH_UNIT)  # not over what a shader is about to read
+        GL_3_1.glTexBuffer(_TEXTURE_BUFFER, texel_format, buffer.glo)
+
+    def bind(self, unit: int) -> None:
+        """Bind to a texture unit."""
+        GL_1_3.glActiveTexture(GL_1_3.GL_TEXTURE0 + unit)
+        GL_1_1.glBindTexture(_TEXTURE_BUFFER, self.glo)
+
+    def release(self) -> None:
+        """Delete the texture and its buffer."""
+        GL_1_1.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.glo)))
+        self.buffer.release()
+
+
+class Raster:
+    """A framebuffer with a 32-bit float depth buffer and two 32-bit images: row and depth.
+
+    moderngl's own depth textures are 24-bit integers.
+    """
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+        self.size = size
+        self.rows = ctx.texture(size, 1, dtype="u4")
+        self.depth = ctx.texture(size, 1, dtype="f4")
+        renderbuffer, framebuffer = ctypes.c_uint(0), ctypes.c_uint(0)
+        GL_3_0.glGenRenderbuffers(1, ctypes.byref(renderbuffer))
+        GL_3_0.glBindRenderbuffer(_RENDERBUFFER, renderbuffer.value)
+        GL_3_0.glRenderbufferStorage(_RENDERBUFFER, _DEPTH_COMPONENT32F, *size)
+        GL_3_0.glGenFramebuffers(1, ctypes.byref(framebuffer))
+        GL_3_0.glBindFramebuffer(_FRAMEBUFFER, framebuffer.value)
+        for index, texture in enumerate((self.rows, self.depth)):
+            GL_3_0.glFramebufferTexture2D(
+                _FRAMEBUFFER, _COLOR_ATTACHMENT0 + index, GL_1_1.GL_TEXTURE_2D, texture.glo, 0
+            )
+        GL_3_0.glFramebufferRenderbuffer(_FRAMEBUFFER, _DEPTH_ATTACHMENT, _RENDERBUFFER, renderbuffer.value)
+        buffers = (ctypes.c_uint * 2)(_COLOR_ATTACHMENT0, _COLOR_ATTACHMENT0 + 1)
+        GL_2_0.glDrawBuffers(2, buffers)
+        self._renderbuffer, self._framebuffer = renderbuffer, framebuffer
+        self.target = ctx.detect_framebuffer(framebuffer.value)
+
+    def clear(self) -> None:
+        """Bind it and clear: no row anywhere, depth +inf, the depth buffer at its far end."""
+        self.target.use()
+        none = (ctypes.c_uint * 4)(*[0xFFFFFFFF] * 4)
+        infinite = (ctypes.c_float * 4)(*[float("inf")] * 4)
+        far = (ctypes.c_float * 1)(0.0)
+        GL_3_0.glClearBufferuiv(GL_1_1.GL_COLOR, 0, none)
+        GL_3_0.glClearBufferfv(GL_1_1.GL_COLOR, 1, infinite)
+        GL_1_0.glDepthMask(True)
+        GL_3_0.glClearBufferfv(GL_1_1.GL_DEPTH, 0, far)
+
+    def copy_to(self, rows: moderngl.Buffer, depth: moderngl.Buffer) -> None:
+        """Copy both images to buffers, without leaving the GPU."""
+        GL_3_0.glBindFramebuffer(_READ_FRAMEBUFFER, self._framebuffer.value)
+        for index, (buffer, form, kind) in enumerate(
+            ((rows, _RED_INTEGER, _UNSIGNED_INT), (depth, _RED, _FLOAT))
+        ):
+            GL_1_0.glReadBuffer(_COLOR_ATTACHMENT0 + index)
+            GL_1_5.glBindBuffer(_PIXEL_PACK_BUFFER, buffer.glo)
+            GL_1_0.glReadPixels(0, 0, *self.size, form, kind, ctypes.c_void_p(0))
+        GL_1_5.glBindBuffer(_PIXEL_PACK_BUFFER, 0)
+
+    def depth_is_float32(self) -> bool:
+        """Whether the driver really stores 32-bit float depth."""
+        GL_3_0.glBindRenderbuffer(_RENDERBUFFER, self._renderbuffer.value)
+        value = ctypes.c_int(0)
+        GL_3_0.glGetRenderbufferParameteriv(
+            _RENDERBUFFER, GL_3_0.GL_RENDERBUFFER_INTERNAL_FORMAT, ctypes.byref(value)
+        )
+        return value.value == _DEPTH_COMPONENT32F
+
+    def release(self) -> None:
+        """Delete everything."""
+        GL_3_0.glDeleteFramebuffers(1, ctypes.byref(self._framebuffer))
+        GL_3_0.glDeleteRenderbuffers(1, ctypes.byref(self._renderbuffer))
+        self.rows.release()
+        self.depth.release()

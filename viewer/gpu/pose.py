@@ -1,0 +1,104 @@
+"""A pose on the GPU: a structure of arrays, each uploaded once and only when asked for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, unknown_name
+from ..scan.points import Bounds, PointCloud
+from . import gl
+from .context import Gpu
+
+T = TypeVar("T")
+_FORMATS = {"positions": gl.RGB32F, "normals": gl.RGB32F, "colors": gl.RGBA8, "radii": gl.R32F}
+
+
+class GpuPose:
+    """The arrays of one point cloud as buffer textures, indexed by row.
+
+    A row is a point's place in the cloud's arrays; `cloud.ids` gives its index in the file.
+    """
+
+    def __init__(self, gpu: Gpu, cloud: PointCloud) -> None:
+        if len(cloud) > gpu.max_points:
+            raise InputError(
+                f"{len(cloud):,} points in one pose; this driver takes {gpu.max_points:,}",
+                hint="Split the scan or thin it out",
+            )
+        self.gpu = gpu
+        self.cloud = cloud
+        self.uploaded_bytes = 0
+        self._upload_ms = 0.0
+        self._arrays: dict[str, gl.BufferTexture] = {}
+        self._facts: dict[str, Any] = {}
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """The robust bounds of the cloud; a box of two units where there is no point."""
+        cloud = self.cloud
+        return cloud.bounds() if len(cloud) else Bounds(cloud.origin - 1, cloud.origin + 1)
+
+    def array(self, name: str) -> gl.BufferTexture:
+        """positions, normals, colors, radii, or 'scalar:NAME'; uploaded at the first call."""
+        if name not in self._arrays:
+            values = self._values(name)
+            texels = _FORMATS.get(name, gl.R32F)
+            # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
+            data = values if values.size else np.zeros(4, np.float32)
+            start = time.perf_counter()
+            self._arrays[name] = gl.BufferTexture(self.gpu.ctx.buffer(data), texels)
+            self._upload_ms += (time.perf_counter() - start) * 1e3
+            self.uploaded_bytes += data.nbytes
+        return self._arrays[name]
+
+    def _values(self, name: str) -> NDArray:
+        if name.startswith("scalar:"):
+            values: NDArray | None = self.scalar(name.removeprefix("scalar:"))
+        else:
+            values = getattr(self.cloud, name)
+        if values is None:
+            raise InputError(f"the scan has no {name}")
+        dtype = np.uint8 if name == "colors" else np.float32
+        return np.ascontiguousarray(values, dtype)
+
+    def scalar(self, name: str) -> NDArray:
+        """The named scalar, (N,); raises InputError that lists the known ones."""
+        if name not in self.cloud.scalars:
+            raise unknown_name("scalar", name, list(self.cloud.scalars))
+        return self.cloud.scalars[name]
+
+    def remember(self, key: str, make: Callable[[], T]) -> T:
+        """What `make` returned the first time for this key: small facts about the pose."""
+        if key not in self._facts:
+            self._facts[key] = make()
+        return self._facts[key]
+
+    def scalar_range(self, name: str) -> tuple[float, float]:
+        """The 2 % and 98 % quantiles of a scalar's finite values."""
+        return self.remember(f"range of {name}", lambda: _robust_range(self.scalar(name)))
+
+    def take_upload_ms(self) -> float:
+        """How long uploads took since the last call."""
+        taken, self._upload_ms = self._upload_ms, 0.0
+        return taken
+
+    def release(self) -> None:
+        """Delete all buffers."""
+        for array in self._arrays.values():
+            array.release()
+        self._arrays.clear()
+
+
+def _robust_range(values: NDArray) -> tuple[float, float]:
+    sample = values[:: max(1, len(values) // 65536)].astype(np.float64)
+    sample = sample[np.isfinite(sample)]
+    if not len(sample):
+        return 0.0, 1.0
+    low, high = (float(v) for v in np.quantile(sample, [0.02, 0.98]))
+    return (low, high) if high > low else (float(sample.min()), float(sample.max()))

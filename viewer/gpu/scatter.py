@@ -1,0 +1,48 @@
+"""Scatter: a compute shader sends items to cells and keeps the best per cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import moderngl
+
+from . import gl
+from .compact import IndexList
+from .context import Gpu
+
+_NO_KEY = 0x7F800000  # +inf as float bits: a key buffer of depths reads as floats
+_NO_ITEM = 0xFFFFFFFF
+
+
+def scatter(
+    gpu: Gpu,
+    cells: str,
+    count: int,
+    keys: gl.BufferTexture,
+    best: gl.BufferTexture,
+    bind: Callable[[moderngl.ComputeShader], None],
+    defines: Mapping[str, object] | None = None,
+    listed: IndexList | None = None,
+) -> None:
+    """Send `count` items to cells: the least key per cell, then the lowest item that has it.
+
+    cells: the shader file that names an item's cells and key (it calls `visit`). keys,
+    best: one R32UI texel a cell; cells that nothing hit hold +inf bits and 0xFFFFFFFF.
+    bind: sets what `cells` reads. listed: filled with the cells that were hit.
+    """
+    gl.clear_words(keys.buffer, _NO_KEY)
+    gl.clear_words(best.buffer, _NO_ITEM)
+    if listed is not None:
+        listed.clear()
+    for number, name in enumerate(("depth", "id", "list") if listed is not None else ("depth", "id")):
+        program = gpu.compute("scatter/scatter.comp", {"PASS": number, **(defines or {})}, {"cells": cells})
+        with gpu.timers.measure(name):
+            keys.buffer.bind_to_storage_buffer(0)
+            keys.bind(0)
+            best.buffer.bind_to_storage_buffer(1)
+            best.bind(1)
+            if listed is not None:
+                listed.bind()
+            gpu.set(program, item_count=count)
+            bind(program)
+            gpu.dispatch(program, count)

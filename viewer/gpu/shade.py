@@ -1,0 +1,93 @@
+"""Shading: one look for the surfaces of all backends."""
+
+from __future__ import annotations
+
+import math
+
+from ..look import Look, color_table, rgba, value_source
+from . import gl
+from .context import Gpu
+from .surface import Surface
+
+# How shade.comp names where a colour, a number and the light come from.
+_COLOR_CODES = {"plain": 0, "own": 1, "normal": 2, "value": 3, "id": 4}
+_VALUE_CODES = {"depth": 0, "height": 1, "scalar": 2}
+_LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
+
+
+def shade(surface: Surface, look: Look) -> None:
+    """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
+    pose, view, gpu = surface.pose, surface.view, surface.gpu
+    cloud = pose.cloud
+    source = value_source(look, cloud)
+    value = source if source in (None, "depth", "height") else "scalar"
+    color = "value" if source else "own" if look.color_by == "auto" else look.color_by
+    if color == "own" and cloud.colors is None:
+        color = "plain"
+    light = look.light if look.light != "auto" else "flat" if cloud.normals is None else "head"
+    eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
+    program = gpu.compute(
+        "shade/shade.comp",
+        {
+            "COLOR_BY": _COLOR_CODES[color],
+            "VALUE": _VALUE_CODES[value or "scalar"],
+            "LIGHT": _LIGHT_CODES[light],
+            "EYE_DOME": int(eye_dome),
+        },
+    )
+    surface.bind_view()
+    covered = surface.list_covered()
+    with gpu.timers.measure("shade"):
+        surface.depths.bind(0)
+        surface.rows.bind(1)
+        if color == "own":
+            pose.array("colors").bind(2)
+        if light != "flat" or color == "normal":
+            pose.array("normals").bind(3)
+        if value == "scalar":
+            pose.array(f"scalar:{source}").bind(4)
+        if value == "height":
+            pose.array("positions").bind(6)
+        if value is not None:
+            _color_map(gpu, look.color_map).bind(5)
+        gpu.set(
+            program,
+            plain=tuple(c / 255 for c in rgba(look.plain)[:3]),
+            value_range=value_range(surface, look) if source else (0, 1),
+            height_axis=(*view.up, float(view.up @ cloud.origin)),
+            light=_direction(look.azimuth, look.elevation),
+            phong=(look.ambient, look.diffuse, look.specular, look.shininess),
+            eye_dome_strength=look.eye_dome_strength,
+            eye_dome_radius=look.eye_dome_radius,
+        )
+        gl.clear_words(surface.picture, int.from_bytes(bytes(rgba(look.background)), "little"))
+        surface.picture.bind_to_storage_buffer(0)
+        covered.run(program)
+        gpu.ctx.memory_barrier()
+    surface.look = look
+
+
+def value_range(surface: Surface, look: Look) -> tuple[float, float]:
+    """(low, high) of the colour map: the look's own, else of what the scan holds."""
+    pose, view = surface.pose, surface.view
+    source, bounds = value_source(look, pose.cloud), pose.bounds
+    if source == "depth":
+        middle = -float((view.rotation @ (bounds.center - pose.cloud.origin) + view.translation)[2])
+        low, high = middle - bounds.radius, middle + bounds.radius
+    elif source == "height":
+        low, high = sorted((float(bounds.low @ view.up), float(bounds.high @ view.up)))
+    else:
+        low, high = pose.scalar_range(source or "")
+    return (low if look.low is None else look.low, high if look.high is None else look.high)
+
+
+def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:
+    return gpu.keep(
+        ("color_map", name), lambda: gl.BufferTexture(gpu.ctx.buffer(color_table(name)), gl.RGBA8)
+    )
+
+
+def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
+    """To the fixed light, view space: azimuth 0 and elevation 0 is where the eye is."""
+    a, e = math.radians(azimuth), math.radians(elevation)
+    return math.cos(e) * math.sin(a), math.sin(e), math.cos(e) * math.cos(a)

@@ -1,0 +1,235 @@
+"""The Surface: what each pixel sees. Every backend writes one; everything else reads it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..look import Look, rgba, value_source
+from ..scan.points import PointCloud
+from . import gl
+from .compact import IndexList, list_covered
+from .context import Gpu
+from .pose import GpuPose
+from .view import View
+
+NOTHING = 0xFFFFFFFF
+
+
+@dataclass
+class Stats:
+    """What a frame took. Times in milliseconds.
+
+    backend: the one that drew. passes: (name, gpu_ms), empty while timers are off.
+    skipped: what was not computed -> why.
+    """
+
+    backend: str = ""
+    gpu_ms: float = 0.0
+    cpu_ms: float = 0.0
+    upload_ms: float = 0.0
+    derive_ms: float = 0.0
+    passes: list[tuple[str, float]] = field(default_factory=list)
+    skipped: dict[str, str] = field(default_factory=dict)
+
+
+class Surface:
+    """A picture's pixels before shading. Row 0 is the top.
+
+    On the GPU: `depths` (float bits, +inf: nothing) and `rows` (the point that a pixel
+    shows, 0xFFFFFFFF: none), one word a pixel; colour, normal and value are fetched by row.
+    Reading a property copies it to the CPU.
+    """
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        width, height = size
+        if width < 1 or height < 1:
+            raise InputError(f"a picture of {width}x{height} pixels cannot be drawn")
+        if width * height > gpu.max_pixels:
+            raise InputError(
+                f"a picture of {width}x{height} pixels is too large; this driver takes "
+                f"{gpu.max_pixels:,} pixels",
+                hint="Use a smaller --size",
+            )
+        self.gpu = gpu
+        self.size = (width, height)
+        self.depths = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
+        self.rows = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
+        self.picture = gpu.ctx.buffer(reserve=4 * width * height)
+        self._block = gpu.ctx.buffer(reserve=View.BLOCK_BYTES)
+        self._shown: tuple[GpuPose, View] | None = None
+        self.look = Look()
+        self.stats = Stats()
+        self.covered = IndexList(gpu, width * height)
+        self._covered_known = False
+        self._raster: gl.Raster | None = None
+
+    # --- for backends -----------------------------------------------------------------
+
+    def start(self, pose: GpuPose, view: View) -> None:
+        """Begin a frame: what backends and shading read from now on."""
+        self._shown = pose, view
+        self._block.write(view.block())
+        self.bind_view()
+        self._covered_known = False
+        self.stats = Stats()
+
+    def bind_view(self) -> None:
+        """Make this surface's view the one that shaders read."""
+        self._block.bind_to_uniform_block(0)
+
+    def take_covered(self) -> IndexList:
+        """The list of covered pixels, for a backend that can fill it at less than the cost of
+        looking at every pixel."""
+        self._covered_known = True
+        return self.covered
+
+    def list_covered(self) -> IndexList:
+        """The list of the pixels that show something, in no order: what shading works on."""
+        if not self._covered_known:
+            self.rows.bind(1)
+            list_covered(self.gpu, self.size[0] * self.size[1], self.covered)
+            self._covered_known = True
+        return self.covered
+
+    def raster(self) -> gl.Raster:
+        """The framebuffer of backends that rasterise; `take_raster` makes it the Surface."""
+        if self._raster is None:
+            self._raster = gl.Raster(self.gpu.ctx, self.size)
+        return self._raster
+
+    def take_raster(self) -> None:
+        """Copy what was rasterised into the Surface."""
+        self.raster().copy_to(self.rows.buffer, self.depths.buffer)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        words = 3 + (3 if self._raster else 0)
+        return 4 * self.size[0] * self.size[1] * words + self.covered.nbytes
+
+    @property
+    def pose(self) -> GpuPose:
+        """The pose that it shows."""
+        return self._drawn()[0]
+
+    @property
+    def view(self) -> View:
+        """The view that it shows it from."""
+        return self._drawn()[1]
+
+    # --- for readers ------------------------------------------------------------------
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """(H, W) float32, scan units along the view axis; +inf where nothing is."""
+        return self._read(self.depths.buffer, np.float32)
+
+    @property
+    def row(self) -> NDArray[np.uint32]:
+        """(H, W) uint32, the point's row in the cloud's arrays; 0xFFFFFFFF where none."""
+        return self._read(self.rows.buffer, np.uint32)
+
+    @property
+    def id(self) -> NDArray[np.uint32]:
+        """(H, W) uint32, the point's index in the file; 0xFFFFFFFF where none."""
+        ids = self._cloud.ids
+        return self.row if ids is None else self._fetch(ids, NOTHING)
+
+    @property
+    def color(self) -> NDArray[np.float32]:
+        """(H, W, 3) float32, linear; the look's plain colour where the scan has none; 0 where nothing is."""
+        colors = self._cloud.colors
+        if colors is None:
+            plain = np.array(rgba(self.look.plain)[:3], np.uint8)
+            rgb = np.where((self.row != NOTHING)[..., None], plain, np.uint8(0))
+        else:
+            rgb = self._fetch(colors[:, :3], 0)
+        return _LINEAR[rgb]
+
+    @property
+    def normal(self) -> NDArray[np.float32]:
+        """(H, W, 3) float32, world space, unit length; 0 where unknown."""
+        normals = self._cloud.normals
+        if normals is None:
+            return np.zeros((*self.size[::-1], 3), np.float32)
+        fetched = self._fetch(normals, 0)
+        length = np.linalg.norm(fetched, axis=2, keepdims=True)
+        usable = np.isfinite(length) & (length > 0)
+        return np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
+
+    @property
+    def coverage(self) -> NDArray[np.float32]:
+        """(H, W) float32, 0..1 of the pixel."""
+        return (self.row != NOTHING).astype(np.float32)
+
+    @property
+    def level(self) -> NDArray[np.uint8]:
+        """(H, W) uint8: 0 measured, 255 nothing."""
+        return np.where(self.row != NOTHING, 0, 255).astype(np.uint8)
+
+    @property
+    def value(self) -> NDArray[np.float32]:
+        """(H, W) float32, the number that the look colours by; NaN where there is none."""
+        source, cloud = value_source(self.look, self._cloud), self._cloud
+        if source is None:
+            return np.full(self.size[::-1], np.nan, np.float32)
+        if source == "depth":
+            return np.where(self.row == NOTHING, np.float32(np.nan), self.depth)
+        values = cloud.world() @ self.view.up if source == "height" else cloud.scalars[source]
+        return self._fetch(values.astype(np.float32), np.nan)
+
+    def image(self, look: Look | None = None) -> NDArray[np.uint8]:
+        """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
+        if look is not None and look != self.look:
+            from .shade import shade  # shading reads surfaces; this is its one way back
+
+            shade(self, look)
+        return self._read(self.picture, np.uint8).reshape(*self.size[::-1], 4)
+
+    def arrays(self) -> dict[str, NDArray]:
+        """All channels by name, as `.npz` files hold them."""
+        names = ("color", "normal", "depth", "coverage", "value", "id", "level")
+        return {name: getattr(self, name) for name in names}
+
+    def release(self) -> None:
+        """Delete everything it holds on the GPU."""
+        for resource in (self.depths, self.rows, self.picture, self._block, self.covered, self._raster):
+            if resource is not None:
+                resource.release()
+
+    # --- inside -----------------------------------------------------------------------
+
+    def _drawn(self) -> tuple[GpuPose, View]:
+        if self._shown is None:
+            raise RuntimeError("nothing was drawn to this surface")
+        return self._shown
+
+    @property
+    def _cloud(self) -> PointCloud:
+        return self.pose.cloud
+
+    def _read(self, buffer: moderngl.Buffer, dtype: type) -> NDArray:
+        width, height = self.size
+        out = np.empty(4 * width * height, np.uint8)
+        buffer.read_into(out)
+        return out.view(dtype).reshape(height, -1)
+
+    def _fetch(self, values: NDArray, nothing: float) -> NDArray:
+        rows = self.row
+        found = rows != NOTHING
+        out = np.full((*rows.shape, *values.shape[1:]), nothing, values.dtype)
+        out[found] = values[rows[found]]
+        return out
+
+
+def _linear_table() -> NDArray[np.float32]:
+    c = np.arange(256) / 255
+    return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92).astype(np.float32)
+
+
+_LINEAR = _linear_table()

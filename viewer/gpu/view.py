@@ -1,0 +1,79 @@
+"""What shaders know of the camera: float32, relative to the pose's origin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..scan.points import Bounds
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera at a picture size, seen from a pose's origin (the block of common/view.glsl).
+
+    rotation: (3, 3) float64, world to view. translation: (3,) float64, from the origin to
+    view space. scale: pixels per unit of x/-z (perspective) or of x (orthographic).
+    near, far: what is outside is not drawn. reach: the depth that an orthographic depth
+    buffer ends at. up: (3,) float64, the world's unit up.
+    """
+
+    BLOCK_BYTES: ClassVar[int] = 96
+
+    size: tuple[int, int]
+    rotation: NDArray[np.float64]
+    translation: NDArray[np.float64]
+    scale: float
+    near: float
+    far: float
+    reach: float
+    perspective: bool
+    up: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], bounds: Bounds) -> View:
+        """Combine camera and origin in float64, so that the GPU sees only small numbers."""
+        rotation = camera.rotation()
+        perspective = camera.projection == "perspective"
+        extent = 2 * math.tan(math.radians(camera.fov_y) / 2) if perspective else camera.view_height
+        near, far = camera.clip_range()
+        return cls(
+            size=size,
+            rotation=rotation,
+            translation=rotation @ (origin - np.array(camera.eye)),
+            scale=size[1] / extent,
+            near=near,
+            far=far,
+            reach=min(far, camera.reach(bounds)),
+            perspective=perspective,
+            up=np.array(camera.up) / np.linalg.norm(camera.up),
+        )
+
+    def block(self) -> bytes:
+        """The std140 block `View` of common/view.glsl."""
+        matrix = np.zeros((4, 4), np.float32)  # columns, as GLSL stores them
+        matrix[:3, :3] = self.rotation.T
+        matrix[3, :3] = self.translation
+        matrix[3, 3] = 1
+        limits = np.array([self.scale, self.near, self.far, self.reach], np.float32)
+        return (
+            matrix.tobytes()
+            + limits.tobytes()
+            + np.array([*self.size, self.perspective, 0], np.int32).tobytes()
+        )
+
+    def project(self, positions: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Pixel coordinates (N, 2), row 0 at the top, and depths (N,), in float64.
+
+        The plain twin of `project` in common/view.glsl. positions: (N, 3) relative to the origin.
+        """
+        view = positions @ self.rotation.T + self.translation
+        depth = -view[:, 2]
+        scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
+        center = np.array(self.size) / 2
+        return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth

@@ -1,0 +1,87 @@
+"""How a surface is shown: one look for all backends. Plain values, no GL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError, unknown_name
+from .params import param
+from .scan.points import PointCloud
+
+# Perceptually uniform and readable with colour-blindness; the tables are the library cmap's.
+COLOR_MAPS = ("batlow", "cividis", "viridis", "lapaz", "oslo", "vik")
+COLOR_BY = ("auto", "own", "plain", "normal", "depth", "height", "id")
+
+
+@dataclass(frozen=True)
+class Look:
+    """Lighting, colouring and background.
+
+    `color_by` and `light` are "auto" by default: own colours where the scan has them, a
+    head light where it has normals, else eye-dome lighting, which needs depth alone.
+    """
+
+    color_by: str = param("auto", f"What gives the colour: {', '.join(COLOR_BY)}, or a scalar's name")
+    light: str = param(
+        "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
+        choices=("auto", "flat", "head", "fixed"),
+    )  # fmt: skip
+    eye_dome: bool | None = param(None, "Darken where the depth steps back; auto: if unlit", type=bool)
+    eye_dome_strength: float = param(1.0, "Strength of eye-dome lighting", low=0, high=20)
+    eye_dome_radius: int = param(1, "Reach of eye-dome lighting, pixels", low=1, high=16)
+    azimuth: float = param(-35.0, "Where the fixed light stands, degrees", low=-180, high=180)
+    elevation: float = param(40.0, "How high the fixed light stands, degrees", low=-90, high=90)
+    ambient: float = param(0.25, "Light from everywhere", low=0, high=1)
+    diffuse: float = param(0.75, "Phong's diffuse share", low=0, high=1)
+    specular: float = param(0.12, "Phong's specular share", low=0, high=1)
+    shininess: float = param(24.0, "Phong's exponent", low=1, high=200)
+    color_map: str = param("batlow", "Colour map of depth, height and scalars", choices=COLOR_MAPS)
+    low: float | None = param(None, "Value at the map's start; auto: from the data", type=float)
+    high: float | None = param(None, "Value at the map's end; auto: from the data", type=float)
+    plain: str = param("#c8c2b8", "Colour of points that have none, #rrggbb")
+    background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa")
+
+    def __post_init__(self) -> None:
+        rgba(self.plain, "plain")
+        rgba(self.background, "background")
+
+
+def value_source(look: Look, cloud: PointCloud) -> str | None:
+    """What the look colours by where that is a number: "depth", "height" or a scalar's name.
+
+    None where colours do not come from a number. Raises InputError for an unknown name.
+    """
+    if look.color_by in ("depth", "height"):
+        return look.color_by
+    if look.color_by in COLOR_BY:
+        return None
+    if look.color_by not in cloud.scalars:
+        raise unknown_name("colour source", look.color_by, [*COLOR_BY, *cloud.scalars])
+    return look.color_by
+
+
+def wants_normals(look: Look) -> bool:
+    """Whether the look cannot be drawn without normals."""
+    return look.light in ("head", "fixed") or look.color_by == "normal"
+
+
+def rgba(text: str, name: str = "colour") -> tuple[int, int, int, int]:
+    """The bytes of '#rrggbb' or '#rrggbbaa'; raises InputError."""
+    digits = text.removeprefix("#")
+    if len(digits) not in (6, 8) or not text.startswith("#"):
+        raise InputError(f"'{text}' is no colour", name, "Use #rrggbb or #rrggbbaa")
+    try:
+        values = bytes.fromhex(digits)
+    except ValueError:
+        raise InputError(f"'{text}' is no colour", name, "Use #rrggbb or #rrggbbaa") from None
+    return values[0], values[1], values[2], values[3] if len(values) == 4 else 255
+
+
+def color_table(name: str) -> NDArray[np.uint8]:
+    """256 colours of a map, (256, 4) uint8 sRGB."""
+    import cmap
+
+    return (np.asarray(cmap.Colormap(name).lut(256)) * 255).round().astype(np.uint8)

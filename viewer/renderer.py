@@ -1,0 +1,138 @@
+"""What lives longer than a frame: the context, the poses on the GPU, and what was prepared for them."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from .backends import Backend, Derived
+from .gpu.context import Gpu, headless
+from .gpu.pose import GpuPose
+from .look import Look, wants_normals
+from .scan.points import PointCloud
+from .scan.pose import Pose
+
+_MEGABYTE = 1 << 20
+
+
+@dataclass
+class Prepared:
+    """What a backend derived for a pose (None where it derives nothing), and how long it took."""
+
+    derived: Derived | None
+    derive_ms: float
+
+
+@dataclass
+class _Resident:
+    pose: Pose  # held, so that its identity stays its own
+    gpu_pose: GpuPose
+    derived: dict[Any, Prepared] = field(default_factory=dict)
+    jobs: dict[Any, Future[Any]] = field(default_factory=dict)
+
+    @property
+    def nbytes(self) -> int:
+        return self.gpu_pose.uploaded_bytes + sum(
+            p.derived.nbytes for p in self.derived.values() if p.derived
+        )
+
+    def release(self) -> None:
+        for job in self.jobs.values():
+            job.cancel()
+        for prepared in self.derived.values():
+            if prepared.derived:
+                prepared.derived.release()
+        self.gpu_pose.release()
+
+
+class Renderer:
+    """Keeps poses on the GPU, least recently used out first, within `budget_bytes`.
+
+    The pose being drawn always stays. gpu: None opens a headless context (NoOpenGLError).
+    budget_bytes: None takes 1 GiB on hardware and 128 MiB on software drivers, where it is
+    the same memory that the timeline's cache lives in.
+    """
+
+    def __init__(self, gpu: Gpu | None = None, budget_bytes: int | None = None) -> None:
+        self.gpu = gpu or headless()
+        self.budget_bytes = budget_bytes or (128 if self.gpu.software else 1024) * _MEGABYTE
+        self._resident: OrderedDict[int, _Resident] = OrderedDict()
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="prepare")
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that poses hold on the GPU."""
+        return sum(r.nbytes for r in self._resident.values())
+
+    def resident(self, pose: Pose) -> GpuPose:
+        """The pose on the GPU; its arrays are uploaded when something first reads them."""
+        key = id(pose)
+        if key not in self._resident:
+            self._resident[key] = _Resident(pose, GpuPose(self.gpu, pose.cloud))
+        self._resident.move_to_end(key)
+        while len(self._resident) > 1 and self.nbytes > self.budget_bytes:
+            self._resident.popitem(last=False)[1].release()
+        return self._resident[key].gpu_pose
+
+    def prepare(
+        self, gpu_pose: GpuPose, backend: Backend, params: Any, look: Look, wait: bool
+    ) -> Prepared | None:
+        """Make what a backend and a look need of a pose; None while a worker is still at it.
+
+        First the attributes that the scan does not have are estimated, then the backend's
+        derive function runs; only uploads happen on this thread.
+        """
+        entry = next(r for r in self._resident.values() if r.gpu_pose is gpu_pose)
+        missing = _missing(gpu_pose.cloud, backend, params, look)
+        if missing:
+            result = self._run(entry, missing, lambda: _estimated(gpu_pose.cloud, missing), wait)
+            if result is None:
+                return None
+            gpu_pose.cloud = result[0]
+        key = (backend.name, *backend.derive_key(params))
+        if key not in entry.derived:
+            derive, cloud = backend.derive, gpu_pose.cloud
+            if derive is None:
+                return Prepared(None, 0.0)
+            result = self._run(entry, key, lambda: derive(cloud, params), wait)
+            if result is None:
+                return None
+            entry.derived[key] = Prepared(backend.upload(self.gpu, result[0]), result[1])
+        return entry.derived[key]
+
+    def _run(self, entry: _Resident, key: Any, work: Any, wait: bool) -> tuple[Any, float] | None:
+        def timed() -> tuple[Any, float]:
+            start = time.perf_counter()
+            return work(), (time.perf_counter() - start) * 1e3
+
+        if key not in entry.jobs:
+            if wait:
+                return timed()
+            entry.jobs[key] = self._worker.submit(timed)
+        if not (wait or entry.jobs[key].done()):
+            return None
+        return entry.jobs.pop(key).result()
+
+    def release(self) -> None:
+        """Delete every pose and stop the worker. The context stays open."""
+        self._worker.shutdown(wait=True, cancel_futures=True)
+        while self._resident:
+            self._resident.popitem()[1].release()
+
+
+def _missing(cloud: PointCloud, backend: Backend, params: Any, look: Look) -> tuple[str, ...]:
+    wanted = {*backend.needs(cloud, params), *(("normals",) if wants_normals(look) else ())}
+    return tuple(sorted(name for name in wanted if getattr(cloud, name) is None)) if len(cloud) else ()
+
+
+def _estimated(cloud: PointCloud, missing: tuple[str, ...]) -> PointCloud:
+    from .scan.estimate import estimate_normals, estimate_radii
+
+    if "normals" in missing:
+        cloud = replace(cloud, normals=estimate_normals(cloud))
+    if "radii" in missing:
+        cloud = replace(cloud, radii=estimate_radii(cloud))
+    return cloud

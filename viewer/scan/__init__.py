@@ -1,0 +1,1 @@
+"""What a scan is: points, poses, timelines and the files they come from. Knows no GL."""

@@ -1,0 +1,231 @@
+"""Point clouds: float32 offsets from a float64 origin, with whatever attributes a scan has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+
+_CHUNK = 1 << 20  # points converted at a time, so that float64 copies stay small
+_LARGEST = float(np.finfo(np.float32).max)
+_SAMPLE = 1 << 13  # points that robust statistics look at
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """An axis-aligned box in scan units. low, high: (3,) float64."""
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """(3,) float64."""
+        return (self.low + self.high) / 2
+
+    @property
+    def radius(self) -> float:
+        """Half of the diagonal."""
+        return float(np.linalg.norm(self.high - self.low) / 2)
+
+    def corners(self) -> NDArray[np.float64]:
+        """(8, 3) float64."""
+        pick = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)
+        return np.where(pick, self.high, self.low)
+
+    def grown(self, margin: float) -> Bounds:
+        """Larger by a margin on every side."""
+        return Bounds(self.low - margin, self.high + margin)
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """N points of one moment. Make one with `from_arrays`, which guards the door.
+
+    positions: (N, 3) float32, scan units, relative to origin
+    origin:    (3,) float64, scan units
+    normals:   (N, 3) float32 as stored in the file (unit length expected), or None
+    colors:    (N, 4) uint8, sRGB and alpha, or None
+    radii:     (N,) float32, scan units, or None
+    scalars:   name -> (N,) array of any real type
+    ids:       (N,) uint32, the index in the file before anything was dropped; None: 0..N-1
+    dropped:   how many points were dropped because a coordinate was NaN or infinite
+    """
+
+    positions: NDArray[np.float32]
+    origin: NDArray[np.float64]
+    normals: NDArray[np.float32] | None = None
+    colors: NDArray[np.uint8] | None = None
+    radii: NDArray[np.float32] | None = None
+    scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
+    ids: NDArray[np.uint32] | None = None
+    dropped: int = 0
+
+    @classmethod
+    def from_arrays(
+        cls,
+        positions: ArrayLike,
+        *,
+        normals: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        radii: ArrayLike | None = None,
+        scalars: Mapping[str, ArrayLike] | None = None,
+        origin: ArrayLike | None = None,
+    ) -> PointCloud:
+        """Points with a NaN or infinite coordinate are dropped and counted.
+
+        positions: (N, 3) absolute, any real type. colors: (N, 3) or (N, 4), uint8 or
+        float in 0..1. origin: (3,); chosen by `choose_origin` where None.
+        Raises InputError where shapes do not fit.
+        """
+        points = np.asarray(positions)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"positions have shape {points.shape}, expected (N, 3)")
+        if points.dtype.kind not in "fiu":
+            raise InputError(f"positions are of type {points.dtype}, expected numbers")
+        count = len(points)
+        keep = finite_rows(points)
+        kept = count if keep is None else int(np.count_nonzero(keep))
+
+        def pick(values: ArrayLike | None, name: str, columns: tuple[int, ...]) -> NDArray | None:
+            if values is None:
+                return None
+            array = np.asarray(values)
+            width = array.shape[1] if array.ndim == 2 else 1 if array.ndim == 1 else -1
+            if len(array) != count or width not in columns or array.dtype.kind not in "fiub":
+                raise InputError(f"{name} have shape {array.shape} ({array.dtype}) for {count} points")
+            return array if keep is None else array[keep]
+
+        normals_ = pick(normals, "normals", (3,))
+        colors_ = pick(colors, "colors", (3, 4))
+        radii_ = pick(radii, "radii", (1,))
+        if keep is not None:
+            points = points[keep]
+        base = choose_origin(points) if origin is None else np.array(origin, np.float64)
+        return cls(
+            positions=_relative(points, base),
+            origin=base,
+            normals=None if normals_ is None else np.ascontiguousarray(normals_, np.float32),
+            colors=None if colors_ is None else _rgba8(colors_),
+            radii=None if radii_ is None else np.ascontiguousarray(radii_, np.float32),
+            scalars={name: np.ascontiguousarray(pick(values, f"values of '{name}'", (1,)))
+                     for name, values in (scalars or {}).items()},
+            ids=None if keep is None else np.flatnonzero(keep).astype(np.uint32),
+            dropped=count - kept,
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held by all arrays."""
+        arrays = [self.positions, self.normals, self.colors, self.radii, self.ids]
+        return sum(a.nbytes for a in [*arrays, *self.scalars.values()] if a is not None)
+
+    def world(self) -> NDArray[np.float64]:
+        """Absolute positions, (N, 3) float64."""
+        return self.positions + self.origin
+
+    def bounds(self) -> Bounds:
+        """The box around the body of the points, which a few far outliers do not stretch.
+
+        The 2 % to 98 % quantile box, grown on every side by half of its longest edge, and
+        then shrunk to the points inside. Raises InputError where there is no point.
+        """
+        if not len(self):
+            raise InputError("no points to fit a view to")
+        low, high = _quantile_box(self.positions)
+        margin = 0.5 * float((high - low).max())
+        low, high = low - margin, high + margin
+        smallest, largest = np.full(3, np.inf), np.full(3, -np.inf)
+        for start in range(0, len(self), _CHUNK):
+            part = self.positions[start : start + _CHUNK]
+            part_low, part_high = _extremes(part)
+            if (part_low < low).any() or (part_high > high).any():
+                # Column by column: numpy is 20 times slower along the short axis.
+                inside = np.ones(len(part), bool)
+                for axis in range(3):
+                    inside &= (part[:, axis] >= low[axis]) & (part[:, axis] <= high[axis])
+                if not inside.any():
+                    continue
+                part_low, part_high = _extremes(part[inside])
+            smallest, largest = np.minimum(smallest, part_low), np.maximum(largest, part_high)
+        return Bounds(smallest + self.origin, largest + self.origin)
+
+
+def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:
+    """Which rows are finite in all columns, (N,) bool; None where all are.
+
+    A value that float32 cannot hold counts as infinite.
+    """
+    if points.dtype.kind != "f":
+        return None
+    keep = None
+    for start in range(0, len(points), _CHUNK):
+        part = points[start : start + _CHUNK]
+        low, high = _extremes(part)  # NaN where there is one, and then not within
+        if (low > -_LARGEST).all() and (high < _LARGEST).all():
+            continue
+        if keep is None:
+            keep = np.ones(len(points), bool)
+        keep[start : start + _CHUNK] = (np.abs(part) < _LARGEST).all(axis=1)
+    return keep
+
+
+def _extremes(points: NDArray) -> tuple[NDArray, NDArray]:
+    columns = points.T
+    return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
+
+
+def choose_origin(points: NDArray) -> NDArray[np.float64]:
+    """The median position on a power-of-two grid of the robust extent, (3,) float64.
+
+    The grid makes the poses of a sequence share one origin as a rule, and a body near
+    zero keep its coordinates; medians and quantiles make one far outlier harmless.
+    """
+    if not len(points):
+        return np.zeros(3)
+    low, high = _quantile_box(points)
+    extent = float((high - low).max())
+    median = np.median(_sample(points), axis=0)
+    if extent <= 0 or not np.isfinite(extent):
+        return median if np.abs(median).max() > 0 else np.zeros(3)
+    grid = 2.0 ** np.ceil(np.log2(extent))
+    return np.round(median / grid) * grid + 0.0  # + 0.0: no negative zero
+
+
+def _sample(points: NDArray) -> NDArray[np.float64]:
+    return np.asarray(points[:: max(1, len(points) // _SAMPLE)], np.float64)
+
+
+def _quantile_box(points: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    low, high = np.quantile(_sample(points), [0.02, 0.98], axis=0)
+    return low, high
+
+
+def _relative(points: NDArray, origin: NDArray[np.float64]) -> NDArray[np.float32]:
+    if points.dtype == np.float32 and not origin.any():
+        return np.ascontiguousarray(points)
+    offsets = np.empty(points.shape, np.float32)
+    for start in range(0, len(points), _CHUNK):
+        stop = start + _CHUNK
+        offsets[start:stop] = points[start:stop].astype(np.float64) - origin
+    return offsets
+
+
+def _rgba8(colors: NDArray) -> NDArray[np.uint8]:
+    rgba = np.full((len(colors), 4), 255, np.uint8)
+    if colors.dtype.kind == "f":
+        scaled = np.nan_to_num(colors.astype(np.float32)) * np.float32(255)
+        colors = np.clip(np.rint(scaled), 0, 255)
+    elif colors.dtype == np.uint16:
+        colors = colors >> 8
+    elif colors.dtype != np.uint8:
+        colors = np.clip(colors, 0, 255)
+    rgba[:, : colors.shape[1]] = colors
+    return rgba

@@ -1,0 +1,32 @@
+"""How far apart the points of a cloud are, in a few milliseconds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .points import PointCloud
+
+_DISTANCES = 4_000_000  # point-to-point distances looked at
+_NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
+
+
+def typical_spacing(cloud: PointCloud) -> float:
+    """The median distance between neighbours, scan units; 1.0 where all points coincide.
+
+    A few points are compared with all others. On a surface of one point per s^2 there are
+    k points within s sqrt(k / pi), so the distance to the sixth neighbour gives s; copies of
+    a point do not count.
+    """
+    points = cloud.positions
+    count = len(points)
+    if count < 2:
+        return 1.0
+    probes = points[np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int)]
+    spacings = []
+    for probe in probes:
+        squared = sum((points[:, axis] - probe[axis]) ** 2 for axis in range(3))
+        squared = squared[squared > 0]
+        k = min(_NEIGHBOR, len(squared))
+        if k:
+            spacings.append(float(np.sqrt(np.partition(squared, k - 1)[k - 1]) / np.sqrt(k / np.pi)))
+    return float(np.median(spacings)) if spacings else 1.0
