@@ -26,6 +26,17 @@ settings.register_profile(
 settings.load_profile("deterministic")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """--bless: write what is checked in anew instead of comparing with it."""
+    parser.addoption("--bless", action="store_true", help="rewrite checked-in references")
+
+
+@pytest.fixture
+def bless(request: pytest.FixtureRequest) -> bool:
+    """Whether references are to be rewritten."""
+    return bool(request.config.getoption("--bless"))
+
+
 @pytest.fixture(autouse=True)
 def numpy_errors_raise() -> Iterator[None]:
     """Overflow, invalid values and division by zero fail the test; underflow to zero is fine."""

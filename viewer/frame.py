@@ -55,7 +55,7 @@ def render_frame(
     timers.start_frame()
 
     pose = renderer.resident(request.pose)
-    name = request.backend or default_backend(pose.cloud)
+    name = request.backend or default_backend(pose.stored)
     params = request.params if request.params is not None else find_backend(name).params()
     prepared = renderer.prepare(pose, find_backend(name), params, request.look, wait)
     if prepared is None:

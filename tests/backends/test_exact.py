@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from scenes import NOTHING, looking_down_z, plane, sphere, sphere_hits, zbuffer
 
-from viewer.backends import backends
+from viewer.backends import backend, backends
 from viewer.camera import Camera
+from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 
 Draw = Callable[..., Surface]
 every_backend = pytest.mark.parametrize("name", list(backends()))
@@ -221,3 +224,22 @@ def test_ids_are_those_of_the_file(draw: Draw, name: str) -> None:
     assert cloud.dropped == 2
     surface = draw(cloud, looking_down_z(fov_y=60), (65, 65), name)
     assert set(np.unique(surface.id)) == {1, 3, NOTHING}
+
+
+def test_automatic_choices_do_not_depend_on_what_was_estimated_before(renderer: Renderer) -> None:
+    bare = sphere(3000)
+    pose = Pose(0, 0.0, "x", PointCloud.from_arrays(bare.positions))
+    camera = Camera.orbit(bare.bounds())
+    surface = Surface(renderer.gpu, (60, 60))
+
+    def picture(name: str | None, look: Look, **params: object) -> np.ndarray:
+        chosen = params and {"params": backend(name or "points").params(params)}
+        render_frame(renderer, Request(pose, camera, name, look=look, **chosen), surface)
+        return surface.image()
+
+    before = picture(None, Look())
+    uniform = picture("surfels", Look())
+    picture("surfels", Look(light="head"), radius="own")
+    assert pose.cloud.normals is None
+    np.testing.assert_array_equal(picture(None, Look()), before)
+    np.testing.assert_array_equal(picture("surfels", Look()), uniform)

@@ -31,9 +31,10 @@ class Params:
 
     instancing: str = param("gs", "How points become quads", choices=FEEDS, affects="shader")
     radius: str = param(
-        "auto", "auto: the scan's own, else uniform; local: estimated for each point",
-        choices=("auto", "uniform", "local"),
-    )  # fmt: skip
+        "auto",
+        "auto: the scan's own, else uniform; own: estimated where the scan has none; uniform: one for all",
+        choices=("auto", "own", "uniform"),
+    )
     radius_scale: float = param(1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0))
     mask_cutoff: float = param(
         0.0183, "Value of the Gaussian mask where the splat ends", low=0.0183, high=0.99
@@ -43,18 +44,20 @@ class Params:
 
 def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
     """Normals, and radii where they shall be the points' own."""
-    return ("normals", "radii") if params.radius == "local" else ("normals",)
+    return ("normals", "radii") if params.radius == "own" else ("normals",)
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Splat in one pass; always complete."""
     params: Params = frame.params
+    own = {"auto": pose.stored.radii is not None, "own": True, "uniform": False}[params.radius]
     amplify(
         pose,
         surface,
         params.instancing,
         "surfels/surfel.glsl",
         "surfels/splat.frag",
+        use_radii=own,
         radius_scale=params.radius_scale,
         uniform_radius=_uniform_radius(pose),
         cull_back=params.cull_back,

@@ -14,26 +14,33 @@ _STAGES = {"gs": ("amplify/gs.vert", "amplify/gs.geom")}
 FEEDS = tuple(_STAGES)
 
 
-def amplify(pose: GpuPose, surface: Surface, feed: str, shape: str, fragment: str, **uniforms: Any) -> None:
+def amplify(
+    pose: GpuPose,
+    surface: Surface,
+    feed: str,
+    shape: str,
+    fragment: str,
+    use_radii: bool,
+    **uniforms: Any,
+) -> None:
     """Draw every point of a pose as a shape, in id order with a strict depth test.
 
     feed: one of FEEDS. shape: the shader file with `begin_shape` and `corner`. fragment:
-    the shape's fragment shader, which writes a row and a depth. uniforms: of both.
+    the shape's fragment shader, which writes a row and a depth. use_radii: whether points
+    bring their own radius. uniforms: of both.
     """
     gpu, count = pose.gpu, len(pose.cloud)
     target = surface.raster()
-    has_radius = pose.cloud.radii is not None
-    program = gpu.program((*_STAGES[feed], fragment), {"HAS_RADIUS": int(has_radius)}, {"shape": shape})
+    program = gpu.program((*_STAGES[feed], fragment), {"HAS_RADIUS": int(use_radii)}, {"shape": shape})
     gpu.set(program, **uniforms)
     with gpu.timers.measure("splat"):
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        attributes = [("positions", "3f", "in_position"), ("normals", "3f", "in_normal")]
-        if has_radius:
-            attributes.append(("radii", "1f", "in_radius"))
-        content = [(pose.array(name).buffer, form, attribute) for name, form, attribute in attributes]
         if count:
+            attributes = [("positions", "3f", "in_position"), ("normals", "3f", "in_normal")]
+            attributes += [("radii", "1f", "in_radius")] if use_radii else []
+            content = [(pose.array(name).buffer, form, attribute) for name, form, attribute in attributes]
             vertices = gpu.ctx.vertex_array(program, content)
             vertices.render(moderngl.POINTS, vertices=count)
             vertices.release()

@@ -23,6 +23,8 @@ class GpuPose:
     """The arrays of one point cloud as buffer textures, indexed by row.
 
     A row is a point's place in the cloud's arrays; `cloud.ids` gives its index in the file.
+    `stored` is the cloud as the scan has it, `cloud` the same with what was estimated since;
+    whatever is chosen automatically looks at `stored`, so that it does not change by history.
     """
 
     def __init__(self, gpu: Gpu, cloud: PointCloud) -> None:
@@ -32,7 +34,7 @@ class GpuPose:
                 hint="Split the scan or thin it out",
             )
         self.gpu = gpu
-        self.cloud = cloud
+        self.stored = self.cloud = cloud
         self.uploaded_bytes = 0
         self._upload_ms = 0.0
         self._arrays: dict[str, gl.BufferTexture] = {}

@@ -24,7 +24,7 @@ def shade(surface: Surface, look: Look) -> None:
     color = "value" if source else "own" if look.color_by == "auto" else look.color_by
     if color == "own" and cloud.colors is None:
         color = "plain"
-    light = look.light if look.light != "auto" else "flat" if cloud.normals is None else "head"
+    light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
     program = gpu.compute(
         "shade/shade.comp",

@@ -18,6 +18,7 @@ from .pose import GpuPose
 from .view import View
 
 NOTHING = 0xFFFFFFFF
+_CHUNK = 1 << 20  # points counted at a time
 
 
 @dataclass
@@ -195,6 +196,19 @@ class Surface:
         """All channels by name, as `.npz` files hold them."""
         names = ("color", "normal", "depth", "coverage", "value", "id", "level")
         return {name: getattr(self, name) for name in names}
+
+    def point_counts(self) -> dict[str, int]:
+        """What became of the points: "in", of these "drawn" (they have a pixel), "outside" (their
+        centre is not in the picture or not between near and far) and "hidden" (the rest)."""
+        rows = self.row
+        shown = np.zeros(len(self._cloud), bool)
+        shown[rows[rows != NOTHING]] = True
+        within = 0
+        for start in range(0, len(shown), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            within += np.count_nonzero(self.view.contains(self._cloud.positions[part]) & ~shown[part])
+        drawn = int(np.count_nonzero(shown))
+        return {"in": len(shown), "drawn": drawn, "outside": len(shown) - drawn - within, "hidden": within}
 
     def release(self) -> None:
         """Delete everything it holds on the GPU."""

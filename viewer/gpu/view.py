@@ -77,3 +77,10 @@ class View:
         scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
         center = np.array(self.size) / 2
         return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
+
+    def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # a point in the eye's plane is out of range
+            pixels, depth = self.project(positions)
+        in_picture = ((pixels >= 0) & (pixels < self.size)).all(axis=1)
+        return in_picture & (depth >= self.near) & (depth <= self.far)

@@ -1,0 +1,85 @@
+"""The docs tell the truth: tables come from declarations, commands run as they stand there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from viewer.backends import backends
+from viewer.look import Look
+from viewer.params import Parameter, describe
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+# These set up, open a window or run all tests; they have tests of their own.
+ELSEWHERE = ("make ", "git clone", "cd ", "pipx ", "scan4d view", "python ")
+
+
+def table(parameters: list[Parameter]) -> str:
+    """A Markdown table of declared parameters."""
+    rows = ["| parameter | default | values | affects | what it does |", "|---|---|---|---|---|"]
+    for p in parameters:
+        default = "auto" if p.default is None else str(p.default).lower() if p.type is bool else p.default
+        limits = f"{p.low:g} to {p.high:g}" if p.low is not None and p.high is not None else p.type.__name__
+        values = ", ".join(p.choices) or ("on, off" if p.type is bool else limits)
+        rows.append(f"| `{p.name}` | {default} | {values} | {p.affects} | {p.help} |")
+    return "\n".join(rows)
+
+
+def backends_page() -> str:
+    """docs/backends.md as the declarations have it."""
+    parts = [
+        "# Backends and looks",
+        "This page is made from the declarations in the code: `python -m pytest tests/test_docs.py --bless`.",
+    ]
+    for backend in backends().values():
+        about = " ".join((backend.module.__doc__ or "").split())
+        parts += [f"## {backend.title} (`--backend {backend.name}`)", about, table(backend.parameters)]
+    parts += [
+        "## Look (`--look key=value`)",
+        " ".join((Look.__doc__ or "").split()),
+        table(describe(Look)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def test_the_page_of_backends_is_up_to_date(bless: bool) -> None:
+    page = ROOT / "docs" / "backends.md"
+    if bless:
+        page.write_text(backends_page(), encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == backends_page()
+
+
+def commands(text: str) -> list[str]:
+    """The lines of the sh blocks, without comments and continued lines joined."""
+    lines = "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.S | re.M)).replace("\\\n", " ").splitlines()
+    return [line.split("  #")[0].strip() for line in lines if line.strip() and not line.startswith("#")]
+
+
+@pytest.mark.parametrize("page", DOCS, ids=lambda page: page.name)
+def test_commands_in_the_docs_run(page: Path, tmp_path: Path) -> None:
+    ran = 0
+    for command in commands(page.read_text(encoding="utf-8")):
+        if command.startswith(ELSEWHERE):
+            continue
+        name, *arguments = shlex.split(command)
+        assert name == "scan4d", f"{page.name}: what is '{command}'?"
+        done = subprocess.run(
+            [sys.executable, "-m", "viewer.cli", *arguments],
+            cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+        assert done.returncode == 0, f"{command}\n{done.stderr}"
+        ran += 1
+    assert ran or page.name != "README.md"
+
+
+@pytest.mark.parametrize("page", DOCS, ids=lambda page: page.name)
+def test_links_in_the_docs_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), f"{page.name} links to {target}"
