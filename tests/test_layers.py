@@ -17,13 +17,13 @@ LAYERS = (
     {"backends"},
     {"renderer", "frame", "export"},
     {"app", "bench", "__init__"},
-    {"cli"},
+    {"cli", "commands"},
 )
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}
 
 WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
-SLOW = {"open3d", "OpenEXR", "av", "plyfile", "PIL", "tqdm", "cmap"} | WINDOW
+SLOW = {"open3d", "OpenEXR", "av", "plyfile", "lzf", "PIL", "tqdm", "cmap"} | WINDOW
 
 
 def modules() -> list[Path]:

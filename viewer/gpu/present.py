@@ -4,21 +4,43 @@ from __future__ import annotations
 
 import moderngl
 
+from .context import Gpu
 from .surface import Surface
 
 
-def present(surface: Surface, left: int, bottom: int) -> None:
-    """Copy the shaded picture to the window, pixel by pixel.
+class Presenter:
+    """Copies shaded pictures to the window's framebuffer, one pixel to one pixel."""
 
-    left, bottom: where its lower left corner goes, pixels from the window's lower left.
-    The window's framebuffer is bound afterwards.
-    """
-    gpu = surface.gpu
-    program = gpu.program(("present/present.vert", "present/present.frag"))
-    triangle = gpu.keep("present", lambda: gpu.ctx.vertex_array(program, []))
-    gpu.set(program, corner=(left, bottom), size=surface.size)
-    surface.picture.bind_to_storage_buffer(0)
-    gpu.ctx.screen.use()
-    gpu.ctx.viewport = (left, bottom, *surface.size)
-    gpu.ctx.enable_only(moderngl.NOTHING)
-    triangle.render(moderngl.TRIANGLES, vertices=3)
+    def __init__(self, gpu: Gpu) -> None:
+        self.gpu = gpu
+        self._program = gpu.program(("present/present.vert", "present/present.frag"))
+        self._triangle = gpu.ctx.vertex_array(self._program, [])
+        self._texture: moderngl.Texture | None = None
+
+    def present(self, surface: Surface, left: int, bottom: int) -> None:
+        """Put the picture's lower left corner there, in pixels from the window's.
+
+        The window's framebuffer is bound afterwards.
+        """
+        ctx = self.gpu.ctx
+        texture = self._texture_of(surface.size)
+        texture.write(surface.picture)
+        texture.use(0)
+        self.gpu.set(self._program, corner=(left, bottom))
+        ctx.screen.use()
+        ctx.viewport = (left, bottom, *surface.size)
+        ctx.enable_only(moderngl.NOTHING)
+        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+
+    def _texture_of(self, size: tuple[int, int]) -> moderngl.Texture:
+        if self._texture is None or self._texture.size != size:
+            if self._texture is not None:
+                self._texture.release()
+            self._texture = self.gpu.ctx.texture(size, 4)
+        return self._texture
+
+    def release(self) -> None:
+        """Delete what it holds on the GPU."""
+        self._triangle.release()
+        if self._texture is not None:
+            self._texture.release()

@@ -206,7 +206,7 @@ class Surface:
         within = 0
         for start in range(0, len(shown), _CHUNK):
             part = slice(start, start + _CHUNK)
-            within += np.count_nonzero(self.view.contains(self._cloud.positions[part]) & ~shown[part])
+            within += int(np.count_nonzero(self.view.contains(self._cloud.positions[part]) & ~shown[part]))
         drawn = int(np.count_nonzero(shown))
         return {"in": len(shown), "drawn": drawn, "outside": len(shown) - drawn - within, "hidden": within}
 

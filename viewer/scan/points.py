@@ -227,5 +227,6 @@ def _rgba8(colors: NDArray) -> NDArray[np.uint8]:
         colors = colors >> 8
     elif colors.dtype != np.uint8:
         colors = np.clip(colors, 0, 255)
-    rgba[:, : colors.shape[1]] = colors
+    for channel in range(colors.shape[1]):  # by columns: numpy is slow along the short axis
+        rgba[:, channel] = colors[:, channel]
     return rgba

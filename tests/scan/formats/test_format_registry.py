@@ -1,0 +1,167 @@
+"""The door to all formats: what is known, what is refused, and how files are written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.errors import InputError
+from viewer.scan import formats
+from viewer.scan.formats import npz, ply
+from viewer.scan.points import PointCloud
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_everything_survives_a_round_trip(suffix: str, full_cloud: PointCloud, tmp_path: Path) -> None:
+    path = tmp_path / f"scan{suffix}"
+    formats.write(path, full_cloud)
+    back = formats.read(path)
+    np.testing.assert_allclose(back.world(), full_cloud.world(), rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(back.normals, full_cloud.normals)
+    np.testing.assert_array_equal(back.colors, full_cloud.colors)
+    np.testing.assert_array_equal(back.radii, full_cloud.radii)
+    assert back.scalars.keys() == full_cloud.scalars.keys()
+    for name, values in full_cloud.scalars.items():
+        assert back.scalars[name].dtype == values.dtype
+        np.testing.assert_array_equal(back.scalars[name], values)
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_bare_points_gain_no_attributes(suffix: str, tmp_path: Path) -> None:
+    points = np.random.default_rng(0).random((9, 3), np.float32)
+    formats.write(tmp_path / f"bare{suffix}", PointCloud.from_arrays(points))
+    back = formats.read(tmp_path / f"bare{suffix}")
+    np.testing.assert_allclose(back.world(), points, rtol=0, atol=1e-7)
+    assert back.normals is back.colors is back.radii is None
+    assert not back.scalars
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_scalar_types_that_files_do_not_know_keep_their_values(suffix: str, tmp_path: Path) -> None:
+    scalars = {
+        "mask": np.array([True, False]),
+        "half": np.array([0.5, -2], np.float16),
+        "count": np.array([2**50, -1]),
+    }
+    formats.write(tmp_path / f"odd{suffix}", PointCloud.from_arrays(np.eye(3)[:2], scalars=scalars))
+    back = formats.read(tmp_path / f"odd{suffix}").scalars
+    for name, values in scalars.items():
+        np.testing.assert_array_equal(back[name].astype(values.dtype), values)
+
+
+def test_what_is_written() -> None:
+    assert formats.writable_suffixes() == [".npz", ".pcd", ".ply"]
+
+
+def test_upper_case_suffixes_are_known(tmp_path: Path) -> None:
+    (tmp_path / "SCAN.XYZ").write_text("1 2 3\n")
+    assert len(formats.read(tmp_path / "SCAN.XYZ")) == 1
+
+
+def test_unknown_suffix_lists_the_known(tmp_path: Path) -> None:
+    (tmp_path / "scan.stl").write_text("solid")
+    for call in (formats.read, formats.frame_count):
+        with pytest.raises(InputError, match=r"unknown file suffix '\.stl'") as caught:
+            call(tmp_path / "scan.stl")
+        assert all(suffix in str(caught.value) for suffix in formats.known_suffixes())
+    with pytest.raises(InputError, match=r"cannot write '\.obj' files.*\.npz, \.pcd, \.ply"):
+        formats.write(tmp_path / "scan.obj", PointCloud.from_arrays(np.eye(3)))
+
+
+@pytest.mark.parametrize("suffix", formats.known_suffixes())
+def test_every_format_refuses_what_is_no_file(suffix: str, tmp_path: Path) -> None:
+    folder, empty = tmp_path / f"folder{suffix}", tmp_path / f"empty{suffix}"
+    folder.mkdir()
+    empty.touch()
+    cases = {folder: "is a folder", empty: "is empty", tmp_path / f"missing{suffix}": "no such file"}
+    for path, reason in cases.items():
+        with pytest.raises(InputError, match=reason) as caught:
+            formats.read(path)
+        assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", formats.known_suffixes())
+def test_every_format_refuses_noise_in_one_message(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"noise{suffix}"
+    path.write_bytes(np.random.default_rng(1).bytes(5000))
+    with pytest.raises(InputError) as caught:
+        formats.read(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+    assert caught.value.hint
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_points_without_finite_coordinates_are_refused(suffix: str, tmp_path: Path) -> None:
+    nowhere = PointCloud(np.full((4, 3), np.nan, np.float32), np.zeros(3))
+    formats.write(tmp_path / f"nan{suffix}", nowhere)
+    with pytest.raises(InputError, match="none of its 4 points has finite coordinates"):
+        formats.read(tmp_path / f"nan{suffix}")
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_infinite_points_are_dropped_and_counted(suffix: str, tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [np.inf, 0, 0], [1, 1, 1]], np.float32)
+    formats.write(tmp_path / f"gap{suffix}", PointCloud(points, np.zeros(3), scalars={"s": np.arange(3.0)}))
+    back = formats.read(tmp_path / f"gap{suffix}")
+    assert back.dropped == 1
+    np.testing.assert_array_equal(back.ids, [0, 2])
+    np.testing.assert_array_equal(back.scalars["s"], [0, 2])
+
+
+def test_frames_of_single_moment_files(tmp_path: Path) -> None:
+    (tmp_path / "one.xyz").write_text("1 2 3\n")
+    assert formats.frame_count(tmp_path / "one.xyz") == 1
+    assert formats.read_times(tmp_path / "one.xyz") is None
+    for frame in (1, -1):
+        with pytest.raises(InputError, match=f"has no frame {frame}. It holds 1"):
+            formats.read(tmp_path / "one.xyz", frame)
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_failed_write_leaves_what_was_there(
+    error: BaseException, full_cloud: PointCloud, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, cloud: PointCloud) -> None:
+        path.write_text("half of it")
+        raise error
+
+    (tmp_path / "scan.ply").write_text("former")
+    monkeypatch.setattr(ply, "write", fail)
+    with pytest.raises(InputError if isinstance(error, OSError) else KeyboardInterrupt):
+        formats.write(tmp_path / "scan.ply", full_cloud)
+    assert [path.name for path in tmp_path.iterdir()] == ["scan.ply"]
+    assert (tmp_path / "scan.ply").read_text() == "former"
+
+
+def test_write_into_a_missing_folder_names_it(full_cloud: PointCloud, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no folder"):
+        formats.write(tmp_path / "none" / "scan.ply", full_cloud)
+
+
+def test_out_of_memory_is_a_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def exhaust(path: Path, frame: int) -> PointCloud:
+        raise MemoryError
+
+    (tmp_path / "big.npz").write_bytes(b"x")
+    monkeypatch.setattr(npz, "frame_count", lambda path: 3)
+    monkeypatch.setattr(npz, "read", exhaust)
+    with pytest.raises(InputError, match=r"big\.npz, frame 2: cannot be read as NPZ: not enough memory"):
+        formats.read(tmp_path / "big.npz", 2)
+
+
+def test_simple_files_need_no_other_library(full_cloud: PointCloud, tmp_path: Path) -> None:
+    """PLY and NPZ are read with numpy alone."""
+    formats.write(tmp_path / "scan.ply", full_cloud)
+    formats.write(tmp_path / "scan.npz", full_cloud)
+    code = (
+        "import sys; from viewer.scan import formats\n"
+        f"formats.read({str(tmp_path / 'scan.ply')!r}); formats.read({str(tmp_path / 'scan.npz')!r})\n"
+        "print(*({'open3d', 'plyfile', 'lzf'} & set(sys.modules)))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == ""

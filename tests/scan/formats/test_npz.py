@@ -1,0 +1,182 @@
+"""NPY and NPZ: attributes, sequences, and archives that lie about their size."""
+
+from __future__ import annotations
+
+import io
+import tracemalloc
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.errors import InputError
+from viewer.scan.formats import frame_count, read, read_times, write
+from viewer.scan.points import PointCloud
+
+RNG = np.random.default_rng(11)
+SEQUENCE = RNG.random((4, 30, 3), np.float32) - 0.5
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "scan.npz"
+
+
+def header(shape: tuple[int, ...], descr: str = "<f4") -> bytes:
+    """The head of an NPY file of any promised shape, without values."""
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(stream, {"descr": descr, "fortran_order": False, "shape": shape})
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_sequence_with_attributes_of_each_frame_or_of_all(save, shared: bool, path: Path) -> None:
+    lead = (30,) if shared else (4, 30)
+    arrays = {
+        "normals": RNG.random((*lead, 3)),
+        "colors": RNG.integers(0, 256, (*lead, 4), np.uint8),
+        "radii": RNG.random(lead),
+        "label": RNG.integers(0, 9, lead, np.int16),
+    }
+    save(path, positions=SEQUENCE, times=np.arange(4) / 30, camera=np.eye(4), note="a word", **arrays)
+    assert frame_count(path) == 4
+    np.testing.assert_array_equal(read_times(path), np.arange(4) / 30)
+    for frame in range(4):
+        cloud = read(path, frame)
+        expected = {name: array if shared else array[frame] for name, array in arrays.items()}
+        np.testing.assert_allclose(cloud.world(), SEQUENCE[frame], rtol=0, atol=1e-7)
+        np.testing.assert_allclose(cloud.normals, expected["normals"], rtol=1e-6)
+        np.testing.assert_array_equal(cloud.colors, expected["colors"])
+        np.testing.assert_allclose(cloud.radii, expected["radii"], rtol=1e-6)
+        assert set(cloud.scalars) == {"label"}
+        np.testing.assert_array_equal(cloud.scalars["label"], expected["label"])
+        assert cloud.scalars["label"].dtype == np.int16
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("dtype", ["<f4", ">f8", "<i4", "<f2"])
+def test_any_real_type_and_order(order: str, dtype: str, tmp_path: Path) -> None:
+    points = np.asarray((SEQUENCE * 100).astype(dtype), order=order)
+    np.save(tmp_path / "scan.npy", points)
+    np.savez(tmp_path / "scan.npz", positions=points)
+    for name in ("scan.npy", "scan.npz"):
+        assert frame_count(tmp_path / name) == 4
+        np.testing.assert_allclose(read(tmp_path / name, 2).world(), points[2], rtol=0, atol=1e-5)
+    np.save(tmp_path / "one.npy", points[1])
+    assert frame_count(tmp_path / "one.npy") == 1
+    np.testing.assert_allclose(read(tmp_path / "one.npy").world(), points[1], rtol=0, atol=1e-5)
+
+
+def test_missing_frames_are_named(path: Path) -> None:
+    np.savez(path, positions=SEQUENCE)
+    assert read_times(path) is None
+    with pytest.raises(InputError, match=r"has no frame 4\. It holds 4, counted from 0"):
+        read(path, 4)
+
+
+def test_an_origin_is_kept_and_added(path: Path) -> None:
+    origin = np.array([500_000.25, 5_400_000.5, 100])
+    np.savez(path, positions=SEQUENCE[0], origin=origin)
+    cloud = read(path)
+    np.testing.assert_array_equal(cloud.origin, origin)
+    np.testing.assert_array_equal(cloud.positions, SEQUENCE[0])
+
+
+def test_a_round_trip_is_exact(full_cloud: PointCloud, path: Path) -> None:
+    write(path, full_cloud)
+    back = read(path)
+    np.testing.assert_array_equal(back.positions, full_cloud.positions)
+    np.testing.assert_array_equal(back.origin, full_cloud.origin)
+
+
+def test_scalars_of_any_name(path: Path) -> None:
+    scalars = {name: np.arange(2.0) for name in ("file", "allow_pickle", "a b", "depth/left", "Ä")}
+    write(path, PointCloud.from_arrays(np.eye(3)[:2], scalars=scalars))
+    assert set(read(path).scalars) == set(scalars)
+
+
+def test_one_frame_of_a_long_sequence_costs_one_frame(tmp_path: Path) -> None:
+    frames = np.ones((500, 10_000, 3), np.float32)  # 60 MB, 120 kB a frame
+    np.save(tmp_path / "long.npy", frames)
+    np.savez(tmp_path / "long.npz", positions=frames)
+    skipped = 2 << 24  # zipfile skips in steps of 16 MB, of which it holds two
+    for name, most in (("long.npy", 2_000_000), ("long.npz", 2_000_000 + skipped)):
+        tracemalloc.start()
+        assert len(read(tmp_path / name, 499)) == 10_000
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < most
+
+
+class Trap:
+    """Pickles of it run code."""
+
+    def __reduce__(self) -> tuple:
+        return (pytest.fail, ("a pickle was loaded",))
+
+
+def test_pickles_are_never_loaded(path: Path) -> None:
+    objects = np.array([Trap()] * 3, object)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, array in {"positions": np.eye(3), "extra": objects}.items():
+            with archive.open(f"{name}.npy", "w") as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=True)
+    assert not read(path).scalars
+    np.save(path.with_suffix(".npy"), np.array([[Trap()] * 3], object))
+    with pytest.raises(InputError, match="pickled objects, which are refused"):
+        read(path.with_suffix(".npy"))
+
+
+@pytest.mark.parametrize("shape", [(10**12, 3), (7, 3), (10**9, 10**9, 3), (-5, 3), (0, 10**12, 3)])
+def test_headers_that_promise_too_much(shape: tuple[int, ...], tmp_path: Path) -> None:
+    (tmp_path / "scan.npy").write_bytes(header(shape) + bytes(6 * 12))
+    with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
+        archive.writestr("positions.npy", header(shape) + bytes(6 * 12))
+    for name in ("scan.npy", "scan.npz"):
+        with pytest.raises(InputError, match=r"promises .* bytes and holds 72|has no frame 0"):
+            read(tmp_path / name)
+
+
+def test_a_zip_bomb_is_refused_before_it_unpacks(path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        count = 25_000_000
+        with archive.open("positions.npy", "w", force_zip64=True) as stream:
+            stream.write(header((count, 3)))
+            for _ in range(count // 1_000_000):
+                stream.write(bytes(12_000_000))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="bytes would unpack to 300000"):
+        read(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000
+
+
+def test_constant_arrays_of_modest_size_are_no_bomb(path: Path) -> None:
+    np.savez_compressed(path, positions=np.zeros((1_000_000, 3), np.float32))
+    assert len(read(path)) == 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("arrays", "reason"),
+    [
+        ({"xyz": np.eye(3)}, "no array 'positions', only: xyz"),
+        ({"positions": np.zeros((4, 2))}, r"array 'positions' has shape \(4, 2\). Positions are \(N, 3\)"),
+        ({"positions": np.zeros((2, 2, 4, 3))}, "has shape"),
+        ({"positions": np.zeros((0, 5, 3))}, "has no frame 0. It holds 0"),
+        ({"positions": np.zeros((0, 3))}, "holds no points"),
+        ({"positions": np.array([["a", "b", "c"]])}, "expected numbers"),
+        ({"positions": np.zeros((1, 3), complex)}, "expected numbers"),
+        ({"positions": np.eye(3), "normals": np.eye(2)}, "'normals' has shape"),
+        ({"positions": np.eye(3), "colors": np.zeros((3, 5))}, "'colors' has shape"),
+        ({"positions": np.eye(3), "radii": np.zeros(4)}, "'radii' has shape"),
+        ({"positions": np.eye(3), "origin": np.zeros(2)}, "'origin' is not 3 finite numbers"),
+        ({"positions": np.eye(3), "origin": np.full(3, np.nan)}, "'origin' is not 3 finite numbers"),
+    ],
+)
+def test_arrays_that_cannot_be_used(arrays: dict[str, np.ndarray], reason: str, path: Path) -> None:
+    np.savez(path, **arrays)
+    with pytest.raises(InputError, match=reason):
+        read(path)

@@ -1,0 +1,169 @@
+"""PCD: the three encodings, packed colours, fields of any kind, and damaged files."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import lzf
+import numpy as np
+import pytest
+
+from viewer.errors import InputError
+from viewer.scan.formats import read, write
+from viewer.scan.points import PointCloud
+
+ROWS = np.array(
+    [((1, 2, 3), 0x80FF2010, (0.5, 1.5), 7), ((4, 5, np.nan), 1, (0, 0), 8), ((-1, 0, 2), 2, (2.5, 3.5), -9)],
+    [("p", "<f4", 3), ("rgba", "<u4"), ("moment", "<f8", 2), ("label", "<i2")],
+)
+FIELDS = "x y z rgba moment label"
+HEADER = {
+    "VERSION": "0.7",
+    "FIELDS": FIELDS,
+    "SIZE": "4 4 4 4 8 2",
+    "TYPE": "F F F U F I",
+    "COUNT": "1 1 1 1 2 1",
+    "WIDTH": "3",
+    "HEIGHT": "1",
+    "VIEWPOINT": "0 0 0 1 0 0 0",
+    "POINTS": "3",
+}
+
+
+def body_of(encoding: str) -> bytes:
+    """ROWS as the encoding has them."""
+    columns = [*ROWS["p"].T, ROWS["rgba"], *ROWS["moment"].T, ROWS["label"]]
+    if encoding == "binary":
+        return ROWS.tobytes()
+    if encoding == "ascii":
+        return "".join(" ".join(str(c[i]) for c in columns) + "\n" for i in range(3)).encode()
+    fields = [*columns[:4], ROWS["moment"], ROWS["label"]]  # field after field, two moments a point
+    data = b"".join(np.ascontiguousarray(field).tobytes() for field in fields)
+    packed = lzf.compress(data + bytes(0), 10 * len(data)) or pytest.fail("did not pack")
+    return struct.pack("<II", len(packed), len(data)) + packed
+
+
+def save(path: Path, encoding: str = "binary", body: bytes | None = None, **changes: str | None) -> Path:
+    lines = [f"{key} {value}\n" for key, value in (HEADER | changes).items() if value is not None]
+    path.write_bytes(
+        "".join([*lines, f"DATA {encoding}\n"]).encode() + (body_of(encoding) if body is None else body)
+    )
+    return path
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "scan.pcd"
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
+def test_all_encodings_hold_the_same(encoding: str, path: Path) -> None:
+    cloud = read(save(path, encoding))
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3], [-1, 0, 2]])
+    np.testing.assert_array_equal(cloud.ids, [0, 2])
+    assert cloud.dropped == 1
+    np.testing.assert_array_equal(cloud.colors, [[255, 32, 16, 128], [0, 0, 2, 0]])
+    np.testing.assert_array_equal(cloud.scalars["moment_0"], [0.5, 2.5])
+    np.testing.assert_array_equal(cloud.scalars["moment_1"], [1.5, 3.5])
+    np.testing.assert_array_equal(cloud.scalars["label"], [7, -9])
+    assert [values.dtype.str for values in cloud.scalars.values()] == ["<f8", "<f8", "<i2"]
+
+
+def test_upper_case_names_padding_and_missing_lines(path: Path) -> None:
+    save(path, FIELDS="X Y Z _ _ label", VIEWPOINT=None, POINTS=None, VERSION=None)
+    cloud = read(path)
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3], [-1, 0, 2]])
+    assert set(cloud.scalars) == {"label"}
+
+
+def test_colours_packed_into_a_float_are_opaque(path: Path) -> None:
+    cloud = read(save(path, FIELDS=FIELDS.replace("rgba", "rgb"), TYPE="F F F F F I"))
+    np.testing.assert_array_equal(cloud.colors, [[255, 32, 16, 255], [0, 0, 2, 255]])
+
+
+def test_alpha_that_nobody_set_is_opaque(path: Path) -> None:
+    rows = ROWS.copy()
+    rows["rgba"] &= 0xFFFFFF
+    assert (read(save(path, body=rows.tobytes())).colors[:, 3] == 255).all()
+
+
+def test_bytes_behind_the_points_are_ignored(path: Path) -> None:
+    assert len(read(save(path, body=ROWS.tobytes() + bytes(3906)))) == 2
+
+
+@pytest.mark.parametrize("delimiter", [" ", "\t", ","])
+def test_delimiters_of_ascii(delimiter: str, path: Path) -> None:
+    body = delimiter.join(["289814.15", "4320978.61", "170.76"]).encode() + b"\r\n"
+    save(path, "ascii", body, FIELDS="X Y Z", SIZE="4 4 4", TYPE="F F F", COUNT=None, WIDTH="1", POINTS="1")
+    np.testing.assert_allclose(read(path).world(), [[289814.15, 4320978.61, 170.76]], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+@pytest.mark.parametrize("promised", ["4", "1000000", str(10**18)])
+def test_fewer_points_than_promised(encoding: str, promised: str, path: Path) -> None:
+    with pytest.raises(InputError, match=f"holds 3 of the {promised} points"):
+        read(save(path, encoding, WIDTH=promised, POINTS=promised))
+
+
+def test_damaged_compressed_data(path: Path) -> None:
+    whole = body_of("binary_compressed")
+    packed, unpacked = struct.unpack("<II", whole[:8])
+    cases = {
+        whole[:20]: f"holds 12 of its {packed} bytes",
+        whole[:4]: "ends before its compressed data",
+        struct.pack("<II", packed, 10**9)
+        + whole[8:]: "holds 1000000000 bytes of points, its header promises",
+        struct.pack("<II", 1, unpacked) + whole[8:]: f"1 bytes of compressed data cannot hold {unpacked}",
+        whole[:8] + bytes([255]) * packed: "cannot be read as PCD|damaged",
+    }
+    for body, reason in cases.items():
+        with pytest.raises(InputError, match=reason):
+            read(save(path, "binary_compressed", body))
+
+
+def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
+    body = struct.pack("<II", 100, 34 * 10**8) + bytes(100)
+    with pytest.raises(InputError, match="cannot hold 3400000000"):
+        read(save(path, "binary_compressed", body, WIDTH=str(10**8), POINTS=str(10**8)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"FIELDS": None}, "no FIELDS line"),
+        ({"POINTS": None, "WIDTH": None}, "no WIDTH line"),
+        ({"SIZE": "4 4 4"}, "differ in length"),
+        ({"SIZE": "4 4 3 4 8 2"}, "unknown PCD type and size 'F3'"),
+        ({"COUNT": f"1 1 1 1 {10**12} 1"}, "promises 3 points"),
+        ({"COUNT": "1 1 1 1 0 1"}, "promises 3 points"),
+        ({"POINTS": "0"}, "promises 0 points"),
+        ({"POINTS": "-3"}, "promises -3 points"),
+        ({"FIELDS": "x y w rgba moment label"}, "no x, y and z among the columns: x, y, w"),
+    ],
+)
+def test_headers_that_cannot_be_used(changes: dict[str, str | None], reason: str, path: Path) -> None:
+    with pytest.raises(InputError, match=reason):
+        read(save(path, **changes))
+
+
+def test_unknown_encoding(path: Path) -> None:
+    with pytest.raises(InputError, match=r"unknown PCD encoding 'zip'\. Known: ascii, binary"):
+        read(save(path, "zip", b""))
+
+
+def test_other_programs_can_read_what_is_written(tmp_path: Path) -> None:
+    open3d = pytest.importorskip("open3d", exc_type=ImportError)
+    rng = np.random.default_rng(5)
+    cloud = PointCloud.from_arrays(
+        rng.random((30, 3), np.float32) - 0.5,
+        normals=rng.random((30, 3)),
+        colors=rng.integers(0, 256, (30, 3), np.uint8),
+        scalars={"intensity": rng.random(30, np.float32)},
+    )
+    write(tmp_path / "scan.pcd", cloud)
+    other = open3d.t.io.read_point_cloud(str(tmp_path / "scan.pcd")).point
+    np.testing.assert_array_equal(other["positions"].numpy(), cloud.world().astype(np.float32))
+    np.testing.assert_array_equal(other["normals"].numpy(), cloud.normals)
+    np.testing.assert_array_equal(other["colors"].numpy(), cloud.colors[:, :3])
+    np.testing.assert_array_equal(other["intensity"].numpy()[:, 0], cloud.scalars["intensity"])

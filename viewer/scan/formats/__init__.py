@@ -1,0 +1,139 @@
+"""The file formats of point clouds: one module a format, found by scanning this folder.
+
+A format module declares
+
+- `TITLE: str`, as messages name it, and `SUFFIXES: tuple[str, ...]`, lower case with the dot;
+- `read(path, frame=0) -> PointCloud`;
+- where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
+  `read_times(path)` (seconds, (T,) float64, or None);
+- where it can be written: `write(path, cloud)`.
+
+A module may raise any exception: the functions below turn it into one InputError that names the file.
+Modules whose name starts with an underscore are helpers.
+"""
+
+from __future__ import annotations
+
+import os
+import pkgutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, Scan4DError, unknown_name
+from ..points import PointCloud
+
+
+def known_suffixes() -> list[str]:
+    """Every suffix that can be read, sorted."""
+    return sorted(_formats())
+
+
+def writable_suffixes() -> list[str]:
+    """Every suffix that can be written, sorted."""
+    return sorted(suffix for suffix, module in _formats().items() if hasattr(module, "write"))
+
+
+def frame_count(path: Path | str) -> int:
+    """How many moments the file holds; reads no more than its header. Raises InputError."""
+    path = Path(path)
+    module = _readable(path)
+    with _one_message(path, f"cannot be read as {module.TITLE}"):
+        return module.frame_count(path) if hasattr(module, "frame_count") else 1
+
+
+def read_times(path: Path | str) -> NDArray[np.float64] | None:
+    """The times stored with the moments of the file, (T,) seconds, or None. Raises InputError."""
+    path = Path(path)
+    module = _readable(path)
+    with _one_message(path, f"cannot be read as {module.TITLE}"):
+        return module.read_times(path) if hasattr(module, "read_times") else None
+
+
+def read(path: Path | str, frame: int = 0) -> PointCloud:
+    """The points of one moment of a file; at least one.
+
+    Raises InputError where the path is not a readable file of a known format, where the file is
+    empty or damaged or has no such frame, and where no point of it has finite coordinates.
+    """
+    path = Path(path)
+    module = _readable(path)
+    frames = frame_count(path)
+    if not 0 <= frame < frames:
+        raise InputError(f"has no frame {frame}", path, f"It holds {frames}, counted from 0")
+    where = path if frames == 1 else f"{path}, frame {frame}"
+    with _one_message(where, f"cannot be read as {module.TITLE}"):
+        cloud: PointCloud = module.read(path, frame)
+        if not len(cloud):
+            what = f"none of its {cloud.dropped} points has finite coordinates"
+            raise InputError(what if cloud.dropped else "holds no points")
+    return cloud
+
+
+def write(path: Path | str, cloud: PointCloud) -> None:
+    """Write the points in the format that the suffix names, in one step.
+
+    The file takes its name only when it is complete; whatever goes wrong, a former file of that name
+    stays as it was and nothing else remains. Raises InputError for an unknown suffix or a failed write.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in writable_suffixes():
+        raise InputError(f"cannot write '{suffix}' files", path, f"Known: {', '.join(writable_suffixes())}")
+    if not path.parent.is_dir():
+        raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
+    module = _formats()[suffix]
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    with _one_message(path, f"cannot be written as {module.TITLE}", "Check free space and permissions"):
+        try:
+            module.write(temporary, cloud)
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@cache
+def _formats() -> dict[str, ModuleType]:
+    names = [m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")]
+    modules = [import_module(f"{__name__}.{name}") for name in names]
+    return {suffix: module for module in modules for suffix in module.SUFFIXES}
+
+
+def _readable(path: Path) -> ModuleType:
+    """The format of a file that exists and is not empty."""
+    if path.is_dir():
+        raise InputError("is a folder, not a file", path)
+    if not path.exists():
+        raise InputError("no such file", path, "Check the path")
+    suffix = path.suffix.lower()
+    if suffix not in _formats():
+        error = unknown_name("file suffix", suffix, known_suffixes())
+        raise InputError(error.what, path, error.hint)
+    if path.stat().st_size == 0:
+        raise InputError("is empty (0 bytes)", path, "Copy or export the file again")
+    return _formats()[suffix]
+
+
+@contextmanager
+def _one_message(
+    where: object, failed: str, hint: str = "Check that it is complete, or export it again"
+) -> Iterator[None]:
+    """Turn whatever goes wrong inside into an InputError that says where.
+
+    Odd numbers in a file (NaN, overflow in a conversion) are data, so numpy does not complain of them.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except Scan4DError as error:
+        raise InputError(error.what, error.where or where, error.hint or hint) from error
+    except MemoryError as error:
+        raise InputError(f"{failed}: not enough memory", where, "Close other programs") from error
+    except Exception as error:
+        raise InputError(f"{failed}: {str(error) or type(error).__name__}", where, hint) from error

@@ -1,0 +1,174 @@
+"""Named columns, as PLY, PCD and text files hold points, to and from a PointCloud."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
+from typing import BinaryIO
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+from numpy.typing import DTypeLike, NDArray
+
+from ...errors import InputError
+from ..points import PointCloud
+
+Columns = Mapping[str, NDArray]  # name -> (N,)
+
+# What the columns of a file may be called, in lower case; the first set that is complete is taken.
+_POSITIONS = [("x", "y", "z")]
+_NORMALS = [("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")]
+_COLORS = [
+    ("red", "green", "blue", "alpha"),
+    ("red", "green", "blue"),
+    ("r", "g", "b", "a"),
+    ("r", "g", "b"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+]
+_RADII = [("radius",), ("surfel_radius",)]
+
+
+def cloud_from_columns(columns: Columns) -> PointCloud:
+    """Points from named columns; names count in any case, what is not geometry becomes a scalar.
+
+    columns: name -> (N,) of any real type and byte order. Raises InputError where x, y or z is missing.
+    """
+    rest = dict(columns)
+    names = {name.lower(): name for name in columns}
+
+    def take(choices: Sequence[Sequence[str]]) -> NDArray | None:
+        for choice in choices:
+            if all(name in names for name in choice):
+                return _joined([rest.pop(names[name]) for name in choice])
+        return None
+
+    positions = take(_POSITIONS)
+    if positions is None:
+        raise InputError(f"no x, y and z among the columns: {', '.join(columns) or 'none'}")
+    normals, colors, radii = take(_NORMALS), take(_COLORS), take(_RADII)
+    return PointCloud.from_arrays(
+        positions,
+        normals=normals,
+        colors=None if colors is None else _bytes_or_units(colors),
+        radii=None if radii is None else radii[:, 0],
+        scalars={name: column.astype(column.dtype.newbyteorder("=")) for name, column in rest.items()},
+    )
+
+
+def columns_from_cloud(
+    cloud: PointCloud, normals: tuple[str, str, str] = ("nx", "ny", "nz")
+) -> dict[str, NDArray]:
+    """Everything a cloud holds but its ids as named columns, positions absolute.
+
+    Positions are float32 where that is exact, else float64. normals: what their columns are called.
+    Names lose their blanks, types that files do not know (bool, half, long double) are widened.
+    """
+    blocks = [
+        (("x", "y", "z"), _absolute(cloud)),
+        (normals, cloud.normals),
+        (("red", "green", "blue", "alpha"), cloud.colors),
+        (("radius",), None if cloud.radii is None else cloud.radii[:, None]),
+    ]
+    columns = {
+        name: block[:, i] for names, block in blocks if block is not None for i, name in enumerate(names)
+    }
+    for name, values in cloud.scalars.items():
+        columns["_".join(name.split())] = values.astype(_STORED.get(values.dtype.char, values.dtype))
+    return columns
+
+
+_STORED = {"?": "u1", "e": "f4", "g": "f8"}  # numpy's type characters: bool, half, long double
+
+
+def records(columns: Columns) -> NDArray[np.void]:
+    """One little-endian record a point, (N,), fields packed in the order of the columns."""
+    dtype = np.dtype([(name, column.dtype.newbyteorder("<")) for name, column in columns.items()])
+    rows = np.empty(len(next(iter(columns.values()))), dtype)
+    for name, column in columns.items():
+        rows[name] = column
+    return rows
+
+
+def text_lines(stream: BinaryIO) -> Iterator[str]:
+    """The lines of a stream from where it stands; Latin-1 takes any byte."""
+    return (line.decode("latin-1") for line in stream)
+
+
+def parse_table(
+    lines: Iterable[str],
+    columns: Sequence[int] | None = None,
+    delimiter: str | None = None,
+    rows: int | None = None,
+) -> NDArray[np.float64]:
+    """Numbers from lines of text, (N, C) float64; blank lines and comments (`#`, `//`) are skipped.
+
+    columns: which to take; None: all, and then every row must have the same number (0 rows: 3).
+    rows: how many to read at most. What is allocated follows the text, not `rows`.
+    Raises InputError where something is not a number or a row is too short.
+    """
+    filled = (line for line in lines if line.strip() and not line.startswith(("#", "//")))
+    wanted = islice(filled, None if rows is None else min(rows, sys.maxsize))
+    first = next(wanted, None)
+    if first is None:
+        return np.empty((0, len(columns or range(3))))
+    try:
+        return np.loadtxt(chain([first], wanted), usecols=columns, delimiter=delimiter, ndmin=2)
+    except ValueError as error:
+        reason = str(error).split(";")[0].rstrip(".")
+        raise InputError(f"not a table of numbers: {reason} of the points") from error
+
+
+def declared(columns: Columns, dtypes: Mapping[str, DTypeLike]) -> dict[str, NDArray]:
+    """Columns parsed from text in the types that the header declares.
+
+    Coordinates stay float64: text may hold more digits than the declared type. A whole-number column
+    that does not fit its type stays float64 too.
+    """
+    return {
+        name: column if name.lower() in _POSITIONS[0] else _fitted(column, np.dtype(dtypes[name]))
+        for name, column in columns.items()
+    }
+
+
+def _fitted(column: NDArray[np.float64], dtype: np.dtype) -> NDArray:
+    if dtype.kind in "iu":
+        limits = np.iinfo(dtype)
+        if not ((column >= limits.min) & (column <= limits.max)).all():
+            return column
+    return column.astype(dtype)
+
+
+def _joined(columns: Sequence[NDArray]) -> NDArray:
+    """(N, C) from C columns, without a copy where they lie side by side in one record."""
+    first = columns[0]
+    start, step = _address(first), first.itemsize
+    side_by_side = all(
+        (column.dtype, column.strides, _address(column)) == (first.dtype, first.strides, start + i * step)
+        for i, column in enumerate(columns)
+    )
+    if side_by_side:
+        return as_strided(first, (len(first), len(columns)), (first.strides[0], step), writeable=False)
+    return np.stack(columns, axis=1)
+
+
+def _address(array: NDArray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def _bytes_or_units(colors: NDArray) -> NDArray:
+    """Colours as PointCloud takes them. Floats beyond 1 and small uint16 count in 0..255."""
+    if colors.dtype.kind == "f" and np.nanmax(colors, initial=0) > 1:
+        return np.clip(colors, 0, 255) / 255
+    if colors.dtype == np.uint16 and colors.max(initial=0) <= 255:
+        return colors.astype(np.uint8)
+    return colors
+
+
+def _absolute(cloud: PointCloud) -> NDArray[np.float32] | NDArray[np.float64]:
+    if not cloud.origin.any():
+        return cloud.positions
+    world = cloud.world()
+    single = world.astype(np.float32)
+    return single if np.array_equal(single, world) else world

@@ -1,0 +1,199 @@
+"""PCD: the Point Cloud Library's format, versions 0.5 to 0.7, all three encodings.
+
+Read here and not by a library because those at hand lose columns, alpha or whole files (upper-case
+names, 64-bit types). VIEWPOINT is where the sensor stood, not a transform, and is not applied.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, unknown_name
+from ..points import PointCloud
+from ._columns import (
+    Columns,
+    cloud_from_columns,
+    columns_from_cloud,
+    declared,
+    parse_table,
+    records,
+    text_lines,
+)
+
+TITLE = "PCD"
+SUFFIXES = (".pcd",)
+
+_HEADER_LIMIT = 1 << 16  # bytes looked at for the header
+_TYPES = {"F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8"}
+_PADDING = "_"
+_LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
+
+
+@dataclass(frozen=True)
+class _Field:
+    name: str
+    type: str  # numpy's, as "f4"
+    count: int
+
+    @property
+    def columns(self) -> list[str]:
+        return [self.name] if self.count == 1 else [f"{self.name}_{i}" for i in range(self.count)]
+
+
+@dataclass(frozen=True)
+class _Header:
+    fields: list[_Field]
+    points: int
+    encoding: str
+    size: int  # bytes
+
+    @property
+    def dtype(self) -> np.dtype:
+        """One point; fields go by number, since names may repeat."""
+        return np.dtype([(str(i), f"<{f.type}", (f.count,)) for i, f in enumerate(self.fields)])
+
+
+def read(path: Path, frame: int = 0) -> PointCloud:
+    """All finite points of a PCD file. Raises InputError."""
+    size = path.stat().st_size
+    with open(path, "rb") as stream:
+        header = _read_header(stream.read(_HEADER_LIMIT), size)
+        if header.encoding not in _ENCODINGS:
+            raise unknown_name("PCD encoding", header.encoding, list(_ENCODINGS))
+        stream.seek(header.size)
+        columns = _ENCODINGS[header.encoding](stream, header, size - header.size)
+    return cloud_from_columns(columns)
+
+
+def write(path: Path, cloud: PointCloud) -> None:
+    """Write a binary PCD; colours are packed as `rgba`, radii are called `radius`."""
+    columns = columns_from_cloud(cloud, normals=("normal_x", "normal_y", "normal_z"))
+    if cloud.colors is not None:
+        names = ("alpha", "red", "green", "blue")
+        alpha, red, green, blue = (columns.pop(name).astype("u4") for name in names)
+        columns["rgba"] = alpha << 24 | red << 16 | green << 8 | blue
+    header: dict[str, list] = {
+        "VERSION": ["0.7"],
+        "FIELDS": list(columns),
+        "SIZE": [column.itemsize for column in columns.values()],
+        "TYPE": [column.dtype.kind.upper() for column in columns.values()],
+        "COUNT": [1] * len(columns),
+        "WIDTH": [len(cloud)],
+        "HEIGHT": [1],
+        "VIEWPOINT": [0, 0, 0, 1, 0, 0, 0],
+        "POINTS": [len(cloud)],
+        "DATA": ["binary"],
+    }
+    with open(path, "wb") as stream:
+        for key, values in header.items():
+            stream.write(f"{key} {' '.join(map(str, values))}\n".encode())
+        records(columns).tofile(stream)
+
+
+def _read_header(head: bytes, file_size: int) -> _Header:
+    end = re.search(rb"^DATA[ \t]+(\w+)[ \t\r]*(\n|\Z)", head, re.MULTILINE)
+    if end is None:
+        raise InputError("is not a PCD file: it has no DATA line")
+    lines = head[: end.start()].decode("utf-8", "replace").splitlines()
+    words = {line.split()[0].upper(): line.split()[1:] for line in lines if line.strip()}
+    for key in ("FIELDS", *(["WIDTH", "HEIGHT"] if "POINTS" not in words else [])):
+        if not words.get(key):
+            raise InputError(f"the PCD header has no {key} line")
+    names = words["FIELDS"]
+    sizes, types = words.get("SIZE", []), words.get("TYPE", [])
+    counts = [int(count) for count in words.get("COUNT", ["1"] * len(names))]
+    if not len(names) == len(sizes) == len(types) == len(counts):
+        raise InputError("FIELDS, SIZE, TYPE and COUNT of the PCD header differ in length")
+    for code in (type_ + size for type_, size in zip(types, sizes, strict=True)):
+        if code not in _TYPES:
+            raise unknown_name("PCD type and size", code, list(_TYPES))
+    sides = words["POINTS"] if "POINTS" in words else words["WIDTH"] + words["HEIGHT"]
+    points = math.prod(map(int, sides))
+    if points < 1 or min(counts) < 1 or sum(counts) > file_size:
+        raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
+    fields = [_Field(n, (t + s).lower(), c) for n, t, s, c in zip(names, types, sizes, counts, strict=True)]
+    return _Header(fields, points, end[1].decode().lower(), end.end())
+
+
+def _read_ascii(stream: BinaryIO, header: _Header, size: int) -> Columns:
+    start = stream.read(_HEADER_LIMIT)
+    stream.seek(header.size)
+    delimiter = "," if b"," in start else None
+    table = parse_table(text_lines(stream), delimiter=delimiter, rows=header.points)
+    if len(table) < header.points:
+        raise _too_few(len(table), header)
+    ends = np.cumsum([f.count for f in header.fields])
+    if table.shape[1] < ends[-1]:
+        raise InputError(f"its rows hold {table.shape[1]} values, the header promises {ends[-1]}")
+    blocks = np.split(table, ends[:-1], axis=1)
+    types = {column: f.type for f in header.fields for column in f.columns}
+    return _unpacked(declared(_columns(header, blocks), types))
+
+
+def _read_binary(stream: BinaryIO, header: _Header, size: int) -> Columns:
+    dtype = header.dtype
+    if header.points * dtype.itemsize > size:
+        raise _too_few(size // dtype.itemsize, header)
+    rows = np.fromfile(stream, dtype, header.points)
+    return _unpacked(_columns(header, [rows[name] for name in dtype.names or ()]))
+
+
+def _read_compressed(stream: BinaryIO, header: _Header, size: int) -> Columns:
+    """One LZF stream that holds field after field, each for all points."""
+    import lzf
+
+    if size < 8:
+        raise InputError("ends before its compressed data")
+    packed, unpacked = struct.unpack("<II", stream.read(8))
+    promised = header.points * header.dtype.itemsize
+    if unpacked != promised:
+        raise InputError(f"holds {unpacked} bytes of points, its header promises {promised}")
+    if packed > size - 8:
+        raise InputError(f"holds {size - 8} of its {packed} bytes of compressed data")
+    if unpacked > packed * _LZF_MAX_RATIO:
+        raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked}")
+    data = lzf.decompress(stream.read(packed), unpacked)
+    if data is None or len(data) != unpacked:
+        raise InputError("its compressed data are damaged")
+    blocks, start = [], 0
+    for f in header.fields:
+        block = np.frombuffer(data, f"<{f.type}", header.points * f.count, start)
+        blocks.append(block.reshape(header.points, f.count))
+        start += block.nbytes
+    return _unpacked(_columns(header, blocks))
+
+
+_ENCODINGS = {"ascii": _read_ascii, "binary": _read_binary, "binary_compressed": _read_compressed}
+
+
+def _columns(header: _Header, blocks: list[NDArray]) -> dict[str, NDArray]:
+    """blocks: (N, count) of every field."""
+    return {
+        name: block[:, i]
+        for f, block in zip(header.fields, blocks, strict=False)
+        if f.name != _PADDING
+        for i, name in enumerate(f.columns)
+    }
+
+
+def _unpacked(columns: dict[str, NDArray]) -> Columns:
+    """Split the packed colour 0xAARRGGBB, an integer or the bits of a float, into its four columns."""
+    for name in ("rgba", "rgb"):
+        if name in columns and columns[name].itemsize == 4:
+            channels = np.ascontiguousarray(columns.pop(name))[:, None].view("u1")
+            columns |= {"red": channels[:, 2], "green": channels[:, 1], "blue": channels[:, 0]}
+            if name == "rgba" and channels[:, 3].any():  # many writers leave alpha 0
+                columns["alpha"] = channels[:, 3]
+    return columns
+
+
+def _too_few(held: int, header: _Header) -> InputError:
+    return InputError(f"holds {held} of the {header.points} points that its header promises")

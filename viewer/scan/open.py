@@ -1,0 +1,148 @@
+"""From what a user names (a file, a folder, a pattern, the demo) to a Timeline."""
+
+from __future__ import annotations
+
+import difflib
+import glob
+import itertools
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from . import formats
+from .sources import FileSequence, FrameSource, MultiFrameFile
+from .timeline import Notice, Timeline
+from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
+
+DEMO = "demo"
+_NOTES = {".txt", ".csv"}  # beside frames of another kind these are notes, not frames
+_PRINTF = re.compile("%(0?[0-9]*)d")
+_NAMES_TO_COMPARE = 5000
+
+
+def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float | None = None) -> Timeline:
+    """Open a scan; no frame is read before it is asked for.
+
+    path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo".
+    unit: the name of its unit of length, for example "mm"; None: what the scan tells, else "units".
+    fps: frame numbers a second, where no times.csv tells the times. Without it the times
+    stored in the file count, and without those 25 a second.
+    Raises InputError where there is nothing to open, and says what is near.
+    """
+    if fps is not None and not (np.isfinite(fps) and fps > 0):
+        raise InputError(f"a frame rate of {fps} is not usable", hint="Give frames per second above 0")
+    source = find_source(path)
+    recorded = source.times()
+    measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
+    if recorded is None or (fps is not None and not measured):
+        labels = [source.label(index) for index in range(len(source))]
+        recorded = paced_times(labels, DEFAULT_FPS if fps is None else fps)
+    timeline = Timeline(source, recorded, unit or source.unit or "units")
+    if measured and fps is not None:
+        timeline.messages.append(Notice("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used"))
+    return timeline
+
+
+def find_source(path: str | os.PathLike[str]) -> FrameSource:
+    """Where the frames of the scan named `path` come from. Raises InputError."""
+    path = os.fspath(path)
+    if path == DEMO:
+        from .demo import DemoSource
+
+        return DemoSource()
+    if os.path.isdir(path):
+        return _open_folder(Path(path))
+    if os.path.isfile(path):
+        return _open_frames([Path(path)], Path(path).name)
+    if os.path.exists(path):
+        raise InputError("is neither a file nor a folder", path)
+    if _PRINTF.search(path) or glob.has_magic(path):
+        return _open_pattern(path)
+    raise _nothing_there(path)
+
+
+def _open_folder(folder: Path) -> FrameSource:
+    """The frames are in the folder, or in its folder `frames`, whatever stands beside that."""
+    for place in (folder / "frames", folder):
+        if place.is_dir() and (frames := _choose_frames(_entries(place), place)):
+            return _open_frames(frames, folder.resolve().name)
+    inner = sorted((entry.name for entry in _entries(folder) if entry.is_dir()), key=natural_key)
+    hint = f"Its folders: {_listed(inner)}" if inner else f"Known files: {_listed(formats.known_suffixes())}"
+    raise InputError("holds no scan files", folder, hint)
+
+
+def _open_pattern(pattern: str) -> FrameSource:
+    files = _matches(pattern)
+    if not files:
+        raise InputError("matches no file", pattern, "Check its folder, and quote it against the shell")
+    frames = _choose_frames(files, pattern)
+    if not frames:
+        raise InputError("matches no scan file", pattern, f"Known files: {_listed(formats.known_suffixes())}")
+    return _open_frames(frames, Path(pattern).name)
+
+
+def _matches(pattern: str) -> list[Path]:
+    """The files that a glob pattern or a printf pattern names."""
+    if not _PRINTF.search(pattern):
+        return [Path(name) for name in glob.glob(pattern, recursive=True)]
+    texts_and_widths = _PRINTF.split(pattern)
+    texts, widths = texts_and_widths[::2], texts_and_widths[1::2]
+    wild = "*".join(glob.escape(text) for text in texts)
+    digits = [f"[0-9]{{{max(1, int(width or 1))},}}" for width in widths]
+    exact = re.compile("".join(re.escape(t) + d for t, d in zip(texts, [*digits, ""], strict=True)))
+    return [Path(name) for name in glob.glob(wild) if exact.fullmatch(name)]
+
+
+def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
+    """The frames among the files, in natural order; empty where there is none.
+
+    Left aside: hidden files, times.csv, unknown suffixes, and TXT and CSV beside frames of
+    another kind. Raises InputError where two kinds remain.
+    """
+    known = set(formats.known_suffixes())
+    by_kind: dict[str, list[Path]] = {}
+    for file in files:
+        kind = file.suffix.lower()
+        if kind in known and not file.name.startswith(".") and file.name != TIMES_FILE and file.is_file():
+            by_kind.setdefault(kind, []).append(file)
+    if by_kind.keys() - _NOTES:
+        by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in _NOTES}
+    if len(by_kind) > 1:
+        found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
+        hint = (
+            f"Choose one kind with a pattern such as '*{max(by_kind, key=lambda kind: len(by_kind[kind]))}'"
+        )
+        raise InputError(f"holds files of several kinds ({found})", where, hint)
+    return sorted(itertools.chain(*by_kind.values()), key=lambda file: natural_key(str(file)))
+
+
+def _open_frames(files: list[Path], name: str) -> FrameSource:
+    if len(files) == 1 and (count := formats.frame_count(files[0])) > 1:
+        return MultiFrameFile(files[0], count)
+    return FileSequence(files, name)
+
+
+def _nothing_there(path: str) -> InputError:
+    """The error for a missing path, with the names close to the first part of it that is missing."""
+    missing = Path(path)
+    while not os.path.exists(missing.parent):
+        missing = missing.parent
+    names = [entry.name for entry in _entries(missing.parent)[:_NAMES_TO_COMPARE]]
+    close = difflib.get_close_matches(missing.name, names, n=3)
+    hint = f"Close to it: {_listed(close)}" if close else f"There is no '{missing.name}' in {missing.parent}"
+    return InputError("no such file or folder", path, hint)
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        raise InputError(f"cannot be listed ({error.strerror})", folder) from error
+
+
+def _listed(names: Sequence[str], most: int = 12) -> str:
+    return ", ".join([*names[:most], "..."] if len(names) > most else names)

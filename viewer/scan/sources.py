@@ -1,0 +1,99 @@
+"""Where the frames of a scan come from: a sequence of files, or one file of many frames."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from . import formats
+from .points import PointCloud
+from .times import TIMES_FILE, read_times_csv
+
+
+class FrameSource(Protocol):
+    """What a Timeline plays. Nothing is read before `load`, which several threads may call at once."""
+
+    @property
+    def name(self) -> str:
+        """What a window's title calls the scan."""
+
+    @property
+    def unit(self) -> str | None:
+        """The name of its unit of length, or None where the scan does not tell."""
+
+    def __len__(self) -> int:
+        """How many frames there are; at least one."""
+
+    def label(self, index: int) -> str:
+        """The name of a frame, for example its file's."""
+
+    def times(self) -> NDArray[np.float64] | None:
+        """(T,) seconds as recorded with the scan, or None where nothing was recorded."""
+
+    def load(self, index: int) -> PointCloud:
+        """Read one frame. Raises InputError where it is unusable."""
+
+
+class FileSequence:
+    """One frame a file, in the order given. paths: at least one."""
+
+    unit = None
+
+    def __init__(self, paths: Sequence[Path], name: str) -> None:
+        self.name = name
+        self._paths = list(paths)
+        self._folder = Path(os.path.commonpath([path.parent for path in paths]))
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def label(self, index: int) -> str:
+        """The file's name; with its folder where the sequence spans several."""
+        return self._paths[index].relative_to(self._folder).as_posix()
+
+    def times(self) -> NDArray[np.float64] | None:
+        """From a times.csv beside the frames, or beside their folder where that is called `frames`."""
+        if len(self) == 1:
+            return None
+        folders = [self._folder, self._folder.parent] if self._folder.name == "frames" else [self._folder]
+        for file in (folder / TIMES_FILE for folder in folders):
+            if file.is_file():
+                return read_times_csv(file, [self.label(index) for index in range(len(self))])
+        return None
+
+    def load(self, index: int) -> PointCloud:
+        path = self._paths[index]
+        if (count := formats.frame_count(path)) > 1:
+            raise InputError(
+                f"holds {count} frames, where each file of a sequence holds one", path, "Open this file alone"
+            )
+        return formats.read(path)
+
+
+class MultiFrameFile:
+    """One file that holds all frames, such as NPY or NPZ with positions (T, N, 3)."""
+
+    unit = None
+
+    def __init__(self, path: Path, count: int) -> None:
+        self.name = path.name
+        self._path = path
+        self._count = count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def label(self, index: int) -> str:
+        return f"{self.name} frame {index}"
+
+    def times(self) -> NDArray[np.float64] | None:
+        return formats.read_times(self._path)
+
+    def load(self, index: int) -> PointCloud:
+        return formats.read(self._path, frame=index)

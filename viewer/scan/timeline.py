@@ -1,0 +1,304 @@
+"""A scan in time: it knows when each pose is and where it comes from, and reads it when asked."""
+
+from __future__ import annotations
+
+import atexit
+import copy
+import operator
+import threading
+import traceback
+from collections.abc import Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .cache import PoseCache, default_budget
+from .pose import Pose
+from .sources import FrameSource
+
+_CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something about a scan that its user should know.
+
+    kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
+    coordinate were left out) or "times". index: the frame; None where it concerns all.
+    """
+
+    kind: Literal["broken", "dropped", "times"]
+    text: str
+    index: int | None = None
+
+
+class Timeline:
+    """The poses of a scan, read when asked for and kept in a cache bounded in bytes.
+
+    times:    (T,) float64, seconds, increasing, read-only
+    unit:     the name of the scan's unit of length
+    name:     the scan's name
+    messages: what there is to report; it only grows, by one of a kind per frame
+
+    Every method may be called from any thread. One worker thread, started by the first
+    `request` or `prefetch`, reads ahead; it knows no GL. Scripts use `pose`, which waits; a
+    window uses `request` or `prefetch`, and `ready`, which do not.
+    """
+
+    def __init__(
+        self, source: FrameSource, times: ArrayLike, unit: str = "units", cache_bytes: int | None = None
+    ) -> None:
+        """times: (T,) seconds. cache_bytes: what poses may take; None: `default_budget()`.
+
+        Raises InputError where there is no frame, or the times do not fit or increase.
+        """
+        self.times = _checked_times(times, source)
+        self.unit = unit
+        self.name = source.name
+        self.messages: list[Notice] = []
+        self._source = source
+        self._state = threading.Condition()  # guards all that follows
+        self._cache = PoseCache(default_budget() if cache_bytes is None else cache_bytes)
+        self._loading: dict[int, Future[Pose]] = {}
+        self._broken: dict[int, InputError] = {}
+        self._sizes: dict[int, int] = {}  # bytes of every pose read so far
+        self._typical_size = 0
+        self._requests: list[int] = []  # latest last
+        self._playhead, self._direction = 0, 1
+        self._read_ahead = False  # until the cache holds what playing reaches next
+        self._wanted: int | None = None  # what was asked of the worker last,
+        self._in_use: Pose | None = None  # held here even where it exceeds the cache
+        self._worker: threading.Thread | None = None
+        self._closed = False
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __iter__(self) -> Iterator[Pose]:
+        """All poses in order. Broken frames are left out; `broken` and `messages` name them."""
+        for index in range(len(self)):
+            try:
+                pose = self.pose(index)
+            except InputError:
+                continue
+            yield pose
+
+    def label(self, index: int) -> str:
+        """The name of a frame, for example its file's."""
+        return self._source.label(self._checked_index(index))
+
+    def nearest(self, time: float) -> int:
+        """The index of the pose nearest to a time in seconds, the earlier one of two."""
+        return int(np.abs(self.times - time).argmin())
+
+    @property
+    def broken(self) -> dict[int, InputError]:
+        """The frames found unreadable so far, and why."""
+        with self._state:
+            return dict(self._broken)
+
+    def cached(self) -> list[range]:
+        """The runs of poses that the cache holds, in order."""
+        with self._state:
+            indices = sorted(self._cache)
+        runs: list[range] = []
+        for index in indices:
+            if runs and runs[-1].stop == index:
+                runs[-1] = range(runs[-1].start, index + 1)
+            else:
+                runs.append(range(index, index + 1))
+        return runs
+
+    def pose(self, index: int) -> Pose:
+        """One pose, read now unless it is in memory; threads that ask for it at once read it once.
+
+        Raises InputError where there is no such pose, or its frame is broken; a broken frame
+        is not read again.
+        """
+        index = self._checked_index(index)
+        with self._state:
+            if self._closed:
+                raise ValueError("the timeline is closed")
+            if index in self._broken:
+                raise copy.copy(self._broken[index])
+            if (held := self._held(index)) is not None:
+                return held
+            begun = self._loading.get(index)
+            future = begun or self._begin(index)
+        if begun is None:
+            self._load(index, future)
+        return future.result()
+
+    def ready(self, index: int) -> Pose | None:
+        """The pose if it is in memory, else None at once."""
+        with self._state:
+            return self._held(index)
+
+    def request(self, index: int) -> None:
+        """Ask the worker for a pose, before all that was asked of it earlier."""
+        index = self._checked_index(index)
+        with self._state:
+            if index in self._requests:
+                self._requests.remove(index)
+            self._requests.append(index)
+            self._want(index)
+
+    def prefetch(self, index: int, direction: int = 1) -> None:
+        """Ask the worker for the pose at the playhead, then for those that playing reaches next.
+
+        It reads on, round the end, as far as the cache holds them, and evicts none that is
+        reached earlier than the one it reads. Replaces all that was asked of it earlier.
+        direction: 1 or -1.
+        """
+        index = self._checked_index(index)
+        with self._state:
+            self._requests.clear()
+            self._playhead, self._direction = index, direction
+            self._read_ahead = True
+            self._cache.touch(sorted(self._cache, key=self._distance, reverse=True))
+            self._want(index)
+
+    def close(self) -> None:
+        """Stop the worker and let go of all poses; nothing is read any more."""
+        with self._state:
+            self._closed = True
+            self._cache.clear()
+            self._in_use = None
+            self._state.notify_all()
+        if self._worker is not None:
+            atexit.unregister(self.close)
+            self._worker.join(_CLOSE_WAIT)
+
+    def __enter__(self) -> Timeline:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _checked_index(self, index: int) -> int:
+        index = operator.index(index)
+        if not 0 <= index < len(self):
+            raise InputError(f"there is no pose {index}", self.name, f"It has the poses 0 to {len(self) - 1}")
+        return index
+
+    def _held(self, index: int) -> Pose | None:
+        if self._in_use is not None and self._in_use.index == index:
+            return self._in_use
+        return self._cache.get(index)
+
+    def _want(self, index: int) -> None:
+        """Note what is in use from now on, and have the worker look at what is to do."""
+        if self._closed:
+            return
+        self._wanted, self._in_use = index, self._held(index)
+        if self._worker is None:
+            self._worker = threading.Thread(target=self._work, name="scan4d-poses", daemon=True)
+            self._worker.start()
+            atexit.register(self.close)  # a worker inside a native library must not outlive it
+        self._state.notify_all()
+
+    def _work(self) -> None:
+        while True:
+            with self._state:
+                while (task := self._next_task()) is None and not self._closed:
+                    self._state.wait()
+                if task is None or self._closed:
+                    return
+                index, ahead = task
+                future = self._begin(index)
+            self._load(index, future, ahead)
+            del future  # it holds the pose
+
+    def _next_task(self) -> tuple[int, bool] | None:
+        """What the worker should read, and whether it is read ahead or was requested; None: nothing."""
+        while self._requests:
+            if self._is_missing(index := self._requests.pop()):
+                return index, False
+        nearer_bytes = 0
+        for step in range(len(self) if self._read_ahead else 0):
+            index = (self._playhead + self._direction * step) % len(self)
+            size = self._sizes.get(index, self._typical_size)
+            if self._is_missing(index):
+                if nearer_bytes + size > self._cache.budget and index != self._wanted:
+                    break
+                return index, True
+            if index in self._cache or index in self._loading:
+                nearer_bytes += size
+        self._read_ahead = False
+        return None
+
+    def _is_missing(self, index: int) -> bool:
+        in_use = self._in_use is not None and self._in_use.index == index
+        return not (in_use or any(index in held for held in (self._cache, self._loading, self._broken)))
+
+    def _distance(self, index: int) -> int:
+        """How many steps playing takes from the playhead to a pose."""
+        return (index - self._playhead) * self._direction % len(self)
+
+    def _begin(self, index: int) -> Future[Pose]:
+        """From here on until `_load` is done, others wait for this future."""
+        future = self._loading[index] = Future()
+        return future
+
+    def _load(self, index: int, future: Future[Pose], ahead: bool = False) -> None:
+        """Read a pose outside the lock and note what came of it; the future gets the pose or the error."""
+        try:
+            pose = self._read(index)
+        except BaseException as error:
+            with self._state:
+                del self._loading[index]
+                if isinstance(error, InputError):
+                    self._broken[index] = _at_rest(error)
+                    self.messages.append(Notice("broken", f"frame {index} is left out: {error}", index))
+                    error = copy.copy(self._broken[index])
+            future.set_exception(error)
+            return
+        with self._state:
+            del self._loading[index]
+            if pose.cloud.dropped and index not in self._sizes:
+                what = f"{pose.label}: {pose.cloud.dropped} points without finite coordinates are left out"
+                self.messages.append(Notice("dropped", what, index))
+            self._sizes[index] = self._typical_size = pose.nbytes
+            if not self._closed:
+                nearer = {at for at in self._cache if self._distance(at) < self._distance(index)}
+                self._cache.put(pose, keep=nearer if ahead else ())
+                if index == self._wanted:
+                    self._in_use = pose
+        future.set_result(pose)
+
+    def _read(self, index: int) -> Pose:
+        label = self._source.label(index)
+        try:
+            return Pose(index, float(self.times[index]), label, self._source.load(index))
+        except InputError as error:
+            if error.where is None:
+                error.where = label
+            raise
+        except Exception as error:  # whatever a damaged file does to a reader, playing goes on
+            raise InputError(f"cannot be read ({type(error).__name__}: {error})", label) from error
+
+
+def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]:
+    checked = np.array(times, np.float64)
+    if not len(source):
+        raise InputError("holds no frames", source.name)
+    if checked.shape != (len(source),):
+        raise InputError(f"times have shape {checked.shape} for {len(source)} frames", source.name)
+    if not (np.isfinite(checked).all() and (np.diff(checked) > 0).all()):
+        raise InputError("times do not increase with the frames", source.name, "Give a frame rate instead")
+    checked.setflags(write=False)
+    return checked
+
+
+def _at_rest(error: InputError) -> InputError:
+    """The error as it is kept: its traceback as a note, since frames hold what readers held, perhaps a file.
+
+    To be raised as a copy, so that it does not gather the frames of those who ask.
+    """
+    kept = copy.copy(error)
+    kept.add_note("".join(traceback.format_exception(error)))
+    return kept
