@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from .camera import Camera
 from .errors import Scan4DError
 from .look import Look
+from .scan.open import open_scan
 from .scan.points import PointCloud
 from .scan.pose import Pose
 

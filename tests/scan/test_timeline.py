@@ -72,7 +72,7 @@ def settle(scan: Timeline) -> None:
 
     def idle() -> bool:
         with scan._state:
-            return not (scan._requests or scan._read_ahead or scan._loading)
+            return not (scan._requests or scan._ahead or scan._loading)
 
     wait_until(idle)
 
@@ -251,7 +251,7 @@ def test_a_pose_larger_than_the_cache_is_not_read_again_for_nobody() -> None:
         scan.request(1)
         source.gate.release(100)
         settle(scan)
-    assert source.loads == [0, 1]
+    assert source.loads == [0, 1, 2]
 
 
 def test_a_pose_larger_than_expected_does_not_push_out_nearer_ones() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import OrderedDict
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from ..errors import InputError
 from .pose import Pose
@@ -48,14 +48,14 @@ class PoseCache:
             self._poses.move_to_end(index)
         return pose
 
-    def put(self, pose: Pose, keep: Collection[int] = ()) -> bool:
-        """Hold this pose and evict others for it, none in `keep`; False where it does not fit."""
+    def put(self, pose: Pose, keep: Callable[[int], bool] = lambda _: False) -> bool:
+        """Hold this pose and evict others for it, but none to `keep`; False where it does not fit."""
         self._drop(pose.index)
         room, victims = self.budget - self.nbytes, []
         for index, held in self._poses.items():
             if room >= pose.nbytes:
                 break
-            if index not in keep:
+            if not keep(index):
                 victims.append(index)
                 room += held.nbytes
         if room < pose.nbytes:

@@ -121,31 +121,37 @@ def _facing(normals: Vectors, directions: NDArray[np.floating]) -> Vectors:
 
 
 def _seen_from(points: Vectors, reach: float) -> NDArray[np.float32]:
-    """For each point the sum of the directions from which nothing hides it, (N, 3).
-
-    A view looks along an axis at a grid of cells; in each cell the nearest points, and those
-    within a small depth behind them, are seen. The depths of a cell serve both ends of the axis.
-    """
+    """For each point the sum of the directions from which nothing hides it, (N, 3)."""
     center = np.median(points, axis=0)
     half = 2 * np.quantile(np.linalg.norm(points - center, axis=1), 0.98)  # strays beyond go to the rim
     cell = max(_CELL * reach, 2 * half / _GRID) or 1.0
-    side = int(2 * half / cell) + 1
-    depth_seen = np.float32(_DEPTH / _CELL)
     local = np.clip((points - center) / cell, -_GRID, _GRID).astype(np.float32)  # in cells
     seen_from = np.zeros_like(local)
     for axis in _half_sphere(_AXES).astype(np.float32):
-        across = np.cross(axis, np.eye(3, dtype=np.float32)[np.abs(axis).argmin()])
-        across /= np.linalg.norm(across)
-        x, y, depth = (local @ np.stack([across, np.cross(axis, across), axis], axis=1)).T
-        column, row = (np.clip(v + np.float32(side / 2), 0, side - 1).astype(np.intp) for v in (x, y))
-        at = row * side + column
-        front, back = (np.full(side * side, far, np.float32) for far in (-np.inf, np.inf))
-        np.maximum.at(front, at, depth)
-        np.minimum.at(back, at, depth)
-        votes = (depth >= front[at] - depth_seen) * (1 + _FRONT_BONUS * axis[2])
-        votes -= (depth <= back[at] + depth_seen) * (1 - _FRONT_BONUS * axis[2])
+        from_front, from_back = _visible(local, axis, side=int(2 * half / cell) + 1)
+        votes = from_front * (1 + _FRONT_BONUS * axis[2]) - from_back * (1 - _FRONT_BONUS * axis[2])
         seen_from += votes[:, None] * axis
     return seen_from
+
+
+def _visible(
+    points: NDArray[np.float32], axis: NDArray[np.float32], side: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether each point is seen from the two ends of an axis, the positive one first, (N,).
+
+    points: in cells. A view looks at side x side cells; in each the first points are seen, and
+    those little behind them.
+    """
+    across = np.cross(axis, np.eye(3, dtype=np.float32)[np.abs(axis).argmin()])
+    across /= np.linalg.norm(across)
+    x, y, depth = (points @ np.stack([across, np.cross(axis, across), axis], axis=1)).T
+    column, row = (np.clip(v + np.float32(side / 2), 0, side - 1).astype(np.intp) for v in (x, y))
+    at = row * side + column
+    nearest, farthest = (np.full(side * side, none, np.float32) for none in (-np.inf, np.inf))
+    np.maximum.at(nearest, at, depth)
+    np.minimum.at(farthest, at, depth)
+    little = np.float32(_DEPTH / _CELL)
+    return depth >= nearest[at] - little, depth <= farthest[at] + little
 
 
 def _half_sphere(count: int) -> Vectors:

@@ -113,9 +113,8 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
         by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in _NOTES}
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
-        hint = (
-            f"Choose one kind with a pattern such as '*{max(by_kind, key=lambda kind: len(by_kind[kind]))}'"
-        )
+        most = max(by_kind, key=lambda kind: len(by_kind[kind]))
+        hint = f"Choose one kind with a pattern such as '*{most}'"
         raise InputError(f"holds files of several kinds ({found})", where, hint)
     return sorted(itertools.chain(*by_kind.values()), key=lambda file: natural_key(str(file)))
 

@@ -7,6 +7,7 @@ import numpy as np
 from .points import PointCloud
 
 _DISTANCES = 4_000_000  # point-to-point distances looked at
+_NEAREST = 128  # of these, so that each of six neighbours may have twenty copies
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
 
 
@@ -25,8 +26,9 @@ def typical_spacing(cloud: PointCloud) -> float:
     spacings = []
     for probe in probes:
         squared = sum((points[:, axis] - probe[axis]) ** 2 for axis in range(3))
-        squared = squared[squared > 0]
-        k = min(_NEIGHBOR, len(squared))
+        nearest = np.partition(squared, min(_NEAREST, count) - 1)[:_NEAREST]
+        distinct = np.unique(nearest[nearest > 0])  # copies of a point are at one distance
+        k = min(_NEIGHBOR, len(distinct))
         if k:
-            spacings.append(float(np.sqrt(np.partition(squared, k - 1)[k - 1]) / np.sqrt(k / np.pi)))
+            spacings.append(float(np.sqrt(distinct[k - 1] / (k / np.pi))))
     return float(np.median(spacings)) if spacings else 1.0

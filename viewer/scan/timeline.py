@@ -69,7 +69,7 @@ class Timeline:
         self._typical_size = 0
         self._requests: list[int] = []  # latest last
         self._playhead, self._direction = 0, 1
-        self._read_ahead = False  # until the cache holds what playing reaches next
+        self._ahead: Iterator[int] | None = None  # what is to be read ahead, while there is something
         self._wanted: int | None = None  # what was asked of the worker last,
         self._in_use: Pose | None = None  # held here even where it exceeds the cache
         self._worker: threading.Thread | None = None
@@ -158,7 +158,7 @@ class Timeline:
         with self._state:
             self._requests.clear()
             self._playhead, self._direction = index, direction
-            self._read_ahead = True
+            self._ahead = self._upcoming()
             self._cache.touch(sorted(self._cache, key=self._distance, reverse=True))
             self._want(index)
 
@@ -218,18 +218,24 @@ class Timeline:
         while self._requests:
             if self._is_missing(index := self._requests.pop()):
                 return index, False
-        nearer_bytes = 0
-        for step in range(len(self) if self._read_ahead else 0):
-            index = (self._playhead + self._direction * step) % len(self)
-            size = self._sizes.get(index, self._typical_size)
-            if self._is_missing(index):
-                if nearer_bytes + size > self._cache.budget and index != self._wanted:
-                    break
+        if self._ahead is not None:
+            for index in self._ahead:
                 return index, True
-            if index in self._cache or index in self._loading:
-                nearer_bytes += size
-        self._read_ahead = False
+            self._ahead = None
         return None
+
+    def _upcoming(self) -> Iterator[int]:
+        """What playing reaches next and is missing, as far as the cache holds it; runs under the lock."""
+        nearer_bytes = 0
+        for step in range(len(self)):
+            index = (self._playhead + self._direction * step) % len(self)
+            if self._is_missing(index):
+                size = self._sizes.get(index, self._typical_size)
+                if nearer_bytes + size > self._cache.budget and index != self._wanted:
+                    return
+                yield index
+            if index in self._cache or index in self._loading:
+                nearer_bytes += self._sizes.get(index, self._typical_size)
 
     def _is_missing(self, index: int) -> bool:
         in_use = self._in_use is not None and self._in_use.index == index
@@ -264,8 +270,8 @@ class Timeline:
                 self.messages.append(Notice("dropped", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
             if not self._closed:
-                nearer = {at for at in self._cache if self._distance(at) < self._distance(index)}
-                self._cache.put(pose, keep=nearer if ahead else ())
+                distance = self._distance(index) if ahead else 0
+                self._cache.put(pose, keep=lambda other: self._distance(other) < distance)
                 if index == self._wanted:
                     self._in_use = pose
         future.set_result(pose)
