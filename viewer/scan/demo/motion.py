@@ -1,0 +1,211 @@
+"""How the demo subject moves: rotations that fade in space, on a schedule that repeats.
+
+The head at rest is an implicit surface; a pose is that surface bent by four twists, one after the
+other. A twist can be undone exactly, so the moved head is an implicit surface as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import head
+from .dual import coordinates
+from .shapes import Scalar, bell, length, ramp
+
+PERIOD = 2.56  # seconds
+_FAINT = 1e-8  # radians or weights that move a point by less than float32 can tell
+_BATCH = 1 << 13  # points moved at a time, so that intermediate results stay in the cache
+_BISECTIONS = 52  # halvings that bring an angle down to the precision of float64
+
+
+@dataclass(frozen=True)
+class Twist:
+    """A rotation about an axis by an angle that fades in space: p -> c + R(amount * weight(p)) (p - c).
+
+    center: a point of the axis. axis: its unit direction. weight: 0..1 over the place. A point
+    only slides along its own circle, and where `amount` is small enough for points of a circle
+    not to pass each other, the twist is one to one.
+    It works on one side of the face, x >= 0; the other side is its mirror image.
+    """
+
+    center: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    weight: Callable[[Scalar, Scalar, Scalar], Scalar]
+
+    def apply(self, points: NDArray, normals: NDArray, amount: float) -> tuple[NDArray, NDArray, NDArray]:
+        """Moved points (3, N), unit normals (3, N), and the growth of the surface's area (N,)."""
+        weight = self.weight(*coordinates(points))
+        arm = points - _column(self.center, points)
+        tangent = _cross(self.axis, arm)
+        # By the matrix determinant lemma and Sherman and Morrison: the Jacobian is a rotation
+        # times I + tangent slope^T.
+        slope = amount * weight.gradient
+        growth = 1.0 + _dot(tangent, slope)
+        bent = growth * normals - slope * _dot(tangent, normals)
+        stretch = np.sqrt(_dot(bent, bent))
+        angle = amount * weight.value
+        moved = _rotate(self.axis, arm, angle) + _column(self.center, points)
+        return moved, _rotate(self.axis, bent / stretch, angle), stretch
+
+    def undo(self, points: NDArray, amount: float) -> NDArray:
+        """Where moved points (3, N) came from, (3, N), by bisection along their circles."""
+        center = _column(self.center, points)
+        arm = points - center
+        low, high = np.zeros(points.shape[1]), np.ones(points.shape[1])
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            origin = _rotate(self.axis, arm, -amount * middle) + center
+            below = self.weight(*origin) > middle
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return _rotate(self.axis, arm, -0.5 * amount * (low + high)) + center
+
+
+def _eyelid(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+    """The upper lid, up to the crease; the opening of the eye closes like a curtain."""
+    upper, lower = head.lid_margins(x)
+    height = y - head.EYE[1]
+    # What lies farther out than the lid turns as the lid does, so that nothing passes anything.
+    radius = length(height, z - head.EYE[2])
+    level = height * 14.5 / (0.5 * (radius + 14.0 + np.sqrt(np.square(radius - 14.0) + 1.0)))
+    over = 0.5 * (level - lower + np.sqrt(np.square(level - lower) + 0.04))
+    past = 0.5 * (level - upper + np.sqrt(np.square(level - upper) + 0.04))
+    return (over - past) / 10.5 * (1.0 - ramp(height, 6.0, 20.0)) * ramp(z, 55.0, 64.0)
+
+
+def _brow(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+    """The brows and the forehead above them."""
+    return bell(np.square(x), 700.0, 1300.0) * bell(y, 35.0, 12.0) * ramp(z, 0.0, 60.0)
+
+
+def _jaw(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+    """The lower jaw: parted sharply from the upper lip and teeth, gradually from the cheeks."""
+    below = head.mouth_sheet(x, z) - y
+    parted = np.exp(-np.square(np.square(x / 19.0))) * ramp(z, 40.0, 62.0)
+    sharp, gradual = 0.5 + 0.5 * np.tanh(below / 0.12), ramp(below, -38.0, 46.0)
+    lower = gradual + parted * (sharp - gradual)
+    return lower * ramp(z, -10.0, 62.0) * ramp(y, -147.0, -88.0)
+
+
+def _mouth_corner(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+    """The corner of the mouth and the cheek beside and above it."""
+    square = np.square(x)
+    place = bell(x, 28.0, 15.0) * bell(y, -54.0, 16.0) * bell(z, 80.0, 26.0)
+    return 1.1 * square / (square + 100.0) * place * ramp(z, 0.0, 40.0)
+
+
+def _unit(*direction: float) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in np.asarray(direction) / np.linalg.norm(direction))
+    return x, y, z
+
+
+EYELID = Twist(head.EYE, (1.0, 0.0, 0.0), _eyelid)
+BROW = Twist((0.0, 0.0, -10.0), (-1.0, 0.0, 0.0), _brow)
+JAW = Twist((0.0, -35.0, -15.0), (1.0, 0.0, 0.0), _jaw)
+MOUTH_CORNER = Twist((0.0, -60.0, 18.0), _unit(-0.55, 0.78, 0.22), _mouth_corner)
+
+
+def amounts(time: float) -> list[tuple[Twist, float]]:
+    """The twists at work at a time in seconds, in the order they are applied, with angles in radians."""
+    angles = (
+        (EYELID, 0.72 * _peak(time, 0.56, 30.0)),
+        (BROW, 0.085 * _peak(time, 0.30, 3.0) - 0.02 * _peak(time, 0.76, 4.0)),
+        (JAW, 0.27 * _peak(time, 0.31, 4.0) + 0.05 * _peak(time, 0.75, 4.0)),
+        (MOUTH_CORNER, 0.17 * _peak(time, 0.75, 3.0) - 0.05 * _peak(time, 0.31, 4.0)),
+    )
+    return [(twist, angle) for twist, angle in angles if abs(angle) > _FAINT]
+
+
+def _peak(time: float, center: float, sharpness: float) -> float:
+    """A smooth peak of height 1, once a period; center: in periods (von Mises)."""
+    return float(np.exp(sharpness * (np.cos(2.0 * np.pi * (time / PERIOD - center)) - 1.0)))
+
+
+def move(points: NDArray, normals: NDArray, time: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Points and normals of the skin at rest, moved to a time in seconds.
+
+    points, normals: (3, N) float32 or float64. Gives both in the same shape and type, normals of
+    unit length, and the growth of the surface's area at each point, (N,). Fastest where points
+    that are near each other follow each other: batches that nothing moves are passed over.
+    """
+    twists = amounts(time)
+    moved, turned, growth = np.empty_like(points), np.empty_like(normals), np.empty_like(points[0])
+    for start in range(0, points.shape[1], _BATCH):
+        batch = slice(start, start + _BATCH)
+        moved[:, batch], turned[:, batch], growth[batch] = _twisted(
+            points[:, batch], normals[:, batch], twists
+        )
+    return moved, turned, growth
+
+
+def _twisted(
+    points: NDArray, normals: NDArray, twists: list[tuple[Twist, float]]
+) -> tuple[NDArray, NDArray, NDArray]:
+    mirror = _mirror(points)
+    points, normals, growth = points * mirror, normals * mirror, np.ones_like(points[0])
+    for twist, amount in twists:
+        if (twist.weight(*points) > _FAINT).any():
+            points, normals, stretch = twist.apply(points, normals, amount)
+            growth *= stretch
+    return points * mirror, normals * mirror, growth
+
+
+def rest_of(points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """Where the skin at points (3, N) of a moment is at rest, (3, N): the inverse of `move`."""
+    mirror = _mirror(points)
+    points = points * mirror
+    for twist, amount in reversed(amounts(time)):
+        points = twist.undo(points, amount)
+    return points * mirror
+
+
+def surface_value(points: ArrayLike, time: float) -> NDArray[np.float64]:
+    """The exact subject at a time: negative inside, 0 on the surface, about mm near it.
+
+    points: (N, 3), mm. Gives (N,) float64. See `surface_normal`.
+    """
+    p = np.asarray(points, np.float64).T
+    return np.minimum(head.skin(*rest_of(p, time)), head.eyes(*p))
+
+
+def surface_normal(points: ArrayLike, time: float) -> NDArray[np.float64]:
+    """The exact unit normals (N, 3) of the subject at points (N, 3) of its surface at a time."""
+    p = np.asarray(points, np.float64).T
+    rest = rest_of(p, time)
+    skin, eyes = head.skin(*coordinates(rest)), head.eyes(*coordinates(p))
+    _, normals, _ = move(rest, normalized(skin.gradient), time)
+    return np.where(skin.value < eyes.value, normals, normalized(eyes.gradient)).T
+
+
+def normalized(vectors: NDArray) -> NDArray:
+    """Vectors (3, N) of length 1."""
+    return vectors / np.sqrt(_dot(vectors, vectors))
+
+
+def _mirror(points: NDArray) -> NDArray:
+    """Factors (3, N) that bring points to the side x >= 0, and back."""
+    factors = np.ones_like(points)
+    factors[0] = np.copysign(1.0, points[0])
+    return factors
+
+
+def _dot(a: NDArray, b: NDArray) -> NDArray:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(axis: tuple[float, float, float], v: NDArray) -> NDArray:
+    k = axis
+    return np.stack([k[1] * v[2] - k[2] * v[1], k[2] * v[0] - k[0] * v[2], k[0] * v[1] - k[1] * v[0]])
+
+
+def _rotate(axis: tuple[float, float, float], v: NDArray, angle: NDArray) -> NDArray:
+    """Vectors (3, N) turned about a unit axis by angles (N,) (Rodrigues)."""
+    along = (axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2]) * (1.0 - np.cos(angle))
+    return v * np.cos(angle) + _cross(axis, v) * np.sin(angle) + _column(axis, v) * along
+
+
+def _column(values: tuple[float, float, float], like: NDArray) -> NDArray:
+    return np.array(values, like.dtype)[:, None]

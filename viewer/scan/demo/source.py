@@ -1,0 +1,53 @@
+"""The demo scan as a source of frames: a head that speaks, raises its brows, blinks and smiles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..points import PointCloud
+from .asset import rest_points
+from .motion import PERIOD, move
+
+_MOST_GROWTH = 4.0  # of area; beyond it, at the corners of the mouth, larger radii would stick out
+
+
+class DemoSource:
+    """64 poses of a head in one loop of 2.56 s, computed when asked for.
+
+    Point i is the same point of the subject in every pose. Each cloud has normals, colours,
+    radii (1.5 times the local spacing) and the scalar `displacement`, mm from the pose at rest.
+    """
+
+    name = "demo"
+    unit = "mm"
+    fps = 25.0
+
+    def __len__(self) -> int:
+        return round(PERIOD * self.fps)
+
+    def label(self, index: int) -> str:
+        """The name of a pose."""
+        return f"demo {index:02d}"
+
+    def times(self) -> NDArray[np.float64]:
+        """(T,) seconds."""
+        return np.arange(len(self)) / self.fps
+
+    def load(self, index: int) -> PointCloud:
+        """Compute one pose; the first call reads the points at rest."""
+        rest = rest_points()
+        skin = slice(0, rest.skin)
+        positions, normals, radii = rest.positions.copy(), rest.normals.copy(), rest.radii.copy()
+        positions[:, skin], normals[:, skin], growth = move(
+            rest.positions[:, skin], rest.normals[:, skin], index / self.fps
+        )
+        radii[skin] *= np.sqrt(np.clip(growth, 1.0, _MOST_GROWTH))
+        return PointCloud.from_arrays(
+            np.ascontiguousarray(positions.T),
+            normals=normals.T,
+            colors=rest.colors,
+            radii=radii,
+            scalars={"displacement": np.sqrt(np.square(positions - rest.positions).sum(axis=0))},
+            origin=np.zeros(3),
+        )
