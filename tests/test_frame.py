@@ -14,7 +14,7 @@ import viewer
 from viewer.backends import Backend
 from viewer.camera import Camera
 from viewer.errors import InputError
-from viewer.frame import Request, default_backend, render_frame
+from viewer.frame import Request, choose, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.params import param
@@ -38,13 +38,16 @@ def test_render_takes_parameters_by_name_and_explains_wrong_ones() -> None:
     thin = viewer.render(sphere(3000), size=(60, 40), backend="surfels", radius_scale=0.3)
     thick = viewer.render(sphere(3000), size=(60, 40), backend="surfels")
     assert thin.coverage.sum() < thick.coverage.sum()
-    with pytest.raises(InputError, match=r"unknown parameter of 'points' 'radius'. Known: size"):
+    with pytest.raises(InputError, match=r"unknown parameter of 'points' 'radius'. Known: point_size"):
         viewer.render(sphere(10), backend="points", radius=2)
 
 
 def test_the_default_follows_what_the_scan_stores() -> None:
-    assert default_backend(sphere(10)) == "surfels"
-    assert default_backend(BARE) == "points"
+    assert choose(sphere(10))[0] == "surfels"
+    assert choose(BARE)[0] == "points"
+    assert choose(BARE)[1].point_size == 0
+    assert choose(BARE, "points")[1].point_size == 1
+    assert choose(BARE, None, {"point_size": "3"})[1].point_size == 3
     assert viewer.render(sphere(10), size=(8, 8)).stats.backend == "surfels"
     assert viewer.render(BARE, size=(8, 8)).stats.backend == "points"
 

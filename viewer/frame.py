@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -23,7 +24,7 @@ FALLBACK = "points"
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a picture shows. backend: None for the default of the scan (see `default_backend`).
+    """What a picture shows. backend: None for the default of the scan (see `choose`).
 
     params: the backend's own `Params`; None for its defaults.
     """
@@ -55,8 +56,8 @@ def render_frame(
     timers.start_frame()
 
     pose = renderer.resident(request.pose)
-    name = request.backend or default_backend(pose.stored)
-    params = request.params if request.params is not None else find_backend(name).params()
+    name, params = choose(pose.stored, request.backend)
+    params = params if request.params is None else request.params
     prepared = renderer.prepare(pose, find_backend(name), params, request.look, wait)
     if prepared is None:
         name, params, look = FALLBACK, find_backend(FALLBACK).params(), _unlit(request.look)
@@ -85,9 +86,20 @@ def _unlit(look: Look) -> Look:
     return replace(look, light="auto", color_by=color_by)
 
 
-def default_backend(cloud: PointCloud) -> str:
-    """Surfels where the scan has normals, else points: a default never waits for an estimate."""
-    return "points" if cloud.normals is None else "surfels"
+def choose(
+    cloud: PointCloud, name: str | None = None, values: Mapping[str, object] | None = None
+) -> tuple[str, Any]:
+    """(backend name, its parameters) for a scan: what the user named, the rest by default.
+
+    name: None takes surfels where the scan stores normals, else points as large as it takes
+    to touch their neighbours: a default never waits for an estimate. values: parameters by
+    name. Raises InputError for unknown names.
+    """
+    if name is not None:
+        return name, find_backend(name).params(values)
+    if cloud.normals is not None:
+        return "surfels", find_backend("surfels").params(values)
+    return "points", find_backend("points").params({"point_size": 0, **(values or {})})
 
 
 def render(
@@ -101,14 +113,14 @@ def render(
     """The work of `viewer.render`: one picture, on a headless context that later calls share."""
     if isinstance(pose, PointCloud):
         pose = Pose(0, 0.0, "points", pose)
-    renderer = _shared_renderer()
+    renderer = shared_renderer()
     resident = renderer.resident(pose)
-    name = backend or default_backend(pose.cloud)
+    name, chosen = choose(pose.cloud, backend, params)
     request = Request(
         pose=pose,
         camera=camera or Camera.orbit(resident.bounds, aspect=size[0] / size[1]),
         backend=name,
-        params=find_backend(name).params(params),
+        params=chosen,
         look=look or Look(),
     )
     surface = Surface(renderer.gpu, size)
@@ -118,5 +130,9 @@ def render(
 
 
 @cache
-def _shared_renderer() -> Renderer:
+def shared_renderer() -> Renderer:
+    """The headless renderer of this process, on the first device unless SCAN4D_DEVICE says otherwise.
+
+    One context a process: drivers and moderngl do not go well with several.
+    """
     return Renderer()

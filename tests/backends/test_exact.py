@@ -37,7 +37,7 @@ def test_one_point_on_its_pixel_with_its_depth(draw: Draw) -> None:
 @pytest.mark.parametrize("size", [1, 2, 3, 8])
 def test_a_point_is_a_square_of_its_size(draw: Draw, size: int) -> None:
     cloud = PointCloud.from_arrays([[0.01, -0.01, -2.0]])
-    surface = draw(cloud, looking_down_z(fov_y=90), params={"size": size})
+    surface = draw(cloud, looking_down_z(fov_y=90), params={"point_size": size})
     rows, columns = np.nonzero(surface.id == 0)
     assert len(rows) == size * size
     assert np.ptp(rows) == np.ptp(columns) == size - 1
@@ -243,3 +243,14 @@ def test_automatic_choices_do_not_depend_on_what_was_estimated_before(renderer: 
     assert pose.cloud.normals is None
     np.testing.assert_array_equal(picture(None, Look()), before)
     np.testing.assert_array_equal(picture("surfels", Look()), uniform)
+
+
+def test_points_can_be_as_large_as_it_takes_to_touch(draw: Draw) -> None:
+    cloud = plane(60, 3.0)
+    camera = looking_down_z(fov_y=40)
+    touching = draw(cloud, camera, (300, 300), params={"point_size": 0})
+    assert touching.coverage.mean() > 0.97
+    assert draw(cloud, camera, (300, 300)).coverage.mean() < 0.1
+    far = draw(cloud, Camera(eye=(0, 0, 300), target=(0, 0, 0)), (300, 300), params={"point_size": 0})
+    near = draw(cloud, Camera(eye=(0, 0, 300), target=(0, 0, 0)), (300, 300), params={"point_size": 1})
+    np.testing.assert_array_equal(far.id, near.id)

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -83,7 +83,7 @@ class Backend:
         """Its parameters as declared."""
         return describe(self.module.Params)
 
-    def params(self, values: dict[str, object] | None = None) -> Any:
+    def params(self, values: Mapping[str, object] | None = None) -> Any:
         """Its parameters, with these values in place of defaults; raises InputError."""
         return parse(self.module.Params, values or {}, f"parameter of '{self.name}'")
 

@@ -6,6 +6,7 @@ there are far fewer points than pixels, the points list the pixels to be shaded.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import moderngl
@@ -13,8 +14,10 @@ import moderngl
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import scatter
 from ..gpu.surface import Surface
+from ..gpu.view import View
 from ..params import param
 from ..scan.points import PointCloud
+from ..scan.spacing import typical_spacing
 from . import FrameView
 
 TITLE = "Points"
@@ -22,13 +25,21 @@ TITLE = "Points"
 # The points can list the pixels that they hit, at a third pass over the points; looking for
 # the covered pixels costs about as much as that pass over this share of their number.
 _LIST_BELOW = 0.25
+# Points are not on a grid: squares a little larger than the spacing leave few gaps.
+_OVERLAP, _LARGEST = 1.25, 8
 
 
 @dataclass(frozen=True)
 class Params:
     """Parameters of the points backend."""
 
-    size: int = param(1, "Edge of a point's square, pixels", low=1, high=32, sweep=(1, 2, 4))
+    point_size: int = param(
+        1,
+        "Edge of a point's square, pixels; 0: as far as the next point",
+        low=0,
+        high=32,
+        sweep=(1, 2, 4),
+    )
 
 
 def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
@@ -39,12 +50,13 @@ def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter the points; always complete."""
     params: Params = frame.params
+    size = params.point_size or _touching(pose, frame.view)
     count, pixels = len(pose.cloud), surface.size[0] * surface.size[1]
-    sparse = count * params.size**2 < _LIST_BELOW * pixels
+    sparse = count * size**2 < _LIST_BELOW * pixels
 
     def bind(program: moderngl.ComputeShader) -> None:
         pose.array("positions").bind(2)
-        pose.gpu.set(program, point_size=params.size)
+        pose.gpu.set(program, point_size=size)
 
     scatter(
         pose.gpu,
@@ -53,9 +65,17 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.depths,
         surface.rows,
         bind,
-        defines={"POINT_SIZE": 1 if params.size == 1 else 0},
+        defines={"POINT_SIZE": int(size == 1)},
         listed=surface.take_covered() if sparse else None,
     )
     if sparse:
         surface.stats.skipped["compact"] = "few points: they list the pixels themselves"
     return False
+
+
+def _touching(pose: GpuPose, view: View) -> int:
+    """The size at which squares in the middle of the scan touch their neighbours, pixels."""
+    spacing = pose.remember("spacing", lambda: typical_spacing(pose.cloud))
+    depth = max(view.depth_of(pose.bounds.center - pose.cloud.origin), view.near)
+    pixels = spacing * view.scale / (depth if view.perspective else 1.0)
+    return min(max(math.ceil(_OVERLAP * pixels), 1), _LARGEST)

@@ -72,7 +72,7 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     pose, view = surface.pose, surface.view
     source, bounds = value_source(look, pose.cloud), pose.bounds
     if source == "depth":
-        middle = -float((view.rotation @ (bounds.center - pose.cloud.origin) + view.translation)[2])
+        middle = view.depth_of(bounds.center - pose.cloud.origin)
         low, high = middle - bounds.radius, middle + bounds.radius
     elif source == "height":
         low, high = sorted((float(bounds.low @ view.up), float(bounds.high @ view.up)))

@@ -78,6 +78,10 @@ class View:
         center = np.array(self.size) / 2
         return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
 
+    def depth_of(self, position: NDArray[np.floating]) -> float:
+        """Depth of one point (3,), relative to the origin."""
+        return -float(self.rotation[2] @ position + self.translation[2])
+
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""
         with np.errstate(divide="ignore", invalid="ignore"):  # a point in the eye's plane is out of range

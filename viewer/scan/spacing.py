@@ -6,7 +6,7 @@ import numpy as np
 
 from .points import PointCloud
 
-_DISTANCES = 4_000_000  # point-to-point distances looked at
+_DISTANCES = 2_000_000  # point-to-point distances looked at
 _NEAREST = 128  # of these, so that each of six neighbours may have twenty copies
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
 

@@ -1,0 +1,86 @@
+"""List the renderer backends and their parameters."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+import numpy as np
+
+from ..backends import Backend
+from ..backends import backends as all_backends
+from ..errors import NoOpenGLError
+from ..params import Parameter
+from ..scan.points import PointCloud
+from . import drawing
+
+_NO_POINTS = PointCloud.from_arrays(np.zeros((0, 3)))
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d backends`."""
+    parser.add_argument("--json", action="store_true", help="as a JSON list")
+
+
+def run(args: Namespace) -> int:
+    """Print them."""
+    obstacle = _obstacle(args.device)
+    if args.json:
+        print(json.dumps([describe(b, obstacle) for b in all_backends().values()], indent=2))
+    else:
+        print("\n\n".join(_as_text(b) for b in all_backends().values()))
+        if obstacle:
+            print(f"\nNone of them is available here: {obstacle}")
+    return 0
+
+
+def describe(backend: Backend, obstacle: str | None) -> dict[str, Any]:
+    """The declaration of a backend as plain values. obstacle: why it is not available."""
+    return {
+        "name": backend.name,
+        "title": backend.title,
+        "help": backend.help,
+        "needs": list(backend.needs(_NO_POINTS, backend.params())),
+        "available": obstacle is None,
+        "why_not": obstacle,
+        "parameters": [_parameter(p) for p in backend.parameters],
+    }
+
+
+def _parameter(parameter: Parameter) -> dict[str, Any]:
+    facts = parameter.to_json()
+    facts["range"] = [facts.pop("low"), facts.pop("high")]
+    return facts
+
+
+def _obstacle(device: int | None) -> str | None:
+    """Why nothing can be drawn on this machine; None where it can."""
+    try:
+        drawing.renderer(device)
+    except NoOpenGLError as error:
+        return str(error)
+    return None
+
+
+def _as_text(backend: Backend) -> str:
+    rows = [(p.name, _value(p.default), _domain(p), p.help) for p in backend.parameters]
+    widths = [max(len(row[column]) for row in rows) for column in range(3)] if rows else []
+    lines = [
+        "  " + "  ".join([*(f"{c:{w}}" for c, w in zip(row, widths, strict=False)), row[3]]) for row in rows
+    ]
+    return "\n".join([f"{backend.name}: {backend.help}", *lines])
+
+
+def _value(value: object) -> str:
+    return "auto" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _domain(parameter: Parameter) -> str:
+    """What values it takes: its choices, or its type and range."""
+    if parameter.choices:
+        return "|".join(parameter.choices)
+    if parameter.low is None and parameter.high is None:
+        return parameter.type.__name__
+    low, high = ("" if limit is None else f"{limit:g}" for limit in (parameter.low, parameter.high))
+    return f"{parameter.type.__name__} {low}..{high}"

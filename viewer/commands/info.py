@@ -1,0 +1,97 @@
+"""Tell what a scan holds; reads its first readable pose alone."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
+from .scans import SCAN_HELP, first_readable, open_timeline
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d info`."""
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
+    parser.add_argument("--json", action="store_true", help="as a JSON object")
+
+
+def run(args: Namespace) -> int:
+    """Print it."""
+    with open_timeline(args, args.scan) as timeline:
+        facts = describe(timeline, first_readable(timeline))
+    print(json.dumps(facts, indent=2, allow_nan=False) if args.json else _as_text(facts))
+    return 0
+
+
+def describe(timeline: Timeline, pose: Pose) -> dict[str, Any]:
+    """What is known of a scan from one pose, as plain values. Lengths in scan units, times in seconds."""
+    cloud, times = pose.cloud, timeline.times
+    steps = np.diff(times)
+    low, high = ([float(f(column)) for column in cloud.positions.T] for f in (np.min, np.max))
+    return {
+        "name": timeline.name,
+        "poses": len(timeline),
+        "unit": timeline.unit,
+        "times": {
+            "first": float(times[0]),
+            "last": float(times[-1]),
+            "median_step": float(np.median(steps)) if len(steps) else None,
+        },
+        "pose": pose.index,
+        "label": pose.label,
+        "points": len(cloud),
+        "dropped": cloud.dropped,
+        "bytes": cloud.nbytes,
+        "origin": cloud.origin.tolist(),
+        "bounds": {"low": (cloud.origin + low).tolist(), "high": (cloud.origin + high).tolist()},
+        "attributes": {
+            name: {"type": str(values.dtype), "columns": values[:1].size, "range": _range(values)}
+            for name, values in _attributes(cloud).items()
+        },
+    }  # fmt: skip
+
+
+def _attributes(cloud: PointCloud) -> dict[str, NDArray]:
+    named = {"normals": cloud.normals, "colors": cloud.colors, "radii": cloud.radii}
+    return {name: values for name, values in named.items() if values is not None} | dict(cloud.scalars)
+
+
+def _range(values: NDArray) -> list[float] | None:
+    """[lowest, highest] of the finite values, None where there is none."""
+    finite = values[np.isfinite(values)]
+    return [float(finite.min()), float(finite.max())] if finite.size else None
+
+
+def _as_text(facts: dict[str, Any]) -> str:
+    times, unit = facts["times"], facts["unit"]
+    low, high = facts["bounds"]["low"], facts["bounds"]["high"]
+    poses = f"{facts['poses']}"
+    if times["median_step"]:
+        poses += f", {times['first']:g} to {times['last']:g} s, {1 / times['median_step']:g} a second"
+    points = f"{facts['points']:,}"
+    if facts["dropped"]:
+        points += f" ({facts['dropped']:,} with a NaN or infinite coordinate left out)"
+    rows = [
+        ("scan", facts["name"]),
+        ("poses", poses),
+        ("pose", f"{facts['pose']}, {facts['label']}"),
+        ("points", points),
+        ("unit", unit),
+        ("size", " x ".join(f"{b - a:g}" for a, b in zip(low, high, strict=True))),
+        ("from", ", ".join(f"{value:g}" for value in low)),
+        ("to", ", ".join(f"{value:g}" for value in high)),
+        ("origin", ", ".join(f"{value:g}" for value in facts["origin"])),
+        ("memory", f"{facts['bytes'] / 1e6:.1f} MB a pose"),
+    ]
+    for name, attribute in facts["attributes"].items():
+        span = "no finite value" if attribute["range"] is None else "{:g} to {:g}".format(*attribute["range"])
+        columns = f" x {attribute['columns']}" if attribute["columns"] > 1 else ""
+        rows.append((name, f"{attribute['type']}{columns}, {span}"))
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:{width}}  {value}" for name, value in rows)

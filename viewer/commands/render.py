@@ -1,0 +1,164 @@
+"""Draw pictures of a scan without a window.
+
+OUT is a .png, .exr or .npz file, a .mp4 film, or for several pictures a numbered pattern
+such as out%04d.png. PNG and MP4 show the look; EXR and NPZ hold what each pixel sees.
+The camera is fitted to the first pose drawn and stays where it is.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from ..backends import backend as find_backend
+from ..camera import Camera
+from ..errors import InputError
+from ..export import FILM_SUFFIX, PICTURE_SUFFIXES, check_output, pictures, whole_file
+from ..frame import Request, choose
+from ..look import Look
+from ..params import parse
+from ..renderer import Renderer
+from ..scan.points import Bounds
+from ..scan.timeline import Timeline
+from . import drawing, stats
+from .console import progress
+from .drawing import Shot
+from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline, read_poses
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d render`."""
+    parser.add_argument("scan", metavar="SCAN", nargs="?", default="demo", help=SCAN_HELP)
+    parser.add_argument(
+        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
+        help=".png .exr .npz .mp4, or a pattern with %%04d",
+    )  # fmt: skip
+    add_pose_arguments(parser)
+    picture = parser.add_argument_group("the picture")
+    picture.add_argument("--size", type=_size, default=(1920, 1280), metavar="WxH", help="default 1920x1280")
+    picture.add_argument(
+        "--backend", metavar="NAME", help="default: surfels where normals are stored, else points"
+    )
+    picture.add_argument(
+        "--set", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
+        help="the backend's parameters; 'scan4d backends' lists them",
+    )  # fmt: skip
+    picture.add_argument(
+        "--look", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
+        help="lighting, colours and background",
+    )  # fmt: skip
+    camera = parser.add_argument_group("from where").add_mutually_exclusive_group()
+    camera.add_argument("--camera", type=Camera.load, metavar="FILE.json", help="as a file has it")
+    camera.add_argument(
+        "--orbit", type=_orbit, default=(0.0, 0.0), metavar="AZIMUTH,ELEVATION[,DISTANCE]",
+        help="degrees, and scan units; without a distance, fitted",
+    )  # fmt: skip
+    camera.add_argument(
+        "--turntable", type=_count, metavar="N", help="all round in N pictures; several poses play on the way"
+    )
+    measuring = parser.add_argument_group("measuring")
+    measuring.add_argument("--stats", type=Path, metavar="FILE.json", help="write what the pictures took")
+    measuring.add_argument(
+        "--repeat", type=_count, metavar="N", help="medians of N draws after two warm-ups in --stats"
+    )
+
+
+def run(args: Namespace) -> int:
+    """Draw what is asked for; broken frames among several are left out."""
+    if args.repeat and not args.stats:
+        raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
+    if args.stats:
+        check_output(args.stats, (".json",), several=False)
+    look, values = parse(Look, dict(args.look), "look"), dict(args.set)
+    if args.backend:
+        find_backend(args.backend).params(values)  # wrong names are told before anything is read
+    with open_timeline(args, args.scan) as timeline:
+        indices = chosen_poses(args, timeline) or [0]
+        shots = drawing.shots(indices, args.turntable)
+        check_output(args.out, (*PICTURE_SUFFIXES, FILM_SUFFIX), several=len(shots) > 1)
+        fps = drawing.film_rate(timeline, indices, args.fps)
+        draws = len(shots) * stats.draw_count(args.repeat)
+        frames = []
+        with (
+            drawing.canvas(args.device, args.size) as (renderer, surface),
+            pictures(args.out, args.size, fps) as put,
+            progress(draws) as tick,
+        ):
+            for shot, request in _requests(args, timeline, renderer, shots, look, values):
+                if args.stats:
+                    frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
+                else:
+                    stats.draw(renderer, request, surface)
+                    tick()
+                put(surface, shot.number)
+            if args.stats:
+                _write_json(stats.summary(renderer, surface, request, frames), args.stats)
+    print(args.out)
+    return 0
+
+
+def _write_json(data: dict[str, Any], path: Path) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+
+
+def _requests(
+    args: Namespace,
+    timeline: Timeline,
+    renderer: Renderer,
+    shots: list[Shot],
+    look: Look,
+    values: dict[str, object],
+) -> Iterator[tuple[Shot, Request]]:
+    """What to draw for each shot. The first pose settles the backend and the camera."""
+    chosen, camera_of = None, None
+    for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
+        chosen = chosen or choose(pose.cloud, args.backend, values)
+        camera_of = camera_of or _camera(args, renderer.resident(pose).bounds, shots)
+        for shot in shots:
+            if shot.pose == pose.index:
+                yield shot, Request(pose, camera_of(shot), *chosen, look)
+
+
+def _camera(args: Namespace, bounds: Bounds, shots: list[Shot]) -> Callable[[Shot], Camera]:
+    """The camera of each shot. bounds: of the first pose."""
+    aspect = args.size[0] / args.size[1]
+    if args.turntable:
+        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, args.up)
+    camera = args.camera or Camera.orbit(bounds, *args.orbit, aspect=aspect, up=args.up)
+    return lambda shot: camera
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch("([0-9]+)[xX]([0-9]+)", text)
+    if not match:
+        raise ArgumentTypeError(f"'{text}' is no size; give width and height as in 1920x1280")
+    return int(match[1]), int(match[2])
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise ArgumentTypeError(f"'{text}' is not key=value")
+    return name, value
+
+
+def _orbit(text: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
+        raise ArgumentTypeError(f"'{text}' is no AZIMUTH,ELEVATION[,DISTANCE] such as 30,15")
+    return numbers
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise ArgumentTypeError(f"'{text}' is no number of at least 1")
+    return int(text)

@@ -1,0 +1,99 @@
+"""Scans as the command line names them: opened, their poses chosen, and read one after another."""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Sequence
+
+from ..errors import InputError
+from ..scan.open import open_scan
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
+from .console import warn
+
+SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'frame*.ply', or demo"
+
+
+def add_pose_arguments(parser: ArgumentParser) -> None:
+    """The arguments that choose poses."""
+    group = parser.add_argument_group("which poses").add_mutually_exclusive_group()
+    group.add_argument("--pose", type=int, metavar="I", help="one pose, counted from 0")
+    group.add_argument("--time", type=float, metavar="S", help="the pose nearest to a time in seconds")
+    group.add_argument("--poses", metavar="A:B[:STEP]", help="from A up to but not including B")
+    group.add_argument("--all", action="store_true", help="all poses")
+
+
+def open_timeline(args: Namespace, scan: str) -> Timeline:
+    """Open a scan with the unit and the frame rate of the command line. Raises InputError."""
+    return open_scan(scan, unit=args.unit, fps=args.fps)
+
+
+def chosen_poses(args: Namespace, timeline: Timeline) -> list[int] | None:
+    """The indices that the arguments choose, at least one; None where they leave it open.
+
+    Raises InputError where there is no such pose.
+    """
+    if args.pose is not None:
+        timeline.label(args.pose)  # raises where there is none
+        return [args.pose]
+    if args.time is not None:
+        return [timeline.nearest(args.time)]
+    if args.poses is not None:
+        return _poses_between(args.poses, timeline)
+    return list(range(len(timeline))) if args.all else None
+
+
+def _poses_between(text: str, timeline: Timeline) -> list[int]:
+    match = re.fullmatch(r"(\d*):(\d*)(?::0*([1-9]\d*))?", text)
+    if not match:
+        raise InputError(
+            f"'{text}' is no range of poses", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
+        )
+    start, stop, step = (int(part) if part else None for part in match.groups())
+    indices = list(range(len(timeline)))[start:stop:step]
+    if not indices:
+        raise InputError(
+            f"there is no pose in {text}", timeline.name, f"It has the poses 0 to {len(timeline) - 1}"
+        )
+    return indices
+
+
+def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
+    """The poses of these indices, the next one being read while one is in use.
+
+    Where several are asked for, broken ones are reported and left out. Raises InputError
+    where none is left.
+    """
+    said, found = 0, False
+    for place, index in enumerate(indices):
+        try:
+            pose = timeline.pose(index)
+        except InputError:
+            if len(indices) == 1:
+                raise
+            said = _report(timeline, said)
+            continue
+        said, found = _report(timeline, said), True
+        if place + 1 < len(indices):
+            timeline.request(indices[place + 1])
+        yield pose
+    if not found:
+        raise InputError(f"none of its {len(indices)} frames can be read", timeline.name)
+
+
+def first_readable(timeline: Timeline) -> Pose:
+    """The first pose that is not broken, and no other is read. Raises InputError where all are."""
+    pose = next(iter(timeline), None)
+    if pose is None:
+        raise timeline.broken[0]
+    _report(timeline, 0)
+    return pose
+
+
+def _report(timeline: Timeline, said: int) -> int:
+    """Say the timeline's messages from number `said` on; how many are said now."""
+    messages = timeline.messages[said:]
+    for notice in messages:
+        warn(f"{timeline.name}: {notice.text}")
+    return said + len(messages)

@@ -1,0 +1,88 @@
+"""Open scans in a window; the demo scan where none is named.
+
+Where no window can be opened, --fallback plays them without one: into numbered PNGs, a
+contact sheet and a film.
+"""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from ..camera import Camera
+from ..errors import InputError, NoOpenGLError
+from ..export import contact_sheet, film, thumbnail, write_png
+from ..frame import Request
+from . import drawing, stats
+from .console import progress
+from .doctor import display
+from .scans import SCAN_HELP, open_timeline, read_poses
+
+_SIZE = (1200, 800)
+_SHEET_PICTURES = 25  # at most, on a contact sheet
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d view`."""
+    parser.add_argument("scans", metavar="SCAN", nargs="*", help=SCAN_HELP)
+    parser.add_argument(
+        "--fallback", type=Path, metavar="DIR", help="where no window can be opened, play into this folder"
+    )
+
+
+def run(args: Namespace) -> int:
+    """Open the window, or play without one."""
+    scans = args.scans or ["demo"]
+    try:
+        return _open_window(args, scans)
+    except NoOpenGLError as error:
+        if args.fallback is None:
+            raise
+        print(f"No window: {error.what}. Playing into {args.fallback} instead.", flush=True)
+    try:
+        args.fallback.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made: {error.strerror}", args.fallback) from error
+    for number, scan in enumerate(scans):
+        _play(args, scan, f"{number}_" if len(scans) > 1 else "")
+    return 0
+
+
+def _open_window(args: Namespace, scans: list[str]) -> int:
+    if display() is None:
+        raise NoOpenGLError(
+            "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)",
+            hint="Use --fallback DIR to play into a folder, or 'scan4d render'",
+        )
+    from .. import app
+
+    return app.run(scans, unit=args.unit, fps=args.fps, up=args.up, device=args.device)
+
+
+def _play(args: Namespace, scan: str, prefix: str) -> None:
+    """Draw all poses of a scan into the folder, and say what is there."""
+    with open_timeline(args, scan) as timeline:
+        stem = prefix + re.sub(r"[^\w-]+", "_", timeline.name)
+        name = str(args.fallback / stem)
+        indices = list(range(len(timeline)))
+        on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
+        fps = drawing.film_rate(timeline, indices, args.fps)
+        camera, thumbnails = None, []
+        with (
+            drawing.canvas(args.device, _SIZE) as (renderer, surface),
+            film(f"{name}.mp4", _SIZE, fps) as add,
+            progress(len(indices)) as tick,
+        ):
+            for pose in read_poses(timeline, indices):
+                bounds = renderer.resident(pose).bounds
+                camera = camera or Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=args.up)
+                stats.draw(renderer, Request(pose, camera), surface)
+                image = surface.image()
+                write_png(image, f"{name}_{pose.index:04d}.png")
+                add(image)
+                if pose.index in on_sheet:
+                    thumbnails.append(thumbnail(image))
+                tick()
+    contact_sheet(thumbnails, f"{name}_contact_sheet.png")
+    print(f"{name}_%04d.png\n{name}_contact_sheet.png\n{name}.mp4")
