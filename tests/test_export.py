@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scenes import sphere
 from written import bits, film, picture
 
-from viewer import export
+from viewer import export, files
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.gpu.surface import NOTHING, Surface
@@ -151,7 +151,7 @@ def test_a_film_too_large_for_its_codec_is_one_message(tmp_path: Path) -> None:
 def test_a_whole_file_appears_at_the_end(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with export.whole_file(path) as temporary:
+    with files.whole_file(path) as temporary:
         temporary.write_text("new")
         assert path.read_text() == "old"
     assert path.read_text() == "new"
@@ -164,7 +164,7 @@ def test_a_failed_file_leaves_the_old_one(error: BaseException, tmp_path: Path) 
     path.write_text("old")
     with (  # noqa: PT012
         pytest.raises(InputError if isinstance(error, OSError) else type(error)),
-        export.whole_file(path) as temporary,
+        files.whole_file(path) as temporary,
     ):
         temporary.write_text("half")
         raise error
@@ -177,7 +177,7 @@ def test_a_failed_file_leaves_the_old_one(error: BaseException, tmp_path: Path) 
 def test_a_full_disk_is_one_message_and_leaves_nothing(suffix: str, tmp_path: Path) -> None:
     code = f"""
 import resource, numpy as np
-from viewer import export
+from viewer import export, files
 class Noise:
     def image(self): return np.random.default_rng(0).integers(0, 255, (480, 640, 4), np.uint8)
     def arrays(self):

@@ -7,7 +7,6 @@ unshaded. Every file takes its name only when it is complete.
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .files import whole_file
 from .look import Look, rgba
 
 if TYPE_CHECKING:
@@ -35,25 +35,6 @@ _THUMBNAIL_WIDTH = 320  # pixels
 _SHEET_GAP = 4  # pixels
 _MPEG4_BIT_RATE = 20_000_000
 _BT709, _LIMITED_RANGE = 1, 1  # as video streams code them
-
-
-@contextmanager
-def whole_file(path: Path | str) -> Iterator[Path]:
-    """A temporary path in the same folder; it becomes `path` only if the block ends well.
-
-    Whatever goes wrong, a former file of that name stays as it was and nothing else remains.
-    Raises InputError where the file cannot be written.
-    """
-    path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        what = f"cannot be written: {error.strerror or error}"
-        raise InputError(what, path, "Check free space and permissions") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 # --- where pictures go ----------------------------------------------------------------------

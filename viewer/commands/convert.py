@@ -11,7 +11,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from ..errors import InputError
-from ..export import check_output, is_pattern, numbered, whole_file
+from ..export import check_output, is_pattern, numbered
+from ..files import whole_file
 from ..scan import formats
 from ..scan.times import TIMES_FILE
 from .console import progress

@@ -18,7 +18,8 @@ from typing import Any
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError
-from ..export import FILM_SUFFIX, PICTURE_SUFFIXES, check_output, pictures, whole_file
+from ..export import FILM_SUFFIX, PICTURE_SUFFIXES, check_output, pictures
+from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look
 from ..params import parse

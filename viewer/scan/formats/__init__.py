@@ -14,7 +14,6 @@ Modules whose name starts with an underscore are helpers.
 
 from __future__ import annotations
 
-import os
 import pkgutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError, unknown_name
+from ...files import whole_file
 from ..points import PointCloud
 
 
@@ -89,13 +89,9 @@ def write(path: Path | str, cloud: PointCloud) -> None:
     if not path.parent.is_dir():
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
     module = _formats()[suffix]
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-    with _one_message(path, f"cannot be written as {module.TITLE}", "Check free space and permissions"):
-        try:
-            module.write(temporary, cloud)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+    problem = f"cannot be written as {module.TITLE}", "Check free space and permissions"
+    with _one_message(path, *problem), whole_file(path) as temporary:
+        module.write(temporary, cloud)
 
 
 @cache

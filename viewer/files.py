@@ -1,0 +1,29 @@
+"""Files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import InputError
+
+
+@contextmanager
+def whole_file(path: Path | str) -> Iterator[Path]:
+    """A temporary path in the same folder; it becomes `path` only if the block ends well.
+
+    Whatever goes wrong, a former file of that name stays as it was and nothing else remains.
+    Raises InputError where the file cannot be written.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        what = f"cannot be written: {error.strerror or error}"
+        raise InputError(what, path, "Check free space and permissions") from error
+    finally:
+        temporary.unlink(missing_ok=True)
