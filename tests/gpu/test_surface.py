@@ -183,7 +183,7 @@ def test_sparse_points_list_their_pixels_as_a_search_would(
 
 def test_every_point_is_accounted_for(draw: Draw) -> None:
     # In a line along the view axis: the first hides the next, one is behind the eye, one beside.
-    points = [[0, 0, -2.0], [0, 0, -3], [0, 0, 1], [50, 0, -2], [0, 0, 0]]
+    points = [[0, 0, -2.0], [0, 0, -3], [0, 0, 1], [50, 0, -2], [0, 0, 0], [np.nan, 0, 0]]
     camera = Camera(eye=(0, 0, 0), target=(0, 0, -1))
     counts = draw(PointCloud.from_arrays(points), camera, (9, 9)).point_counts()
-    assert counts == {"in": 5, "drawn": 1, "outside": 3, "hidden": 1}
+    assert counts == {"in": 6, "drawn": 1, "dropped": 1, "outside": 3, "hidden": 1}

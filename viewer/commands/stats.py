@@ -10,10 +10,8 @@ from dataclasses import asdict
 from statistics import median
 from typing import Any
 
-import numpy as np
-
 from ..frame import Request, render_frame
-from ..gpu.surface import NOTHING, Surface
+from ..gpu.surface import Surface
 from ..renderer import Renderer
 
 _WARM_UPS = 2
@@ -48,7 +46,6 @@ def draw_measured(
         runs = [draw(renderer, request, surface) for _ in range(repeat or 1)]
     finally:
         timers.enabled = False
-    cloud = request.pose.cloud
     return {
         "pose": request.pose.index,
         "gpu_ms": median(run.total() for run in runs),
@@ -56,7 +53,7 @@ def draw_measured(
         "upload_ms": first.upload_ms,
         "derive_ms": first.derive_ms,
         "passes": [{"name": name, "gpu_ms": median(run[name] for run in runs)} for name in runs[0]],
-        "points": {"in": len(cloud), "drawn": visible_points(surface), "culled": {"dropped": cloud.dropped}},
+        "points": _points(surface),
         "skipped": surface.stats.skipped,
     }
 
@@ -72,10 +69,9 @@ def draw(renderer: Renderer, request: Request, surface: Surface) -> Counter[str]
     return passes
 
 
-def visible_points(surface: Surface) -> int:
-    """How many points have a pixel."""
-    rows = surface.row
-    return len(np.unique(rows[rows != NOTHING]))
+def _points(surface: Surface) -> dict[str, Any]:
+    counts = surface.point_counts()
+    return {"in": counts.pop("in"), "drawn": counts.pop("drawn"), "culled": counts}
 
 
 def summary(

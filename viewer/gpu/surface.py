@@ -198,17 +198,24 @@ class Surface:
         return {name: getattr(self, name) for name in names}
 
     def point_counts(self) -> dict[str, int]:
-        """What became of the points: "in", of these "drawn" (they have a pixel), "outside" (their
-        centre is not in the picture or not between near and far) and "hidden" (the rest)."""
-        rows = self.row
-        shown = np.zeros(len(self._cloud), bool)
+        """What became of the points of the file: "in", and of these "drawn" (they have a pixel),
+        "dropped" (not finite), "outside" (the centre is not in the picture or not between near
+        and far) and "hidden" (the rest)."""
+        cloud, rows = self._cloud, self.row
+        shown = np.zeros(len(cloud), bool)
         shown[rows[rows != NOTHING]] = True
-        within = 0
-        for start in range(0, len(shown), _CHUNK):
+        hidden = 0
+        for start in range(0, len(cloud), _CHUNK):
             part = slice(start, start + _CHUNK)
-            within += int(np.count_nonzero(self.view.contains(self._cloud.positions[part]) & ~shown[part]))
+            hidden += int(np.count_nonzero(self.view.contains(cloud.positions[part]) & ~shown[part]))
         drawn = int(np.count_nonzero(shown))
-        return {"in": len(shown), "drawn": drawn, "outside": len(shown) - drawn - within, "hidden": within}
+        return {
+            "in": len(cloud) + cloud.dropped,
+            "drawn": drawn,
+            "dropped": cloud.dropped,
+            "outside": len(cloud) - drawn - hidden,
+            "hidden": hidden,
+        }
 
     def release(self) -> None:
         """Delete everything it holds on the GPU."""
