@@ -25,8 +25,8 @@ TITLE = "Points"
 # The points can list the pixels that they hit, at a third pass over the points; looking for
 # the covered pixels costs about as much as that pass over this share of their number.
 _LIST_BELOW = 0.25
-# Points are not on a grid: squares a little larger than the spacing leave few gaps.
-_OVERLAP, _LARGEST = 1.25, 8
+# Points are not on a grid: squares larger than the typical spacing leave few gaps.
+_OVERLAP, _LARGEST = 1.6, 12
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..look import Look, color_table, rgba, value_source
 from . import gl
 from .context import Gpu
@@ -72,10 +74,12 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     pose, view = surface.pose, surface.view
     source, bounds = value_source(look, pose.cloud), pose.bounds
     if source == "depth":
-        middle = view.depth_of(bounds.center - pose.cloud.origin)
-        low, high = middle - bounds.radius, middle + bounds.radius
-    elif source == "height":
-        low, high = sorted((float(bounds.low @ view.up), float(bounds.high @ view.up)))
+        middle, axis = view.depth_of(bounds.center - pose.cloud.origin), view.rotation[2]
+    else:
+        middle, axis = float(bounds.center @ view.up), view.up
+    if source in ("depth", "height"):
+        half = float(np.abs(axis) @ (bounds.high - bounds.low)) / 2
+        low, high = middle - half, middle + half
     else:
         low, high = pose.scalar_range(source or "")
     return (low if look.low is None else look.low, high if look.high is None else look.high)
