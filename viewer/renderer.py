@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from collections import OrderedDict
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -28,7 +29,7 @@ class Prepared:
 
 @dataclass
 class _Resident:
-    pose: Pose  # held, so that its identity stays its own
+    pose: weakref.ref[Pose]
     gpu_pose: GpuPose
     derived: dict[Any, Prepared] = field(default_factory=dict)
     jobs: dict[Any, Future[Any]] = field(default_factory=dict)
@@ -45,15 +46,17 @@ class _Resident:
         for prepared in self.derived.values():
             if prepared.derived:
                 prepared.derived.release()
-        self.gpu_pose.release()
 
 
 class Renderer:
     """Keeps poses on the GPU, least recently used out first, within `budget_bytes`.
 
-    The pose being drawn always stays. gpu: None opens a headless context (NoOpenGLError).
-    budget_bytes: None takes 1 GiB on hardware and 128 MiB on software drivers, where it is
-    the same memory that the timeline's cache lives in.
+    The pose being drawn always stays; one that nobody else holds any more goes with the next
+    frame, so that a timeline's cache bounds what is kept here too.
+
+    gpu: None opens a headless context (raises NoOpenGLError). budget_bytes: None takes 1 GiB
+    on hardware and 128 MiB on software drivers, where it is the same memory that the
+    timeline's cache lives in.
     """
 
     def __init__(self, gpu: Gpu | None = None, budget_bytes: int | None = None) -> None:
@@ -70,11 +73,14 @@ class Renderer:
     def resident(self, pose: Pose) -> GpuPose:
         """The pose on the GPU; its arrays are uploaded when something first reads them."""
         key = id(pose)
+        for gone in [k for k, r in self._resident.items() if r.pose() is None]:
+            self._resident.pop(gone).release()
         if key not in self._resident:
-            self._resident[key] = _Resident(pose, GpuPose(self.gpu, pose.cloud))
+            self._resident[key] = _Resident(weakref.ref(pose), GpuPose(self.gpu, pose.cloud))
         self._resident.move_to_end(key)
         while len(self._resident) > 1 and self.nbytes > self.budget_bytes:
             self._resident.popitem(last=False)[1].release()
+        self.gpu.collect()
         return self._resident[key].gpu_pose
 
     def prepare(
@@ -121,6 +127,7 @@ class Renderer:
         self._worker.shutdown(wait=True, cancel_futures=True)
         while self._resident:
             self._resident.popitem()[1].release()
+        self.gpu.collect()
 
 
 def _missing(cloud: PointCloud, backend: Backend, params: Any, look: Look) -> tuple[str, ...]:

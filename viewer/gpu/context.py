@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import moderngl
 
@@ -20,6 +21,13 @@ REQUIRED_VERSION = 430
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
 _GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
+
+
+class Resource(Protocol):
+    """Something on the GPU that is released by hand."""
+
+    def release(self) -> object:
+        """Delete it."""
 
 
 @dataclass
@@ -58,6 +66,7 @@ class Gpu:
         self.max_pixels = gl.integer(0x90DE) // 4  # MAX_SHADER_STORAGE_BLOCK_SIZE, 4 bytes a pixel
         self.max_points = gl.max_texture_buffer_texels()
         self._kept: dict[object, Any] = {}
+        self._discarded: deque[Resource] = deque()
         gl.reverse_depth()
 
     def compute(
@@ -102,6 +111,15 @@ class Gpu:
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
+
+    def discard(self, *resources: Resource | None) -> None:
+        """Have these released by the next `collect`. From any thread, a finalizer's too."""
+        self._discarded.extend(r for r in resources if r is not None)
+
+    def collect(self) -> None:
+        """Release what was discarded; on the GL thread only."""
+        while self._discarded:
+            self._discarded.popleft().release()
 
     def set(self, program: moderngl.Program | moderngl.ComputeShader, **values: Any) -> None:
         """Set uniforms by name; those that the compiler found unused are passed over."""

@@ -28,16 +28,16 @@ class GpuPose:
     """
 
     def __init__(self, gpu: Gpu, cloud: PointCloud) -> None:
+        self.gpu = gpu
+        self._arrays: dict[str, gl.BufferTexture] = {}
         if len(cloud) > gpu.max_points:
             raise InputError(
                 f"{len(cloud):,} points in one pose; this driver takes {gpu.max_points:,}",
                 hint="Split the scan or thin it out",
             )
-        self.gpu = gpu
         self.stored = self.cloud = cloud
         self.uploaded_bytes = 0
         self._upload_ms = 0.0
-        self._arrays: dict[str, gl.BufferTexture] = {}
         self._facts: dict[str, Any] = {}
 
     @cached_property
@@ -90,11 +90,8 @@ class GpuPose:
         taken, self._upload_ms = self._upload_ms, 0.0
         return taken
 
-    def release(self) -> None:
-        """Delete all buffers."""
-        for array in self._arrays.values():
-            array.release()
-        self._arrays.clear()
+    def __del__(self) -> None:
+        self.gpu.discard(*self._arrays.values())
 
 
 def _robust_range(values: NDArray) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ..look import Look, rgba, value_source
 from ..scan.points import PointCloud
 from . import gl
 from .compact import IndexList, list_covered
-from .context import Gpu
+from .context import Gpu, Resource
 from .pose import GpuPose
 from .view import View
 
@@ -47,6 +47,9 @@ class Surface:
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self.gpu = gpu
+        self._resources: tuple[Resource, ...] = ()
+        self._raster: gl.Raster | None = None
         width, height = size
         if width < 1 or height < 1:
             raise InputError(f"a picture of {width}x{height} pixels cannot be drawn")
@@ -56,7 +59,7 @@ class Surface:
                 f"{gpu.max_pixels:,} pixels",
                 hint="Use a smaller --size",
             )
-        self.gpu = gpu
+        gpu.collect()
         self.size = (width, height)
         self.depths = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
         self.rows = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
@@ -67,7 +70,7 @@ class Surface:
         self.stats = Stats()
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
-        self._raster: gl.Raster | None = None
+        self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
     # --- for backends -----------------------------------------------------------------
 
@@ -218,10 +221,12 @@ class Surface:
         }
 
     def release(self) -> None:
-        """Delete everything it holds on the GPU."""
-        for resource in (self.depths, self.rows, self.picture, self._block, self.covered, self._raster):
-            if resource is not None:
-                resource.release()
+        """Give up what it holds on the GPU now; otherwise that goes with the object."""
+        self.gpu.discard(*self._resources, self._raster)
+        self._resources, self._raster = (), None
+
+    def __del__(self) -> None:
+        self.release()
 
     # --- inside -----------------------------------------------------------------------
 
