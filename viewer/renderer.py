@@ -117,10 +117,15 @@ class Renderer:
         if key not in entry.jobs:
             if wait:
                 return timed()
+            self._drop_waiting_jobs()  # for poses that were passed meanwhile
             entry.jobs[key] = self._worker.submit(timed)
         if not (wait or entry.jobs[key].done()):
             return None
         return entry.jobs.pop(key).result()
+
+    def _drop_waiting_jobs(self) -> None:
+        for entry in self._resident.values():
+            entry.jobs = {key: job for key, job in entry.jobs.items() if not job.cancel()}
 
     def release(self) -> None:
         """Delete every pose and stop the worker. The context stays open."""

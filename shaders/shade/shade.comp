@@ -81,7 +81,7 @@ float eye_dome(ivec2 pixel, float depth) {
         float other = depth_at(clamp(pixel + step, ivec2(0), view_size - 1));
         sum += max(0.0, 1.0 - other / depth);
     }
-    return exp(-100.0 * eye_dome_strength * sum);
+    return exp(-50.0 * eye_dome_strength * sum);
 }
 
 vec3 shade(int index) {

@@ -13,8 +13,8 @@ import moderngl
 import numpy as np
 
 if sys.platform.startswith("linux"):
-    # PyOpenGL finds no current context under EGL unless told so. A window sets its own
-    # platform before this module is imported.
+    # Headless contexts come from EGL. In a window the raw functions work all the same: they
+    # only need their addresses, which EGL gives for whichever context is current.
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
 
 import OpenGL

@@ -1,0 +1,134 @@
+"""Playing never waits for the disk."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from viewer.app.playback import Playback
+from viewer.app.session import Session
+from viewer.errors import InputError
+from viewer.scan.points import PointCloud
+from viewer.scan.timeline import Timeline
+
+
+class Frames:
+    """A source that reads a frame whenever the test lets it."""
+
+    name = "frames"
+
+    def __init__(self, count: int, broken: int | None = None) -> None:
+        self.count, self.broken = count, broken
+        self.gate = threading.Semaphore(0)
+        self.loads: list[int] = []  # begun
+
+    def __len__(self) -> int:
+        return self.count
+
+    def label(self, index: int) -> str:
+        return f"{index}.fake"
+
+    def times(self) -> None:
+        return None
+
+    def load(self, index: int) -> PointCloud:
+        self.loads.append(index)
+        self.gate.acquire()
+        if index == self.broken:
+            raise InputError("is broken")
+        return PointCloud.from_arrays(np.full((10, 3), float(index)), origin=np.zeros(3))
+
+
+@pytest.fixture
+def started() -> Iterator[Callable[..., tuple[Playback, Frames]]]:
+    opened: list[tuple[Playback, Frames]] = []
+
+    def start(count: int = 10, broken: int | None = None) -> tuple[Playback, Frames]:
+        source = Frames(count, broken)
+        opened.append((Playback(Timeline(source, np.arange(count) / 10), Session("scan")), source))
+        return opened[-1]
+
+    yield start
+    for playback, source in opened:
+        source.gate.release(1000)
+        playback.close()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for a worker; a minute without it is a failure."""
+    for _ in range(60_000):
+        if condition():
+            return
+        time.sleep(0.001)
+    raise AssertionError("did not come about")
+
+
+def shown(playback: Playback, now: float) -> int | None:
+    playback.advance(now)
+    return playback.pose.index if playback.pose else None
+
+
+def test_the_first_pose_is_waited_for_without_blocking(started: Callable) -> None:
+    playback, source = started()
+    assert shown(playback, 0.0) is None
+    assert playback.waiting
+    source.gate.release()
+    until(lambda: shown(playback, 0.0) == 0)
+    assert not playback.waiting
+
+
+def test_a_slow_disk_shows_the_latest_pose_there_is(started: Callable) -> None:
+    playback, source = started()
+    source.gate.release()
+    until(lambda: shown(playback, 0.0) == 0)
+    playback.toggle(0.0)
+    until(lambda: source.loads == [0, 1])
+    assert shown(playback, 0.55) == 0  # frame 5 is due, only the first is read
+    source.gate.release()
+    until(lambda: shown(playback, 0.58) == 1)
+    source.gate.release()
+    until(lambda: shown(playback, 0.59) == 5)  # the next that it reads is the one that is due
+
+
+def test_a_broken_frame_keeps_the_one_before_and_playing_goes_on(started: Callable) -> None:
+    playback, source = started(broken=1)
+    source.gate.release(1000)
+    until(lambda: shown(playback, 0.0) == 0)
+    playback.toggle(0.0)
+    until(lambda: 1 in playback.timeline.broken)
+    assert shown(playback, 0.15) == 0
+    assert "broken" in str(playback.problem)
+    assert not playback.waiting
+    until(lambda: shown(playback, 0.25) == 2)
+    assert playback.player.playing
+    assert playback.problem is None
+
+
+def test_stepping_pauses_and_asks_for_the_frame(started: Callable) -> None:
+    playback, source = started()
+    source.gate.release(1000)
+    playback.toggle(0.0)
+    playback.step(1, 0.0)
+    assert not playback.player.playing
+    until(lambda: shown(playback, 5.0) == 1)
+
+
+def test_seeking_while_playing_plays_on_from_there(started: Callable) -> None:
+    playback, source = started()
+    source.gate.release(1000)
+    playback.toggle(0.0)
+    playback.seek(6, 0.0)
+    until(lambda: shown(playback, 0.05) == 6)
+    until(lambda: shown(playback, 0.15) == 7)
+
+
+def test_the_loop_begins_anew_at_the_latest_pose_behind(started: Callable) -> None:
+    playback, source = started(count=4)
+    source.gate.release(1000)
+    playback.toggle(0.0)
+    until(lambda: len(playback.timeline.cached()) == 1 and len(playback.timeline.cached()[0]) == 4)
+    assert [shown(playback, t) for t in (0.05, 0.15, 0.25, 0.35, 0.45)] == [0, 1, 2, 3, 0]

@@ -1,0 +1,129 @@
+"""Widgets made from the declarations of parameters (see viewer/params.py)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from imgui_bundle import ImVec2, imgui
+
+from ..look import rgba
+from ..params import Parameter, describe
+
+T = TypeVar("T")
+_LABEL_SHARE = 0.46  # of the width
+_DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
+_DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
+
+
+def edit(values: T, choices: Mapping[str, Sequence[str]] | None = None) -> T:
+    """A row of label and widget for each parameter; the same object while nothing is edited.
+
+    choices: words to choose from, for parameters that declare none.
+    """
+    for parameter in describe(type(values)):
+        old = getattr(values, parameter.name)
+        words = parameter.choices or (choices or {}).get(parameter.name, ())
+        imgui.push_id(parameter.name)
+        label(parameter.name.replace("_", " ").capitalize(), parameter.help)
+        new = _edit_optional(parameter, old) if parameter.optional else _edit(parameter, old, words)
+        imgui.pop_id()
+        if new != old:
+            values = replace(values, **{parameter.name: new})  # type: ignore[type-var]
+    return values
+
+
+def label(text: str, tooltip: str = "") -> None:
+    """A text at the left of a row; the next widget takes the rest of it."""
+    width = imgui.get_content_region_avail().x
+    imgui.align_text_to_frame_padding()
+    imgui.text(text)
+    if tooltip:
+        imgui.set_item_tooltip(tooltip)
+    imgui.same_line(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE)
+    imgui.set_next_item_width(-1)
+
+
+def choose(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:
+    """A combo box; the word that is chosen now."""
+    titles = titles or {}
+    if imgui.begin_combo(f"##{name}", titles.get(current, current)):
+        for word in words:
+            if imgui.selectable(f"{titles.get(word, word)}##{word}", word == current)[0]:
+                current = word
+        imgui.end_combo()
+    return current
+
+
+def _edit_optional(parameter: Parameter, value: Any) -> Any:
+    """A box for "auto", and the widget beside it where that is not ticked."""
+    toggled, auto = imgui.checkbox("auto", value is None)
+    if toggled:
+        value = None if auto else parameter.type(parameter.low or 0)
+    if value is not None:
+        imgui.same_line()
+        imgui.set_next_item_width(-1)
+        value = _edit(parameter, value, parameter.choices)
+    return value
+
+
+def _edit(parameter: Parameter, value: Any, words: Sequence[str]) -> Any:
+    name = "##value"
+    if parameter.type is bool:
+        return imgui.checkbox(name, value)[1]
+    if words:
+        return choose(name, value, words)
+    if parameter.type is str:
+        return _edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
+    return _edit_number(name, parameter, value)
+
+
+def _edit_number(name: str, parameter: Parameter, value: Any) -> Any:
+    low = -math.inf if parameter.low is None else parameter.low
+    high = math.inf if parameter.high is None else parameter.high
+    edit_one = _edit_whole if parameter.type is int else _edit_real
+    changed, new = edit_one(name, value, low, high)
+    return parameter.type(min(max(new, low), high)) if changed else value
+
+
+def _edit_whole(name: str, value: int, low: float, high: float) -> tuple[bool, int]:
+    if math.isfinite(high - low):
+        return imgui.slider_int(name, value, int(low), int(high))
+    return imgui.drag_int(name, value, 0.1)
+
+
+def _edit_real(name: str, value: float, low: float, high: float) -> tuple[bool, float]:
+    if not math.isfinite(high - low):
+        speed = max(abs(value), 1.0) * _DRAG_SPEED
+        changed, new = imgui.drag_float(name, value, speed, format="%.5g")
+    elif low > 0 and high / low > _DECADES:
+        logarithmic = imgui.SliderFlags_.logarithmic.value
+        changed, new = imgui.slider_float(name, value, low, high, "%.3g", logarithmic)
+    else:
+        decimals = min(max(2 - math.floor(math.log10(high - low)), 0), 6)
+        changed, new = imgui.slider_float(name, value, low, high, f"%.{decimals}f")
+    return changed, float(f"{new:.6g}")  # ImGui's float32 has no more digits
+
+
+def _edit_color(name: str, value: str) -> str:
+    red, green, blue, _ = rgba(value)
+    flags = imgui.ColorEditFlags_.display_hex.value
+    changed, new = imgui.color_edit3(name, [red / 255, green / 255, blue / 255], flags)
+    return "#" + "".join(f"{round(255 * c):02x}" for c in new[:3]) + value[7:] if changed else value
+
+
+def _edit_text(name: str, value: str) -> str:
+    entered, new = imgui.input_text(name, value, imgui.InputTextFlags_.enter_returns_true.value)
+    return new if entered else value
+
+
+def icon_button(icon: str, tooltip: str, enabled: bool = True) -> bool:
+    """A square button with one icon; True when it is pressed."""
+    imgui.begin_disabled(not enabled)
+    side = imgui.get_frame_height()
+    pressed = imgui.button(icon, ImVec2(1.3 * side, side))
+    imgui.end_disabled()
+    imgui.set_item_tooltip(tooltip)
+    return pressed
