@@ -55,13 +55,11 @@ def data_dir() -> Path:
 
 
 @pytest.fixture(scope="session")
-def renderer() -> Iterator[Renderer]:
+def renderer() -> Renderer:
     """A headless renderer on whatever OpenGL there is; all GPU tests share it."""
-    from viewer.renderer import Renderer
+    from viewer.frame import shared_renderer
 
-    renderer = Renderer()
-    yield renderer
-    renderer.release()
+    return shared_renderer()
 
 
 @pytest.fixture

@@ -48,12 +48,6 @@ class Done(NamedTuple):
 Run = Callable[..., Done]
 
 
-@pytest.fixture(autouse=True)
-def one_context(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command line draws with the tests' own renderer: two contexts would disturb each other."""
-    monkeypatch.setattr(frame, "shared_renderer", lambda: renderer)
-
-
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Run:
     """run("render", ...): a command line in this process. Nothing ever prints a traceback."""
@@ -269,7 +263,8 @@ def test_a_turntable_goes_round_and_never_cuts(run: Run, tmp_path: Path) -> None
     x, y = np.meshgrid(np.linspace(-5, 5, 100), np.linspace(-1, 1, 20))
     plank = np.stack([np.zeros(x.size), y.ravel(), x.ravel()], axis=1)
     np.savez(tmp_path / "plank.npz", positions=plank)
-    done = run("render", tmp_path / "plank.npz", "-o", tmp_path / "t%d.npz", *SMALL, "--turntable", 4)
+    turn = ("--turntable", 4, "--backend", "points")
+    done = run("render", tmp_path / "plank.npz", "-o", tmp_path / "t%d.npz", *SMALL, *turn)
     assert done.code == 0
     surfaces = [stored(tmp_path / f"t{k}.npz") for k in range(4)]
     seen = [surface["id"] != NOTHING for surface in surfaces]

@@ -131,8 +131,5 @@ def render(
 
 @cache
 def shared_renderer() -> Renderer:
-    """The headless renderer of this process, on the first device unless SCAN4D_DEVICE says otherwise.
-
-    One context a process: drivers and moderngl do not go well with several.
-    """
+    """The headless renderer that `viewer.render` and the command line draw with."""
     return Renderer()

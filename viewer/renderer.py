@@ -72,6 +72,7 @@ class Renderer:
 
     def resident(self, pose: Pose) -> GpuPose:
         """The pose on the GPU; its arrays are uploaded when something first reads them."""
+        self.gpu.collect()
         key = id(pose)
         for gone in [k for k, r in self._resident.items() if r.pose() is None]:
             self._resident.pop(gone).release()
@@ -80,7 +81,6 @@ class Renderer:
         self._resident.move_to_end(key)
         while len(self._resident) > 1 and self.nbytes > self.budget_bytes:
             self._resident.popitem(last=False)[1].release()
-        self.gpu.collect()
         return self._resident[key].gpu_pose
 
     def prepare(

@@ -13,6 +13,7 @@ from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
 from viewer.gpu import gl
+from viewer.gpu.context import headless
 from viewer.gpu.surface import Surface
 from viewer.look import Look, color_table
 from viewer.renderer import Renderer
@@ -187,3 +188,16 @@ def test_every_point_is_accounted_for(draw: Draw) -> None:
     camera = Camera(eye=(0, 0, 0), target=(0, 0, -1))
     counts = draw(PointCloud.from_arrays(points), camera, (9, 9)).point_counts()
     assert counts == {"in": 6, "drawn": 1, "dropped": 1, "outside": 3, "hidden": 1}
+
+
+def test_two_contexts_do_not_disturb_each_other(renderer: Renderer) -> None:
+    other = Renderer(headless())
+    pictures = []
+    for own in (renderer, other, renderer, other):
+        surface = Surface(own.gpu, (40, 30))
+        render_frame(own, Request(Pose(0, 0.0, "x", CLOUD), CAMERA, "surfels"), surface)
+        pictures.append((surface, surface.image(), surface.image(Look(color_by="depth"))))
+    for surface, picture, _ in pictures:
+        np.testing.assert_array_equal(picture, pictures[0][1])
+        np.testing.assert_array_equal(surface.image(Look(color_by="depth")), pictures[0][2])
+    other.release()

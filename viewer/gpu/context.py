@@ -47,7 +47,7 @@ class Gpu:
     where the context lacks what the project needs.
     """
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    def __init__(self, ctx: moderngl.Context, headless: bool = False) -> None:
         missing = [name for name in REQUIRED_EXTENSIONS if name not in ctx.extensions]
         if ctx.version_code >= 450:
             missing = []  # clip control is core since 4.5
@@ -59,6 +59,7 @@ class Gpu:
                 "'scan4d doctor' to see what there is",
             )
         self.ctx = ctx
+        self._headless = headless
         self.device: str = ctx.info["GL_RENDERER"]
         self.driver: str = ctx.info["GL_VERSION"]
         self.software = any(word in self.device.lower() for word in _SOFTWARE)
@@ -112,12 +113,21 @@ class Gpu:
             self._kept[key] = make()
         return self._kept[key]
 
+    def activate(self) -> None:
+        """Make a headless context the current one, whatever else the process draws with.
+
+        A window's context is its library's to switch.
+        """
+        if self._headless:
+            self.ctx.__enter__()
+
     def discard(self, *resources: Resource | None) -> None:
         """Have these released by the next `collect`. From any thread, a finalizer's too."""
         self._discarded.extend(r for r in resources if r is not None)
 
     def collect(self) -> None:
         """Release what was discarded; on the GL thread only."""
+        self.activate()
         while self._discarded:
             self._discarded.popleft().release()
 
@@ -155,7 +165,8 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
         options.append(("hidden window", {}))
     for how, settings in options:
         try:
-            gpu = Gpu(moderngl.create_context(standalone=True, require=REQUIRED_VERSION, **settings))
+            ctx = moderngl.create_context(standalone=True, require=REQUIRED_VERSION, **settings)
+            gpu = Gpu(ctx, headless=True)
         except NoOpenGLError as error:
             attempts.log.append((how, str(error)))
         except Exception as error:  # moderngl and glcontext raise bare Exceptions

@@ -190,6 +190,7 @@ class Surface:
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
         if look is not None and look != self.look:
+            self.gpu.activate()
             from .shade import shade  # shading reads surfaces; this is its one way back
 
             shade(self, look)
@@ -240,6 +241,7 @@ class Surface:
         return self.pose.cloud
 
     def _read(self, buffer: moderngl.Buffer, dtype: type) -> NDArray:
+        self.gpu.activate()
         width, height = self.size
         out = np.empty(4 * width * height, np.uint8)
         buffer.read_into(out)
