@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewer.camera import Camera, up_vector
+from viewer.camera import Camera
 from viewer.errors import InputError
+from viewer.geometry import up_vector
 from viewer.gpu.view import View
 from viewer.scan.points import Bounds
 

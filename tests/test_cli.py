@@ -235,12 +235,11 @@ def test_numbered_pictures_bear_the_number_of_their_pose(
 ) -> None:
     assert run("render", scans / "sequence", "-o", tmp_path / "p%03d.npz", *SMALL, *choice).code == 0
     assert names(tmp_path) == [f"p{number:03d}.npz" for number in numbers]
-    # Fitted to the first, then left alone: the ball grows in the picture.
+    # One camera for all, which shows the largest whole: the ball grows in the picture.
     coverage = [stored(tmp_path / name)["coverage"].mean() for name in names(tmp_path)]
     assert coverage == sorted(set(coverage))
-    first = formats.read(scans / "sequence" / f"f{numbers[0]:02d}.npz")
     last = formats.read(scans / "sequence" / f"f{numbers[-1]:02d}.npz")
-    expected = viewer.render(last, front(first), (96, 64), "surfels")
+    expected = viewer.render(last, front(last), (96, 64), "surfels")
     assert np.array_equal(stored(tmp_path / names(tmp_path)[-1])["depth"], expected.depth)
 
 
@@ -284,7 +283,7 @@ def test_a_turntable_while_playing(run: Run, scans: Path, tmp_path: Path) -> Non
     sequence = ("render", scans / "sequence", *SMALL, "-o")
     assert run(*sequence, tmp_path / "p%d.npz", "--all", "--turntable", 4).code == 0
     assert names(tmp_path) == [f"p{k}.npz" for k in range(FRAMES)]
-    cloud = formats.read(scans / "sequence" / "f00.npz")
+    cloud = formats.read(scans / "sequence" / f"f{FRAMES - 1:02d}.npz")  # the largest
     distance = max(front(cloud, azimuth=a).distance for a in (0, 90, 180, 270))
     camera = front(cloud, azimuth=270, distance=distance)
     expected = viewer.render(formats.read(scans / "sequence" / "f03.npz"), camera, (96, 64), "surfels")
@@ -696,7 +695,7 @@ def test_doctor_without_opengl() -> None:
     done = finish(process("doctor", "--device", 99))
     assert (done.code, done.err) == (3, "")
     assert "EGL device 99" in done.out
-    assert "apt-get install" in done.out
+    assert "lists the devices" in done.out
 
 
 # --- view -----------------------------------------------------------------------------------
@@ -751,16 +750,17 @@ def test_a_fallback_that_cannot_be_a_folder(refused: Callable[..., str], run: Ru
     assert str(tmp_path / "file") in done.err
 
 
-def test_view_passes_everything_to_the_window(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from viewer import app
 
     calls: list[tuple[object, dict[str, object]]] = []
     monkeypatch.setattr(app, "run", lambda scans, **options: calls.append((scans, options)) or 0)
     monkeypatch.setenv("DISPLAY", ":7")
-    assert run("view", "a.ply", "b", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
+    ball = str(scans / "ball.npz")
+    assert run("view", ball, "demo", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
     assert run("view").code == 0
     assert calls == [
-        (["a.ply", "b"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1}),
+        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1}),
         (["demo"], {"unit": None, "fps": None, "up": "+y", "device": None}),
     ]
 

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 
 # A part of the package may import its own layer and those before it.
 LAYERS = (
-    {"errors", "files", "params", "resources", "camera", "look", "scan"},
+    {"errors", "files", "geometry", "params", "resources", "camera", "look", "scan"},
     {"gpu"},
     {"backends"},
     {"renderer", "frame", "export"},

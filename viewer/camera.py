@@ -12,15 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, unknown_name
+from .geometry import Vector, up_vector
 from .scan.points import Bounds
 
 PROJECTIONS = ("perspective", "orthographic")
-Vector = tuple[float, float, float]
 _FIT_MARGIN = 1.04
 
-_UPS: dict[str, Vector] = {
-    "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
-}  # fmt: skip
 # Where azimuth 0 looks from, for each up axis: the front, at right angles to up.
 _FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
 
@@ -230,13 +227,6 @@ class Camera:
     def projected(self, projection: str) -> Camera:
         """The same view in the other projection: what is at the target keeps its size."""
         return replace(self, projection=projection, height=self.view_height)
-
-
-def up_vector(name: str) -> Vector:
-    """The unit vector of an axis name such as '+y' or '-z'; raises InputError."""
-    if name not in _UPS:
-        raise unknown_name("up axis", name, list(_UPS))
-    return _UPS[name]
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
 
-from .camera import up_vector
 from .errors import InputError, Scan4DError
+from .geometry import up_vector
 
 COMMANDS = ("view", "render", "info", "convert", "backends", "doctor")
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, unknown_name
+from .geometry import AXES
 from .params import param
 from .scan.points import PointCloud
 
@@ -41,6 +42,7 @@ class Look:
     color_map: str = param("batlow", "Colour map of depth, height and scalars", choices=COLOR_MAPS)
     low: float | None = param(None, "Value at the map's start; auto: from the data", type=float)
     high: float | None = param(None, "Value at the map's end; auto: from the data", type=float)
+    up: str = param("+y", "The axis that height is measured along", choices=tuple(AXES))
     plain: str = param("#c8c2b8", "Colour of points that have none, #rrggbb")
     background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa")
 

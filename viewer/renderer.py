@@ -36,8 +36,11 @@ class _Resident:
 
     @property
     def nbytes(self) -> int:
-        return self.gpu_pose.uploaded_bytes + sum(
-            p.derived.nbytes for p in self.derived.values() if p.derived
+        estimated = self.gpu_pose.cloud.nbytes - self.gpu_pose.stored.nbytes
+        return (
+            self.gpu_pose.uploaded_bytes
+            + estimated
+            + sum(p.derived.nbytes for p in self.derived.values() if p.derived)
         )
 
     def release(self) -> None:

@@ -11,8 +11,13 @@ layout(std140, binding = 0) uniform View {
 
 const uint NONE = 0xFFFFFFFFu;
 
+// Several programs compute the same point's depth and pixel, and compare: without `precise`
+// each compiler run may contract or reorder as it likes, and they differ in the last bit.
 vec3 to_view(vec3 position) {
-    return (world_to_view * vec4(position, 1.0)).xyz;
+    precise vec3 view = world_to_view[0].xyz * position.x + world_to_view[1].xyz * position.y;
+    view = view + world_to_view[2].xyz * position.z;
+    view = view + world_to_view[3].xyz;
+    return view;
 }
 
 // Pixels per scan unit at this depth.
@@ -22,7 +27,10 @@ float scale_at(float depth) {
 
 // Pixel coordinates of a point in view space; row 0 is the top.
 vec2 to_pixel(vec3 view) {
-    return 0.5 * vec2(view_size) + vec2(view.x, -view.y) * scale_at(-view.z);
+    precise float scale = view_perspective ? view_scale / -view.z : view_scale;
+    precise vec2 pixel = vec2(view.x, -view.y) * scale;
+    pixel = pixel + 0.5 * vec2(view_size);
+    return pixel;
 }
 
 // View-space position of a pixel coordinate at a depth.

@@ -13,11 +13,12 @@ layout(binding = 3) uniform samplerBuffer normals;
 layout(binding = 4) uniform samplerBuffer values;
 layout(binding = 5) uniform samplerBuffer color_map;
 layout(binding = 6) uniform samplerBuffer positions;
+layout(binding = 7) uniform usamplerBuffer ids;
 layout(std430, binding = 0) writeonly buffer Picture { uint picture[]; };
 
 uniform vec3 plain;          // sRGB
-uniform vec2 value_range;
-uniform vec4 height_axis;    // dot with (position, 1) is the height
+uniform vec2 value_range;    // relative to the zero that values are stored from
+uniform vec3 height_axis;
 uniform vec3 light;          // to the light, view space
 uniform vec4 phong;          // ambient, diffuse, specular, shininess
 uniform float eye_dome_strength;
@@ -38,7 +39,7 @@ vec3 base_color(uint row, float depth, vec3 normal) {
 #if VALUE == 0
     float value = depth;
 #elif VALUE == 1
-    float value = dot(height_axis, vec4(texelFetch(positions, int(row)).xyz, 1.0));
+    float value = dot(height_axis, texelFetch(positions, int(row)).xyz);
 #else
     float value = texelFetch(values, int(row)).r;
 #endif
@@ -46,8 +47,13 @@ vec3 base_color(uint row, float depth, vec3 normal) {
     float t = (value - value_range.x) / max(value_range.y - value_range.x, 1e-30);
     return texelFetch(color_map, int(clamp(t, 0.0, 1.0) * 255.0 + 0.5)).rgb;
 #else
+#if HAS_IDS
+    uint id = texelFetch(ids, int(row)).r;
+#else
+    uint id = row;
+#endif
     // Knuth's multiplicative hash: neighbouring ids get colours far apart.
-    uint h = row * 2654435761u;
+    uint h = id * 2654435761u;
     h ^= h >> 16;
     return vec3(64u + (uvec3(h, h >> 8, h >> 16) & 127u) * 3u / 2u) / 255.0;
 #endif

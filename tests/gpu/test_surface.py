@@ -201,3 +201,56 @@ def test_two_contexts_do_not_disturb_each_other(renderer: Renderer) -> None:
         np.testing.assert_array_equal(picture, pictures[0][1])
         np.testing.assert_array_equal(surface.image(Look(color_by="depth")), pictures[0][2])
     other.release()
+
+
+def test_heights_and_times_far_from_zero_keep_their_steps(draw: Draw) -> None:
+    shift = np.array([0, 4.5e6, 0])
+    seconds = np.linspace(0, 255, 3000)
+    near = replace(CLOUD, scalars={"t": seconds})
+    far = replace(sphere(3000, center=tuple(shift)), scalars={"t": seconds + 1.7e9})
+    eye, target = (tuple(np.add(v, shift)) for v in (CAMERA.eye, CAMERA.target))
+    moved = replace(CAMERA, eye=eye, target=target)
+    for source in ("height", "t"):
+        look = Look(color_by=source, light="flat")
+        here = draw(near, CAMERA, (80, 60), "surfels", look)
+        there = draw(far, moved, (80, 60), "surfels", look)
+        same = here.row == there.row
+        assert same.mean() > 0.99
+        steps = np.abs(here.image().astype(int) - there.image())[same]
+        assert steps.max() <= 6, "one entry of the colour map"
+        assert len(np.unique(there.image().reshape(-1, 4), axis=0)) > 100
+
+
+def test_height_is_along_the_world_not_the_picture(draw: Draw) -> None:
+    from_above = Camera.orbit(CLOUD.bounds(), 0, 90)
+    surface = draw(CLOUD, from_above, (80, 60), "surfels", Look(color_by="height"))
+    covered = surface.row != NOTHING
+    np.testing.assert_allclose(
+        surface.value[covered], CLOUD.positions[surface.row[covered], 1], rtol=1e-5, atol=1e-6
+    )
+
+
+def test_colours_by_id_are_those_of_the_file(draw: Draw) -> None:
+    look = Look(color_by="id", light="flat")
+    bad = CLOUD.positions.copy()
+    bad[:100] = np.nan
+    holed = PointCloud.from_arrays(bad, normals=CLOUD.normals, radii=CLOUD.radii)
+    whole, part = (draw(cloud, CAMERA, (80, 60), "surfels", look) for cloud in (CLOUD, holed))
+    same = whole.id == part.id
+    assert same.mean() > 0.9
+    np.testing.assert_array_equal(whole.image()[same], part.image()[same])
+
+
+def test_more_pixels_than_one_dimension_of_a_dispatch_takes(renderer: Renderer) -> None:
+    size = (8192, 2304)  # 73 728 work groups of covered pixels
+    x, y = np.array([-1.0, 1, 1, -1]) * 9, np.array([-1.0, -1, 1, 1]) * 9
+    wall = PointCloud.from_arrays(
+        np.stack([x, y, np.full(4, -2.0)], axis=1), normals=[[0, 0, 1]] * 4, radii=[40.0] * 4
+    )
+    surface = Surface(renderer.gpu, size)
+    camera = Camera(eye=(0, 0, 0), target=(0, 0, -1), fov_y=20)
+    look = Look(light="flat", color_by="plain", plain="#336699")
+    render_frame(renderer, Request(Pose(0, 0.0, "x", wall), camera, "surfels", None, look), surface)
+    assert len(surface.covered) == size[0] * size[1]
+    assert (surface.image() == [0x33, 0x66, 0x99, 255]).all()
+    surface.release()

@@ -19,7 +19,7 @@ def run(
     up: the up axis. device: has no effect on a window, which says so.
     Raises InputError where the first scan cannot be opened, NoOpenGLError without a window.
     """
-    from ..camera import up_vector
+    from ..geometry import up_vector
     from ..scan.open import open_scan
 
     up_vector(up)

@@ -13,6 +13,7 @@ from ..backends import backends
 from ..camera import Camera
 from ..errors import InputError, Scan4DError
 from ..gpu.context import Gpu
+from ..look import Look
 from ..scan.open import open_scan
 from ..scan.timeline import Timeline
 from . import layout, theme
@@ -46,7 +47,7 @@ class App:
         up: str = "+y",
     ) -> None:
         self.scans = list(scans)
-        self.session = Session(self.scans[0])
+        self.session = Session(self.scans[0], look=Look(up=up))
         self.notes: list[str] = []
         self.gesture: str | None = None
         self.opening: str | None = None

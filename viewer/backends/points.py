@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import moderngl
+import numpy as np
 
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import scatter
@@ -17,7 +18,7 @@ from ..gpu.surface import Surface
 from ..gpu.view import View
 from ..params import param
 from ..scan.points import PointCloud
-from ..scan.spacing import typical_spacing
+from ..scan.spacing import spacings
 from . import FrameView
 
 TITLE = "Points"
@@ -25,8 +26,11 @@ TITLE = "Points"
 # The points can list the pixels that they hit, at a third pass over the points; looking for
 # the covered pixels costs about as much as that pass over this share of their number.
 _LIST_BELOW = 0.25
-# Points are not on a grid: squares larger than the typical spacing leave few gaps.
-_OVERLAP, _LARGEST = 1.6, 12
+# Points are not on a grid, and not everywhere equally dense: squares that cover 1.6 times the
+# usual spacing, and 1.25 times that of the sparsest tenth unless it is sparser still, leave
+# few gaps.
+_USUAL_OVERLAP, _SPARSE_OVERLAP, _SPARSEST = 1.6, 1.25, 2.0
+_LARGEST = 32  # pixels
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ class Params:
         1,
         "Edge of a point's square, pixels; 0: as far as the next point",
         low=0,
-        high=32,
+        high=_LARGEST,
         sweep=(1, 2, 4),
     )
 
@@ -75,7 +79,13 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 
 def _touching(pose: GpuPose, view: View) -> int:
     """The size at which squares in the middle of the scan touch their neighbours, pixels."""
-    spacing = pose.remember("spacing", lambda: typical_spacing(pose.cloud))
-    depth = max(view.depth_of(pose.bounds.center - pose.cloud.origin), view.near)
-    pixels = spacing * view.scale / (depth if view.perspective else 1.0)
-    return min(max(math.ceil(_OVERLAP * pixels), 1), _LARGEST)
+    reach = pose.remember("reach", lambda: _reach(pose.cloud))
+    depth = max(float(view.depths(pose.bounds.center - pose.cloud.origin)), view.near)
+    pixels = reach * view.scale / (depth if view.perspective else 1.0)
+    return min(max(math.ceil(pixels), 1), _LARGEST)
+
+
+def _reach(cloud: PointCloud) -> float:
+    """The edge of squares that touch, scan units."""
+    usual, sparse = (float(v) for v in np.quantile(spacings(cloud), [0.5, 0.9]))
+    return max(_USUAL_OVERLAP * usual, _SPARSE_OVERLAP * min(sparse, _SPARSEST * usual))

@@ -51,7 +51,7 @@ def run(args: Namespace) -> int:
         "OpenGL, tried": attempts.log,
         "OpenGL": _driver(gpu) if gpu else [],
         "Extensions": _extensions(gpu) if gpu else [],
-        "Devices (--device)": list(_devices()) if gpu else [],
+        "Devices (--device)": list(_devices()),
         "Window": [("display", display() or "none: neither DISPLAY nor WAYLAND_DISPLAY is set")],
         "Software": _software(),
     }

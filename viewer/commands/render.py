@@ -23,13 +23,11 @@ from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look
 from ..params import parse
-from ..renderer import Renderer
-from ..scan.points import Bounds
 from ..scan.timeline import Timeline
 from . import drawing, stats
 from .console import progress
 from .drawing import Shot
-from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline, read_poses
+from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline, read_poses
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -75,7 +73,7 @@ def run(args: Namespace) -> int:
         raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
     if args.stats:
         check_output(args.stats, (".json",), several=False)
-    look, values = parse(Look, dict(args.look), "look"), dict(args.set)
+    look, values = parse(Look, {"up": args.up, **dict(args.look)}, "look"), dict(args.set)
     if args.backend:
         find_backend(args.backend).params(values)  # wrong names are told before anything is read
     with open_timeline(args, args.scan) as timeline:
@@ -90,7 +88,7 @@ def run(args: Namespace) -> int:
             pictures(args.out, args.size, fps) as put,
             progress(draws) as tick,
         ):
-            for shot, request in _requests(args, timeline, renderer, shots, look, values):
+            for shot, request in _requests(args, timeline, shots, look, values):
                 if args.stats:
                     frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
                 else:
@@ -111,27 +109,29 @@ def _write_json(data: dict[str, Any], path: Path) -> None:
 def _requests(
     args: Namespace,
     timeline: Timeline,
-    renderer: Renderer,
     shots: list[Shot],
     look: Look,
     values: dict[str, object],
 ) -> Iterator[tuple[Shot, Request]]:
-    """What to draw for each shot. The first pose settles the backend and the camera."""
-    chosen, camera_of = None, None
+    """What to draw for each shot. The first pose settles the backend, several the camera."""
+    chosen = None
+    camera_of = _camera(args, timeline, shots)
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or choose(pose.cloud, args.backend, values)
-        camera_of = camera_of or _camera(args, renderer.resident(pose).bounds, shots)
         for shot in shots:
             if shot.pose == pose.index:
                 yield shot, Request(pose, camera_of(shot), *chosen, look)
 
 
-def _camera(args: Namespace, bounds: Bounds, shots: list[Shot]) -> Callable[[Shot], Camera]:
-    """The camera of each shot. bounds: of the first pose."""
+def _camera(args: Namespace, timeline: Timeline, shots: list[Shot]) -> Callable[[Shot], Camera]:
+    """The camera of each shot."""
+    if args.camera:
+        return lambda shot: args.camera
     aspect = args.size[0] / args.size[1]
+    bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:
         return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, args.up)
-    camera = args.camera or Camera.orbit(bounds, *args.orbit, aspect=aspect, up=args.up)
+    camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=args.up)
     return lambda shot: camera
 
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+
+import numpy as np
 
 from ..errors import InputError
 from ..scan.open import open_scan
+from ..scan.points import Bounds
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from .console import warn
 
+_FRAMED = 5  # poses that a camera is fitted to
 SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'frame*.ply', or demo"
 
 
@@ -38,6 +44,8 @@ def chosen_poses(args: Namespace, timeline: Timeline) -> list[int] | None:
         timeline.label(args.pose)  # raises where there is none
         return [args.pose]
     if args.time is not None:
+        if not math.isfinite(args.time):
+            raise InputError(f"{args.time} is no time", "--time", "Use seconds")
         return [timeline.nearest(args.time)]
     if args.poses is not None:
         return _poses_between(args.poses, timeline)
@@ -82,6 +90,21 @@ def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
         raise InputError(f"none of its {len(indices)} frames can be read", timeline.name)
 
 
+def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
+    """The bounds of some of these poses together, so that a subject that moves stays in the picture.
+
+    Broken ones are passed over. Raises InputError where none can be read.
+    """
+    spread = dict.fromkeys(indices[i * (len(indices) - 1) // (_FRAMED - 1)] for i in range(_FRAMED))
+    boxes = []
+    for index in spread:
+        with suppress(InputError):
+            boxes.append(timeline.pose(index).cloud.bounds())
+    if not boxes:  # there may be a readable one between
+        return next(read_poses(timeline, indices)).cloud.bounds()
+    return Bounds(np.min([b.low for b in boxes], axis=0), np.max([b.high for b in boxes], axis=0))
+
+
 def first_readable(timeline: Timeline) -> Pose:
     """The first pose that is not broken, and no other is read. Raises InputError where all are."""
     pose = next(iter(timeline), None)
@@ -95,5 +118,6 @@ def _report(timeline: Timeline, said: int) -> int:
     """Say the timeline's messages from number `said` on; how many are said now."""
     messages = timeline.messages[said:]
     for notice in messages:
-        warn(f"{timeline.name}: {notice.text}")
+        known = notice.text.startswith(timeline.name)  # a single file is named after itself
+        warn(notice.text if known else f"{timeline.name}: {notice.text}")
     return said + len(messages)

@@ -14,10 +14,11 @@ from ..camera import Camera
 from ..errors import InputError, NoOpenGLError
 from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
+from ..look import Look
 from . import drawing, stats
 from .console import progress
 from .doctor import display
-from .scans import SCAN_HELP, open_timeline, read_poses
+from .scans import SCAN_HELP, framing, open_timeline, read_poses
 
 _SIZE = (1200, 800)
 _SHEET_PICTURES = 25  # at most, on a contact sheet
@@ -34,6 +35,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Open the window, or play without one."""
     scans = args.scans or ["demo"]
+    for scan in scans:
+        open_timeline(args, scan).close()  # wrong names are told before anything is drawn
     try:
         return _open_window(args, scans)
     except NoOpenGLError as error:
@@ -68,16 +71,16 @@ def _play(args: Namespace, scan: str, prefix: str) -> None:
         indices = list(range(len(timeline)))
         on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
         fps = drawing.film_rate(timeline, indices, args.fps)
-        camera, thumbnails = None, []
+        thumbnails = []
         with (
             drawing.canvas(args.device, _SIZE) as (renderer, surface),
             film(f"{name}.mp4", _SIZE, fps) as add,
             progress(len(indices)) as tick,
         ):
+            bounds = framing(timeline, indices)
+            camera = Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=args.up)
             for pose in read_poses(timeline, indices):
-                bounds = renderer.resident(pose).bounds
-                camera = camera or Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=args.up)
-                stats.draw(renderer, Request(pose, camera), surface)
+                stats.draw(renderer, Request(pose, camera, look=Look(up=args.up)), surface)
                 image = surface.image()
                 write_png(image, f"{name}_{pose.index:04d}.png")
                 add(image)

@@ -6,7 +6,7 @@ import struct
 
 import moderngl
 
-from .context import Gpu
+from .context import GROUP, GROUP_LIMIT, Gpu
 
 _RUN = 8  # pixels an invocation of compact/covered.comp looks at
 
@@ -18,11 +18,12 @@ class IndexList:
         self.nbytes = 4 * capacity + 16
         self._indices = gpu.ctx.buffer(reserve=4 * capacity)
         # The three work group counts of an indirect dispatch, then the length of the list.
+        self._rows = -(-capacity // (GROUP * GROUP_LIMIT))
         self._dispatch = gpu.ctx.buffer(reserve=16)
 
     def clear(self) -> None:
         """Make it empty."""
-        self._dispatch.write(struct.pack("4I", 0, 1, 1, 0))
+        self._dispatch.write(struct.pack("4I", 0, self._rows, 1, 0))
 
     def bind(self) -> None:
         """Bind where shaders that include common/list.glsl find it."""

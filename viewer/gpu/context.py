@@ -20,7 +20,8 @@ T = TypeVar("T")
 REQUIRED_VERSION = 430
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
-_GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
+GROUP = 256  # invocations of a work group (common/item.glsl)
+GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
 
 
 class Resource(Protocol):
@@ -64,7 +65,7 @@ class Gpu:
         self.driver: str = ctx.info["GL_VERSION"]
         self.software = any(word in self.device.lower() for word in _SOFTWARE)
         self.timers = Timers(ctx, self.software)
-        self.max_pixels = gl.integer(0x90DE) // 4  # MAX_SHADER_STORAGE_BLOCK_SIZE, 4 bytes a pixel
+        self.max_pixels = gl.max_storage_block_bytes() // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
         self._kept: dict[object, Any] = {}
         self._discarded: deque[Resource] = deque()
@@ -137,11 +138,11 @@ class Gpu:
             if name in program:
                 program[name] = value
 
-    def dispatch(self, program: moderngl.ComputeShader, count: int, group: int = 256) -> None:
+    def dispatch(self, program: moderngl.ComputeShader, count: int) -> None:
         """Run one invocation for each of `count` items; shaders find theirs with `item()`."""
-        groups = -(-count // group)
+        groups = -(-count // GROUP)
         if groups:
-            rows = -(-groups // _GROUP_LIMIT)
+            rows = -(-groups // GROUP_LIMIT)
             program.run(-(-groups // rows), rows)
             self.ctx.memory_barrier()
 
@@ -155,6 +156,8 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
     attempts = attempts if attempts is not None else Attempts()
     if device is None:
         device = device_from_environment()
+    if device is not None and device < 0:
+        raise InputError(f"{device} is no device number", "--device", "Use 0, 1, ...")
     options: list[tuple[str, dict[str, Any]]] = []
     if sys.platform.startswith("linux"):
         name = "EGL" if device is None else f"EGL device {device}"
@@ -174,6 +177,11 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
         else:
             attempts.log.append((how, f"{gpu.device}, OpenGL {gpu.driver}"))
             return gpu
+    if device:
+        raise NoOpenGLError(
+            f"no usable OpenGL on device {device} ({attempts})",
+            hint="'scan4d doctor' lists the devices; without --device the driver chooses",
+        )
     raise NoOpenGLError(
         f"no usable OpenGL ({attempts})",
         hint="Install a graphics driver, or Mesa's software OpenGL (Debian: apt-get install libegl1 "

@@ -22,7 +22,17 @@ import OpenGL
 OpenGL.ERROR_CHECKING = False
 OpenGL.ERROR_LOGGING = False
 
-from OpenGL.raw.GL.VERSION import GL_1_0, GL_1_1, GL_1_3, GL_1_5, GL_2_0, GL_3_0, GL_3_1, GL_4_3  # noqa: E402
+from OpenGL.raw.GL.VERSION import (  # noqa: E402
+    GL_1_0,
+    GL_1_1,
+    GL_1_3,
+    GL_1_5,
+    GL_2_0,
+    GL_3_0,
+    GL_3_1,
+    GL_3_2,
+    GL_4_3,
+)
 from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
 
 RGB32F = 0x8815
@@ -42,20 +52,26 @@ _COLOR_ATTACHMENT0 = 0x8CE0
 _DEPTH_ATTACHMENT = 0x8D00
 _DEPTH_COMPONENT32F = 0x8CAC
 _MAX_TEXTURE_BUFFER_SIZE = 0x8C2B
+_MAX_SHADER_STORAGE_BLOCK_SIZE = 0x90DE
 _READ_FRAMEBUFFER = 0x8CA8
 _SCRATCH_UNIT = 15
 
 
 def integer(name: int) -> int:
     """An integer limit or state of the current context."""
-    value = ctypes.c_int64(0)  # some drivers write 64 bits for large limits
-    GL_1_0.glGetIntegerv(name, ctypes.cast(ctypes.byref(value), ctypes.POINTER(ctypes.c_int)))
-    return int(ctypes.c_int32(value.value & 0xFFFFFFFF).value)
+    value = ctypes.c_int64(0)
+    GL_3_2.glGetInteger64v(name, ctypes.byref(value))
+    return value.value
 
 
 def max_texture_buffer_texels() -> int:
     """How many texels a buffer texture may have."""
     return integer(_MAX_TEXTURE_BUFFER_SIZE)
+
+
+def max_storage_block_bytes() -> int:
+    """How many bytes of a buffer a shader may see as a storage block."""
+    return integer(_MAX_SHADER_STORAGE_BLOCK_SIZE)
 
 
 def reverse_depth() -> None:

@@ -16,7 +16,14 @@ from . import gl
 from .context import Gpu
 
 T = TypeVar("T")
-_FORMATS = {"positions": gl.RGB32F, "normals": gl.RGB32F, "colors": gl.RGBA8, "radii": gl.R32F}
+_FORMATS = {
+    "positions": gl.RGB32F,
+    "normals": gl.RGB32F,
+    "colors": gl.RGBA8,
+    "ids": gl.R32UI,
+    "radii": gl.R32F,
+}
+_SAMPLE = 1 << 13  # values that ranges look at
 
 
 class GpuPose:
@@ -47,7 +54,7 @@ class GpuPose:
         return cloud.bounds() if len(cloud) else Bounds(cloud.origin - 1, cloud.origin + 1)
 
     def array(self, name: str) -> gl.BufferTexture:
-        """positions, normals, colors, radii, or 'scalar:NAME'; uploaded at the first call."""
+        """positions, normals, colors, radii, ids, or 'scalar:NAME'; uploaded at the first call."""
         if name not in self._arrays:
             values = self._values(name)
             texels = _FORMATS.get(name, gl.R32F)
@@ -61,13 +68,15 @@ class GpuPose:
 
     def _values(self, name: str) -> NDArray:
         if name.startswith("scalar:"):
-            values: NDArray | None = self.scalar(name.removeprefix("scalar:"))
-        else:
-            values = getattr(self.cloud, name)
+            scalar = name.removeprefix("scalar:")
+            return (self.scalar(scalar) - self.scalar_zero(scalar)).astype(np.float32)
+        values: NDArray | None = getattr(self.cloud, name)
         if values is None:
-            raise InputError(f"the scan has no {name}")
-        dtype = np.uint8 if name == "colors" else np.float32
-        return np.ascontiguousarray(values, dtype)
+            hint = (
+                "Give the look when rendering, which estimates what is missing" if name == "normals" else None
+            )
+            raise InputError(f"the scan has no {name}", hint=hint)
+        return values
 
     def scalar(self, name: str) -> NDArray:
         """The named scalar, (N,); raises InputError that lists the known ones."""
@@ -83,7 +92,16 @@ class GpuPose:
 
     def scalar_range(self, name: str) -> tuple[float, float]:
         """The 2 % and 98 % quantiles of a scalar's finite values."""
-        return self.remember(f"range of {name}", lambda: _robust_range(self.scalar(name)))
+        return self.remember(f"range of {name}", lambda: robust_range(_strided(self.scalar(name))))
+
+    def scalar_zero(self, name: str) -> float:
+        """What a scalar is stored relative to on the GPU: times of 1e9 seconds keep their steps."""
+        return self.scalar_range(name)[0]
+
+    @cached_property
+    def sample(self) -> NDArray[np.float64]:
+        """Some of the positions, (M, 3), relative to the origin: for ranges."""
+        return _strided(self.cloud.positions).astype(np.float64)
 
     def take_upload_ms(self) -> float:
         """How long uploads took since the last call."""
@@ -94,10 +112,15 @@ class GpuPose:
         self.gpu.discard(*self._arrays.values())
 
 
-def _robust_range(values: NDArray) -> tuple[float, float]:
-    sample = values[:: max(1, len(values) // 65536)].astype(np.float64)
-    sample = sample[np.isfinite(sample)]
-    if not len(sample):
+def _strided(values: NDArray) -> NDArray:
+    return values[:: max(1, len(values) // _SAMPLE)]
+
+
+def robust_range(values: NDArray) -> tuple[float, float]:
+    """The 2 % and 98 % quantiles of the finite values (N,), as float64; (0, 1) where there is none."""
+    finite = values.astype(np.float64)
+    finite = finite[np.isfinite(finite)]
+    if not len(finite):
         return 0.0, 1.0
-    low, high = (float(v) for v in np.quantile(sample, [0.02, 0.98]))
-    return (low, high) if high > low else (float(sample.min()), float(sample.max()))
+    low, high = (float(v) for v in np.quantile(finite, [0.02, 0.98]))
+    return (low, high) if high > low else (float(finite.min()), float(finite.max()))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from ..geometry import up_vector
 from ..look import Look, color_table, rgba, value_source
 from . import gl
 from .context import Gpu
+from .pose import robust_range
 from .surface import Surface
 
 # How shade.comp names where a colour, a number and the light come from.
@@ -19,7 +19,7 @@ _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
 
 def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
-    pose, view, gpu = surface.pose, surface.view, surface.gpu
+    pose, gpu = surface.pose, surface.gpu
     cloud = pose.cloud
     source = value_source(look, cloud)
     value = source if source in (None, "depth", "height") else "scalar"
@@ -35,6 +35,7 @@ def shade(surface: Surface, look: Look) -> None:
             "VALUE": _VALUE_CODES[value or "scalar"],
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
+            "HAS_IDS": int(cloud.ids is not None),
         },
     )
     surface.bind_view()
@@ -50,13 +51,15 @@ def shade(surface: Surface, look: Look) -> None:
             pose.array(f"scalar:{source}").bind(4)
         if value == "height":
             pose.array("positions").bind(6)
+        if color == "id" and cloud.ids is not None:
+            pose.array("ids").bind(7)
         if value is not None:
             _color_map(gpu, look.color_map).bind(5)
         gpu.set(
             program,
             plain=tuple(c / 255 for c in rgba(look.plain)[:3]),
-            value_range=value_range(surface, look) if source else (0, 1),
-            height_axis=(*view.up, float(view.up @ cloud.origin)),
+            value_range=_stored_range(surface, look, source) if source else (0, 1),
+            height_axis=up_vector(look.up),
             light=_direction(look.azimuth, look.elevation),
             phong=(look.ambient, look.diffuse, look.specular, look.shininess),
             eye_dome_strength=look.eye_dome_strength,
@@ -70,19 +73,29 @@ def shade(surface: Surface, look: Look) -> None:
 
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:
-    """(low, high) of the colour map: the look's own, else of what the scan holds."""
-    pose, view = surface.pose, surface.view
-    source, bounds = value_source(look, pose.cloud), pose.bounds
+    """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles."""
+    pose, source = surface.pose, value_source(look, surface.pose.cloud)
     if source == "depth":
-        middle, axis = view.depth_of(bounds.center - pose.cloud.origin), view.rotation[2]
-    else:
-        middle, axis = float(bounds.center @ view.up), view.up
-    if source in ("depth", "height"):
-        half = float(np.abs(axis) @ (bounds.high - bounds.low)) / 2
-        low, high = middle - half, middle + half
+        low, high = robust_range(surface.view.depths(pose.sample))
+    elif source == "height":
+        low, high = robust_range((pose.sample + pose.cloud.origin) @ up_vector(look.up))
     else:
         low, high = pose.scalar_range(source or "")
     return (low if look.low is None else look.low, high if look.high is None else look.high)
+
+
+def _stored_range(surface: Surface, look: Look, source: str) -> tuple[float, float]:
+    """`value_range` less what the values on the GPU are stored relative to, taken off in float64
+    so that heights and times far from zero keep their steps."""
+    pose = surface.pose
+    if source == "depth":
+        zero = 0.0
+    elif source == "height":
+        zero = float(pose.cloud.origin @ up_vector(look.up))
+    else:
+        zero = pose.scalar_zero(source)
+    low, high = value_range(surface, look)
+    return low - zero, high - zero
 
 
 def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:

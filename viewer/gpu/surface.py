@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..geometry import up_vector
 from ..look import Look, rgba, value_source
 from ..scan.points import PointCloud
 from . import gl
@@ -184,7 +185,7 @@ class Surface:
             return np.full(self.size[::-1], np.nan, np.float32)
         if source == "depth":
             return np.where(self.row == NOTHING, np.float32(np.nan), self.depth)
-        values = cloud.world() @ self.view.up if source == "height" else cloud.scalars[source]
+        values = cloud.world() @ up_vector(self.look.up) if source == "height" else cloud.scalars[source]
         return self._fetch(values.astype(np.float32), np.nan)
 
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:

@@ -22,6 +22,7 @@ class Timers:
         self.kind = "finish" if software else "query"
         self.enabled = False
         self._passes: list[tuple[str, float | moderngl.Query]] = []
+        self._queries: dict[tuple[str, int], moderngl.Query] = {}  # moderngl never deletes one
 
     def start_frame(self) -> None:
         """Forget the passes of the last frame."""
@@ -33,7 +34,10 @@ class Timers:
         if not self.enabled:
             yield
         elif self.kind == "query":
-            query = self._ctx.query(time=True)
+            key = name, sum(name == other for other, _ in self._passes)
+            if key not in self._queries:
+                self._queries[key] = self._ctx.query(time=True)
+            query = self._queries[key]
             with query:
                 yield
             self._passes.append((name, query))

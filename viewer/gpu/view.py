@@ -20,7 +20,7 @@ class View:
     rotation: (3, 3) float64, world to view. translation: (3,) float64, from the origin to
     view space. scale: pixels per unit of x/-z (perspective) or of x (orthographic).
     near, far: what is outside is not drawn. reach: the depth that an orthographic depth
-    buffer ends at. up: (3,) float64, the world's unit up.
+    buffer ends at.
     """
 
     BLOCK_BYTES: ClassVar[int] = 96
@@ -33,7 +33,6 @@ class View:
     far: float
     reach: float
     perspective: bool
-    up: NDArray[np.float64]
 
     @classmethod
     def of(cls, camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], bounds: Bounds) -> View:
@@ -51,7 +50,6 @@ class View:
             far=far,
             reach=min(far, camera.reach(bounds)),
             perspective=perspective,
-            up=np.array(camera.up) / np.linalg.norm(camera.up),
         )
 
     def block(self) -> bytes:
@@ -78,9 +76,9 @@ class View:
         center = np.array(self.size) / 2
         return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
 
-    def depth_of(self, position: NDArray[np.floating]) -> float:
-        """Depth of one point (3,), relative to the origin."""
-        return -float(self.rotation[2] @ position + self.translation[2])
+    def depths(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Depths (...) of points (..., 3), relative to the origin."""
+        return -(positions @ self.rotation[2] + self.translation[2])
 
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""

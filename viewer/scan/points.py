@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 
 _CHUNK = 1 << 20  # points converted at a time, so that float64 copies stay small
-_LARGEST = float(np.finfo(np.float32).max)
+_LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
 
@@ -161,7 +161,7 @@ class PointCloud:
 def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:
     """Which rows are finite in all columns, (N,) bool; None where all are.
 
-    A value that float32 cannot hold counts as infinite.
+    A coordinate of 1e18 or more counts as infinite: float32 cannot hold its square.
     """
     if points.dtype.kind != "f":
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .points import PointCloud
 
@@ -14,6 +15,14 @@ _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
 def typical_spacing(cloud: PointCloud) -> float:
     """The median distance between neighbours, scan units; 1.0 where all points coincide.
 
+    See `spacings`.
+    """
+    return float(np.median(spacings(cloud)))
+
+
+def spacings(cloud: PointCloud) -> NDArray[np.float64]:
+    """The distance between neighbours at some places of a cloud, (P,), scan units; P > 0.
+
     A few points are compared with all others. On a surface of one point per s^2 there are
     k points within s sqrt(k / pi), so the distance to the sixth neighbour gives s; copies of
     a point do not count.
@@ -21,14 +30,14 @@ def typical_spacing(cloud: PointCloud) -> float:
     points = cloud.positions
     count = len(points)
     if count < 2:
-        return 1.0
+        return np.ones(1)
     probes = points[np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int)]
-    spacings = []
+    found = []
     for probe in probes:
         squared = sum((points[:, axis] - probe[axis]) ** 2 for axis in range(3))
         nearest = np.partition(squared, min(_NEAREST, count) - 1)[:_NEAREST]
         distinct = np.unique(nearest[nearest > 0])  # copies of a point are at one distance
         k = min(_NEIGHBOR, len(distinct))
         if k:
-            spacings.append(float(np.sqrt(distinct[k - 1] / (k / np.pi))))
-    return float(np.median(spacings)) if spacings else 1.0
+            found.append(float(np.sqrt(distinct[k - 1] / (k / np.pi))))
+    return np.array(found or [1.0])

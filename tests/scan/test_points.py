@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.errors import InputError
+from viewer.scan.points import PointCloud
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e18, -1e37])
+def test_points_that_float32_cannot_work_with_are_dropped_and_counted(value: float) -> None:
+    points = np.random.default_rng(0).normal(size=(1000, 3))
+    points[7, 1] = points[500, 2] = value
+    cloud = PointCloud.from_arrays(points, colors=np.arange(3000).reshape(1000, 3) % 255 / 255)
+    assert (len(cloud), cloud.dropped) == (998, 2)
+    assert cloud.ids is not None
+    assert 7 not in cloud.ids
+    assert cloud.ids[-1] == 999
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert (viewer.render(cloud, size=(40, 30)).coverage > 0).any()
+
+
+def test_the_largest_coordinates_still_draw() -> None:
+    cloud = PointCloud.from_arrays(np.random.default_rng(0).normal(size=(1000, 3)) * 1e16)
+    assert (viewer.render(cloud, size=(40, 30)).coverage > 0).any()
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"positions": np.zeros((3, 2))}, r"expected \(N, 3\)"),
+        ({"positions": np.zeros((3, 3), complex)}, "expected numbers"),
+        ({"positions": np.zeros((3, 3)), "normals": np.zeros((2, 3))}, "normals have shape"),
+        ({"positions": np.zeros((3, 3)), "colors": np.zeros((3, 2))}, "colors have shape"),
+        ({"positions": np.zeros((3, 3)), "scalars": {"q": np.zeros(4)}}, "values of 'q'"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_explained(arrays: dict[str, np.ndarray], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        PointCloud.from_arrays(**arrays)
+
+
+def test_one_far_outlier_moves_neither_origin_nor_bounds() -> None:
+    body = np.random.default_rng(0).uniform(-1, 1, (5000, 3)) + 1000
+    alone = PointCloud.from_arrays(body)
+    joined = PointCloud.from_arrays(np.concatenate([body, [[1e9, 0, 0]]]))
+    np.testing.assert_array_equal(alone.origin, joined.origin)
+    np.testing.assert_allclose(alone.bounds().low, joined.bounds().low, rtol=1e-6)
+    np.testing.assert_allclose(alone.bounds().high, joined.bounds().high, rtol=1e-6)
+
+
+def test_poses_of_a_sequence_share_an_origin() -> None:
+    body = np.random.default_rng(0).normal(size=(5000, 3)) + np.array([4e6, 5e6, 101])
+    origins = {tuple(PointCloud.from_arrays(body + 0.001 * i).origin) for i in range(10)}
+    assert len(origins) == 1

@@ -1,0 +1,23 @@
+"""Names of axes."""
+
+from __future__ import annotations
+
+from .errors import unknown_name
+
+Vector = tuple[float, float, float]
+
+AXES: dict[str, Vector] = {
+    "+x": (1, 0, 0),
+    "-x": (-1, 0, 0),
+    "+y": (0, 1, 0),
+    "-y": (0, -1, 0),
+    "+z": (0, 0, 1),
+    "-z": (0, 0, -1),
+}
+
+
+def up_vector(name: str) -> Vector:
+    """The unit vector of an axis name such as '+y' or '-z'; raises InputError."""
+    if name not in AXES:
+        raise unknown_name("up axis", name, list(AXES))
+    return AXES[name]
