@@ -11,7 +11,7 @@ from typing import Any
 
 from ..backends import backends
 from ..camera import Camera
-from ..errors import InputError, Scan4DError
+from ..errors import InputError
 from ..gpu.context import Gpu
 from ..look import Look
 from ..scan.open import open_scan
@@ -150,7 +150,8 @@ class App:
         scan, self.opening, self._opening = self.opening, None, None
         try:
             timeline = opening.result()
-        except Scan4DError as error:
+        except Exception as error:  # whatever a file brings, the window stays
+            log.debug("cannot open %s", scan, exc_info=error)
             self.note(f"Cannot open: {error}")
             return
         assert scan is not None

@@ -39,6 +39,7 @@ class Picture:
         self.problem: Scan4DError | None = None
         self.better_at = math.inf
         self._drawn: Any = None
+        self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
 
     def draw(self, request: Request, size: tuple[int, int], moving: bool) -> bool:
@@ -83,12 +84,14 @@ class Picture:
 
     def clear(self) -> None:
         """Show nothing until the next request."""
-        self._drawn = self.request = self.problem = None
+        self._drawn = self.request = self.problem = self._bounded = None
         self.better_at = math.inf
 
     def bounds(self, pose: Pose) -> Bounds:
-        """The robust bounds of a pose, found once."""
-        return self.renderer.resident(pose).bounds
+        """The robust bounds of a pose, found once; also of one that is too large to draw."""
+        if self._bounded is None or self._bounded[0] is not pose:
+            self._bounded = pose, pose.cloud.bounds()
+        return self._bounded[1]
 
     @property
     def rate(self) -> float:
