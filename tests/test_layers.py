@@ -23,7 +23,7 @@ LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in part
 
 WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
-SLOW = {"open3d", "OpenEXR", "av", "plyfile", "lzf", "PIL", "tqdm", "cmap"} | WINDOW
+SLOW = {"open3d", "OpenEXR", "av", "plyfile", "lzf", "PIL", "tqdm", "cmap", "scipy", "skimage"} | WINDOW
 
 
 def modules() -> list[Path]:

@@ -10,12 +10,13 @@ from .look import Look
 from .scan.open import open_scan
 from .scan.points import PointCloud
 from .scan.pose import Pose
+from .scan.range_view import RangeView
 
 if TYPE_CHECKING:
     from .gpu.surface import Surface
 
 __version__ = "0.1.0"
-__all__ = ["Camera", "Look", "PointCloud", "Pose", "Scan4DError", "open_scan", "render"]
+__all__ = ["Camera", "Look", "PointCloud", "Pose", "RangeView", "Scan4DError", "open_scan", "render"]
 
 
 def render(

@@ -185,6 +185,8 @@ class Camera:
         tangent = math.tan(math.radians(self.fov_y) / 2) / _FIT_MARGIN
         # Each corner must lie within the picture's edges: |y| <= tangent * (distance - z).
         reach = np.maximum(np.abs(y), np.abs(x) / aspect)
+        if not reach.any():  # a line seen end on: as much room as seen from the side
+            reach = np.full_like(reach, bounds.radius)
         distance = float((z + reach / tangent).max())
         height = 2 * _FIT_MARGIN * float(reach.max()) if self.projection == "orthographic" else self.height
         eye = _vector(bounds.center + self.rotation()[2] * distance)

@@ -111,10 +111,12 @@ def test_a_folder_called_frames_inside(tmp_path: Path) -> None:
 
 
 def test_nothing_to_open(tmp_path: Path) -> None:
-    assert "holds no scan files. Known files: .csv, .npy" in message(tmp_path)
+    assert "holds no scan files. Known files: .csv, .exr, .npy" in message(tmp_path)
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
     assert message(tmp_path).endswith("holds no scan files. Its folders: a9, a10, b")
-    assert "a.jpg: unknown file suffix '.jpg'. Known: .csv, .npy" in message(put(tmp_path, "a.jpg") / "a.jpg")
+    assert "a.jpg: unknown file suffix '.jpg'. Known: .csv, .exr, .npy" in message(
+        put(tmp_path, "a.jpg") / "a.jpg"
+    )
     assert "is empty" in message_of_pose(put_empty(tmp_path / "empty.ply"))
     assert "is neither a file nor a folder" in message(os.devnull)
 

@@ -1,4 +1,4 @@
-"""Write poses as PLY, PCD or NPZ.
+"""Write poses as PLY, PCD or NPZ, and range views also as EXR.
 
 OUT is a file for one pose, or for a sequence a numbered pattern such as out%04d.ply, with
 the times beside it in times.csv.
@@ -22,7 +22,7 @@ from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline, r
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d convert`."""
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
-    suffixes = " ".join(formats.writable_suffixes())
+    suffixes = " ".join(formats.writable_suffixes(views=True))
     parser.add_argument("out", metavar="OUT", type=Path, help=f"{suffixes}, or a pattern with %%04d")
     add_pose_arguments(parser)
 
@@ -32,7 +32,7 @@ def run(args: Namespace) -> int:
     sequence = is_pattern(args.out)
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
-        check_output(args.out, formats.writable_suffixes(), several=len(indices) > 1)
+        check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
         files = {index: numbered(args.out, index) for index in indices}
         times_file = args.out.with_name(TIMES_FILE)
         if sequence:
@@ -40,7 +40,7 @@ def run(args: Namespace) -> int:
         rows = []
         with progress(len(indices)) as tick:
             for pose in read_poses(timeline, indices):
-                formats.write(files[pose.index], pose.cloud)
+                formats.write(files[pose.index], pose.cloud, pose.views)
                 rows.append((files[pose.index].name, pose.time))
                 tick()
     if sequence:

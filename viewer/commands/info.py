@@ -47,7 +47,8 @@ def describe(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         "label": pose.label,
         "points": len(cloud),
         "dropped": cloud.dropped,
-        "bytes": cloud.nbytes,
+        "bytes": pose.nbytes,
+        "views": [{"name": view.name, "size": view.depth.shape[::-1]} for view in pose.views],
         "origin": cloud.origin.tolist(),
         "bounds": {"low": (cloud.origin + low).tolist(), "high": (cloud.origin + high).tolist()},
         "attributes": {
@@ -82,6 +83,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         ("poses", poses),
         ("pose", f"{facts['pose']}, {facts['label']}"),
         ("points", points),
+        *(("view", "{}, {} x {} pixels".format(view["name"], *view["size"])) for view in facts["views"]),
         ("unit", unit),
         ("size", " x ".join(f"{b - a:g}" for a, b in zip(low, high, strict=True))),
         ("from", ", ".join(f"{value:g}" for value in low)),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import formats
-from .points import PointCloud
+from .pose import Scanned
 from .times import TIMES_FILE, read_times_csv
 
 
@@ -36,19 +36,25 @@ class FrameSource(Protocol):
     def times(self) -> NDArray[np.float64] | None:
         """(T,) seconds as recorded with the scan, or None where nothing was recorded."""
 
-    def load(self, index: int) -> PointCloud:
+    def load(self, index: int) -> Scanned:
         """Read one frame. Raises InputError where it is unusable."""
 
 
 class FileSequence:
     """One frame a file, in the order given. paths: at least one."""
 
-    unit = None
-
     def __init__(self, paths: Sequence[Path], name: str) -> None:
         self.name = name
         self._paths = list(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))
+
+    @property
+    def unit(self) -> str | None:
+        """As the first file tells, where its format knows units."""
+        try:
+            return formats.read_unit(self._paths[0])
+        except InputError:  # asking for its pose will tell
+            return None
 
     def __len__(self) -> int:
         return len(self._paths)
@@ -67,7 +73,7 @@ class FileSequence:
                 return read_times_csv(file, [self.label(index) for index in range(len(self))])
         return None
 
-    def load(self, index: int) -> PointCloud:
+    def load(self, index: int) -> Scanned:
         path = self._paths[index]
         if (count := formats.frame_count(path)) > 1:
             raise InputError(
@@ -95,5 +101,5 @@ class MultiFrameFile:
     def times(self) -> NDArray[np.float64] | None:
         return formats.read_times(self._path)
 
-    def load(self, index: int) -> PointCloud:
+    def load(self, index: int) -> Scanned:
         return formats.read(self._path, frame=index)

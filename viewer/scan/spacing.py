@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .points import PointCloud
 
 _DISTANCES = 2_000_000  # point-to-point distances looked at
-_NEAREST = 128  # of these, so that each of six neighbours may have twenty copies
+_NEAREST = (128, 8192)  # of these: six neighbours, each with twenty copies or with a thousand
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
 
 
@@ -35,8 +35,12 @@ def spacings(cloud: PointCloud) -> NDArray[np.float64]:
     found = []
     for probe in probes:
         squared = sum((points[:, axis] - probe[axis]) ** 2 for axis in range(3))
-        nearest = np.partition(squared, min(_NEAREST, count) - 1)[:_NEAREST]
-        distinct = np.unique(nearest[nearest > 0])  # copies of a point are at one distance
+        for nearest in _NEAREST:
+            near = np.argpartition(squared, min(nearest, count) - 1)[:nearest]
+            _, first = np.unique(points[near], axis=0, return_index=True)
+            if len(first) > _NEIGHBOR:
+                break
+        distinct = np.sort(squared[near[first]])[1:]  # without the probe itself
         k = min(_NEIGHBOR, len(distinct))
         if k:
             found.append(float(np.sqrt(distinct[k - 1] / (k / np.pi))))

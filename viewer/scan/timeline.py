@@ -279,7 +279,7 @@ class Timeline:
     def _read(self, index: int) -> Pose:
         label = self._source.label(index)
         try:
-            return Pose(index, float(self.times[index]), label, self._source.load(index))
+            return Pose.of(index, float(self.times[index]), label, self._source.load(index))
         except InputError as error:
             if error.where is None:
                 error.where = label

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from range_scenes import sphere_view
 
 from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
+from viewer.scan.range_view import merge
 
 HEAD = 600  # bytes of a file that hold its header
 MOST_SEED = 6000  # bytes of a real file that is worth damaging
@@ -59,6 +61,8 @@ def save_arrays(folder: Path) -> None:
     np.savez(
         folder / "seed3.npz", positions=sequence, radii=np.ones(8), origin=np.ones(3), times=np.arange(3)
     )
+    views = (sphere_view((0, 0, 4), size=(9, 7)), sphere_view((3, 0, 4), size=(6, 8), name="right"))
+    formats.write(folder / "seed5.exr", merge(views), views)
     np.savez_compressed(folder / "seed4.npz", positions=sequence, label=np.ones((3, 8), np.int8))
 
 
@@ -138,7 +142,7 @@ def read_or_refuse(path: Path) -> InputError | None:
 
 def read_all(path: Path) -> list[PointCloud]:
     formats.read_times(path)
-    return [formats.read(path, frame) for frame in range(min(formats.frame_count(path), 4))]
+    return [formats.read_points(path, frame) for frame in range(min(formats.frame_count(path), 4))]
 
 
 @pytest.mark.parametrize("suffix", formats.known_suffixes())

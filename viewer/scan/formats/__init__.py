@@ -1,12 +1,13 @@
-"""The file formats of point clouds: one module a format, found by scanning this folder.
+"""The file formats of scans: one module a format, found by scanning this folder.
 
 A format module declares
 
 - `TITLE: str`, as messages name it, and `SUFFIXES: tuple[str, ...]`, lower case with the dot;
-- `read(path, frame=0) -> PointCloud`;
+- `read(path, frame=0) -> PointCloud`, or a tuple of RangeViews;
 - where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
   `read_times(path)` (seconds, (T,) float64, or None);
-- where it can be written: `write(path, cloud)`.
+- where it tells the unit of length: `read_unit(path) -> str`, from the header alone;
+- where it can be written: `write(path, cloud)`, or `write_views(path, views)`.
 
 A module may raise any exception: the functions below turn it into one InputError that names the file.
 Modules whose name starts with an underscore are helpers.
@@ -15,7 +16,7 @@ Modules whose name starts with an underscore are helpers.
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -28,6 +29,8 @@ from numpy.typing import NDArray
 from ...errors import InputError, Scan4DError, unknown_name
 from ...files import whole_file
 from ..points import PointCloud
+from ..pose import Scanned
+from ..range_view import RangeView, merge
 
 
 def known_suffixes() -> list[str]:
@@ -35,9 +38,12 @@ def known_suffixes() -> list[str]:
     return sorted(_formats())
 
 
-def writable_suffixes() -> list[str]:
-    """Every suffix that can be written, sorted."""
-    return sorted(suffix for suffix, module in _formats().items() if hasattr(module, "write"))
+def writable_suffixes(views: bool = False) -> list[str]:
+    """Every suffix that can be written, sorted. views: those that take range views too."""
+    writers = ["write", "write_views"] if views else ["write"]
+    return sorted(
+        suffix for suffix, module in _formats().items() if any(hasattr(module, name) for name in writers)
+    )
 
 
 def frame_count(path: Path | str) -> int:
@@ -56,8 +62,16 @@ def read_times(path: Path | str) -> NDArray[np.float64] | None:
         return module.read_times(path) if hasattr(module, "read_times") else None
 
 
-def read(path: Path | str, frame: int = 0) -> PointCloud:
-    """The points of one moment of a file; at least one.
+def read_unit(path: Path | str) -> str | None:
+    """The name of the unit of length that the file tells, or None. Raises InputError."""
+    path = Path(path)
+    module = _readable(path)
+    with _one_message(path, f"cannot be read as {module.TITLE}"):
+        return module.read_unit(path) if hasattr(module, "read_unit") else None
+
+
+def read(path: Path | str, frame: int = 0) -> Scanned:
+    """One moment of a file as it is stored: points, at least one, or range views.
 
     Raises InputError where the path is not a readable file of a known format, where the file is
     empty or damaged or has no such frame, and where no point of it has finite coordinates.
@@ -69,29 +83,46 @@ def read(path: Path | str, frame: int = 0) -> PointCloud:
         raise InputError(f"has no frame {frame}", path, f"It holds {frames}, counted from 0")
     where = path if frames == 1 else f"{path}, frame {frame}"
     with _one_message(where, f"cannot be read as {module.TITLE}"):
-        cloud: PointCloud = module.read(path, frame)
-        if not len(cloud):
-            what = f"none of its {cloud.dropped} points has finite coordinates"
-            raise InputError(what if cloud.dropped else "holds no points")
-    return cloud
+        scanned: Scanned = module.read(path, frame)
+        if isinstance(scanned, PointCloud) and not len(scanned):
+            what = f"none of its {scanned.dropped} points has finite coordinates"
+            raise InputError(what if scanned.dropped else "holds no points")
+    return scanned
 
 
-def write(path: Path | str, cloud: PointCloud) -> None:
+def read_points(path: Path | str, frame: int = 0) -> PointCloud:
+    """The points of one moment of a file; those of range views merged. Raises InputError as `read`."""
+    scanned = read(path, frame)
+    if isinstance(scanned, PointCloud):
+        return scanned
+    with _one_message(path, "cannot be turned into points"):
+        return merge(scanned)
+
+
+def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) -> None:
     """Write the points in the format that the suffix names, in one step.
 
+    views: the range views behind the points, which a format of range views takes in their stead.
     The file takes its name only when it is complete; whatever goes wrong, a former file of that name
-    stays as it was and nothing else remains. Raises InputError for an unknown suffix or a failed write.
+    stays as it was and nothing else remains. Raises InputError for an unknown suffix, a failed write,
+    and where a format of range views gets none.
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in writable_suffixes():
-        raise InputError(f"cannot write '{suffix}' files", path, f"Known: {', '.join(writable_suffixes())}")
+    if suffix not in (known := writable_suffixes(views=True)):
+        raise InputError(f"cannot write '{suffix}' files", path, f"Known: {', '.join(known)}")
+    module = _formats()[suffix]
+    if not (views or hasattr(module, "write")):
+        hint = f"Points can be written as {', '.join(writable_suffixes())}"
+        raise InputError(f"{module.TITLE} holds range views, and this scan has none", path, hint)
     if not path.parent.is_dir():
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
-    module = _formats()[suffix]
     problem = f"cannot be written as {module.TITLE}", "Check free space and permissions"
     with _one_message(path, *problem), whole_file(path) as temporary:
-        module.write(temporary, cloud)
+        if hasattr(module, "write"):
+            module.write(temporary, cloud)
+        else:
+            module.write_views(temporary, views)
 
 
 @cache

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..points import PointCloud
+from ._packed import check_unpacked_size
 from ._stored import StoredArray
 
 TITLE = "NPZ"
 SUFFIXES = (".npz",)
 
 _RESERVED = {"positions", "normals", "colors", "radii", "origin", "times"}
-_FREE_BYTES = 16 << 20  # an archive may always unpack to this many bytes
-_MAX_RATIO = 250  # and beyond that to so many times its size: scans pack to a half or a tenth
+_MOST_RATIO = 250  # of unpacked to packed: scans pack to a half or a tenth
 
 
 def frame_count(path: Path) -> int:
@@ -101,9 +101,8 @@ def _arrays(path: Path) -> Iterator[dict[str, StoredArray]]:
     """All arrays of the archive by name, open as long as the context lasts."""
     with ZipFile(path) as archive, ExitStack() as streams:
         members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
-        unpacked, held = sum(member.file_size for member in members), path.stat().st_size
-        if unpacked > _FREE_BYTES + _MAX_RATIO * held:
-            raise InputError(f"{held} bytes would unpack to {unpacked}", hint="Save it with numpy.savez")
+        unpacked = sum(member.file_size for member in members)
+        check_unpacked_size(path, unpacked, _MOST_RATIO, "Save it with numpy.savez")
         yield {
             name: StoredArray.open(name, streams.enter_context(archive.open(member)), member.file_size)
             for member in members

@@ -1,0 +1,302 @@
+"""EXR: range views bit for bit, what other programs find in it, and what is refused."""
+
+from __future__ import annotations
+
+import struct
+import tracemalloc
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from range_scenes import sphere_view
+
+from viewer.errors import InputError
+from viewer.scan import formats
+from viewer.scan.colors import linear_from_srgb8
+from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
+from viewer.scan.range_view import RangeView, merge
+
+OpenEXR = pytest.importorskip("OpenEXR", exc_type=ImportError)
+
+UTM = np.array([665187.25, 5648349.5, 241.75])
+
+
+def pods(center: np.ndarray | None = None) -> tuple[RangeView, ...]:
+    center = np.zeros(3) if center is None else center
+    return (
+        sphere_view(np.add(center, (0.3, 0, 4)), center, name="left"),
+        sphere_view(np.add(center, (3, -1, 4)), center, size=(31, 17), name="rechts ä"),
+    )
+
+
+def save(path: Path, views: tuple[RangeView, ...]) -> Path:
+    formats.write(path, merge(views), views)
+    return path
+
+
+def assert_same_bits(views: tuple[RangeView, ...], others: tuple[RangeView, ...]) -> None:
+    assert len(views) == len(others)
+    for view, other in zip(views, others, strict=True):
+        for field in fields(RangeView):
+            value, same = getattr(view, field.name), getattr(other, field.name)
+            if isinstance(value, np.ndarray):
+                assert (value.dtype, value.shape) == (same.dtype, same.shape), field.name
+                assert value.tobytes() == same.tobytes(), field.name
+            else:
+                assert value == same, field.name
+
+
+@pytest.mark.parametrize("center", [np.zeros(3), UTM])
+def test_views_come_back_bit_for_bit(center: np.ndarray, tmp_path: Path) -> None:
+    left, right = pods(center)
+    depth, color = left.depth.copy(), left.color.copy()
+    depth[0, :6] = [np.nan, np.inf, -np.inf, 0.0, -0.0, np.float32(1e-40)]
+    color[0, :4, 0] = [np.nan, np.inf, -0.0, 6e-8]
+    left = replace(left, depth=depth, color=color, fx=52.1 + 1e-13, cx=23.3)
+    views = (left, right, replace(right, name="bare", color=None, confidence=None))
+    assert_same_bits(formats.read(save(tmp_path / "f.exr", views)), views)
+
+
+def test_the_file_is_as_documented(tmp_path: Path) -> None:
+    views = pods()
+    with OpenEXR.File(str(save(tmp_path / "f.exr", views)), separate_channels=True) as file:
+        for view, part in zip(views, file.parts, strict=True):
+            types = {name: channel.pixels.dtype for name, channel in part.channels.items()}
+            half, single = np.dtype(np.float16), np.dtype(np.float32)
+            expected = {"R": half, "G": half, "B": half, "mask": half, "Z": single, "confidence": single}
+            assert (part.name(), types) == (view.name, expected)
+            assert part.header["unit"] == "mm"
+            assert part.header["fx"].tolist() == [view.fx]
+            assert part.header["worldToCamera"].dtype == part.header["worldToNDC"].dtype == np.float32
+
+
+def test_standard_matrices_mean_what_the_standard_says(tmp_path: Path) -> None:
+    """Row vectors; a left-handed camera space that looks down +z; NDC from 0, 0 at the top left."""
+    views = pods()
+    with OpenEXR.File(str(save(tmp_path / "f.exr", views)), header_only=True) as file:
+        headers = [dict(part.header) for part in file.parts]
+    for view, header in zip(views, headers, strict=True):
+        row, column = np.nonzero(view.valid())
+        points = np.column_stack([view.positions(), np.ones(len(row))])
+        camera = points @ header["worldToCamera"]
+        assert camera[:, 2] == pytest.approx(view.depth[row, column], abs=1e-5)
+        assert np.linalg.det(header["worldToCamera"][:3, :3].astype(float)) == pytest.approx(-1, abs=1e-6)
+        ndc = points @ header["worldToNDC"]
+        width, height = header["displayWindow"][1] + 1
+        assert (width, height) == (48, 40)  # one for all parts
+        assert ndc[:, 0] / ndc[:, 3] * width == pytest.approx(column + 0.5, abs=1e-3)
+        assert ndc[:, 1] / ndc[:, 3] * height == pytest.approx(row + 0.5, abs=1e-3)
+
+
+def other(path: Path, *, drop: tuple[str, ...] = (), **changes: object) -> Path:
+    """A range scan as another program may write it: single-part, with these attributes and channels."""
+    view = sphere_view((0, 0, 4))
+    with OpenEXR.File(str(save(path, (view,))), separate_channels=True) as file:
+        header = {k: v for k, v in file.parts[0].header.items() if k not in ("channels", "name", *drop)}
+        channels = {k: c.pixels for k, c in file.parts[0].channels.items() if k not in drop}
+    for key, value in changes.items():
+        (channels if key in (*channels, "R") else header)[key] = value
+    with open(path, "wb") as stream:
+        OpenEXR.File(header, channels).write(stream)
+    return path
+
+
+def test_what_may_be_absent(tmp_path: Path) -> None:
+    absent = ("R", "G", "B", "mask", "confidence", "worldToCamera64", "worldToNDC", "unit")
+    (view,) = formats.read(other(tmp_path / "f.exr", drop=absent, fx=50.5))
+    assert (view.name, view.unit, view.fx) == ("part 0", "units", 50.5)
+    assert view.color is view.confidence is None
+    assert view.mask.all()
+    assert view.eye == pytest.approx([0, 0, 4], abs=1e-6)
+
+
+def test_a_cropped_picture_keeps_its_rays(tmp_path: Path) -> None:
+    whole = sphere_view((0, 0, 4))
+    path = save(tmp_path / "f.exr", (whole,))
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        header = {k: v for k, v in file.parts[0].header.items() if k != "channels"}
+        channels = {k: np.ascontiguousarray(c.pixels[9:, 5:40]) for k, c in file.parts[0].channels.items()}
+    low, high = (np.array(corner, np.int32) for corner in ((5, 9), (39, 39)))
+    with open(path, "wb") as stream:
+        OpenEXR.File(header | {"dataWindow": (low, high)}, channels).write(stream)
+    (view,) = formats.read(path)
+    assert view.depth.shape == (31, 35)
+    kept = np.zeros(whole.depth.shape, bool)
+    kept[9:, 5:40] = True
+    expected = replace(whole, mask=whole.mask & kept).positions()
+    assert view.positions() == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("drop", "changes", "reason"),
+    [
+        (("Z",), {}, "'part 0' is no range view, it lacks: channel Z. A range scan has"),
+        (("fx", "cy"), {}, "lacks: attribute fx, attribute cy"),
+        (("worldToCamera", "worldToCamera64"), {}, "lacks: attribute worldToCamera"),
+        ((), {"fx": np.array([-1.0])}, "calibration is unusable: fx -1"),
+        ((), {"cx": "middle"}, "could not convert string"),
+        ((), {"worldToCamera64": np.eye(3)}, "cannot reshape"),
+        ((), {"worldToCamera64": np.full((4, 4), np.inf)}, "not a rotation and a translation"),
+        ((), {"worldToCamera64": np.eye(4)}, "not a rotation and a translation"),  # it looks down -z
+        ((), {"Z": np.full((40, 48), np.nan, np.float32)}, "no pixel inside the masks has a depth"),
+    ],
+)
+def test_what_is_no_range_scan(
+    drop: tuple[str, ...], changes: dict[str, object], reason: str, tmp_path: Path
+) -> None:
+    path = other(tmp_path / "f.exr", drop=drop, **changes)
+    with pytest.raises(InputError, match=reason) as caught:
+        formats.read_points(path)
+    assert str(caught.value).startswith(str(path))
+    assert caught.value.hint
+
+
+def test_damaged_parts_are_refused_and_standard_output_stays_clean(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = save(tmp_path / "f.exr", pods())
+    whole = path.read_bytes()
+    for size in range(0, len(whole), len(whole) // 40):
+        path.write_bytes(whole[:size])
+        with pytest.raises(InputError):
+            formats.read(path)
+    path.write_bytes(whole[:-300])
+    with pytest.raises(InputError, match="only 1 of its 2 parts can be decoded"):
+        formats.read(path)
+    assert capsys.readouterr().out == ""
+
+
+def test_a_huge_window_is_refused_before_it_is_allocated(tmp_path: Path) -> None:
+    path = save(tmp_path / "f.exr", pods())
+    window, huge = struct.pack("<4i", 0, 0, 47, 39), struct.pack("<4i", 0, 0, 99_999, 99_999)
+    path.write_bytes(path.read_bytes().replace(window, huge))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="bytes would unpack to 240000"):
+        formats.read(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000
+
+
+def test_empty_pixels_of_a_large_picture_are_no_bomb(tmp_path: Path) -> None:
+    view = sphere_view((0, 0, 4))
+    image = np.full((2000, 2000), np.nan, np.float32)
+    image[1000, 1000] = 2
+    views = (replace(view, depth=image, mask=image > 0, color=None, confidence=None),)
+    assert len(formats.read_points(save(tmp_path / "f.exr", views))) == 1
+
+
+def test_writing_needs_views_with_names_that_differ(tmp_path: Path) -> None:
+    left, _ = pods()
+    with pytest.raises(InputError, match=r"EXR holds range views.* written as \.npz, \.pcd, \.ply"):
+        formats.write(tmp_path / "f.exr", PointCloud.from_arrays(np.eye(3)))
+    for views in ((left, left), (replace(left, name=""),)):
+        with pytest.raises(InputError, match="need names that differ"):
+            save(tmp_path / "f.exr", views)
+    assert list(tmp_path.iterdir()) == []
+    assert ".exr" in formats.writable_suffixes(views=True)
+
+
+def test_a_sequence_opens_with_its_unit(tmp_path: Path) -> None:
+    frames = [(sphere_view((0.1 * i, 0, 4)), sphere_view((3, 0, 4), name="right")) for i in range(3)]
+    for index, views in enumerate(frames):
+        save(tmp_path / f"f{index}.exr", views)
+    with open_scan(tmp_path) as scan:
+        assert (len(scan), scan.unit) == (3, "mm")
+        for pose, views in zip(scan, frames, strict=True):
+            assert_same_bits(pose.views, views)
+            assert np.array_equal(pose.cloud.positions, merge(views).positions)
+        assert scan.messages == []
+    (tmp_path / "f0.exr").write_bytes(b"nothing")
+    with open_scan(tmp_path) as scan:
+        assert scan.unit == "units"
+        assert [pose.label for pose in scan] == ["f1.exr", "f2.exr"]
+
+
+# --- real files -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("odd/exr/AllHalfValues.exr", "lacks: channel Z, attribute worldToCamera, attribute fx"),
+        ("odd/exr/WideFloatRange.exr", "lacks: channel Z, attribute worldToCamera, attribute fx"),
+        ("odd/exr/damaged_asan_561_c28c.exr", "lacks: channel Z"),
+        ("odd/exr/damaged_fuzz_5936.exr", "cannot be read as EXR"),
+        ("range/openexr_beachball/singlepart.0001.exr", "'rgba' is no range view, it lacks: attribute world"),
+        ("range/openexr_beachball/multipart.0001.exr", "'rgba_right' is no range view, it lacks: channel Z"),
+        ("range/openexr_deep/LowResLeftView_Balls.exr", "'rgba.left' is a deep image"),
+    ],
+)
+def test_other_pictures_are_refused(name: str, reason: str, data_dir: Path) -> None:
+    with pytest.raises(InputError, match=reason):
+        formats.read(data_dir / name)
+
+
+def test_a_head_from_a_phone(data_dir: Path, tmp_path: Path) -> None:
+    """Its notes: x = (u - cx) d / f, y = (v - cy) d / f, z = d, u and v whole at pixel centres."""
+    with np.load(data_dir / "range/truedepth_head_30/frame-045.npz") as frame:
+        depth, colors = frame["depth"], frame["color"]
+    f, cx, cy = 298.565, 159.232, 119.101
+    view = RangeView(
+        depth=depth,
+        mask=np.isfinite(depth),
+        color=linear_from_srgb8(colors),
+        fx=f,
+        fy=f,
+        cx=cx + 0.5,
+        cy=cy + 0.5,
+        world_to_camera=np.diag([1.0, -1, -1, 1]),  # their y points down, their z away
+        name="phone",
+        unit="m",
+    )
+    v, u = np.nonzero(np.isfinite(depth))
+    d = depth[v, u].astype(float)
+    expected = np.stack([(u - cx) * d / f, (v - cy) * d / f, d], axis=1)
+    assert len(expected) > 10_000
+    assert view.positions() == pytest.approx(expected, abs=1e-12)
+    (back,) = formats.read(save(tmp_path / "f.exr", (view,)))
+    assert_same_bits((back,), (view,))
+    assert np.array_equal(back.points().colors[:, :3], colors[v, u])
+    assert np.einsum("ij,ij->i", view.normals(), view.positions()).max() < 0  # all face the pod
+
+
+def test_two_poses_of_a_depth_camera_meet(data_dir: Path, tmp_path: Path) -> None:
+    """Frames whose poses are stated as camera to world: what both see lies at the same place."""
+    from PIL import Image
+
+    folder, views = data_dir / "range/sevenscenes_kinect_31", []
+    for number in ("000000", "000033"):
+        depth = np.asarray(Image.open(folder / f"frame-{number}.depth.png")).astype(np.float32) / 1000
+        to_world = np.loadtxt(folder / f"frame-{number}.pose.txt")
+        turned = np.diag([1.0, -1, -1, 1]) @ np.linalg.inv(to_world)
+        turned[3] = 0, 0, 0, 1
+        views.append(
+            RangeView(
+                depth=depth,
+                mask=depth < 10,  # 65535 is none
+                fx=585.0,
+                fy=585.0,
+                cx=320.5,
+                cy=240.5,
+                world_to_camera=turned,
+                name=number,
+                unit="m",
+            )
+        )
+        v, u = np.nonzero(views[-1].valid())
+        d = depth[v, u].astype(float)
+        camera = np.stack([(u - 320) * d / 585, (v - 240) * d / 585, d, np.ones(len(d))], axis=1)
+        assert views[-1].positions() == pytest.approx((camera @ to_world.T)[:, :3], abs=1e-6)
+    first, second = views
+    points = first.positions()[::50] @ second.world_to_camera[:3, :3].T + second.world_to_camera[:3, 3]
+    u = np.floor(second.cx - second.fx * points[:, 0] / points[:, 2])
+    v = np.floor(second.cy + second.fy * points[:, 1] / points[:, 2])
+    seen = (points[:, 2] < 0) & (u >= 0) & (u < 640) & (v >= 0) & (v < 480)
+    row, column = v[seen].astype(int), u[seen].astype(int)
+    apart = np.abs(second.depth[row, column] + points[seen, 2])[second.valid()[row, column]]
+    assert len(apart) > 1000
+    assert np.median(apart) < 0.02  # metres
+    assert_same_bits(formats.read(save(tmp_path / "f.exr", (first, second))), (first, second))

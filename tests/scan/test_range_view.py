@@ -1,0 +1,187 @@
+"""Range views: back-projection, what counts as measured, ids, normals from the grid."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from range_scenes import sphere_view
+
+from viewer.errors import InputError
+from viewer.scan.colors import linear_from_srgb8, srgb8_from_linear
+from viewer.scan.pose import Pose
+from viewer.scan.range_view import RangeView, merge
+
+EYE = (2.0, 1.5, 4.0)
+UTM = np.array([665187.25, 5648349.5, 241.75])
+
+
+def flat(depth: object, **fields: object) -> RangeView:
+    """A view from the origin down -z, its principal point in the middle of the picture."""
+    image = np.array(depth, np.float32)
+    height, width = image.shape
+    given = {"mask": np.ones(image.shape, bool), "fx": 2.0, "fy": 2.0, "cx": width / 2, "cy": height / 2}
+    return RangeView(**{"depth": image, "world_to_camera": np.eye(4), **given, **fields})
+
+
+def test_a_pixel_is_where_its_centre_looks() -> None:
+    view = flat([[2, 4, 6], [2, 4, 6]])
+    expected = [[-1, 0.5, -2], [0, 1, -4], [3, 1.5, -6], [-1, -0.5, -2], [0, -1, -4], [3, -1.5, -6]]
+    assert view.positions().tolist() == expected
+    assert view.points().world().tolist() == expected
+
+
+@pytest.mark.parametrize("center", [np.zeros(3), UTM])
+def test_points_lie_on_the_surface(center: np.ndarray) -> None:
+    view = sphere_view(center + EYE, center)
+    from_center = np.linalg.norm(view.positions() - center, axis=1)
+    rounding = 4.7 * 2**-23  # of float32 depths up to 4.7, along rays no longer than 1.2 of it
+    assert len(from_center) > 300
+    assert np.abs(from_center - 1).max() < rounding
+    assert np.linalg.norm(view.points().world() - center, axis=1) == pytest.approx(1, abs=2 * rounding)
+    assert view.eye == pytest.approx(center + EYE, abs=1e-8)
+
+
+def test_points_project_to_the_pixels_they_came_from() -> None:
+    view = sphere_view(EYE)
+    camera = view.positions() @ view.world_to_camera[:3, :3].T + view.world_to_camera[:3, 3]
+    row, column = np.nonzero(view.valid())
+    assert view.cx - view.fx * camera[:, 0] / camera[:, 2] == pytest.approx(column + 0.5, abs=1e-11)
+    assert view.cy + view.fy * camera[:, 1] / camera[:, 2] == pytest.approx(row + 0.5, abs=1e-11)
+    assert -camera[:, 2] == pytest.approx(view.depth[row, column].astype(float), rel=1e-14)
+
+
+def test_what_counts_as_measured() -> None:
+    view = flat([[1, np.nan, np.inf], [0, -1, 1e-30], [-np.inf, 2, 3]])
+    masked = replace(view, mask=np.array([[1, 1, 1], [1, 1, 1], [1, 0, 1]], bool))
+    assert np.flatnonzero(view.valid()).tolist() == [0, 5, 7, 8]
+    points = masked.points()
+    assert points.ids.tolist() == [0, 5, 8]
+    assert points.dropped == 0  # an empty pixel is no damaged point
+
+
+def test_views_come_in_order_and_ids_tell_the_pixel() -> None:
+    first, second = sphere_view(EYE), sphere_view((-2, 0, 4), size=(30, 20))
+    points = merge((first, second))
+    assert np.array_equal(points.world().shape, (len(points.ids), 3))
+    own = np.count_nonzero(first.valid())
+    assert np.array_equal(points.ids[:own], np.flatnonzero(first.valid()))
+    assert np.array_equal(points.ids[own:], 48 * 40 + np.flatnonzero(second.valid()))
+    assert np.array_equal(points.scalars["view"], [0] * own + [1] * (len(points) - own))
+    both = np.concatenate([first.positions(), second.positions()])
+    assert points.world() == pytest.approx(both, abs=1e-6)
+    confidence = np.concatenate([view.confidence[view.valid()] for view in (first, second)])
+    assert np.array_equal(points.scalars["confidence"], confidence)
+
+
+def test_attributes_that_one_view_lacks_are_absent() -> None:
+    full = sphere_view(EYE)
+    points = merge((full, replace(full, color=None, confidence=None)))
+    assert points.colors is None
+    assert list(points.scalars) == ["view"]
+    assert full.points().normals is None  # not computed unless asked for
+
+
+def test_colours_survive_the_way_to_linear_half_and_back() -> None:
+    colors = np.arange(256, dtype=np.uint8).repeat(3).reshape(1, 256, 3)
+    linear = linear_from_srgb8(colors)
+    assert (linear[0, 0, 0], linear[0, 255, 0]) == (0, 1)
+    assert linear[0, 188, 0] == pytest.approx(0.5029, abs=2e-4)  # sRGB's middle grey
+    points = flat(np.ones((1, 256)), color=linear).points()
+    assert np.array_equal(points.colors[:, :3], colors[0])
+    odd = np.array([np.nan, np.inf, -np.inf, 7, -0.5], np.float16)
+    assert srgb8_from_linear(odd).tolist() == [0, 255, 0, 255, 0]
+
+
+def test_normals_of_a_sphere() -> None:
+    view = replace(sphere_view(EYE, size=(200, 200)), mask=np.ones((200, 200), bool))
+    normals, outward = view.normals(), view.positions()
+    assert normals.dtype == np.float32
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-6)
+    facing = np.einsum("ij,ij->i", outward, view.eye - outward) / np.linalg.norm(view.eye - outward, axis=1)
+    angles = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", normals, outward), -1, 1)))
+    assert np.median(angles) < 0.1
+    assert angles[facing > 0.3].max() < 1.5
+    assert np.array_equal(merge((view, view), normals=True).normals, np.tile(normals, (2, 1)))
+
+
+def test_normals_do_not_bridge_edges() -> None:
+    """A wall behind a wall, both facing the pod: no normal leans across the step between them."""
+    depth = np.full((6, 8), 2.0)
+    depth[:, 4:] = 30.0  # 14 pixel footprints away
+    assert flat(depth).normals() == pytest.approx(np.tile([0, 0, 1], (48, 1)), abs=1e-6)
+    depth[:, 4:] = 8.0  # 3 footprints: a slope
+    assert np.abs(flat(depth).normals()[:, 0]).max() > 0.5
+
+
+def test_normals_beside_holes_are_one_sided_and_alone_face_the_pod() -> None:
+    row, column = np.mgrid[:5, :8]
+    slope = flat(np.ones((5, 8)), fx=50.0, fy=50.0)
+    ray = np.stack([(column + 0.5 - 4) / 50, (2.5 - row - 0.5) / 50, -np.ones((5, 8))], axis=2)
+    normal = np.array([0.6, 0.0, 0.8])
+    depth = (-1 / (ray @ normal)).astype(np.float32)  # the plane normal . x = -1
+    depth[:, 2::3] = np.nan  # every pixel keeps one neighbour in its row
+    assert replace(slope, depth=depth).normals() == pytest.approx(
+        np.tile(normal, (np.isfinite(depth).sum(), 1)), abs=1e-4
+    )
+    alone = flat([[np.nan, np.nan], [np.nan, 2]])
+    assert alone.normals()[0] == pytest.approx(-alone.positions()[0] / np.linalg.norm(alone.positions()[0]))
+
+
+def test_points_beyond_float32_are_dropped_and_ids_stay_right() -> None:
+    largest = float(np.finfo(np.float32).max)
+    points = flat([[1, largest, 2]], fx=0.5).points()
+    assert (points.ids.tolist(), points.dropped) == ([0, 2], 1)
+
+
+def test_a_view_of_nothing_has_no_points() -> None:
+    view = flat([[np.nan, 1]], mask=np.array([[True, False]]))
+    for call in (view.points, lambda: Pose.of(0, 0.0, "x", (view,))):
+        with pytest.raises(InputError, match="holds no points"):
+            call()
+    assert view.normals().shape == (0, 3)
+    assert len(merge((view, flat([[1.0]])))) == 1
+
+
+def test_a_pose_holds_views_and_their_points() -> None:
+    views = (sphere_view(EYE), sphere_view((-2, 0, 4)))
+    pose = Pose.of(3, 0.5, "f3.exr", views)
+    assert pose.views is views
+    assert np.array_equal(pose.cloud.positions, merge(views).positions)
+    # depth, mask, colour, confidence; and the matrix
+    assert pose.nbytes == pose.cloud.nbytes + 2 * (48 * 40 * (4 + 1 + 6 + 4) + 128)
+    reference = weakref.ref(pose)
+    assert reference() is pose
+    bare = Pose.of(0, 0.0, "a.ply", pose.cloud)
+    assert bare.views == ()
+    assert bare.cloud is pose.cloud
+
+
+MIRROR = np.diag([1.0, 1, -1, 1])
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"depth": np.zeros(4, np.float32)}, r"depth of a range view has shape \(4,\)"),
+        ({"depth": np.zeros((0, 4), np.float32)}, r"has shape \(0, 4\)"),
+        ({"depth": np.zeros((2, 2))}, r"depth is \(2, 2\) float64, expected \(2, 2\) float32"),
+        ({"mask": np.ones((2, 3), bool)}, r"mask is \(2, 3\) bool, expected \(2, 2\) bool"),
+        ({"mask": None}, "mask is .* NoneType, expected"),
+        ({"color": np.zeros((2, 2, 3), np.uint8)}, r"color is \(2, 2, 3\) uint8, expected .* float16"),
+        ({"confidence": [[1, 1], [1, 1]]}, "confidence is .* list"),
+        ({"fx": 0.0}, "calibration is unusable: fx 0"),
+        ({"cy": np.nan}, "cy nan"),
+        ({"world_to_camera": np.eye(3)}, r"world_to_camera is \(3, 3\)"),
+        ({"world_to_camera": 1.01 * np.eye(4)}, "not a rotation and a translation"),
+        ({"world_to_camera": MIRROR}, "not a rotation and a translation"),
+        ({"world_to_camera": np.full((4, 4), np.nan)}, "not a rotation and a translation"),
+        ({"world_to_camera": np.full((4, 4), 1e300)}, "not a rotation and a translation"),
+    ],
+)
+def test_what_is_no_range_view(fields: dict[str, object], reason: str) -> None:
+    view = flat([[1, 1], [1, 1]])
+    with pytest.raises(InputError, match=reason):
+        replace(view, **fields)

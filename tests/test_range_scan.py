@@ -1,0 +1,81 @@
+"""A range scan from its files to pictures and to other formats."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from range_scenes import looking_at, sphere_view
+
+import viewer
+from viewer import cli
+from viewer.camera import Camera
+from viewer.scan import formats
+from viewer.scan.open import open_scan
+from viewer.scan.range_view import merge
+
+pytest.importorskip("OpenEXR", exc_type=ImportError)
+
+EYES = {"left": (-1.0, 0.0, 4.0), "right": (1.5, 0.5, 4.0)}
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three frames of a unit sphere seen by two pods."""
+    folder = tmp_path_factory.mktemp("range")
+    for index in range(3):
+        views = tuple(
+            sphere_view((x, y, z + 0.1 * index), size=(120, 100), name=n) for n, (x, y, z) in EYES.items()
+        )
+        formats.write(folder / f"f{index}.exr", merge(views), views)
+    return folder
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_converts_to_points(suffix: str, scan: Path, tmp_path: Path) -> None:
+    assert cli.main(["convert", str(scan), str(tmp_path / f"p%d{suffix}")]) == 0
+    with open_scan(scan) as before, open_scan(tmp_path) as after:
+        for pose, other in zip(before, after, strict=True):
+            assert np.array_equal(other.cloud.world(), pose.cloud.world())
+            assert np.array_equal(other.cloud.colors, pose.cloud.colors)
+            assert np.array_equal(other.cloud.scalars["view"], pose.cloud.scalars["view"])
+
+
+def test_converts_to_itself_and_points_do_not(
+    scan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["convert", str(scan), str(tmp_path / "f%d.exr"), "--fps", "25"]) == 0
+    for index in range(3):
+        name = f"f{index}.exr"
+        assert (tmp_path / name).read_bytes() == (scan / name).read_bytes()
+    assert cli.main(["convert", "demo", "--pose", "1", str(tmp_path / "demo.exr")]) == 2
+    assert "EXR holds range views, and this scan has none" in capsys.readouterr().err
+    assert not (tmp_path / "demo.exr").exists()
+
+
+def test_info_names_the_pods(scan: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["info", str(scan), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["views"] == [{"name": name, "size": [120, 100]} for name in EYES]
+    assert facts["unit"] == "mm"
+    assert cli.main(["info", str(scan)]) == 0
+    assert "right, 120 x 100 pixels" in capsys.readouterr().out
+
+
+def test_is_drawn_where_it_was_seen(scan: Path) -> None:
+    """From the place of a pod: each pixel shows the very depth that the pod measured there."""
+    with open_scan(scan) as timeline:
+        pose = timeline.pose(0)
+    view, size = pose.views[0], 200
+    camera = Camera(eye=tuple(view.eye), target=(0, 0, 0), fov_y=2 * np.degrees(np.arctan(0.5)))
+    assert np.allclose(looking_at(camera.eye, camera.target), view.world_to_camera)
+    surface = viewer.render(pose, camera, (size, size), backend="points", point_size=1)
+    row, column = np.nonzero(surface.id < view.depth.size)  # ids of the first view are its pixels
+    assert len(row) > 2000
+    seen = surface.id[row, column]
+    assert surface.depth[row, column] == pytest.approx(view.depth.ravel()[seen], rel=1e-5)
+    u, v = seen % view.depth.shape[1] + 0.5, seen // view.depth.shape[1] + 0.5
+    assert np.abs(size / 2 + size * (u - view.cx) / view.fx - (column + 0.5)).max() <= 0.51
+    assert np.abs(size / 2 + size * (v - view.cy) / view.fy - (row + 0.5)).max() <= 0.51

@@ -1,0 +1,1 @@
+"""What backends are judged by: scenes, error, run time."""

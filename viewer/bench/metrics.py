@@ -1,0 +1,219 @@
+"""Error of a picture against the truth: numbers by the names of docs/benchmark.md.
+
+Functions over arrays; nothing here draws. What is undefined, as the mean of no pixels, is NaN.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+WRONG_LAYER = 4.0  # local spacings between two depths that are of two sheets
+_WINDOW = 11  # pixels, of SSIM
+
+Errors = dict[str, float]
+Mask = NDArray[np.bool_]
+
+
+def coverage(drawn: Mask, true: Mask) -> Errors:
+    """Holes, spill and distance of the outlines of two silhouettes, (H, W) bool.
+
+    Holes that are wholly inside the true silhouette have no part in the outline: they are counted already.
+    """
+    area = _count(true)
+    outline, true_outline = _outline(drawn | _enclosed(~drawn, true)), _outline(true)
+    distances = np.concatenate([_distance(true_outline)[outline], _distance(outline)[true_outline]])
+    return {
+        "hole_percent": _percent(_count(true & ~drawn), area),
+        "spill_percent": _percent(_count(drawn & ~true), area),
+        "boundary_mean": _mean(distances),
+        "boundary_p95": _quantile(distances, 0.95),
+    }
+
+
+def depth(
+    drawn: NDArray[np.floating],
+    true: NDArray[np.floating],
+    footprint: NDArray[np.floating],
+    spacing: float | NDArray[np.floating],
+) -> Errors:
+    """Depth errors where both pictures show something, in scan units and (`_px`) in pixel footprints.
+
+    drawn, true: (H, W), +inf where nothing is. footprint: (H, W), of a pixel at the true depth, scan units.
+    spacing: of the points there, scan units, one number or (H, W).
+    """
+    both = np.isfinite(drawn) & np.isfinite(true)
+    error = drawn[both].astype(np.float64) - true[both]
+    spacing = np.broadcast_to(spacing, both.shape)[both]
+    errors: Errors = {}
+    for unit, values in (("", error), ("_px", error / footprint[both])):
+        size = np.abs(values)
+        errors |= {
+            f"depth_bias{unit}": _mean(values),
+            f"depth_rmse{unit}": float(np.sqrt(_mean(values**2))),
+            f"depth_median{unit}": _quantile(size, 0.5),
+            f"depth_p95{unit}": _quantile(size, 0.95),
+        }
+    wrong = _count(np.abs(error) > WRONG_LAYER * spacing)
+    return errors | {"wrong_layer_percent": _percent(wrong, len(error))}
+
+
+def normals(drawn: NDArray[np.floating], true: NDArray[np.floating]) -> Errors:
+    """Angles in degrees between normals (H, W, 3) where both pictures have one that is not zero.
+
+    Unsigned, as if a normal and its opposite were the same, and signed.
+    """
+    angle = angles(drawn, true)
+    signed = angle[np.isfinite(angle)]
+    errors: Errors = {}
+    for kind, values in (("", np.minimum(signed, 180 - signed)), ("_signed", signed)):
+        errors |= {
+            f"normal{kind}_mean": _mean(values),
+            f"normal{kind}_median": _quantile(values, 0.5),
+            f"normal{kind}_p95": _quantile(values, 0.95),
+        }
+    return errors
+
+
+def angles(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Angles 0..180 in degrees between vectors (..., 3); NaN where one is zero or not finite."""
+    usable = np.isfinite(a).all(axis=-1) & np.isfinite(b).all(axis=-1) & a.any(axis=-1) & b.any(axis=-1)
+    u, v = a[usable].astype(np.float64), b[usable].astype(np.float64)
+    out = np.full(usable.shape, np.nan)
+    # Exact near 0 and 180, where the arc cosine is not.
+    out[usable] = np.degrees(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1)))
+    return out
+
+
+def color(drawn: NDArray[np.uint8], true: NDArray[np.uint8], inside: Mask) -> Errors:
+    """PSNR (dB), SSIM and FLIP of shaded pictures (H, W, 3 or 4), over `inside` (H, W) and the frame.
+
+    SSIM is NaN for pictures smaller than its window of 11 pixels, FLIP where its package is not installed.
+    """
+    drawn, true = drawn[..., :3], true[..., :3]
+    squares = ((drawn.astype(np.float64) - true) ** 2).mean(axis=2)
+    maps = {"ssim": _ssim(drawn, true), "flip": _flip(drawn, true)}
+    errors = {"psnr": _psnr(squares[inside]), "psnr_frame": _psnr(squares)}
+    for name, values in maps.items():
+        errors |= {name: _mean(values[inside]), f"{name}_frame": _mean(values)}
+    return errors
+
+
+def visibility(found: Mask, true: Mask) -> Errors:
+    """Points (N,) bool that were found visible, against those that are (Machado e Silva 2014)."""
+    false_positives = _count(found & ~true)
+    false_negatives = _count(~found & true)
+    correct = len(true) - false_positives - false_negatives
+    return {
+        "false_positives": false_positives,
+        "false_negatives": false_negatives,
+        "correct": correct,
+        "visibility_error_percent": _percent(false_positives + false_negatives, correct),
+    }
+
+
+def flicker(
+    drawn: tuple[dict[str, Any], dict[str, Any]],
+    true: tuple[dict[str, Any], dict[str, Any]],
+    pixels: tuple[NDArray[np.intp], NDArray[np.intp]],
+) -> Errors:
+    """The change from one frame to the next that is not in the truth, at surface points both frames see.
+
+    drawn, true: two frames each, with "image", (H, W, 3 or 4) uint8, and "normal", (H, W, 3). pixels: the
+    same surface points in the first and the second frame, indices into H * W (`reference.both_see`).
+    Colour in parts of full scale, normals in degrees where both frames have one.
+    """
+    drawn_color, drawn_normal = _changes(drawn, pixels)
+    true_color, true_normal = _changes(true, pixels)
+    both = np.isfinite(drawn_normal) & np.isfinite(true_normal)
+    return {
+        "flicker_color": _mean(drawn_color) - _mean(true_color),
+        "flicker_normal": _mean(drawn_normal[both]) - _mean(true_normal[both]),
+    }
+
+
+def _changes(
+    frames: tuple[dict[str, Any], dict[str, Any]], pixels: tuple[NDArray[np.intp], NDArray[np.intp]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Absolute change of colour and of normal at each pair of pixels."""
+    before, after = (
+        (
+            frame["image"].reshape(-1, frame["image"].shape[-1])[at, :3] / 255,
+            frame["normal"].reshape(-1, 3)[at],
+        )
+        for frame, at in zip(frames, pixels, strict=True)
+    )
+    return np.abs(after[0] - before[0]).mean(axis=1), angles(before[1], after[1])
+
+
+def _enclosed(holes: Mask, true: Mask) -> Mask:
+    """Connected parts of `holes` that lie wholly in `true`."""
+    from scipy import ndimage
+
+    labels, count = ndimage.label(holes)
+    reaching_out = np.zeros(count + 1, bool)
+    reaching_out[labels[~true]] = True
+    return holes & ~reaching_out[labels]
+
+
+def _outline(mask: Mask) -> Mask:
+    """The pixels of a mask that have one of four neighbours outside it; the frame's edge is no outline."""
+    from scipy import ndimage
+
+    return mask & ~ndimage.binary_erosion(mask, border_value=1)
+
+
+def _distance(mask: Mask) -> NDArray[np.float64]:
+    """How far each pixel is from the nearest of a mask, (H, W), pixels; NaN where the mask is empty."""
+    from scipy import ndimage
+
+    if not mask.any():
+        return np.full(mask.shape, np.nan)
+    return ndimage.distance_transform_edt(~mask)
+
+
+def _ssim(drawn: NDArray[np.uint8], true: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """SSIM of each pixel, (H, W), with the settings of Wang et al. 2004."""
+    from skimage.metrics import structural_similarity
+
+    if min(drawn.shape[:2]) < _WINDOW:
+        return np.full(drawn.shape[:2], np.nan)
+    _, values = structural_similarity(
+        drawn, true, channel_axis=2, data_range=255, gaussian_weights=True, sigma=1.5,
+        use_sample_covariance=False, full=True,
+    )  # fmt: skip
+    return values.mean(axis=2)
+
+
+def _flip(drawn: NDArray[np.uint8], true: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """FLIP of each pixel, (H, W), 0..1, at its own 67 pixels per degree (Andersson et al. 2020)."""
+    try:
+        import flip_evaluator
+    except ModuleNotFoundError:  # it has no wheels for some platforms
+        return np.full(drawn.shape[:2], np.nan)
+    pictures = (np.ascontiguousarray(picture / np.float32(255), np.float32) for picture in (true, drawn))
+    values, _, _ = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)
+    return np.asarray(values, np.float64).reshape(drawn.shape[:2])
+
+
+def _psnr(squares: NDArray[np.float64]) -> float:
+    error = _mean(squares)
+    return float("inf") if error == 0 else float(10 * np.log10(255**2 / error))
+
+
+def _count(mask: Mask) -> int:
+    return int(np.count_nonzero(mask))
+
+
+def _percent(part: int, whole: int) -> float:
+    return 100.0 * part / whole if whole else float("nan")
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    return float(values.mean()) if values.size else float("nan")
+
+
+def _quantile(values: NDArray[np.float64], q: float) -> float:
+    return float(np.quantile(values, q)) if values.size else float("nan")

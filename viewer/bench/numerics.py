@@ -1,0 +1,528 @@
+"""Numerical stability: a scan given in another way must still give the same picture.
+
+A row draws a shot and its variant with one backend, and says how far they may be apart.
+Where a backend cannot hold a row in principle, its module says so:
+`LIMITS = {name of the row: reason}`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..backends import Backend
+from ..camera import PROJECTIONS, Camera
+from ..frame import Request, render_frame
+from ..gpu.surface import Surface
+from ..look import Look
+from ..renderer import Renderer
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from .samples import Arrays, line, torus, wall
+
+_NO_TURN = np.eye(3)
+
+# --- what is drawn --------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """Points and how they are looked at.
+
+    arrays: the arguments of `PointCloud.from_arrays`. margin: columns and rows of pixels on
+    each side that are drawn but not compared.
+    """
+
+    arrays: Arrays
+    camera: Camera
+    size: tuple[int, int] = (160, 120)
+    look: Look = field(default_factory=lambda: Look(light="head"))
+    margin: tuple[int, int] = (0, 0)
+
+    def __len__(self) -> int:
+        return len(self.arrays["positions"])
+
+    def cloud(self) -> PointCloud:
+        """The points as a scan has them."""
+        return PointCloud.from_arrays(**self.arrays)  # type: ignore[arg-type]
+
+    def given(self, **arrays: NDArray | None) -> Shot:
+        """The same with these arrays in place of its own; None: without."""
+        changed = {**self.arrays, **arrays}
+        return replace(self, arrays={name: a for name, a in changed.items() if a is not None})
+
+    def filled(self, name: str, value: ArrayLike) -> Shot:
+        """The same with one value in all rows of an array."""
+        return self.given(**{name: np.broadcast_to(value, self.arrays[name].shape)})
+
+    def picked(self, rows: NDArray) -> Shot:
+        """The same with these rows of every array."""
+        return self.given(**{name: a[rows] for name, a in self.arrays.items()})
+
+    def joined(self, arrays: Arrays) -> Shot:
+        """The same with more points after its own."""
+        return self.given(**{name: np.concatenate([a, arrays[name]]) for name, a in self.arrays.items()})
+
+    def moved(self, shift: ArrayLike = 0.0, scale: float = 1.0, turn: ArrayLike = _NO_TURN) -> Shot:
+        """Points and camera turned about zero, scaled, then shifted, in float64."""
+        rotation = np.asarray(turn)
+
+        def place(points: ArrayLike) -> NDArray[np.float64]:
+            return scale * (np.asarray(points) @ rotation.T) + shift
+
+        camera = replace(
+            self.camera,
+            eye=tuple(place(self.camera.eye)),
+            target=tuple(place(self.camera.target)),
+            up=tuple(rotation @ self.camera.up),
+        )
+        moved = self.given(
+            positions=place(self.arrays["positions"]),
+            normals=self.arrays["normals"] @ rotation.T,
+            radii=self.arrays["radii"] * scale,
+        )
+        return replace(moved, camera=camera)
+
+    def depths(self) -> NDArray[np.float64]:
+        """Of the points, (N,), scan units along the view axis."""
+        return (np.array(self.camera.eye) - self.arrays["positions"]) @ self.camera.rotation()[2]
+
+    def pixels_per_unit(self) -> float:
+        """At the depth of the camera's target."""
+        return self.size[1] / self.camera.view_height
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What is compared.
+
+    depth: (H, W) float64, from the plane of the camera's target, in widths of a pixel there;
+    +inf where nothing is. color: (H, W, 3) int, 255 sRGB levels.
+    """
+
+    depth: NDArray[np.float64]
+    color: NDArray[np.int_]
+
+
+def picture(renderer: Renderer, backend: Backend, shot: Shot) -> Picture:
+    """Draw a shot with a backend's defaults; raises InputError as `render_frame` does."""
+    pose = Pose(0, 0.0, "numerics", shot.cloud())
+    request = Request(pose, shot.camera, backend.name, look=shot.look)
+    surface = Surface(renderer.gpu, shot.size)
+    while render_frame(renderer, request, surface):
+        pass
+    (width, height), (columns, rows) = shot.size, shot.margin
+    inside = slice(rows, height - rows), slice(columns, width - columns)
+    depth = (surface.depth.astype(np.float64) - shot.camera.distance) * shot.pixels_per_unit()
+    return Picture(depth[inside], surface.image()[inside][..., :3].astype(int))
+
+
+# --- how it is compared ---------------------------------------------------------------
+
+# From these steps on a pixel counts as another one. Eight bits round within one level, and a
+# highlight doubles that.
+_DEPTH_STEP, _COLOR_STEP = 0.1, 3  # pixel widths, levels of 255
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far two pictures are apart.
+
+    pixels: the share of pixels that differ: only one picture covers them, or depth or colour is
+    a step apart. depth, color: the mean difference of the others, pixel widths and levels.
+    """
+
+    pixels: float
+    depth: float
+    color: float
+
+    def __str__(self) -> str:
+        return f"{self.pixels:.4%} of the pixels, depth {self.depth:.2g} px, colour {self.color:.2g} levels"
+
+
+def difference(one: Picture, other: Picture) -> Difference:
+    """Compare two pictures of one size."""
+    covered = np.isfinite(one.depth)
+    both = covered & np.isfinite(other.depth)
+    depth = np.abs(np.where(both, one.depth, 0) - np.where(both, other.depth, 0))
+    color = np.abs(one.color - other.color)
+    same = (covered == np.isfinite(other.depth)) & (depth < _DEPTH_STEP) & (color.max(axis=2) < _COLOR_STEP)
+    if not same.any():
+        return Difference(1.0, 0.0, 0.0)
+    return Difference(1 - float(same.mean()), float(depth[same].mean()), float(color[same].mean()))
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far apart is still the same, from how far the points may be apart.
+
+    error: pixel widths, root mean square over the points; reason: where it comes from.
+
+    Share of the pixels: a pixel differs where its centre lies within the error of a border
+    between what two points show. With a point or a splat for each pixel the borders are 2 pixel
+    widths long in each pixel. Splats meet where their depths are equal; on the torus
+    neighbours lean by 1/14 towards each other, which moves the border by 14 errors.
+    2 sides x 2 x 14 on the third of the picture that is covered: 20 x error.
+    The others: five errors of depth, for slopes up to five; and no more than as many borders
+    whose two sides are less than a step apart.
+    """
+
+    error: float
+    reason: str
+
+    @property
+    def bound(self) -> Difference:
+        """The largest difference that is within it."""
+        pixels = min(20 * self.error, 1.0)
+        return Difference(pixels, 5 * self.error + _DEPTH_STEP * pixels, _COLOR_STEP * pixels)
+
+    def holds(self, found: Difference) -> bool:
+        """Whether a difference is within it."""
+        bound = self.bound
+        return found.pixels <= bound.pixels and found.depth <= bound.depth and found.color <= bound.color
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One line of the suite: a shot, and a variant that must give its picture.
+
+    limit: why it cannot be held in principle, where that is so.
+    """
+
+    name: str
+    shot: Callable[[], Shot]
+    variant: Callable[[Shot], Shot]
+    tolerance: Tolerance
+    limit: str = ""
+
+    def limit_of(self, backend: Backend) -> str:
+        """Why this backend cannot hold it in principle; empty where it must."""
+        return self.limit or getattr(backend.module, "LIMITS", {}).get(self.name, "")
+
+    def compare(self, renderer: Renderer, backend: Backend) -> Difference:
+        """Draw both and compare them."""
+        shot = self.shot()
+        return difference(*(picture(renderer, backend, s) for s in (shot, self.variant(shot))))
+
+
+# --- the rows -------------------------------------------------------------------------
+
+EXACT = Tolerance(0.0, "the same numbers reach the GPU")
+# 2^-17 px is the last bit of a pixel coordinate beyond 128; to view space, the division, the
+# scale and the picture's centre each round once or twice.
+FLOAT32 = Tolerance(5e-5, "float32 on the GPU: six roundings of a pixel coordinate near 160")
+
+_SHIFT = np.array([1.0, -0.37, 0.61])  # on no power-of-two grid
+_QUARTER_TURN = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # about x: +z becomes +y
+_UNIT = 38  # pixels of the body's shot
+
+
+def rows() -> Iterator[Row]:
+    """The suite; shots are made when a row is compared."""
+    yield from _placed()
+    yield from _typed()
+    yield from _clipped()
+    yield from _zoomed()
+    yield from _sized()
+    yield from _arranged()
+    yield from _spoilt()
+
+
+def _rounded(kind: type, at: float, source: str, unit: float = _UNIT) -> Tolerance:
+    """The tolerance where coordinates near `at` are rounded to a float type. unit: pixels."""
+    return Tolerance(
+        FLOAT32.error + unit * float(np.spacing(kind(at))) / 12**0.5,
+        f"{kind.__name__} {source} near {at:.0g} units, on top of: {FLOAT32.reason}",
+    )
+
+
+def _body(count: int = 12_000) -> Shot:
+    """A torus that fills the picture."""
+    return Shot(torus(count), Camera((2.9, 3.4, 4.0)))
+
+
+def _sheet() -> Shot:
+    """A plane of one colour, seen at a slant: which of its points a pixel shows does not matter."""
+    return Shot(wall(60, 40, spacing=0.04), Camera((1.0, 0.5, 3.0)))
+
+
+def _thread() -> Shot:
+    """A line of one colour, unlit."""
+    return Shot(line(200, (1.0, 0.5, 0.3)), Camera((1.0, 0.5, 5.0)), look=Look(light="flat"))
+
+
+def _placed() -> Iterator[Row]:
+    for power in range(3, 10):
+        move = partial(Shot.moved, shift=10.0**power * _SHIFT)
+        yield Row(f"translated by 10^{power}", _body, move, _rounded(np.float64, 10.0**power, "input"))
+    for power in (-6, -4, -2, 2, 4, 6):
+        yield Row(f"scaled by 10^{power}", _body, partial(Shot.moved, scale=10.0**power), FLOAT32)
+    yield Row("fitted, translated by 10^9", _fitted, _fitted_far, _rounded(np.float64, 1e9, "input"))
+    yield Row("fitted, scaled by 10^-6", _fitted, lambda s: _fitted(s.moved(scale=1e-6)), FLOAT32)
+    yield Row("rotated by a quarter turn", _body, partial(Shot.moved, turn=_QUARTER_TURN), FLOAT32)
+    yield Row("rotated by 37 degrees", _body, partial(Shot.moved, turn=_rotation((1, 2, 3), 37)), FLOAT32)
+
+
+def _fitted(shot: Shot | None = None) -> Shot:
+    """With the camera that a user gets."""
+    shot = shot or _body()
+    return replace(shot, camera=Camera.orbit(shot.cloud().bounds(), 36, 34, aspect=4 / 3))
+
+
+def _fitted_far(shot: Shot) -> Shot:
+    return _fitted(shot.moved(shift=1e9 * _SHIFT))
+
+
+def _rotation(axis: tuple[float, float, float], degrees: float) -> NDArray[np.float64]:
+    """Rodrigues' formula, (3, 3)."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.radians(degrees)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _typed() -> Iterator[Row]:
+    def at(distance: float) -> Callable[[], Shot]:
+        return lambda: _body().moved(shift=distance * _SHIFT)
+
+    def as_type(kind: type) -> Callable[[Shot], Shot]:
+        return lambda shot: shot.given(positions=shot.arrays["positions"].astype(kind))
+
+    as_float32, as_float64 = as_type(np.float32), as_type(np.float64)
+    yield Row("float32 values as float64", lambda: as_float32(at(100)()), as_float64, EXACT)
+    yield Row("float32 input", at(100), as_float32, _rounded(np.float32, 100, "input"))
+    yield Row(
+        "float32 input at 10^9",
+        at(1e9),
+        as_float32,
+        FLOAT32,
+        limit="float32 resolves 64 units there: the file has lost the scan",
+    )
+
+
+def _clipped() -> Iterator[Row]:
+    def cut() -> Shot:
+        shot = _body()
+        return replace(shot, camera=replace(shot.camera, near=shot.camera.distance))
+
+    def inside() -> Shot:
+        return replace(_body(), camera=Camera((0, 0, 0), (0.6, 0, 0), fov_y=60))
+
+    def cleared(depth: float | None) -> Callable[[Shot], Shot]:
+        """Without what lies wholly in front of a depth; None: of the near plane."""
+
+        def clear(shot: Shot) -> Shot:
+            limit = shot.camera.clip_range()[0] if depth is None else depth
+            return shot.picked(shot.depths() + 1.5 * shot.arrays["radii"] >= limit)
+
+        return clear
+
+    yield Row("near plane inside the cloud", cut, cleared(None), FLOAT32)
+    # Seen from the hole of the torus, the nearest point in the picture is 0.6 away.
+    yield Row("eye inside the cloud", inside, cleared(0.3), FLOAT32)
+
+
+def _zoomed() -> Iterator[Row]:
+    def detail(power: int) -> Callable[[], Shot]:
+        return lambda: _body().moved(shift=0.7 * 10.0**power * _SHIFT)
+
+    def surrounded(shot: Shot, power: int) -> Shot:
+        """With a torus 10^power times as large around it, of which no splat reaches the picture."""
+        around = Shot(torus(5000), shot.camera).moved(scale=10.0**power)
+        around = replace(around, camera=shot.camera)
+        return shot.joined(around.picked(around.depths() < -2 * around.arrays["radii"]).arrays)
+
+    yield Row(
+        "zoomed in on 10^-3 of the scan",
+        detail(3),
+        partial(surrounded, power=3),
+        _rounded(np.float32, 700, "offsets"),
+    )
+    yield Row(
+        "zoomed in on 10^-6 of the scan",
+        detail(6),
+        partial(surrounded, power=6),
+        FLOAT32,
+        limit="float32 offsets from one origin resolve two pixels there",
+    )
+
+    def splat() -> Shot:
+        """A point on a leaning sheet, from so near that its splat fills the picture."""
+        leaning = {"normals": np.array([[0.6, 0, 0.8]]), "radii": np.array([4.0])}
+        return Shot({**line(1, (0, 0, 0)), **leaning}, Camera((0.0, 0.0, 1.0), fov_y=40))
+
+    yield Row(
+        "zoomed in on 10^-3 of a splat",
+        splat,
+        partial(Shot.filled, name="radii", value=1e3),
+        _rounded(np.float32, 1e3, "corners", splat().pixels_per_unit()),
+    )
+    yield Row(
+        "zoomed in on 10^-6 of a splat",
+        splat,
+        partial(Shot.filled, name="radii", value=1e6),
+        FLOAT32,
+        limit="float32 corners resolve ten pixels there",
+    )
+
+    def flat() -> Shot:
+        return replace(_body(), camera=_body().camera.projected("orthographic"))
+
+    def telephoto(shot: Shot, power: int) -> Shot:
+        """From 10^power times as far, through a lens as narrow as shows the same."""
+        camera = shot.camera.at_distance(shot.camera.distance * 10.0**power)
+        angle = 2 * np.degrees(np.arctan(shot.camera.view_height / 2 / camera.distance))
+        return replace(
+            shot, camera=replace(camera, projection="perspective", height=None, fov_y=float(angle))
+        )
+
+    # Perspective is below that: x z / distance is 2e-3 px in the mean.
+    yield Row("telephoto x10^3", flat, partial(telephoto, power=3), _rounded(np.float32, 6e3, "depths"))
+    yield Row(
+        "telephoto x10^6",
+        flat,
+        partial(telephoto, power=6),
+        FLOAT32,
+        limit="depth from the eye is float32: it resolves 19 pixels there",
+    )
+
+    def far(power: int) -> Callable[[], Shot]:
+        """A body within one pixel, of one colour, all of which faces the eye."""
+
+        def make() -> Shot:
+            body = _body().filled("colors", 0.7)
+            return _facing(replace(body, size=(9, 9), camera=body.camera.zoomed(10.0**-power)))
+
+        return make
+
+    def alone(shot: Shot) -> Shot:
+        return shot.picked(np.arange(1)).filled("positions", 0.0)
+
+    for power in (6, 9):
+        yield Row(f"zoomed out x10^{power}", far(power), alone, FLOAT32)
+
+
+def _sized() -> Iterator[Row]:
+    def window(_: Shot | None, size: tuple[int, int], margin: int) -> Shot:
+        """A wall of four points a pixel; the same pixels whatever the margin."""
+        width, height = (edge + 2 * margin for edge in size)
+        points = wall(2 * size[0] + 12, 2 * size[1] + 12, spacing=0.5, wave=0.3)
+        camera = Camera((0.0, 0.0, 5.0), projection="orthographic", height=float(height))
+        return Shot(points, camera, (width, height), margin=(margin, margin))
+
+    for size in ((1, 1), (8192, 1)):
+        yield Row(
+            f"{size[0]}x{size[1]} pixels",
+            partial(window, None, size=size, margin=2),
+            partial(window, size=size, margin=0),
+            # Coordinates up to 4096 resolve 32 times less; points lie 1/4 px from the borders.
+            Tolerance(FLOAT32.error * 32, "float32 pixel coordinates near 4096"),
+        )
+
+
+def _arranged() -> Iterator[Row]:
+    def copied(order: Callable[[NDArray, int], NDArray]) -> Callable[[Shot], Shot]:
+        return lambda shot: shot.picked(order(np.arange(len(shot)), 1000))
+
+    def few() -> Shot:
+        return _body(300)
+
+    def bare() -> Shot:
+        """The same spacing everywhere: whatever is looked at to estimate it."""
+        return Shot(wall(20, 15, spacing=0.12), Camera((1.0, 0.5, 5.0))).given(radii=None)
+
+    yield Row("points x1000, one after the other", few, copied(np.repeat), EXACT)
+    yield Row("points x1000, all over again", few, copied(np.tile), EXACT)
+    yield Row("points x1000 without radii", bare, copied(np.repeat), FLOAT32)
+
+    def at_one_place() -> Shot:
+        return _thread().picked(np.arange(1)).filled("positions", 0.0).filled("radii", 0.3)
+
+    yield Row("one point x1000", at_one_place, copied(np.tile), EXACT)
+
+    def spread(shot: Shot) -> Shot:
+        """With eight points behind the eye that span a volume."""
+        corners = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], np.float64)
+        behind = shot.picked(np.arange(8)).given(positions=2 * np.array(shot.camera.eye) + corners)
+        return shot.joined(behind.arrays)
+
+    yield Row("coplanar points", _slanted, spread, FLOAT32)
+    yield Row("coplanar points without normals", _slanted, lambda s: s.given(normals=None), FLOAT32)
+    yield Row("collinear points", _thread, spread, FLOAT32)
+    yield Row(
+        "collinear points without normals",
+        lambda: _facing(_thread()),
+        lambda shot: shot.given(normals=None),
+        FLOAT32,
+        limit="a line has a circle of normals, of which any may be estimated",
+    )
+
+    def end_on(projection: str) -> Callable[[], Shot]:
+        def make() -> Shot:
+            shot = Shot(line(50, (0, 0, 1)), Camera(projection=projection))
+            return replace(shot, camera=shot.camera.fit(shot.cloud().bounds(), 4 / 3))
+
+        return make
+
+    def nearest(shot: Shot) -> Shot:
+        return shot.picked(shot.depths().argsort()[:1])
+
+    for projection in PROJECTIONS:
+        yield Row(f"collinear points end on, {projection}", end_on(projection), nearest, FLOAT32)
+
+    def with_outlier(shot: Shot) -> Shot:
+        outlier = shot.picked(np.arange(1)).given(positions=1e6 * _SHIFT[None])
+        return _fitted(outlier.joined(shot.arrays))
+
+    yield Row("an outlier at 10^6 times the size", _fitted, with_outlier, FLOAT32)
+
+
+def _slanted() -> Shot:
+    return _sheet().moved(turn=_rotation((1, 2, 3), 37))
+
+
+def _facing(shot: Shot) -> Shot:
+    """With normals that face the eye."""
+    normals = np.array(shot.camera.eye) - shot.arrays["positions"]
+    return shot.given(normals=normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def _spoilt() -> Iterator[Row]:
+    yield Row("normals parallel to y", _sheet, partial(Shot.moved, turn=_QUARTER_TURN), FLOAT32)
+
+    def about_y(shot: Shot, angle: float) -> Shot:
+        turn = 2.4 * np.arange(len(shot))
+        aside = np.stack([np.cos(turn), np.zeros(len(shot)), np.sin(turn)], axis=1)
+        return shot.given(normals=shot.arrays["normals"] + angle * aside)
+
+    # 1e-4 is where a template that has a special case at y changes over.
+    for power in (-7, -4):
+        yield Row(
+            f"normals within 10^{power} of y",
+            lambda: _sheet().moved(turn=_QUARTER_TURN),
+            partial(about_y, angle=10.0**power),
+            Tolerance(FLOAT32.error + 5 * 10.0**power, "a splat of 5 px, leaning by that angle"),
+        )
+
+    def matt() -> Shot:
+        return _facing(replace(_body(), look=Look(light="head", specular=0)))
+
+    for name, value in (("zero-length", 0.0), ("NaN", np.nan)):
+        yield Row(
+            f"{name} normals",
+            matt,
+            partial(Shot.filled, name="normals", value=value),
+            # 2 px aside, 228 px from the eye: cos 0.009 is 0.006 levels less.
+            Tolerance(1e-4, "the base faces the eye from the points, a missing normal from the pixels"),
+        )
+
+    def closed() -> Shot:
+        """A sheet beyond the picture's edges: closed whatever the radii, if there is one."""
+        return replace(_sheet(), arrays=wall(100, 80, spacing=0.04))
+
+    for name, value in (("zero", 0.0), ("negative", -1.0), ("NaN", np.nan)):
+        yield Row(f"{name} radii", closed, partial(Shot.filled, name="radii", value=value), FLOAT32)

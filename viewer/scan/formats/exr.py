@@ -1,0 +1,187 @@
+"""EXR: range views, one multi-part OpenEXR file a frame, a part a pod.
+
+A part has the pod's name, the channels `Z` (float, view-space depth in scan units), and where there are such
+`R G B` (half, linear), `mask` (half, 1: use the depth) and `confidence` (float), and the attributes
+
+- `fx fy cx cy` (double): pixels, pixel centres at +0.5, from the upper left corner of the display window;
+- `worldToCamera`, `worldToNDC` (m44f) as OpenEXR's standard attributes: matrices for row vectors; camera
+  space is left-handed and looks down +z; NDC runs from 0, 0 in the upper left corner to 1, 1;
+- `worldToCamera64` (m44d): worldToCamera in double precision, since float32 cannot place a pod at UTM
+  coordinates; it counts where it is there;
+- `unit` (string): the name of the unit of length.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ..range_view import RangeView
+from ._packed import check_unpacked_size
+
+TITLE = "EXR"
+SUFFIXES = (".exr",)
+
+_PINHOLE = ("fx", "fy", "cx", "cy")
+_FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
+_SAMPLE_BYTES = 4  # of a channel, at most
+_MOST_RATIO = 1000  # of unpacked to packed: pictures where nearly all is empty pack to a 500th
+_decoding = Lock()
+
+
+def read_unit(path: Path) -> str | None:
+    """The unit of the first part, or None."""
+    return _unit(_headers(path)[0])
+
+
+def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
+    """The views in the order of the parts. Raises InputError where a part is damaged or no range view."""
+    import OpenEXR
+
+    headers = _headers(path)
+    for number, header in enumerate(headers):
+        _check_form(header, _name(header, number))
+    check_unpacked_size(path, sum(_unpacked_size(header) for header in headers), _MOST_RATIO)
+    # OpenEXR leaves damaged parts out and prints that to standard output, where results go.
+    with _decoding, redirect_stdout(sys.stderr), OpenEXR.File(str(path), separate_channels=True) as file:
+        if len(file.parts) != len(headers):
+            raise InputError(f"only {len(file.parts)} of its {len(headers)} parts can be decoded")
+        images = [{name: channel.pixels for name, channel in part.channels.items()} for part in file.parts]
+    return tuple(
+        _view(header, pixels, _name(header, number))
+        for number, (header, pixels) in enumerate(zip(headers, images, strict=True))
+    )
+
+
+def write_views(path: Path, views: Sequence[RangeView]) -> None:
+    """Write the views; every array and the calibration come back bit for bit.
+
+    Raises InputError where two have the same name.
+    """
+    import OpenEXR
+
+    names = [view.name for view in views]
+    if len({*names}) < len(names) or not all(names):
+        raise InputError(f"the pods need names that differ, not {names}", hint="Rename them")
+    height, width = np.max([view.depth.shape for view in views], axis=0).tolist()  # one for all parts
+    parts = [OpenEXR.Part(_attributes(view, width, height), _channels(view), view.name) for view in views]
+    with open(path, "wb") as stream:  # by a stream, failures come as OSError
+        OpenEXR.File(parts).write(stream)
+
+
+def _headers(path: Path) -> list[dict[str, Any]]:
+    import OpenEXR
+
+    with OpenEXR.File(str(path), header_only=True) as file:
+        return [dict(part.header) for part in file.parts]  # the file takes the headers back
+
+
+def _name(header: dict[str, Any], number: int) -> str:
+    return header.get("name") or f"part {number}"
+
+
+def _unit(header: dict[str, Any]) -> str | None:
+    return str(header["unit"]) if "unit" in header else None
+
+
+def _check_form(header: dict[str, Any], name: str) -> None:
+    """Raise InputError where a part is no range view, and say what is missing."""
+    import OpenEXR
+
+    if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
+        raise InputError(f"'{name}' is a deep image, several depths a pixel, not a range view", hint=_FORM)
+    missing = [f"attribute {key}" for key in _PINHOLE if key not in header]
+    if not {"worldToCamera", "worldToCamera64"} & header.keys():
+        missing.insert(0, "attribute worldToCamera")
+    if "Z" not in {channel.name for channel in header["channels"]}:
+        missing.insert(0, "channel Z")
+    if missing:
+        raise InputError(f"'{name}' is no range view, it lacks: {', '.join(missing)}", hint=_FORM)
+
+
+def _unpacked_size(header: dict[str, Any]) -> int:
+    low, high = (corner.astype(int) for corner in header["dataWindow"])
+    width, height = (high - low + 1).tolist()
+    return width * height * len(header["channels"]) * _SAMPLE_BYTES
+
+
+def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> RangeView:
+    to_camera = header.get("worldToCamera64", header.get("worldToCamera"))
+    fx, fy, cx, cy = (_number(header[key]) for key in _PINHOLE)
+    # The corner of what is stored, where a program has cropped the picture.
+    left, top = (header["dataWindow"][0] - header["displayWindow"][0]).tolist()
+    depth = pixels["Z"].astype(np.float32)
+    color = [pixels[channel].astype(np.float16) for channel in "RGB" if channel in pixels]
+    return RangeView(
+        depth=depth,
+        mask=pixels["mask"] > 0.5 if "mask" in pixels else np.ones(depth.shape, bool),
+        color=np.stack(color, axis=2) if len(color) == 3 else None,
+        confidence=pixels["confidence"].astype(np.float32) if "confidence" in pixels else None,
+        fx=fx,
+        fy=fy,
+        cx=cx - left,
+        cy=cy - top,
+        world_to_camera=_turned(np.asarray(to_camera, np.float64).reshape(4, 4).T),
+        name=name,
+        unit=_unit(header) or "units",
+    )
+
+
+def _number(value: Any) -> float:
+    """An attribute of one number; double ones come as arrays."""
+    return float(np.asarray(value).item())
+
+
+def _channels(view: RangeView) -> dict[str, NDArray]:
+    channels = {"Z": view.depth, "mask": view.mask.astype(np.float16)}
+    if view.color is not None:
+        channels |= dict(zip("RGB", np.moveaxis(view.color, 2, 0), strict=True))
+    if view.confidence is not None:
+        channels["confidence"] = view.confidence
+    return {name: np.ascontiguousarray(channel) for name, channel in channels.items()}
+
+
+def _attributes(view: RangeView, width: int, height: int) -> dict[str, Any]:
+    """The header of a part in a display window of this size."""
+    import OpenEXR
+
+    to_camera = _turned(view.world_to_camera)
+    to_ndc = np.array(
+        [
+            [view.fx / width, 0, view.cx / width, 0],
+            [0, -view.fy / height, view.cy / height, 0],
+            [0, 0, 0, 1],
+            [0, 0, 1, 0],
+        ]
+    )
+    return {
+        "type": OpenEXR.scanlineimage,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "dataWindow": _window(*view.depth.shape[::-1]),
+        "displayWindow": _window(width, height),
+        "worldToCamera": np.ascontiguousarray(to_camera.T, np.float32),
+        "worldToCamera64": np.ascontiguousarray(to_camera.T),
+        "worldToNDC": np.ascontiguousarray((to_ndc @ to_camera).T, np.float32),
+        **{key: np.array([getattr(view, key)], np.float64) for key in _PINHOLE},
+        "unit": view.unit,
+    }
+
+
+def _window(width: int, height: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The first and the last pixel, (x, y)."""
+    return np.zeros(2, np.int32), np.array([width - 1, height - 1], np.int32)
+
+
+def _turned(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World to camera with the view axis turned round: between ours and OpenEXR's camera space."""
+    turned = matrix.copy()
+    turned[2] = -turned[2]
+    return turned

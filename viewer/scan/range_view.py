@@ -1,0 +1,174 @@
+"""Range views: what one pod of a scanner measured, a depth for each pixel of a calibrated camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .colors import srgb8_from_linear
+from .points import PointCloud
+
+_RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
+_STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RangeView:
+    """One pod's range image, texture, mask and calibration, as Scan4D's camera sees: right-handed, down -z.
+
+    depth:           (H, W) float32, view-space depth (-z) in scan units; NaN, infinite or <= 0: none
+    mask:            (H, W) bool, False where the depth is not to be used
+    color:           (H, W, 3) float16, linear, or None
+    confidence:      (H, W) float32, or None
+    fx, fy, cx, cy:  pinhole calibration in pixels; pixel centres at +0.5, row 0 is the top
+    world_to_camera: (4, 4) float64, a rotation and a translation, for column vectors
+    name:            the pod's. unit: the name of the unit of length
+
+    Raises InputError where shapes or types do not fit or the calibration is none.
+    """
+
+    depth: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+    color: NDArray[np.float16] | None = None
+    confidence: NDArray[np.float32] | None = None
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    world_to_camera: NDArray[np.float64]
+    name: str = ""
+    unit: str = "units"
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.depth)
+        if len(shape) != 2 or 0 in shape:
+            raise InputError(f"the depth of a range view has shape {shape}, expected (H, W)")
+        for name, dtype, expected in (
+            ("depth", np.float32, shape),
+            ("mask", np.bool_, shape),
+            ("color", np.float16, (*shape, 3)),
+            ("confidence", np.float32, shape),
+            ("world_to_camera", np.float64, (4, 4)),
+        ):
+            array = getattr(self, name)
+            if array is None and name in ("color", "confidence"):
+                continue
+            if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != expected:
+                found = f"{np.shape(array)} {getattr(array, 'dtype', type(array).__name__)}"
+                raise InputError(f"a range view's {name} is {found}, expected {expected} {np.dtype(dtype)}")
+        if not (np.isfinite([self.fx, self.fy, self.cx, self.cy]).all() and self.fx > 0 and self.fy > 0):
+            given = f"fx {self.fx:g}, fy {self.fy:g}, cx {self.cx:g}, cy {self.cy:g}"
+            raise InputError(f"a range view's calibration is unusable: {given}")
+        if not _is_rigid(self.world_to_camera):
+            raise InputError("a range view's world_to_camera is not a rotation and a translation")
+
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """The pod's place in the world, (3,) float64."""
+        return -self._camera_to_world() @ self.world_to_camera[:3, 3]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held by all arrays."""
+        arrays = [getattr(self, field.name) for field in fields(self)]
+        return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
+
+    def valid(self) -> NDArray[np.bool_]:
+        """The pixels that see a point, (H, W)."""
+        return self.mask & np.isfinite(self.depth) & (self.depth > 0)
+
+    def positions(self) -> NDArray[np.float64]:
+        """World positions of the valid pixels in row order, (N, 3)."""
+        return self._from_eye() + self.eye
+
+    def normals(self) -> NDArray[np.float32]:
+        """World normals of the valid pixels in row order, (N, 3), unit length, towards the pod.
+
+        From differences to the neighbours in the row and in the column: central ones, one-sided
+        beside a hole or an edge. A pixel without a neighbour on its surface faces the pod.
+        """
+        valid = self.valid()
+        from_eye, depth = np.full((*valid.shape, 3), np.nan), np.where(valid, self.depth, np.nan)
+        from_eye[valid] = self._from_eye()
+        down = _tangents(from_eye, depth, 0, _STEEPEST / self.fy)[valid]
+        right = _tangents(from_eye, depth, 1, _STEEPEST / self.fx)[valid]
+        normals, away = np.cross(down, right), from_eye[valid]
+        sides = np.einsum("ij,ij->i", normals, away)
+        normals[sides > 0] *= -1
+        normals[sides == 0] = -away[sides == 0]
+        return (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)
+
+    def points(self, normals: bool = False) -> PointCloud:
+        """The points of this view alone; see `merge`."""
+        return merge([self], normals)
+
+    def _camera_to_world(self) -> NDArray[np.floating]:
+        return np.linalg.inv(self.world_to_camera[:3, :3])
+
+    def _from_eye(self) -> NDArray[np.float64]:
+        """From the pod to the point of each valid pixel in row order, along the world's axes, (N, 3)."""
+        row, column = np.nonzero(self.valid())
+        depth = self.depth[row, column].astype(np.float64)
+        x = (column + 0.5 - self.cx) / self.fx * depth
+        y = (self.cy - row - 0.5) / self.fy * depth
+        return np.stack([x, y, -depth], axis=1) @ self._camera_to_world().T
+
+
+def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
+    """The points that all views see, in view order and then in row order.
+
+    ids count all pixels in that order, so they tell the pixel. Colours and the scalar `confidence` are
+    there where every view has them; the scalar `view` is the number of the view. normals: whether to
+    make them, see `RangeView.normals`. Raises InputError where no view sees a point.
+    """
+    valid = [view.valid() for view in views]
+    ids = np.flatnonzero(np.concatenate([pixels.ravel() for pixels in valid])).astype(np.uint32)
+
+    def of_points(name: str) -> NDArray | None:
+        images = [getattr(view, name) for view in views]
+        if any(image is None for image in images):
+            return None
+        return np.concatenate([image[pixels] for image, pixels in zip(images, valid, strict=True)])
+
+    color, confidence = of_points("color"), of_points("confidence")
+    counts = [np.count_nonzero(pixels) for pixels in valid]
+    scalars = {"view": np.repeat(np.arange(len(views), dtype=np.uint16), counts)}
+    cloud = PointCloud.from_arrays(
+        np.concatenate([view.positions() for view in views]),
+        normals=np.concatenate([view.normals() for view in views]) if normals else None,
+        colors=None if color is None else srgb8_from_linear(color),
+        scalars=scalars if confidence is None else scalars | {"confidence": confidence},
+    )
+    if not len(cloud):
+        raise InputError("holds no points: no pixel inside the masks has a depth")
+    return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
+
+
+def _is_rigid(matrix: NDArray[np.float64]) -> bool:
+    rotation = matrix[:3, :3]
+    return bool(
+        np.isfinite(matrix).all()
+        and (np.abs(rotation) < 2).all()
+        and np.allclose(rotation @ rotation.T, np.eye(3), rtol=0, atol=_RIGID)
+        and np.linalg.det(rotation) > 0
+        and (matrix[3] == (0, 0, 0, 1)).all()
+    )
+
+
+def _tangents(points: NDArray, depth: NDArray, axis: int, steepest: float) -> NDArray[np.float64]:
+    """The sum of the steps from the neighbour before and to the one behind, (H, W, 3); 0 across edges.
+
+    points: (H, W, 3), depth: (H, W), both NaN where there is none. steepest: the depth step that
+    is an edge, as a part of the depth.
+    """
+    before, behind = (depth[:-1], depth[1:]) if axis == 0 else (depth[:, :-1], depth[:, 1:])
+    same = np.abs(behind - before) <= steepest * np.minimum(before, behind)
+    steps = np.where(same[..., None], np.diff(points, axis=axis), 0.0)
+    ends = [(0, 0), (0, 0), (0, 0)]
+    ends[axis] = (1, 1)
+    steps = np.pad(steps, ends)
+    return steps[:-1] + steps[1:] if axis == 0 else steps[:, :-1] + steps[:, 1:]
