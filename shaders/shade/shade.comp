@@ -59,12 +59,16 @@ vec3 base_color(uint row, float depth, vec3 normal) {
 #endif
 }
 
+// From what a pixel shows to the eye, view space.
+vec3 eye_direction(ivec2 pixel, float depth) {
+    return view_perspective ? -normalize(from_pixel(vec2(pixel) + 0.5, depth)) : vec3(0.0, 0.0, 1.0);
+}
+
 vec3 lit(vec3 color, ivec2 pixel, float depth, vec3 normal) {
 #if LIGHT == 0
     return color;
 #else
-    vec3 to_eye = view_perspective
-        ? -normalize(from_pixel(vec2(pixel) + 0.5, depth)) : vec3(0.0, 0.0, 1.0);
+    vec3 to_eye = eye_direction(pixel, depth);
 #if LIGHT == 1
     vec3 to_light = to_eye;
 #else
@@ -100,7 +104,7 @@ vec3 shade(int index) {
     float len = length(normal);
     // A missing normal faces the eye.
     normal = len > 0.0 && len < 3e38
-        ? normal / len : vec3(world_to_view[0].z, world_to_view[1].z, world_to_view[2].z);
+        ? normal / len : transpose(mat3(world_to_view)) * eye_direction(pixel, depth);
 #endif
     vec3 color = base_color(row, depth, normal);
 #if LIGHT != 0 || EYE_DOME
