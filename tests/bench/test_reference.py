@@ -214,7 +214,7 @@ def test_errors_of_the_bunny_are_sane(
     assert 0.3 < seen.mean() < 0.6
     depth = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), spacing)
     assert depth["depth_median"] < spacing
-    assert depth["wrong_layer_percent"] < (2 if backend == "surfels" else 30)
+    assert depth["wrong_layer_percent"] < (2 if backend == "surfels" else 40)
     coverage = metrics.coverage(drawn.coverage > 0, picture.covered)
     assert coverage["hole_percent"] < (1 if backend == "surfels" else 60)
     assert coverage["spill_percent"] < 5
