@@ -17,6 +17,7 @@ from viewer.gpu.context import headless
 from viewer.gpu.surface import Surface
 from viewer.look import Look, color_table
 from viewer.renderer import Renderer
+from viewer.scan.estimate import fake_color
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
@@ -254,3 +255,10 @@ def test_more_pixels_than_one_dimension_of_a_dispatch_takes(renderer: Renderer) 
     assert len(surface.covered) == size[0] * size[1]
     assert (surface.image() == [0x33, 0x66, 0x99, 255]).all()
     surface.release()
+
+
+def test_normals_are_shown_in_the_fake_colour_of_the_paper(draw: Draw) -> None:
+    surface = draw(CLOUD, CAMERA, (80, 60), "surfels", Look(light="flat", color_by="normal"))
+    covered = surface.row != NOTHING
+    expected = fake_color(CLOUD.normals)[surface.row[covered]].astype(int)
+    assert np.abs(surface.image()[covered].astype(int) - expected).max() <= 1
