@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+from ..export import is_pattern, numbered
+from ..files import whole_file
 from ..scan.open import open_scan
 from ..scan.points import Bounds
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
+from ..scan.times import TIMES_FILE
 from .console import warn
 
 _FRAMED = 5  # poses that a camera is fitted to
@@ -121,3 +126,38 @@ def _report(timeline: Timeline, said: int) -> int:
         known = notice.text.startswith(timeline.name)  # a single file is named after itself
         warn(notice.text if known else f"{timeline.name}: {notice.text}")
     return said + len(messages)
+
+
+@contextmanager
+def frame_files(out: Path, indices: Sequence[int]) -> Iterator[Callable[[Pose], Path]]:
+    """The file that each pose goes to; for a pattern, times.csv beside them when all are written.
+
+    Raises InputError where there is a times.csv that tells the times of other files.
+    """
+    times_file = out.with_name(TIMES_FILE)
+    rows: list[tuple[str, float]] = []
+    if is_pattern(out):
+        _check_times_file(times_file, {numbered(out, index).name for index in indices})
+
+    def file_of(pose: Pose) -> Path:
+        path = numbered(out, pose.index)
+        rows.append((path.name, pose.time))
+        return path
+
+    yield file_of
+    if is_pattern(out):
+        with whole_file(times_file) as path, open(path, "w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows([("file", "time"), *rows])
+
+
+def _check_times_file(path: Path, names: set[str]) -> None:
+    """Raise InputError where there is a times.csv that tells the times of other files."""
+    if not path.exists():
+        return
+    try:
+        with open(path, newline="", encoding="utf-8") as stream:
+            told = {row[0] for row in csv.reader(stream) if row}
+    except (OSError, UnicodeDecodeError, csv.Error):
+        told = {"?"}
+    if told - names - {"file"}:
+        raise InputError("tells the times of other files", path, "Write into a folder of its own")

@@ -1,0 +1,157 @@
+"""Scan a mesh, or a sequence of meshes, with a virtual scanner.
+
+OUT is a .exr file of range views, or points merged from them as PLY, PCD or NPZ; for a sequence
+a numbered pattern such as out%04d.exr, with the times beside it in times.csv.
+"""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from ..bench.mesh import Faces, Mesh, read_faces
+from ..bench.scanner import Faults, around, capture, rig
+from ..errors import InputError
+from ..export import check_output
+from ..scan import formats
+from ..scan.pose import Pose
+from ..scan.range_view import merge
+from .console import progress
+from .scans import add_pose_arguments, chosen_poses, frame_files, framing, open_timeline, read_poses
+
+_FACES_FILE = "mesh_topology.ply"  # beside the frames of a sequence that moves one mesh
+_HINT = "Name the mesh that has them with --faces"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d simulate`."""
+    parser.add_argument("scan", metavar="MESH|SEQUENCE", help="PLY or OBJ: a file, a folder, or a pattern")
+    parser.add_argument(
+        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
+        help=f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d",
+    )  # fmt: skip
+    parser.add_argument(
+        "--faces", type=Path, metavar="FILE",
+        help=f"the faces of every frame; default: {_FACES_FILE} where it is beside them, else each its own",
+    )  # fmt: skip
+    add_pose_arguments(parser)
+    pods = parser.add_argument_group("the scanner")
+    places = pods.add_mutually_exclusive_group()
+    places.add_argument(
+        "--pods", type=int, default=2, metavar="N", help="1 to 8; default 2, left and right of the front"
+    )
+    places.add_argument("--azimuths", type=float, nargs="+", metavar="A", help="of each pod, degrees")
+    pods.add_argument("--elevation", type=float, default=0.0, metavar="E", help="of all pods, degrees")
+    pods.add_argument(
+        "--size", type=_size, default=(640, 480), metavar="WxH", help="of a range image, default 640x480"
+    )
+    pods.add_argument("--fov", type=float, default=30.0, metavar="F", help="vertical, degrees, default 30")
+    faults = parser.add_argument_group("its faults")
+    faults.add_argument(
+        "--noise", type=_numbers, default=(0.0,), metavar="SIGMA[,SIGMA...]",
+        help="of depth, scan units; for all pods or for each",
+    )  # fmt: skip
+    faults.add_argument(
+        "--disparity", type=float, default=0.0, metavar="STEP", help="round disparity, pixels"
+    )
+    faults.add_argument(
+        "--dropouts", type=float, default=0.0, metavar="FRACTION", help="pixels without depth"
+    )
+    faults.add_argument("--outliers", type=float, default=0.0, metavar="FRACTION", help="pixels far off")
+    faults.add_argument(
+        "--grazing", type=float, default=90.0, metavar="DEGREES", help="no depth beyond this incidence"
+    )
+    faults.add_argument("--seed", type=_seed, default=0, metavar="N", help="of all chance, default 0")
+
+
+def run(args: Namespace) -> int:
+    """Scan the chosen poses, by default all; broken frames among several are left out."""
+    azimuths = tuple(args.azimuths) if args.azimuths else around(args.pods)
+    faults = _faults(args, len(azimuths))
+    with open_timeline(args, args.scan) as timeline:
+        indices = chosen_poses(args, timeline) or list(range(len(timeline)))
+        check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
+        faces_of = _faces_reader(Path(args.scan), args.faces)
+        faces_of(timeline.label(indices[0]))  # told before all frames are looked at
+        aspect = args.size[0] / args.size[1]
+        bounds = framing(timeline, indices)
+        pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up)
+        with frame_files(args.out, indices) as file_of, progress(len(indices)) as tick:
+            for pose in read_poses(timeline, indices):
+                mesh = _mesh(pose, faces_of(pose.label))
+                views = capture(
+                    mesh, pods, args.size, faults, seed=args.seed, frame=pose.index, unit=timeline.unit
+                )
+                formats.write(file_of(pose), merge(views, normals=True), views)
+                tick()
+    print(args.out)
+    return 0
+
+
+def _faults(args: Namespace, pods: int) -> list[Faults]:
+    """The faults of each pod."""
+    if len(args.noise) not in (1, pods):
+        raise InputError(
+            f"{len(args.noise)} values for {pods} pods", "--noise", "Give one for all, or one a pod"
+        )
+    common = Faults(
+        disparity=args.disparity, dropouts=args.dropouts, outliers=args.outliers, grazing=args.grazing
+    )
+    return [replace(common, noise=args.noise[pod % len(args.noise)]) for pod in range(pods)]
+
+
+def _faces_reader(scan: Path, named: Path | None) -> Callable[[str], Faces]:
+    """A function from the label of a frame to its faces. named: the file that has those of all."""
+    folder = scan if scan.is_dir() else scan.parent
+    beside = [folder / _FACES_FILE, *([folder.parent / _FACES_FILE] if folder.name == "frames" else [])]
+    shared = named or (None if scan.is_file() else next(filter(Path.is_file, beside), None))
+    read_once = cache(read_faces)
+
+    def faces_of(label: str) -> Faces:
+        if shared is not None:
+            return read_once(shared)
+        path = next((path for path in (folder / "frames" / label, folder / label) if path.is_file()), None)
+        if path is None:
+            raise InputError("is no mesh: it has no faces", label, _HINT)
+        try:
+            faces = read_faces(path)
+        except InputError as error:
+            raise InputError(error.what, error.where, error.hint or _HINT) from error
+        if not len(faces):
+            raise InputError("is no mesh: it has no faces", path, _HINT)
+        return faces
+
+    return faces_of
+
+
+def _mesh(pose: Pose, faces: Faces) -> Mesh:
+    try:
+        return Mesh(pose.cloud, faces)
+    except InputError as error:
+        raise InputError(
+            error.what, pose.label, "Its faces and its vertices do not belong together"
+        ) from error
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch("0*([1-9][0-9]{0,5})[xX]0*([1-9][0-9]{0,5})", text)
+    if not match:
+        raise ArgumentTypeError(f"'{text}' is no size; give width and height as in 640x480")
+    return int(match[1]), int(match[2])
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"'{text}' is no number, nor several with commas such as 0.5,1.0") from None
+
+
+def _seed(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 20):
+        raise ArgumentTypeError(f"'{text}' is no seed; give a number such as 7")
+    return int(text)
