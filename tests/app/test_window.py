@@ -176,7 +176,8 @@ def test_escape_does_not_quit_and_ctrl_q_does(screen: Screen, tmp_path: Path, da
         screen.do("key", "Escape")
         screen.do("key", "p")
         app.expect("Saved")
-        screen.do("key", "ctrl+q")
+        # As fingers do it: one key after the other.
+        screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
         assert app.process.wait(PATIENCE) == 0
         assert "Traceback" not in app.log()
 
