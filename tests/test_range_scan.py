@@ -16,8 +16,6 @@ from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.range_view import merge
 
-pytest.importorskip("OpenEXR", exc_type=ImportError)
-
 EYES = {"left": (-1.0, 0.0, 4.0), "right": (1.5, 0.5, 4.0)}
 
 

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from range_scenes import sphere_view
 
@@ -17,8 +18,6 @@ from viewer.scan.colors import linear_from_srgb8
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import RangeView, merge
-
-OpenEXR = pytest.importorskip("OpenEXR", exc_type=ImportError)
 
 UTM = np.array([665187.25, 5648349.5, 241.75])
 
