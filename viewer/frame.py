@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
-from .backends import FrameView
+from .backends import Backend, FrameView
 from .backends import backend as find_backend
 from .camera import Camera
 from .gpu.shade import shade
@@ -24,14 +24,15 @@ FALLBACK = "points"
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a picture shows. backend: None for the default of the scan (see `choose`).
+    """What a picture shows. backend: a name, or one that is not in the folder of backends; None
+    for the default of the scan (see `choose`).
 
     params: the backend's own `Params`; None for its defaults.
     """
 
     pose: Pose
     camera: Camera
-    backend: str | None = None
+    backend: str | Backend | None = None
     params: Any = None
     look: Look = field(default_factory=Look)
 
@@ -56,28 +57,38 @@ def render_frame(
     timers.start_frame()
 
     pose = renderer.resident(request.pose)
-    name, params = choose(pose.stored, request.backend)
-    params = params if request.params is None else request.params
-    prepared = renderer.prepare(pose, find_backend(name), params, request.look, wait)
+    backend, params = _chosen(request, pose.stored)
+    prepared = renderer.prepare(pose, backend, params, request.look, wait)
     if prepared is None:
-        name, params, look = FALLBACK, find_backend(FALLBACK).params(), _unlit(request.look)
+        backend, look = find_backend(FALLBACK), _unlit(request.look)
+        params = backend.params()
     else:
         look = request.look
 
     surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds))
     if prepared is None:
-        surface.stats.skipped[request.backend or "look"] = "what it needs is being prepared"
+        surface.stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
     frame = FrameView(surface.view, params, prepared and prepared.derived, budget_ms, moving)
-    refinable = find_backend(name).draw(pose, frame, surface)
+    refinable = backend.draw(pose, frame, surface)
     shade(surface, look)
 
     stats = surface.stats
-    stats.backend, stats.upload_ms = name, pose.take_upload_ms()
-    stats.derive_ms = prepared.derive_ms if prepared else 0.0
+    stats.backend = backend.name
+    stats.upload_ms, stats.derive_ms = pose.take_ms("upload"), pose.take_ms("derive")
     stats.passes = timers.passes()
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
     return refinable or prepared is None
+
+
+def _chosen(request: Request, cloud: PointCloud) -> tuple[Backend, Any]:
+    """The backend of a request and its parameters."""
+    if isinstance(request.backend, Backend):
+        backend, params = request.backend, request.backend.params()
+    else:
+        name, params = choose(cloud, request.backend)
+        backend = find_backend(name)
+    return backend, params if request.params is None else request.params
 
 
 def _unlit(look: Look) -> Look:

@@ -21,10 +21,9 @@ _MEGABYTE = 1 << 20
 
 @dataclass
 class Prepared:
-    """What a backend derived for a pose (None where it derives nothing), and how long it took."""
+    """What a backend derived for a pose; None where it derives nothing."""
 
     derived: Derived | None
-    derive_ms: float
 
 
 @dataclass
@@ -100,31 +99,32 @@ class Renderer:
             result = self._run(entry, missing, lambda: _estimated(gpu_pose.cloud, missing), wait)
             if result is None:
                 return None
-            gpu_pose.cloud = result[0]
+            gpu_pose.cloud = result
         key = (backend.name, *backend.derive_key(params))
         if key not in entry.derived:
             derive, cloud = backend.derive, gpu_pose.cloud
             if derive is None:
-                return Prepared(None, 0.0)
+                return Prepared(None)
             result = self._run(entry, key, lambda: derive(cloud, params), wait)
             if result is None:
                 return None
-            entry.derived[key] = Prepared(backend.upload(self.gpu, result[0]), result[1])
+            with gpu_pose.preparing("upload"):
+                entry.derived[key] = Prepared(backend.upload(self.gpu, result))
         return entry.derived[key]
 
-    def _run(self, entry: _Resident, key: Any, work: Any, wait: bool) -> tuple[Any, float] | None:
+    def _run(self, entry: _Resident, key: Any, work: Any, wait: bool) -> Any:
         def timed() -> tuple[Any, float]:
             start = time.perf_counter()
             return work(), (time.perf_counter() - start) * 1e3
 
-        if key not in entry.jobs:
-            if wait:
-                return timed()
+        if key not in entry.jobs and not wait:
             self._drop_waiting_jobs()  # for poses that were passed meanwhile
             entry.jobs[key] = self._worker.submit(timed)
         if not (wait or entry.jobs[key].done()):
             return None
-        return entry.jobs.pop(key).result()
+        result, ms = entry.jobs.pop(key).result() if key in entry.jobs else timed()
+        entry.gpu_pose.add_ms("derive", ms)
+        return result
 
     def _drop_waiting_jobs(self) -> None:
         for entry in self._resident.values():

@@ -1,5 +1,6 @@
 // From a Surface to a picture: colour, light, eye-dome lighting, background.
 // COLOR_BY 0 plain, 1 own, 2 normal, 3 value, 4 id. LIGHT 0 flat, 1 head, 2 fixed.
+// OWN_COLORS, OWN_NORMALS: the backend wrote them for each pixel; else each row has them.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -28,11 +29,11 @@ float depth_at(ivec2 pixel) {
     return uintBitsToFloat(texelFetch(depths, pixel.y * view_size.x + pixel.x).r);
 }
 
-vec3 base_color(uint row, float depth, vec3 normal) {
+vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #if COLOR_BY == 0
     return plain;
 #elif COLOR_BY == 1
-    return texelFetch(colors, int(row)).rgb;
+    return texelFetch(colors, OWN_COLORS != 0 ? index : int(row)).rgb;
 #elif COLOR_BY == 2
     return 0.5 * normal + 0.5;
 #elif COLOR_BY == 3
@@ -100,13 +101,13 @@ vec3 shade(int index) {
     float depth = uintBitsToFloat(texelFetch(depths, index).r);
     vec3 normal = vec3(0.0);
 #if LIGHT != 0 || COLOR_BY == 2
-    normal = texelFetch(normals, int(row)).xyz;
+    normal = texelFetch(normals, OWN_NORMALS != 0 ? index : int(row)).xyz;
     float len = length(normal);
     // A missing normal faces the eye.
     normal = len > 0.0 && len < 3e38
         ? normal / len : transpose(mat3(world_to_view)) * eye_direction(pixel, depth);
 #endif
-    vec3 color = base_color(row, depth, normal);
+    vec3 color = base_color(index, row, depth, normal);
 #if LIGHT != 0 || EYE_DOME
     color = lit(to_linear(color), pixel, depth, normal);
 #if EYE_DOME

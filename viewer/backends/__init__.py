@@ -25,7 +25,6 @@ import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import ModuleType
 from typing import Any, Protocol
 
 from ..errors import unknown_name
@@ -63,10 +62,13 @@ class FrameView:
 
 @dataclass(frozen=True, eq=False)
 class Backend:
-    """One backend module, by its declarations."""
+    """One backend module, or an object with the same names, by its declarations."""
 
     name: str
-    module: ModuleType
+    module: Any
+
+    def __str__(self) -> str:
+        return self.name
 
     @property
     def title(self) -> str:

@@ -81,7 +81,7 @@ def summary(
     return {
         "device": renderer.gpu.device,
         "timer": renderer.gpu.timers.kind,
-        "backend": request.backend,
+        "backend": str(request.backend),
         "params": asdict(request.params),
         "size": list(surface.size),
         "frames": frames,

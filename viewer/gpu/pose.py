@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -16,7 +17,8 @@ from . import gl
 from .context import Gpu
 
 T = TypeVar("T")
-_FORMATS = {
+# What one texel of each array is.
+FORMATS = {
     "positions": gl.RGB32F,
     "normals": gl.RGB32F,
     "colors": gl.RGBA8,
@@ -44,7 +46,7 @@ class GpuPose:
             )
         self.stored = self.cloud = cloud
         self.uploaded_bytes = 0
-        self._upload_ms = 0.0
+        self._spent = {"upload": 0.0, "derive": 0.0}
         self._facts: dict[str, Any] = {}
 
     @cached_property
@@ -57,12 +59,11 @@ class GpuPose:
         """positions, normals, colors, radii, ids, or 'scalar:NAME'; uploaded at the first call."""
         if name not in self._arrays:
             values = self._values(name)
-            texels = _FORMATS.get(name, gl.R32F)
+            texels = FORMATS.get(name, gl.R32F)
             # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
             data = values if values.size else np.zeros(4, np.float32)
-            start = time.perf_counter()
-            self._arrays[name] = gl.BufferTexture(self.gpu.ctx.buffer(data), texels)
-            self._upload_ms += (time.perf_counter() - start) * 1e3
+            with self.preparing("upload"):
+                self._arrays[name] = gl.BufferTexture(self.gpu.ctx.buffer(data), texels)
             self.uploaded_bytes += data.nbytes
         return self._arrays[name]
 
@@ -103,9 +104,20 @@ class GpuPose:
         """Some of the positions, (M, 3), relative to the origin: for ranges."""
         return _strided(self.cloud.positions).astype(np.float64)
 
-    def take_upload_ms(self) -> float:
-        """How long uploads took since the last call."""
-        taken, self._upload_ms = self._upload_ms, 0.0
+    @contextmanager
+    def preparing(self, kind: str) -> Iterator[None]:
+        """Count what runs inside as time spent on "upload" or "derive"."""
+        start = time.perf_counter()
+        yield
+        self.add_ms(kind, (time.perf_counter() - start) * 1e3)
+
+    def add_ms(self, kind: str, ms: float) -> None:
+        """Count time spent on "upload" or "derive"."""
+        self._spent[kind] += ms
+
+    def take_ms(self, kind: str) -> float:
+        """How long "upload" or "derive" took since the last call."""
+        taken, self._spent[kind] = self._spent[kind], 0.0
         return taken
 
     def __del__(self) -> None:

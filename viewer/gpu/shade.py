@@ -24,7 +24,7 @@ def shade(surface: Surface, look: Look) -> None:
     source = value_source(look, cloud)
     value = source if source in (None, "depth", "height") else "scalar"
     color = "value" if source else "own" if look.color_by == "auto" else look.color_by
-    if color == "own" and cloud.colors is None:
+    if color == "own" and cloud.colors is None and not surface.is_own("colors"):
         color = "plain"
     light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
@@ -36,6 +36,8 @@ def shade(surface: Surface, look: Look) -> None:
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
             "HAS_IDS": int(cloud.ids is not None),
+            "OWN_COLORS": int(surface.is_own("colors")),
+            "OWN_NORMALS": int(surface.is_own("normals")),
         },
     )
     surface.bind_view()
@@ -44,9 +46,9 @@ def shade(surface: Surface, look: Look) -> None:
         surface.depths.bind(0)
         surface.rows.bind(1)
         if color == "own":
-            pose.array("colors").bind(2)
+            _attribute(surface, "colors").bind(2)
         if light != "flat" or color == "normal":
-            pose.array("normals").bind(3)
+            _attribute(surface, "normals").bind(3)
         if value == "scalar":
             pose.array(f"scalar:{source}").bind(4)
         if value == "height":
@@ -70,6 +72,11 @@ def shade(surface: Surface, look: Look) -> None:
         covered.run(program)
         gpu.ctx.memory_barrier()
     surface.look = look
+
+
+def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
+    """What the backend wrote for each pixel, else the pose's, for each row."""
+    return surface.own(name) if surface.is_own(name) else surface.pose.array(name)
 
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:

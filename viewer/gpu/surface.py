@@ -15,18 +15,20 @@ from ..scan.points import PointCloud
 from . import gl
 from .compact import IndexList, list_covered
 from .context import Gpu, Resource
-from .pose import GpuPose
+from .pose import FORMATS, GpuPose
 from .view import View
 
 NOTHING = 0xFFFFFFFF
 _CHUNK = 1 << 20  # points counted at a time
+_OWN_BYTES = {"normals": 12, "colors": 4}  # a pixel
 
 
 @dataclass
 class Stats:
     """What a frame took. Times in milliseconds.
 
-    backend: the one that drew. passes: (name, gpu_ms), empty while timers are off.
+    backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose,
+    estimates included. passes: (name, gpu_ms), empty while timers are off.
     skipped: what was not computed -> why.
     """
 
@@ -43,13 +45,14 @@ class Surface:
     """A picture's pixels before shading. Row 0 is the top.
 
     On the GPU: `depths` (float bits, +inf: nothing) and `rows` (the point that a pixel
-    shows, 0xFFFFFFFF: none), one word a pixel; colour, normal and value are fetched by row.
-    Reading a property copies it to the CPU.
+    shows, 0xFFFFFFFF: none), one word a pixel; colour, normal and value are fetched by row,
+    unless the backend wrote its `own`. Reading a property copies it to the CPU.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self.gpu = gpu
         self._resources: tuple[Resource, ...] = ()
+        self._own: dict[str, gl.BufferTexture] = {}
         self._raster: gl.Raster | None = None
         width, height = size
         if width < 1 or height < 1:
@@ -71,6 +74,7 @@ class Surface:
         self.stats = Stats()
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
+        self._written: set[str] = set()
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
     # --- for backends -----------------------------------------------------------------
@@ -81,6 +85,7 @@ class Surface:
         self._block.write(view.block())
         self.bind_view()
         self._covered_known = False
+        self._written.clear()
         self.stats = Stats()
 
     def bind_view(self) -> None:
@@ -111,10 +116,23 @@ class Surface:
         """Copy what was rasterised into the Surface."""
         self.raster().copy_to(self.rows.buffer, self.depths.buffer)
 
+    def own(self, name: str) -> gl.BufferTexture:
+        """A texel a pixel, for a backend that writes `normals` or `colors` itself in this frame:
+        they are shown in place of the row's. In the pose's formats; where nothing is, unread."""
+        if name not in self._own:
+            buffer = self.gpu.ctx.buffer(reserve=_OWN_BYTES[name] * self.size[0] * self.size[1])
+            self._own[name] = gl.BufferTexture(buffer, FORMATS[name])
+        self._written.add(name)
+        return self._own[name]
+
+    def is_own(self, name: str) -> bool:
+        """Whether the backend wrote this attribute for each pixel."""
+        return name in self._written
+
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        words = 3 + (3 if self._raster else 0)
+        words = 3 + (3 if self._raster else 0) + sum(_OWN_BYTES[name] for name in self._own) // 4
         return 4 * self.size[0] * self.size[1] * words + self.covered.nbytes
 
     @property
@@ -149,7 +167,10 @@ class Surface:
     def color(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, linear; the look's plain colour where the scan has none; 0 where nothing is."""
         colors = self._cloud.colors
-        if colors is None:
+        if self.is_own("colors"):
+            bytes_ = self._read(self._own["colors"].buffer, np.uint8).reshape(*self.size[::-1], 4)
+            rgb = np.where((self.row != NOTHING)[..., None], bytes_[..., :3], np.uint8(0))
+        elif colors is None:
             plain = np.array(rgba(self.look.plain)[:3], np.uint8)
             rgb = np.where((self.row != NOTHING)[..., None], plain, np.uint8(0))
         else:
@@ -160,9 +181,13 @@ class Surface:
     def normal(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, world space, unit length; 0 where unknown."""
         normals = self._cloud.normals
-        if normals is None:
+        if self.is_own("normals"):
+            written = self._read(self._own["normals"].buffer, np.float32).reshape(*self.size[::-1], 3)
+            fetched = np.where((self.row != NOTHING)[..., None], written, np.float32(0))
+        elif normals is None:
             return np.zeros((*self.size[::-1], 3), np.float32)
-        fetched = self._fetch(normals, 0)
+        else:
+            fetched = self._fetch(normals, 0)
         length = np.linalg.norm(fetched, axis=2, keepdims=True)
         usable = np.isfinite(length) & (length > 0)
         return np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
@@ -224,8 +249,8 @@ class Surface:
 
     def release(self) -> None:
         """Give up what it holds on the GPU now; otherwise that goes with the object."""
-        self.gpu.discard(*self._resources, self._raster)
-        self._resources, self._raster = (), None
+        self.gpu.discard(*self._resources, *self._own.values(), self._raster)
+        self._resources, self._own, self._raster = (), {}, None
 
     def __del__(self) -> None:
         self.release()
@@ -243,10 +268,9 @@ class Surface:
 
     def _read(self, buffer: moderngl.Buffer, dtype: type) -> NDArray:
         self.gpu.activate()
-        width, height = self.size
-        out = np.empty(4 * width * height, np.uint8)
+        out = np.empty(buffer.size, np.uint8)
         buffer.read_into(out)
-        return out.view(dtype).reshape(height, -1)
+        return out.view(dtype).reshape(self.size[1], -1)
 
     def _fetch(self, values: NDArray, nothing: float) -> NDArray:
         rows = self.row

@@ -1,0 +1,11 @@
+// GL_POINTS of one pixel.
+#include "common/view.glsl"
+
+layout(location = 0) in vec3 in_position;
+
+flat out uint row;
+
+void main() {
+    gl_Position = to_clip(to_view(in_position));
+    row = uint(gl_VertexID);
+}

@@ -1,0 +1,132 @@
+"""What every backend is held against: plain GL_POINTS, the floor, and the true mesh, the ceiling.
+
+They have what a backend's module has, and draw to the same Surface, but no user chooses them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ..backends import Backend, FrameView
+from ..gpu import gl
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
+from ..scan.points import PointCloud
+from .mesh import Faces, Mesh
+
+
+@dataclass(frozen=True)
+class NoParams:
+    """They have no parameters."""
+
+
+def gl_points() -> Backend:
+    """Each point as one pixel, as the driver's GL_POINTS draws it."""
+    return Backend("gl-points", _Points())
+
+
+def mesh(truth: Mesh) -> Backend:
+    """The triangles of a mesh, rasterised; for a pose whose cloud are the vertices, with normals."""
+    return Backend("mesh", _Triangles(truth.faces))
+
+
+class _Points:
+    """Plain GL_POINTS."""
+
+    TITLE = "GL_POINTS"
+    Params = NoParams
+
+    def needs(self, cloud: PointCloud, params: NoParams) -> tuple[str, ...]:
+        """Nothing but positions."""
+        return ()
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Draw the points; always complete."""
+        program = pose.gpu.program(("bench/points.vert", "bench/row.frag"))
+        content = [(pose.array("positions").buffer, "3f", "in_position")]
+        _rasterise(pose.gpu, surface, program, content, moderngl.POINTS, len(pose.cloud))
+        return False
+
+
+class _Triangles:
+    """A rasterised mesh. Rows and ids are faces; normals and colours are interpolated for each pixel."""
+
+    TITLE = "Mesh"
+    Params = NoParams
+
+    def __init__(self, faces: Faces) -> None:
+        self._faces = faces
+
+    def needs(self, cloud: PointCloud, params: NoParams) -> tuple[str, ...]:
+        """The normals that it interpolates."""
+        return ("normals",)
+
+    def derive(self, cloud: PointCloud, params: NoParams) -> Faces:
+        """The faces as they are."""
+        return self._faces
+
+    def upload(self, gpu: Gpu, faces: NDArray[np.uint32]) -> _FaceBuffer:
+        """The corners of the faces, on the GPU."""
+        return _FaceBuffer(gpu, faces)
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Draw the triangles, then find what each covered pixel sees of its own; always complete."""
+        gpu, faces = pose.gpu, frame.derived.corners
+        program = gpu.program(("bench/mesh.vert", "bench/mesh.frag"))
+        content = [(pose.array("positions").buffer, "3f", "in_position")]
+        _rasterise(gpu, surface, program, content, moderngl.TRIANGLES, frame.derived.count, faces.buffer)
+
+        colored = pose.cloud.colors is not None
+        resolve = gpu.compute("bench/mesh.comp", {"HAS_COLORS": int(colored)})
+        covered = surface.list_covered()
+        with gpu.timers.measure("resolve"):
+            surface.rows.bind(0)
+            faces.bind(1)
+            for unit, name in enumerate(("positions", "normals", *(("colors",) if colored else ())), 2):
+                pose.array(name).bind(unit)
+            surface.own("normals").buffer.bind_to_storage_buffer(0)
+            if colored:
+                surface.own("colors").buffer.bind_to_storage_buffer(1)
+            covered.run(resolve)
+            gpu.ctx.memory_barrier()
+        return False
+
+
+class _FaceBuffer:
+    """The corners of all faces, three texels each, and how many there are."""
+
+    def __init__(self, gpu: Gpu, faces: Faces) -> None:
+        self.corners = gl.BufferTexture(gpu.ctx.buffer(np.ascontiguousarray(faces)), gl.R32UI)
+        self.count, self.nbytes = faces.size, faces.nbytes
+
+    def release(self) -> None:
+        """Delete the buffer."""
+        self.corners.release()
+
+
+def _rasterise(
+    gpu: Gpu,
+    surface: Surface,
+    program: moderngl.Program,
+    content: list[tuple],
+    mode: int,
+    count: int,
+    indices: moderngl.Buffer | None = None,
+) -> None:
+    """Draw into the Surface with a strict depth test. count: vertices, or indices."""
+    target = surface.raster()
+    with gpu.timers.measure("raster"):
+        target.clear()
+        gpu.ctx.enable_only(moderngl.DEPTH_TEST)
+        gpu.ctx.depth_func = ">"  # reversed depth: near is 1
+        if count:
+            vertices = gpu.ctx.vertex_array(program, content, index_buffer=indices)
+            vertices.render(mode, vertices=count)
+            vertices.release()
+    with gpu.timers.measure("copy"):
+        surface.take_raster()
