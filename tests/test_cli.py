@@ -375,16 +375,16 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
 def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
     run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from viewer.commands import stats
+    from viewer import measure
 
     drawn: list[bool] = []
-    draw = stats.draw
+    draw = measure.draw
 
     def counted(renderer: Renderer, *rest: object) -> object:
         drawn.append(renderer.gpu.timers.enabled)
         return draw(renderer, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(stats, "draw", counted)
+    monkeypatch.setattr(measure, "draw", counted)
     ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--stats", tmp_path / "s.json")
     assert run(*ball, "--repeat", 4).code == 0
     assert drawn == [False] * (2 + 4) + [True] * 4

@@ -15,7 +15,7 @@ LAYERS = (
     {"errors", "files", "geometry", "params", "resources", "camera", "look", "scan"},
     {"gpu"},
     {"backends"},
-    {"renderer", "frame", "export"},
+    {"renderer", "frame", "measure", "export"},
     {"app", "bench", "__init__"},
     {"cli", "commands"},
 )
@@ -23,7 +23,10 @@ LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in part
 
 WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
-SLOW = {"open3d", "OpenEXR", "av", "plyfile", "lzf", "PIL", "tqdm", "cmap", "scipy", "skimage"} | WINDOW
+SLOW = WINDOW | {
+    "PIL", "OpenEXR",
+    "av", "cmap", "jinja2", "lzf", "matplotlib", "open3d", "plyfile", "scipy", "skimage", "tqdm",
+}  # fmt: skip
 
 
 def modules() -> list[Path]:
@@ -48,11 +51,17 @@ def imports(nodes: Iterable[ast.AST], path: Path) -> Iterator[str]:
 
 
 def run_at_import(node: ast.AST) -> Iterator[ast.AST]:
-    """The node and what below it runs when the module is imported: all but function bodies."""
+    """The node and what below it runs when the module is imported: all but function bodies and types."""
     yield node
     for child in ast.iter_child_nodes(node):
-        if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+        later = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) or for_types(child)
+        if not later:
             yield from run_at_import(child)
+
+
+def for_types(node: ast.AST) -> bool:
+    """Whether it is `if TYPE_CHECKING:`."""
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
 def parse(path: Path) -> ast.AST:

@@ -22,6 +22,7 @@ from ..export import FILM_SUFFIX, PICTURE_SUFFIXES, check_output, pictures
 from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look
+from ..measure import draw
 from ..params import parse
 from ..scan.timeline import Timeline
 from . import drawing, stats
@@ -92,7 +93,7 @@ def run(args: Namespace) -> int:
                 if args.stats:
                     frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
                 else:
-                    stats.draw(renderer, request, surface)
+                    draw(renderer, request, surface)
                     tick()
                 put(surface, shot.number)
             if args.stats:

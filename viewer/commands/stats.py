@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-import time
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
 from statistics import median
 from typing import Any
 
-from ..frame import Request, render_frame
+from ..frame import Request
 from ..gpu.surface import Surface
+from ..measure import call_ms, pass_ms, peak_rss
 from ..renderer import Renderer
 
 _WARM_UPS = 2
@@ -31,42 +29,23 @@ def draw_measured(
     counts. cpu_ms is taken with pass timers off, because on software drivers they wait
     between passes; gpu_ms and the passes come from as many further draws with them on.
     """
-    cpu_ms, first = [], None
-    for _ in range(draw_count(repeat)):
-        start = time.perf_counter()
-        draw(renderer, request, surface)
-        surface.image()
-        cpu_ms.append((time.perf_counter() - start) * 1e3)
-        first = first or surface.stats  # uploads and derives what later draws find done
-        tick()
-    assert first is not None
-    timers = renderer.gpu.timers
-    timers.enabled = True
-    try:
-        runs = [draw(renderer, request, surface) for _ in range(repeat or 1)]
-    finally:
-        timers.enabled = False
+    (first_ms,) = call_ms(renderer, request, surface, 1, tick)
+    first = surface.stats  # uploads and derives what later draws find done
+    cpu_ms = [first_ms]
+    if repeat is not None:
+        call_ms(renderer, request, surface, _WARM_UPS - 1, tick)
+        cpu_ms = call_ms(renderer, request, surface, repeat, tick)
+    runs = pass_ms(renderer, request, surface, repeat or 1)
     return {
         "pose": request.pose.index,
         "gpu_ms": median(run.total() for run in runs),
-        "cpu_ms": median(cpu_ms[_WARM_UPS:] or cpu_ms),
+        "cpu_ms": median(cpu_ms),
         "upload_ms": first.upload_ms,
         "derive_ms": first.derive_ms,
         "passes": [{"name": name, "gpu_ms": median(run[name] for run in runs)} for name in runs[0]],
         "points": _points(surface),
         "skipped": surface.stats.skipped,
     }
-
-
-def draw(renderer: Renderer, request: Request, surface: Surface) -> Counter[str]:
-    """Draw until the picture is complete; milliseconds of each pass while timers are on."""
-    passes: Counter[str] = Counter()
-    unfinished = True
-    while unfinished:
-        unfinished = render_frame(renderer, request, surface)
-        for name, ms in surface.stats.passes:
-            passes[name] += ms  # type: ignore[assignment]
-    return passes
 
 
 def _points(surface: Surface) -> dict[str, Any]:
@@ -86,15 +65,5 @@ def summary(
         "size": list(surface.size),
         "frames": frames,
         "bytes_gpu": renderer.nbytes + surface.nbytes,
-        "peak_rss": _peak_rss(),
+        "peak_rss": peak_rss(),
     }
-
-
-def _peak_rss() -> int | None:
-    """The most bytes of memory that this process has had; None where the system does not tell."""
-    if sys.platform == "win32":
-        return None
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024

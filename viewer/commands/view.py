@@ -15,7 +15,8 @@ from ..errors import InputError, NoOpenGLError
 from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
 from ..look import Look
-from . import drawing, stats
+from ..measure import draw
+from . import drawing
 from .console import progress
 from .doctor import display
 from .scans import SCAN_HELP, framing, open_timeline, read_poses
@@ -80,7 +81,7 @@ def _play(args: Namespace, scan: str, prefix: str) -> None:
             bounds = framing(timeline, indices)
             camera = Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=args.up)
             for pose in read_poses(timeline, indices):
-                stats.draw(renderer, Request(pose, camera, look=Look(up=args.up)), surface)
+                draw(renderer, Request(pose, camera, look=Look(up=args.up)), surface)
                 image = surface.image()
                 write_png(image, f"{name}_{pose.index:04d}.png")
                 add(image)

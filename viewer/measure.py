@@ -1,0 +1,77 @@
+"""What pictures take: time of the call and of its passes, and memory."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from .frame import Request, render_frame
+from .gpu.surface import Surface
+from .renderer import Renderer
+
+_PROCESS = Path("/proc/self")  # Linux
+
+
+def draw(renderer: Renderer, request: Request, surface: Surface) -> Counter[str]:
+    """Draw until the picture is complete; milliseconds of each pass while timers are on."""
+    passes: Counter[str] = Counter()
+    unfinished = True
+    while unfinished:
+        unfinished = render_frame(renderer, request, surface)
+        for name, ms in surface.stats.passes:
+            passes[name] += ms  # type: ignore[assignment]
+    return passes
+
+
+def call_ms(
+    renderer: Renderer, request: Request, surface: Surface, repeat: int, tick: Callable[[], object] = int
+) -> list[float]:
+    """Wall time of each of `repeat` draws with the picture read back, ms; `tick` is called after each.
+
+    Timers should be off: on software drivers they wait between passes.
+    """
+    times = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        draw(renderer, request, surface)
+        surface.image()
+        times.append((time.perf_counter() - start) * 1e3)
+        tick()
+    return times
+
+
+def pass_ms(renderer: Renderer, request: Request, surface: Surface, repeat: int) -> list[Counter[str]]:
+    """Milliseconds on the GPU of each pass, in each of `repeat` draws."""
+    timers = renderer.gpu.timers
+    timers.enabled = True
+    try:
+        return [draw(renderer, request, surface) for _ in range(repeat)]
+    finally:
+        timers.enabled = False
+
+
+def peak_rss() -> int | None:
+    """The most bytes of memory that this process has had; None where the system does not tell.
+
+    On Linux since the last `reset_peak_rss`.
+    """
+    with suppress(OSError):
+        for line in (_PROCESS / "status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
+
+
+def reset_peak_rss() -> None:
+    """Let `peak_rss` begin anew, where the system can (proc(5), clear_refs)."""
+    with suppress(OSError):
+        (_PROCESS / "clear_refs").write_text("5")
