@@ -1,9 +1,10 @@
 # Two commands: `make run` and `make test`. Each sets up all that it needs by itself.
 
 PYTHON := .venv/bin/python
+QUICK := --quick
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all lint wheel clean
+.PHONY: help setup run test test-all bench lint wheel clean
 
 help: ## print this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -19,6 +20,9 @@ test: setup ## the tests, without the slow ones
 
 test-all: setup ## all tests
 	$(PYTHON) -m pytest
+
+bench: setup ## run time against error, in two minutes: out/bench/report.html; all of it: make bench QUICK=
+	.venv/bin/scan4d bench $(QUICK) -o out/bench
 
 lint: setup ## ruff and mypy
 	$(PYTHON) -m ruff check .

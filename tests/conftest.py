@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from command_line import Done, Run
 from hypothesis import HealthCheck, settings
 
+from viewer import cli
 from viewer.camera import Camera
 from viewer.look import Look
 from viewer.scan.points import PointCloud
@@ -90,3 +93,30 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
         return surface
 
     return draw
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """run("render", ...): a command line in this process. Nothing ever prints a traceback."""
+
+    def run(*argv: object) -> Done:
+        code = cli.main([str(word) for word in argv])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return Done(code, captured.out, captured.err)
+
+    return run
+
+
+@pytest.fixture
+def refused(run: Run) -> Callable[..., str]:
+    """refused("render", ...): the one message of a command line that ends with code 2."""
+
+    def refused(*argv: object) -> str:
+        done = run(*argv)
+        assert done.code == 2, done
+        assert done.out == ""
+        assert re.fullmatch(r"scan4d: [^\n]+\n", done.err), done.err
+        return done.err
+
+    return refused

@@ -11,10 +11,10 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
+from command_line import Done, Run
 from numpy.typing import NDArray
 from scenes import sphere
 from written import bits, film, picture
@@ -35,44 +35,6 @@ from viewer.scan.points import PointCloud
 ROOT = Path(__file__).resolve().parents[1]
 SMALL = ("--size", "96x64")
 FRAMES = 5
-
-
-class Done(NamedTuple):
-    """What became of a command line."""
-
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Done]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """run("render", ...): a command line in this process. Nothing ever prints a traceback."""
-
-    def run(*argv: object) -> Done:
-        code = cli.main([str(word) for word in argv])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return Done(code, captured.out, captured.err)
-
-    return run
-
-
-@pytest.fixture
-def refused(run: Run) -> Callable[..., str]:
-    """refused("render", ...): the one message of a command line that ends with code 2."""
-
-    def refused(*argv: object) -> str:
-        done = run(*argv)
-        assert done.code == 2, done
-        assert done.out == ""
-        assert re.fullmatch(r"scan4d: [^\n]+\n", done.err), done.err
-        return done.err
-
-    return refused
 
 
 def process(*argv: object, **environment: str) -> subprocess.Popen[str]:

@@ -14,7 +14,7 @@ from typing import NoReturn
 from .errors import InputError, Scan4DError
 from .geometry import up_vector
 
-COMMANDS = ("view", "render", "info", "convert", "simulate", "backends", "doctor")
+COMMANDS = ("view", "render", "info", "convert", "simulate", "bench", "backends", "doctor")
 
 _SIGNED_OPTIONS = ("--orbit", "--up")
 _SIGNED_VALUE = re.compile(r"-([xyz]$|[0-9.])")

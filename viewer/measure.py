@@ -17,13 +17,19 @@ _PROCESS = Path("/proc/self")  # Linux
 
 
 def draw(renderer: Renderer, request: Request, surface: Surface) -> Counter[str]:
-    """Draw until the picture is complete; milliseconds of each pass while timers are on."""
+    """Draw until the picture is complete; milliseconds of each pass while timers are on.
+
+    What was prepared on the way stands in `surface.stats`.
+    """
     passes: Counter[str] = Counter()
+    upload_ms = derive_ms = 0.0
     unfinished = True
     while unfinished:
         unfinished = render_frame(renderer, request, surface)
+        upload_ms, derive_ms = upload_ms + surface.stats.upload_ms, derive_ms + surface.stats.derive_ms
         for name, ms in surface.stats.passes:
             passes[name] += ms  # type: ignore[assignment]
+    surface.stats.upload_ms, surface.stats.derive_ms = upload_ms, derive_ms
     return passes
 
 

@@ -72,6 +72,10 @@ class Renderer:
         """Bytes that poses hold on the GPU."""
         return sum(r.nbytes for r in self._resident.values())
 
+    def bytes_of(self, pose: Pose) -> int:
+        """Bytes that one pose holds on the GPU, with what was derived from it; 0 where it is not there."""
+        return self._resident[id(pose)].nbytes if id(pose) in self._resident else 0
+
     def resident(self, pose: Pose) -> GpuPose:
         """The pose on the GPU; its arrays are uploaded when something first reads them."""
         self.gpu.collect()

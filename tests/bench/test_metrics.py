@@ -174,6 +174,33 @@ def test_pictures_below_the_window_of_ssim_have_none() -> None:
     assert errors["psnr"] == math.inf
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [np.s_[30:45, 20:60], np.s_[:5, :9], np.s_[40:, 50:], np.s_[30:31, 79:80], np.s_[:, 40:41]],
+    ids=["inside", "corner", "other corner", "a pixel at the edge", "a column"],
+)
+def test_looking_only_where_pictures_differ_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch, changed: tuple[slice, slice]
+) -> None:
+    true = noise(3)
+    drawn = true.copy()
+    drawn[changed] = noise(4)[changed]
+    found = metrics.color(drawn, true, disc(20))
+    monkeypatch.setattr(metrics, "_box", lambda mask, margin: np.s_[:, :])
+    np.testing.assert_equal(found, metrics.color(drawn, true, disc(20)))
+
+
+@pytest.mark.parametrize("center", [(30, 40), (2, 40), (30, 79)])
+def test_looking_only_where_something_is_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch, center: tuple[float, float]
+) -> None:
+    true = disc(15, center) & ~disc(4, center)
+    drawn = (disc(14, center) | disc(5, (30, 55))) & (noise(3)[..., 0] > 60)
+    found = metrics.coverage(drawn, true)
+    monkeypatch.setattr(metrics, "_box", lambda mask, margin: np.s_[:, :])
+    assert found == metrics.coverage(drawn, true)
+
+
 # --- visibility ----------------------------------------------------------------------------
 
 
@@ -222,3 +249,39 @@ def test_flicker_follows_the_points_through_the_pictures() -> None:
     assert errors["flicker_color"] > 0.1
     followed = metrics.flicker((first, second), (first, second), pixels)
     assert followed == {"flicker_color": 0, "flicker_normal": 0}
+
+
+# --- several views -------------------------------------------------------------------------
+
+
+def test_errors_of_views_become_one() -> None:
+    errors = metrics.aggregate(
+        {
+            "hole_percent": [2, 4, math.nan],
+            "depth_rmse": [3, math.nan, 4],
+            "depth_median": [3, math.nan, 4],
+            "psnr": [10 * math.log10(255**2 / squares) for squares in (1, 3)],
+            "psnr_frame": [math.inf, 10 * math.log10(255**2 / 4)],
+            "normal_mean": [math.nan, math.nan],
+        }
+    )
+    assert errors["hole_percent"] == 3
+    assert errors["depth_rmse"] == pytest.approx(math.sqrt(25 / 2))
+    assert errors["depth_median"] == 3.5
+    assert errors["psnr"] == pytest.approx(10 * math.log10(255**2 / 2))
+    assert errors["psnr_frame"] == pytest.approx(10 * math.log10(255**2 / 2))
+    assert math.isnan(errors["normal_mean"])
+
+
+def test_points_of_all_views_are_counted_together() -> None:
+    views = [(1, 1, 10), (0, 3, 90)]
+    keys = ("false_positives", "false_negatives", "correct")
+    by_view: dict[str, list[float]] = {key: [view[i] for view in views] for i, key in enumerate(keys)}
+    errors = metrics.aggregate(by_view | {"visibility_error_percent": [20, 100 * 3 / 90]})
+    assert [errors[key] for key in keys] == [1, 4, 100]
+    assert errors["visibility_error_percent"] == 5
+
+
+def test_equal_pictures_in_all_views_are_without_noise() -> None:
+    assert metrics.aggregate({"psnr": [math.inf, math.inf]})["psnr"] == math.inf
+    assert math.isnan(metrics.aggregate({"psnr": [math.nan]})["psnr"])

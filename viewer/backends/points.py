@@ -42,7 +42,7 @@ class Params:
         "Edge of a point's square, pixels; 0: as far as the next point",
         low=0,
         high=_LARGEST,
-        sweep=(1, 2, 4),
+        sweep=(0, 1, 2, 4),
     )
 
 

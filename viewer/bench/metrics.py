@@ -5,13 +5,16 @@ Functions over arrays; nothing here draws. What is undefined, as the mean of no 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 WRONG_LAYER = 4.0  # local spacings between two depths that are of two sheets
+_COUNTS = ("false_positives", "false_negatives", "correct")
 _WINDOW = 11  # pixels, of SSIM
+_REACH = 10  # pixels to each side that a pixel of the FLIP map depends on; SSIM: 5
 
 Errors = dict[str, float]
 Mask = NDArray[np.bool_]
@@ -22,6 +25,8 @@ def coverage(drawn: Mask, true: Mask) -> Errors:
 
     Holes that are wholly inside the true silhouette have no part in the outline: they are counted already.
     """
+    box = _box(drawn | true, 1)  # an outline's pixel has a neighbour outside
+    drawn, true = drawn[box], true[box]
     area = _count(true)
     outline, true_outline = _outline(drawn | _enclosed(~drawn, true)), _outline(true)
     distances = np.concatenate([_distance(true_outline)[outline], _distance(outline)[true_outline]])
@@ -61,7 +66,7 @@ def depth(
 
 
 def normals(drawn: NDArray[np.floating], true: NDArray[np.floating]) -> Errors:
-    """Angles in degrees between normals (H, W, 3) where both pictures have one that is not zero.
+    """Angles in degrees between normals (..., 3) where both pictures have one that is not zero.
 
     Unsigned, as if a normal and its opposite were the same, and signed.
     """
@@ -94,7 +99,10 @@ def color(drawn: NDArray[np.uint8], true: NDArray[np.uint8], inside: Mask) -> Er
     """
     drawn, true = drawn[..., :3], true[..., :3]
     squares = ((drawn.astype(np.float64) - true) ** 2).mean(axis=2)
-    maps = {"ssim": _ssim(drawn, true), "flip": _flip(drawn, true)}
+    # Beyond the reach of a difference SSIM is exactly 1 and FLIP 0. Twice the reach, so that what lies
+    # within it looks at no more than it would in the whole picture.
+    box = _box(squares > 0, 2 * _REACH)
+    maps = {"ssim": _ssim(drawn, true, box), "flip": _flip(drawn, true, box)}
     errors = {"psnr": _psnr(squares[inside]), "psnr_frame": _psnr(squares)}
     for name, values in maps.items():
         errors |= {name: _mean(values[inside]), f"{name}_frame": _mean(values)}
@@ -132,6 +140,32 @@ def flicker(
         "flicker_color": _mean(drawn_color) - _mean(true_color),
         "flicker_normal": _mean(drawn_normal[both]) - _mean(true_normal[both]),
     }
+
+
+def aggregate(by_view: Mapping[str, Sequence[float]]) -> Errors:
+    """The errors of several views as one, by the section "Aggregate" of docs/benchmark.md.
+
+    by_view: for each error its value in every view, NaN where it is undefined there.
+    """
+    errors: Errors = {}
+    for name, values in by_view.items():
+        if name in _COUNTS:
+            errors[name] = sum(values)
+        elif name.startswith("psnr"):
+            errors[name] = _psnr(_defined(255**2 * 10 ** (-np.asarray(values, np.float64) / 10)))
+        elif name.startswith("depth_rmse"):
+            errors[name] = float(np.sqrt(defined_mean(np.square(values))))
+        else:
+            errors[name] = defined_mean(values)
+    if "visibility_error_percent" in errors:
+        wrong = errors["false_positives"] + errors["false_negatives"]
+        errors["visibility_error_percent"] = _percent(wrong, errors["correct"])
+    return errors
+
+
+def defined_mean(values: ArrayLike) -> float:
+    """The mean of the values that are not NaN; NaN where all are."""
+    return _mean(_defined(np.asarray(values, np.float64)))
 
 
 def _changes(
@@ -174,28 +208,47 @@ def _distance(mask: Mask) -> NDArray[np.float64]:
     return ndimage.distance_transform_edt(~mask)
 
 
-def _ssim(drawn: NDArray[np.uint8], true: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """SSIM of each pixel, (H, W), with the settings of Wang et al. 2004."""
+def _box(mask: Mask, margin: int) -> tuple[slice, slice]:
+    """The rows and columns around what is set in a mask (H, W), so much larger; all where nothing is set."""
+    if not mask.any():
+        return slice(None), slice(None)
+    first_row, last_row = np.flatnonzero(mask.any(axis=1))[[0, -1]]
+    first_column, last_column = np.flatnonzero(mask.any(axis=0))[[0, -1]]
+    return (
+        slice(max(first_row - margin, 0), last_row + margin + 1),
+        slice(max(first_column - margin, 0), last_column + margin + 1),
+    )
+
+
+def _ssim(drawn: NDArray[np.uint8], true: NDArray[np.uint8], box: tuple[slice, slice]) -> NDArray[np.float64]:
+    """SSIM of each pixel, (H, W), with the settings of Wang et al. 2004; 1 outside the box."""
     from skimage.metrics import structural_similarity
 
     if min(drawn.shape[:2]) < _WINDOW:
         return np.full(drawn.shape[:2], np.nan)
-    _, values = structural_similarity(
-        drawn, true, channel_axis=2, data_range=255, gaussian_weights=True, sigma=1.5,
+    values = np.ones(drawn.shape[:2])
+    _, by_channel = structural_similarity(
+        drawn[box], true[box], channel_axis=2, data_range=255, gaussian_weights=True, sigma=1.5,
         use_sample_covariance=False, full=True,
     )  # fmt: skip
-    return values.mean(axis=2)
+    values[box] = by_channel.mean(axis=2)
+    return values
 
 
-def _flip(drawn: NDArray[np.uint8], true: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """FLIP of each pixel, (H, W), 0..1, at its own 67 pixels per degree (Andersson et al. 2020)."""
+def _flip(drawn: NDArray[np.uint8], true: NDArray[np.uint8], box: tuple[slice, slice]) -> NDArray[np.float64]:
+    """FLIP of each pixel, (H, W), 0..1, at its own 67 pixels per degree (Andersson et al. 2020).
+
+    0 outside the box.
+    """
     try:
         import flip_evaluator
     except ModuleNotFoundError:  # it has no wheels for some platforms
         return np.full(drawn.shape[:2], np.nan)
-    pictures = (np.ascontiguousarray(picture / np.float32(255), np.float32) for picture in (true, drawn))
-    values, _, _ = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)
-    return np.asarray(values, np.float64).reshape(drawn.shape[:2])
+    values = np.zeros(drawn.shape[:2])
+    pictures = (np.ascontiguousarray(picture[box] / np.float32(255)) for picture in (true, drawn))
+    found, _, _ = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)
+    values[box] = found[..., 0]
+    return values
 
 
 def _psnr(squares: NDArray[np.float64]) -> float:
@@ -207,8 +260,12 @@ def _count(mask: Mask) -> int:
     return int(np.count_nonzero(mask))
 
 
-def _percent(part: int, whole: int) -> float:
+def _percent(part: float, whole: float) -> float:
     return 100.0 * part / whole if whole else float("nan")
+
+
+def _defined(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return values[~np.isnan(values)]
 
 
 def _mean(values: NDArray[np.float64]) -> float:

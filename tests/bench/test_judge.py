@@ -1,0 +1,224 @@
+"""The judge of one view, and flicker along a walk: pictures whose errors are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import pytest
+from scenes import plane
+from test_mesh import sphere_mesh
+
+from viewer.bench.judge import Judge, Walk
+from viewer.bench.mesh import Mesh, read_mesh, vertex_normals
+from viewer.bench.reference import trace
+from viewer.bench.scene import Scene
+from viewer.bench.shapes import Plane, Shapes, Sphere
+from viewer.camera import Camera
+from viewer.look import Look, rgba
+from viewer.scan.points import PointCloud
+
+if TYPE_CHECKING:
+    from viewer.gpu.surface import Surface
+    from viewer.renderer import Renderer
+
+SIZE = (96, 72)
+LOOK = Look(light="head")
+AHEAD = Camera(eye=(0, 0, 4))
+
+
+def judge(
+    renderer: Renderer,
+    truth: Scene,
+    camera: Camera = AHEAD,
+    cloud: PointCloud | None = None,
+    tolerance: float | None = None,
+) -> Judge:
+    cloud = plane(21, depth=0, spacing=0.1) if cloud is None else cloud
+    return Judge.of(renderer.gpu, truth, camera, SIZE, LOOK, cloud, tolerance)
+
+
+def picture(renderer: Renderer, scene: Scene, camera: Camera = AHEAD) -> Surface:
+    """What a flawless backend would draw of another scene."""
+    return trace(scene, camera, SIZE).surface(renderer.gpu, LOOK)
+
+
+def counts(errors: dict[str, float]) -> tuple[float, float, float]:
+    return errors["false_positives"], errors["false_negatives"], errors["correct"]
+
+
+# --- one view ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_the_truth_has_no_errors(renderer: Renderer, projection: str) -> None:
+    camera, mesh = Camera(eye=(2, 1.5, 3), projection=projection), sphere_mesh()
+    errors = judge(renderer, mesh, camera, mesh.points).errors(picture(renderer, mesh, camera))
+    assert errors["psnr"] == errors["psnr_frame"] == math.inf
+    assert errors["ssim"] == errors["ssim_frame"] == 1
+    assert not errors["flip"] > 0
+    assert errors["visibility_error_percent"] < 5  # just behind the outline, which is a pixel wide
+    for name, error in errors.items():
+        if name.startswith(("hole", "spill", "boundary", "depth", "wrong_layer")):
+            assert error == 0, name
+        if name.startswith("normal"):  # they are made unit length in float32 when they are read
+            assert error == pytest.approx(0, abs=1e-5), name
+
+
+@pytest.mark.parametrize("d", [0.5, -1.25])
+def test_a_plane_moved_back_by_d_has_a_bias_of_d(renderer: Renderer, d: float) -> None:
+    truth = judge(renderer, Shapes((Plane(),)))
+    errors = truth.errors(picture(renderer, Shapes((Plane(center=(0, 0, -d)),))))
+    assert errors["depth_bias"] == pytest.approx(d, abs=1e-6)
+    assert errors["depth_rmse"] == errors["depth_p95"] == pytest.approx(abs(d), abs=1e-6)
+    assert errors["depth_bias_px"] == pytest.approx(d * truth.reference.view.scale / 4, rel=1e-6)
+    assert errors["wrong_layer_percent"] == 100  # farther than four spacings of 0.1
+    assert errors["normal_p95"] == 0
+
+
+def test_an_empty_picture_is_all_hole_and_hides_nothing(renderer: Renderer) -> None:
+    mesh = sphere_mesh()
+    truth = judge(renderer, mesh, cloud=mesh.points)
+    errors = truth.errors(picture(renderer, Shapes((Sphere(center=(0, 0, 99)),))))
+    assert errors["hole_percent"] == 100
+    assert math.isnan(errors["depth_bias"])
+    assert counts(errors) == (np.count_nonzero(~truth.probes.seen), 0, np.count_nonzero(truth.probes.seen))
+
+
+def test_points_of_two_planes(renderer: Renderer) -> None:
+    front, back = Plane(), Plane(center=(0, 0, -2))  # the hinder one is all in the shadow of the other
+    square = plane(10, depth=0, spacing=0.2).world()
+    cloud = PointCloud.from_arrays(np.concatenate([square, square - np.array([0, 0, 2])]))
+    truth = judge(renderer, Shapes((front, back)), cloud=cloud)
+
+    def found(*planes: Plane) -> tuple[float, float, float]:
+        return counts(truth.errors(picture(renderer, Shapes(planes))))
+
+    assert found(front, back) == (0, 0, 200)
+    assert found(back) == (100, 0, 100)  # the hinder ones are seen through what is missing
+    assert found(Plane(center=(0, 0, 1))) == (0, 100, 100)
+
+
+def test_points_may_lie_as_far_behind_as_the_tolerance_says(renderer: Renderer) -> None:
+    deep = PointCloud.from_arrays(plane(11, depth=0.5, spacing=0.01).world())
+    truth = Shapes((Plane(),))
+    drawn = picture(renderer, truth)
+    strict, lenient = (judge(renderer, truth, cloud=deep, tolerance=t) for t in (None, 0.6))
+    assert counts(strict.errors(drawn)) == (0, 0, 121)
+    assert not strict.probes.seen.any()
+    assert counts(lenient.errors(drawn)) == (0, 0, 121)
+    assert lenient.probes.seen.all()
+
+
+def test_cloud_and_truth_have_origins_of_their_own(renderer: Renderer) -> None:
+    mesh, camera = sphere_mesh(16), Camera(eye=(2, 1.5, 3))
+    moved = PointCloud.from_arrays(mesh.points.world(), origin=mesh.origin + np.array([5.0, -3.0, 8.0]))
+    here, there = (judge(renderer, mesh, camera, cloud).probes for cloud in (mesh.points, moved))
+    assert (here.pixels == there.pixels).mean() > 0.95  # float32 moves some over an edge
+    assert np.abs(here.limit - there.limit).max() < 1e-5
+    assert (here.seen == there.seen).mean() > 0.9
+
+
+def test_only_points_in_the_picture_are_looked_at(renderer: Renderer) -> None:
+    cloud = PointCloud.from_arrays([[0, 0, 0], [50, 0, 0], [0, 0, 5]])
+    assert len(judge(renderer, Shapes((Plane(),)), cloud=cloud).probes.seen) == 1
+
+
+def test_of_many_points_some_stand_for_all(renderer: Renderer) -> None:
+    ordered = plane(300, depth=0, spacing=0.006)  # of columns, as scanners give them
+    first, again = (judge(renderer, Shapes((Plane(),)), cloud=ordered).probes for _ in range(2))
+    assert len(first.seen) == 50_000
+    assert (first.pixels == again.pixels).all()
+    columns = np.bincount(first.pixels % SIZE[0], minlength=SIZE[0])
+    inside = columns[columns > 0][1:-1]
+    assert inside.min() > 0.7 * inside.max()
+
+
+def test_pictures_are_compared_in_the_judge_s_look(renderer: Renderer) -> None:
+    truth = Shapes((Sphere(),))
+    other = trace(truth, AHEAD, SIZE).surface(renderer.gpu, Look(light="flat", background="#ff0000"))
+    assert judge(renderer, truth).errors(other)["psnr_frame"] == math.inf
+
+
+@pytest.mark.parametrize("size", [1.0, 0.0])
+def test_the_back_of_the_bunny_shows_between_small_points(
+    data_dir: Path, renderer: Renderer, draw: Callable[..., Surface], size: float
+) -> None:
+    stored = read_mesh(data_dir / "models" / "stanford_bunny_35947.ply")
+    cloud = PointCloud.from_arrays(
+        stored.points.world(), normals=vertex_normals(stored), origin=stored.origin
+    )
+    camera = Camera.orbit(stored.bounds, 20, 10)
+    bunny = Judge.of(renderer.gpu, stored, camera, (480, 320), LOOK, cloud, None)
+    errors = bunny.errors(draw(cloud, camera, (480, 320), "points", LOOK, {"point_size": size}))
+    own = bunny.errors(bunny.reference.surface(renderer.gpu, LOOK))
+    assert own["visibility_error_percent"] < 4
+    if size:
+        assert errors["false_positives"] > 10 * errors["false_negatives"]
+    else:  # squares that close the holes cover their neighbours
+        assert errors["false_negatives"] > errors["false_positives"]
+
+
+# --- flicker -------------------------------------------------------------------------------
+
+
+def orbit(renderer: Renderer, frames: int = 3) -> list[Judge]:
+    mesh = sphere_mesh()
+    cameras = [Camera(eye=(2, 1.5, 3)).orbited(4 * k, 0) for k in range(frames)]
+    return [judge(renderer, mesh, camera, mesh.points) for camera in cameras]
+
+
+def redrawn(renderer: Renderer, judges: list[Judge]) -> Iterator[Surface]:
+    """The truth of each judge; a frame is gone when the next is asked for."""
+    for frame in judges:
+        surface = frame.reference.surface(renderer.gpu, LOOK)
+        yield surface
+        surface.release()
+
+
+@pytest.mark.parametrize("kind", ["orbit", "pose"])
+def test_the_truth_does_not_flicker(renderer: Renderer, kind: Literal["orbit", "pose"]) -> None:
+    judges = orbit(renderer)
+    flicker = Walk(judges, [None, None]).flicker(redrawn(renderer, judges), kind)
+    assert flicker == {f"flicker_{kind}_color": 0, f"flicker_{kind}_normal": pytest.approx(0, abs=1e-6)}
+
+
+def test_a_frame_that_is_missing_flickers_by_what_it_lacks(renderer: Renderer) -> None:
+    mesh = sphere_mesh()
+    still = judge(renderer, mesh, cloud=mesh.points)
+    empty = picture(renderer, Shapes((Sphere(center=(0, 0, 99)),)))
+    full = still.reference.surface(renderer.gpu, LOOK)
+    flicker = Walk([still] * 4, [None] * 3).flicker([full, empty, empty, full], "orbit")
+    lost = np.abs(still.image[still.reference.covered, :3] / 255 - np.array(rgba(LOOK.background)[:3]) / 255)
+    assert flicker["flicker_orbit_color"] == pytest.approx(2 / 3 * lost.mean(), rel=1e-9)
+    assert math.isnan(flicker["flicker_orbit_normal"])  # known in both frames of no pair
+
+
+def test_flicker_follows_what_moves(renderer: Renderer) -> None:
+    mesh, camera = sphere_mesh(), Camera(eye=(2, 1.5, 3))
+    shift = np.array([0.3, 0, 0])
+    moved = Mesh(
+        PointCloud.from_arrays(
+            mesh.points.world() + shift, colors=mesh.points.colors, normals=mesh.points.normals
+        ),
+        mesh.faces,
+    )
+    judges = [judge(renderer, scene, camera, scene.points) for scene in (mesh, moved)]
+    first = judges[0].reference
+    carried = mesh.carry(first.id[first.covered], first.positions(), moved)
+    still = [first.surface(renderer.gpu, LOOK)] * 2  # a picture that stays while the body moves
+    followed = Walk(judges, [carried]).flicker(still, "pose")
+    assert followed["flicker_pose_color"] > 0.02
+    assert followed["flicker_pose_normal"] > 5
+    assert Walk(judges, [carried]).flicker(redrawn(renderer, judges), "pose")["flicker_pose_color"] == 0
+
+
+@pytest.mark.parametrize("frames", [2, 4])
+def test_a_walk_wants_a_frame_for_each_judge(renderer: Renderer, frames: int) -> None:
+    judges = orbit(renderer)
+    surface = judges[0].reference.surface(renderer.gpu, LOOK)
+    with pytest.raises(ValueError, match="zip"):
+        Walk(judges, [None, None]).flicker([surface] * frames, "orbit")

@@ -1,0 +1,136 @@
+"""Measuring: two runs find the same errors, all that is needed to repeat a row stands in it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.backends import backend, backends
+from viewer.bench.plan import Contender, Group, plan
+from viewer.bench.results import Row
+from viewer.bench.run import Bench, Settings
+from viewer.errors import InputError
+from viewer.renderer import Renderer
+
+SETTINGS = Settings(size=(120, 80), views=3, repeat=1, frames=2)
+DEFAULTS = tuple(plan(["torus"], list(backends()), counts=(), noises=(), swept_scenes=0)[0].contenders)
+TORUS = Group("torus", DEFAULTS, count=20_000)
+SPREAD = {"median", "p5", "p95"}
+
+
+@pytest.fixture(scope="module")
+def rows(renderer: Renderer) -> list[Row]:
+    return Bench(renderer, SETTINGS).measure(TORUS)
+
+
+def by_backend(rows: list[Row]) -> dict[str, Row]:
+    return {row["backend"]: row for row in rows}
+
+
+def test_a_row_says_all_that_is_needed_to_repeat_it(rows: list[Row], renderer: Renderer) -> None:
+    assert [row["backend"] for row in rows] == [c.backend for c in DEFAULTS]
+    for row in rows:
+        assert {
+            "backend", "scene", "scene_hash", "n", "noise", "params", "size", "seed", "views", "gpu_ms",
+            "cpu_ms", "derive_ms", "upload_ms", "timer", "bytes_gpu", "peak_rss", "errors", "device",
+            "driver", "version",
+        } <= row.keys()  # fmt: skip
+        assert (row["n"], row["size"], row["views"]) == (20_000, [120, 80], 3)
+        assert row["timer"] == renderer.gpu.timers.kind
+        for name in ("gpu_ms", "cpu_ms", "derive_ms", "upload_ms"):
+            assert row[name].keys() == SPREAD
+        assert row["gpu_ms"]["median"] > 0
+        assert row["cpu_ms"]["p5"] <= row["cpu_ms"]["median"] <= row["cpu_ms"]["p95"]
+        assert row["upload_ms"]["median"] > 0, "every view prepares a pose of its own"
+        assert all(len(values) == 3 for values in row["errors_by_view"].values())
+        assert row["errors_by_view"].keys() <= row["errors"].keys()
+        assert row["bytes_gpu"] > 20_000 * 12
+        json.dumps(row)
+
+
+def test_passes_add_up_to_the_time_on_the_gpu(rows: list[Row]) -> None:
+    for row in rows:
+        passes = sum(spread["median"] for spread in row["passes"].values())
+        assert passes == pytest.approx(row["gpu_ms"]["median"], rel=0.3)
+
+
+def test_two_runs_give_identical_errors(rows: list[Row], renderer: Renderer) -> None:
+    again = Bench(renderer, SETTINGS).measure(TORUS)
+    for first, second in zip(rows, again, strict=True):
+        np.testing.assert_equal(second["errors"], first["errors"])
+        np.testing.assert_equal(second["errors_by_view"], first["errors_by_view"])
+        assert second["scene_hash"] == first["scene_hash"]
+
+
+def test_another_seed_looks_from_elsewhere(rows: list[Row], renderer: Renderer) -> None:
+    other = Bench(renderer, replace(SETTINGS, seed=1)).measure(TORUS)
+    assert other[0]["errors"]["hole_percent"] != rows[0]["errors"]["hole_percent"]
+
+
+def test_the_true_mesh_is_the_ceiling_and_gl_points_the_floor(rows: list[Row]) -> None:
+    errors = {name: row["errors"] for name, row in by_backend(rows).items()}
+    assert errors["mesh"]["hole_percent"] < 0.1
+    assert errors["mesh"]["depth_median_px"] < 0.05
+    assert errors["mesh"]["wrong_layer_percent"] == 0
+    assert errors["mesh"]["normal_mean"] < 0.1
+    assert errors["mesh"]["psnr"] > 45
+    assert abs(errors["mesh"]["flicker_orbit_color"]) < 1e-3
+    for name in backends():
+        assert errors["gl-points"]["psnr"] < errors[name]["psnr"] + 0.1 < errors["mesh"]["psnr"]
+
+
+def test_a_sequence_flickers_from_pose_to_pose(renderer: Renderer, data_dir: Path) -> None:
+    group = Group("horse-gallop", DEFAULTS)
+    rows = Bench(renderer, replace(SETTINGS, data=data_dir)).measure(group)
+    errors = {name: row["errors"] for name, row in by_backend(rows).items()}
+    assert abs(errors["mesh"]["flicker_pose_color"]) < 2e-3
+    assert errors["gl-points"]["flicker_pose_color"] > 0.01
+
+
+def test_stopping_keeps_the_views_that_all_have_seen(renderer: Renderer) -> None:
+    bench, ticks = Bench(renderer, SETTINGS), iter(range(len(DEFAULTS) + 2))
+
+    def tick() -> None:
+        if next(ticks, None) is None:
+            raise KeyboardInterrupt
+
+    stopped = bench.measure(TORUS, tick)
+    assert bench.stopped
+    assert [row["views"] for row in stopped] == [1] * len(DEFAULTS)
+    assert all(len(row["errors_by_view"]["hole_percent"]) == 1 for row in stopped)
+
+
+def test_a_backend_that_cannot_draw_a_scene_is_left_out_and_said(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(*_: object) -> None:
+        raise InputError("needs range views")
+
+    monkeypatch.setattr(backend("points").module, "needs", refuses)
+    bench = Bench(renderer, SETTINGS)
+    rows = bench.measure(replace(TORUS, contenders=(Contender("gl-points"), *DEFAULTS[2:])))
+    assert "points" not in by_backend(rows)
+    assert "gl-points" in by_backend(rows)
+    assert any("points" in note and "needs range views" in note for note in bench.notes)
+
+
+def test_measuring_ticks_as_often_as_it_said(renderer: Renderer) -> None:
+    ticks: list[None] = []
+    bench = Bench(renderer, SETTINGS)
+    bench.measure(TORUS, lambda: ticks.append(None))
+    assert len(ticks) == bench.steps(TORUS)
+
+
+def test_pictures_compare_with_the_truth(renderer: Renderer, tmp_path: Path) -> None:
+    from PIL import Image
+
+    Bench(renderer, SETTINGS, tmp_path).measure(replace(TORUS, contenders=DEFAULTS[:2]))
+    pictures = sorted((tmp_path / "pictures").iterdir())
+    assert [path.name for path in pictures] == ["torus--gl-points.png", "torus--mesh.png"]
+    for path in pictures:
+        with Image.open(path) as picture:
+            assert picture.width > 5 * 100

@@ -1,0 +1,133 @@
+"""`scan4d bench` as a user runs it: what it says, writes, keeps and refuses."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+
+from viewer.bench.results import read_rows
+from viewer.commands import bench
+
+SMALL = ("--quick", "--size", "96x64", "--views", 2, "--backend", "points")
+Refused = Callable[..., str]
+
+
+def write_ply(path: Path, faces: bool = True) -> Path:
+    """A unit sphere of quads, or its points alone."""
+    polar, turn = np.meshgrid(
+        np.linspace(0.01, np.pi - 0.01, 12), np.linspace(0, 2 * np.pi, 24), indexing="ij"
+    )
+    points = np.stack([np.sin(polar) * np.cos(turn), np.cos(polar), -np.sin(polar) * np.sin(turn)], axis=-1)
+    first = (np.arange(11)[:, None] * 24 + np.arange(23)).ravel()
+    quads = np.stack([first, first + 24, first + 25, first + 1], axis=1) if faces else []
+    header = ["ply", "format ascii 1.0", f"element vertex {polar.size}"]
+    header += [f"property float {axis}" for axis in "xyz"]
+    header += [f"element face {len(quads)}", "property list uchar int vertex_indices", "end_header"]
+    lines = [" ".join(map(str, point)) for point in points.reshape(-1, 3)]
+    lines += [" ".join(map(str, (4, *quad))) for quad in quads]
+    path.write_text("\n".join([*header, *lines]) + "\n", encoding="ascii")
+    return path
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    """A small mesh of one's own."""
+    return write_ply(tmp_path / "ball.ply")
+
+
+def test_a_mesh_of_ones_own_is_measured_reported_and_compared(run: Run, mesh: Path, tmp_path: Path) -> None:
+    out, again = tmp_path / "out", tmp_path / "again"
+    scenes = ("--scene", mesh, "--suite", "scenes")
+    done = run("bench", *scenes, *SMALL, "-o", out)
+    assert done.code == 0, done.err
+    first, *_, last = done.out.splitlines()
+    assert "about" in first
+    assert last == str(out / "report.html")
+    rows = read_rows(out)
+    assert {row["backend"] for row in rows} == {"gl-points", "mesh", "points"}
+    assert {row["scene"] for row in rows} == {"ball.ply"}
+    assert (out / "report.html").stat().st_size > 10_000
+    assert {path.name for path in (out / "pictures").iterdir()} == {
+        f"ball.ply--{name}.png" for name in ("gl-points", "mesh", "points")
+    }
+
+    done = run("bench", *scenes, *SMALL, "-o", again, "--compare", out)
+    assert done.code == 0
+    assert "worse" not in done.out
+    errors = [[row["errors_by_view"] for row in read_rows(folder)] for folder in (out, again)]
+    assert json.dumps(errors[0]) == json.dumps(errors[1])
+
+    assert run("bench", *scenes, *SMALL, "-o", again).code == 0
+    assert (again / "old-results.jsonl").is_file(), "nothing is lost"
+
+
+def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").write_text("")
+    done = run("bench", "--suite", "numerics", "--backend", "points", "-o", tmp_path)
+    assert done.code == 0, done.err
+    assert (tmp_path / "results.jsonl").exists()
+    lines = [json.loads(line) for line in (tmp_path / "numerics.jsonl").read_text().splitlines()]
+    assert len(lines) > 50
+    assert all(line["held"] or line["limit"] for line in lines)
+    assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--scene", "bunnie"], ["bunnie", "bunny"]),
+        (["--scene", "nowhere.ply"], ["nowhere.ply"]),
+        (["--backend", "nerf"], ["nerf", "points"]),
+        (["--data", "nowhere"], ["nowhere", "--data"]),
+        (["--compare", "nowhere"], ["nowhere"]),
+        (["--size", "8x8"], ["8x8", "1920x1280"]),
+        (["--views", "0"], ["0"]),
+        (["--suite", "speed"], ["speed", "numerics"]),
+    ],
+)
+def test_what_cannot_be_is_one_message(
+    refused: Refused, tmp_path: Path, arguments: list[str], words: list[str]
+) -> None:
+    message = refused("bench", "-o", tmp_path / "out", *arguments)
+    assert all(word in message for word in words), message
+    assert not (tmp_path / "out").exists()
+
+
+def test_points_without_faces_are_no_scene(refused: Refused, tmp_path: Path) -> None:
+    path = write_ply(tmp_path / "points.ply", faces=False)
+    assert "faces" in refused("bench", "--scene", path, "-o", tmp_path / "out")
+
+
+def test_a_missing_library_is_told(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "_LIBRARIES", ("numpy", "no_such_library"))
+    message = refused("bench", "-o", tmp_path)
+    assert "no_such_library" in message
+    assert "scan4d[bench]" in message
+
+
+def test_ctrl_c_keeps_what_was_measured(mesh: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "viewer.cli", "bench", "--scene", str(mesh), "--suite", "scenes",
+               "--quick", "--size", "96x64", "--views", "400", "-o", str(tmp_path / "out")]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while process.poll() is None and not list(tmp_path.glob("out/pictures/*--surfels.png")):
+            time.sleep(0.2)
+        time.sleep(1)  # into the views after the first
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate()
+    assert process.returncode == 1, err
+    assert "Traceback" not in err
+    assert out.splitlines()[-1] == str(tmp_path / "out" / "report.html")
+    rows = read_rows(tmp_path / "out")
+    assert rows
+    assert len({row["views"] for row in rows}) == 1
+    assert 1 <= rows[0]["views"] < 400
+    assert "Stopped" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -1,0 +1,92 @@
+"""What a benchmark measures: scenes x backends, and sweeps that vary one thing at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Literal
+
+from ..backends import backend
+from . import catalog
+from .results import CEILING, FLOOR
+
+COUNTS = (10_000, 100_000, 1_000_000, 10_000_000)
+NOISES = (0.0, 0.5, 1.0, 2.0, 4.0)  # footprints of a scanner's pixel
+Sweep = Literal["n", "noise"]
+
+_SWEPT_SCENES = 2
+_PREFERRED = ("torus", "dragon", "torus-simulated", "bunny-simulated")  # to vary counts and noise on
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A backend with its parameters. params: None for the floor and the ceiling, which have none.
+
+    sweep: the parameter that differs from its default; empty: none does.
+    """
+
+    backend: str
+    params: Any = None
+    sweep: str = ""
+
+
+@dataclass(frozen=True)
+class Group:
+    """A scene and the contenders that take turns on it.
+
+    count, noise: None for the scene's own. sweep: "n" or "noise" where the group is a step of such a
+    sweep, else empty.
+    """
+
+    scene: str
+    contenders: tuple[Contender, ...]
+    count: int | None = None
+    noise: float | None = None
+    sweep: str = ""
+
+
+def plan(
+    scenes: Sequence[str],
+    backends: Sequence[str],
+    counts: Sequence[int] = COUNTS,
+    noises: Sequence[float] = NOISES,
+    swept_scenes: int | None = None,
+) -> list[Group]:
+    """The groups to measure. scenes, backends: names, or files of meshes.
+
+    Each scene meets the defaults of all backends, and every value that their declarations sweep; then
+    counts and noise vary on two scenes each, with the defaults. swept_scenes: on how many scenes parameters
+    are swept; None: on all. Raises InputError for unknown backends.
+    """
+    defaults = [Contender(FLOOR), Contender(CEILING)]
+    defaults += [Contender(name, backend(name).params()) for name in backends]
+    swept = [*defaults, *(contender for name in backends for contender in _sweeps(name))]
+    groups = [
+        Group(scene, tuple(swept if swept_scenes is None or place < swept_scenes else defaults))
+        for place, scene in enumerate(scenes)
+    ]
+    sweeps: tuple[tuple[Sweep, Sequence], ...] = (("n", counts), ("noise", noises))
+    for sweep, values in sweeps:
+        for scene, value in product(_varying(scenes, sweep), values):
+            groups.append(
+                Group(scene, tuple(defaults), **{"count" if sweep == "n" else sweep: value}, sweep=sweep)
+            )
+    return groups
+
+
+def _varying(scenes: Sequence[str], sweep: Sweep) -> list[str]:
+    """The scenes that a sweep is made on."""
+    able = [scene for scene in scenes if catalog.varies(scene, sweep)]
+    return sorted(able, key=lambda scene: scene not in _PREFERRED)[:_SWEPT_SCENES]
+
+
+def _sweeps(name: str) -> list[Contender]:
+    """One contender for each value that a backend's declaration sweeps, but for the defaults."""
+    declared = backend(name)
+    return [
+        Contender(name, declared.params({parameter.name: value}), parameter.name)
+        for parameter in declared.parameters
+        for value in parameter.sweep
+        if value != parameter.default
+    ]

@@ -1,0 +1,321 @@
+"""Measuring: contenders take turns on the views of a scene, each timed and judged.
+
+Times come from draws that are already warm; judging is outside of them. What a picture shows is
+drawn once more for the judge, so that nothing waits for it.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+from .. import __version__
+from ..backends import backend
+from ..camera import Camera
+from ..errors import InputError
+from ..files import whole_file
+from ..frame import Request
+from ..gpu.surface import Surface
+from ..look import Look
+from ..measure import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
+from ..renderer import Renderer
+from . import baselines, catalog, numerics
+from .judge import Judge, Walk
+from .metrics import Errors, aggregate
+from .pictures import picture_path, side_by_side
+from .plan import Contender, Group
+from .reference import footprint
+from .results import CEILING, FLOOR, SPREADS, Row, spread
+from .subjects import Moment, Subject
+from .viewpoints import viewpoints
+
+LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the scan
+_ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
+
+Tick = Callable[[], object]
+Kind = Literal["orbit", "pose"]
+Frame = tuple[Moment, Camera]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How it is measured.
+
+    size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of.
+    frames: of a walk, for flicker. seed: of viewpoints, samples and noise. data: the folder of real scans.
+    """
+
+    size: tuple[int, int] = (1920, 1280)
+    views: int = 20
+    repeat: int = 3
+    frames: int = 6
+    seed: int = 0
+    data: Path | None = None
+
+    def subject(self, group: Group) -> Subject:
+        """What a group looks at. Raises InputError."""
+        return catalog.subject(group.scene, self.data, count=group.count, noise=group.noise, seed=self.seed)
+
+
+@dataclass
+class _Tally:
+    """What was measured of one contender, a value a view."""
+
+    gpu_ms: list[float] = field(default_factory=list)
+    cpu_ms: list[float] = field(default_factory=list)
+    derive_ms: list[float] = field(default_factory=list)
+    upload_ms: list[float] = field(default_factory=list)
+    passes: list[dict[str, float]] = field(default_factory=list)
+    bytes_gpu: list[int] = field(default_factory=list)
+    peak_rss: list[int | None] = field(default_factory=list)
+    errors: list[Errors] = field(default_factory=list)
+    flicker: Errors = field(default_factory=dict)
+
+    def numbers(self, views: int) -> Row:
+        """What a row holds of the first views."""
+        passes = {
+            name: spread([run.get(name, 0.0) for run in self.passes[:views]]) for name in self.passes[0]
+        }
+        by_view = {name: [errors[name] for errors in self.errors[:views]] for name in self.errors[0]}
+        memory = [peak for peak in self.peak_rss[:views] if peak is not None]
+        return {
+            **{name: spread(getattr(self, name)[:views]) for name in SPREADS},
+            "passes": passes,
+            "bytes_gpu": max(self.bytes_gpu[:views]),
+            "peak_rss": max(memory, default=None),
+            "errors": aggregate(by_view) | self.flicker,
+            "errors_by_view": by_view,
+        }
+
+
+class Bench:
+    """Measures groups, one after another. renderer: what draws. folder: where comparing pictures go."""
+
+    def __init__(self, renderer: Renderer, settings: Settings, folder: Path | None = None) -> None:
+        self.renderer, self.settings, self.folder = renderer, settings, folder
+        self.stopped = False
+        self.notes: list[str] = []
+        self._subject = lru_cache(maxsize=1)(settings.subject)
+        self._looked_at: tuple[Moment, list[Camera]] | None = None
+
+    def measure(self, group: Group, tick: Tick = int) -> list[Row]:
+        """The rows of a group. Where Ctrl-C stopped it, of the views that all have seen; `stopped` is set.
+
+        A contender that cannot draw the scene is left out, and `notes` says why. tick: called `steps` times.
+        Raises InputError for scenes that cannot be had.
+        """
+        subject = self._subject(group)
+        tallies = {contender: _Tally() for contender in group.contenders}
+        try:
+            for view in range(self.settings.views):
+                self._view(subject, view, tallies, tick, pictured=not group.sweep)
+            for kind, frames, walk in self._walks(subject):
+                for contender, tally in tallies.items():
+                    tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
+                    tick()
+        except KeyboardInterrupt:
+            self.stopped = True
+        return self._rows(group, subject, tallies)
+
+    def steps(self, group: Group) -> int:
+        """How often measuring a group ticks."""
+        walks = 2 if self._subject(group).moments > 1 else 1
+        return len(group.contenders) * (self.settings.views + walks)
+
+    def foretell(self, groups: Sequence[Group]) -> float:
+        """The seconds that measuring groups will take, from one view of a sphere that all contenders draw.
+
+        That view also loads libraries and compiles shaders, so that no number holds it.
+        """
+        contenders = tuple(dict.fromkeys(c for group in groups for c in group.contenders))
+        sphere = Group("sphere", contenders)
+        rows = []
+        for size in ((96, 64), self.settings.size):
+            start = time.perf_counter()
+            rows = Bench(self.renderer, replace(self.settings, size=size, views=1, frames=2)).measure(sphere)
+            seconds = time.perf_counter() - start
+        draws = 2 + 2 * self.settings.repeat
+        drawing = sum(row["cpu_ms"]["median"] for row in rows) * draws / 1e3 / len(rows)
+        # The view itself, and a walk of two frames, each about as long.
+        judging = max(seconds / (3 * len(rows)) - drawing, 0)
+        return sum(
+            self.steps(group) * (judging + drawing * max(1.0, (group.count or 0) / rows[0]["n"]))
+            for group in groups
+        )
+
+    def numerics(self, names: Sequence[str], tick: Tick = int) -> Iterator[Row]:
+        """The lines of the stability suite, for each backend."""
+        for name in names:
+            for row in numerics.rows():
+                found = row.compare(self.renderer, backend(name))
+                yield {
+                    "row": row.name,
+                    "backend": name,
+                    **asdict(found),
+                    "bound": asdict(row.tolerance.bound),
+                    "held": row.tolerance.holds(found),
+                    "limit": row.limit_of(backend(name)),
+                    "reason": row.tolerance.reason,
+                    "device": self.renderer.gpu.device,
+                    "driver": self.renderer.gpu.driver,
+                    "version": __version__,
+                }
+                tick()
+
+    # --- one view ---------------------------------------------------------------------
+
+    def _view(
+        self, subject: Subject, view: int, tallies: dict[Contender, _Tally], tick: Tick, pictured: bool
+    ) -> None:
+        """Let all contenders draw a view, time them and judge them. pictured: save how they compare."""
+        moment = subject.moment(view * subject.moments // self.settings.views)
+        camera = self._cameras(subject, moment)[view]
+        judge = self._judge(subject, moment, camera)
+        turn = view % len(tallies)  # who is first changes, so that drift hits all alike
+        for contender in (*list(tallies)[turn:], *list(tallies)[:turn]):
+            surface = Surface(self.renderer.gpu, self.settings.size)
+            request = _request(contender, moment, camera)
+            try:
+                self._time(request, surface, tallies[contender])
+            except InputError as error:
+                self.notes.append(f"{subject.name}: {contender.backend} is left out: {error}")
+                del tallies[contender]
+                continue
+            draw(self.renderer, request, surface)
+            tallies[contender].errors.append(judge.errors(surface))
+            if self.folder and pictured and view == 0 and not contender.sweep:
+                _save_comparison(picture_path(self.folder, subject.name, contender.backend), judge, surface)
+            surface.release()
+            tick()
+
+    def _judge(self, subject: Subject, moment: Moment, camera: Camera) -> Judge:
+        size, cloud = self.settings.size, moment.pose.cloud
+        return Judge.of(self.renderer.gpu, moment.truth, camera, size, LOOK, cloud, subject.tolerance)
+
+    def _time(self, request: Request, surface: Surface, tally: _Tally) -> None:
+        """Add what one view takes: the preparation of a pose that is new to the GPU, then warm draws."""
+        with _undisturbed():
+            reset_peak_rss()
+            draw(self.renderer, request, surface)
+            tally.upload_ms.append(surface.stats.upload_ms)
+            tally.derive_ms.append(surface.stats.derive_ms)
+            call_ms(self.renderer, request, surface, 1)  # caches are filled, the picture was read back
+            calls = call_ms(self.renderer, request, surface, self.settings.repeat)
+            runs = pass_ms(self.renderer, request, surface, self.settings.repeat)
+        tally.cpu_ms.append(spread(calls)["median"])
+        tally.gpu_ms.append(spread([run.total() for run in runs])["median"])
+        tally.passes.append({name: spread([run[name] for run in runs])["median"] for name in runs[0]})
+        tally.bytes_gpu.append(self.renderer.bytes_of(request.pose) + surface.nbytes)
+        tally.peak_rss.append(peak_rss())
+
+    def _cameras(self, subject: Subject, moment: Moment) -> list[Camera]:
+        """Where all views look from, to where the subject is at a moment."""
+        if self._looked_at is None or self._looked_at[0] is not moment:
+            views, size, seed = self.settings.views, self.settings.size, self.settings.seed
+            self._looked_at = moment, viewpoints(moment.mesh, views, size, up=subject.up, seed=seed)
+        return self._looked_at[1]
+
+    # --- from frame to frame ----------------------------------------------------------
+
+    def _walks(self, subject: Subject) -> Iterator[tuple[Kind, list[Frame], Walk]]:
+        """An orbit about the first moment; some moments of a sequence whose points are known in all."""
+        first, frames = subject.moment(0), self.settings.frames
+        start = self._cameras(subject, first)[0]
+        orbit = [(first, start.orbited(_ORBIT_STEP * frame, 0)) for frame in range(frames)]
+        judges = [self._judge(subject, *frame) for frame in orbit]
+        yield "orbit", orbit, Walk(judges, [None] * (frames - 1))
+
+        if subject.moments < 2:
+            return
+        indices = [index % subject.moments for index in range(frames)]
+        moments = [subject.moment(index) for index in indices]
+        size = self.settings.size
+        camera = Camera.orbit(first.mesh.bounds, 30, 10, aspect=size[0] / size[1], up=subject.up)
+        playing = [(moment, camera) for moment in moments]
+        judges = [self._judge(subject, *frame) for frame in playing]
+        moved = [
+            subject.carry(index, following, judge.reference)
+            for (index, following), judge in zip(pairwise(indices), judges, strict=False)
+        ]
+        if not any(hits is None for hits in moved):
+            yield "pose", playing, Walk(judges, moved)
+
+    def _drawn(self, contender: Contender, frames: list[Frame]) -> Iterator[Surface]:
+        """One Surface, drawn anew for each frame."""
+        surface = Surface(self.renderer.gpu, self.settings.size)
+        for moment, camera in frames:
+            draw(self.renderer, _request(contender, moment, camera), surface)
+            yield surface
+        surface.release()
+
+    # --- rows -------------------------------------------------------------------------
+
+    def _rows(self, group: Group, subject: Subject, tallies: dict[Contender, _Tally]) -> list[Row]:
+        """The rows of a group, of the views that all its contenders have seen."""
+        views = min((len(tally.errors) for tally in tallies.values()), default=0)
+        if not views:
+            return []
+        gpu, settings, cloud = self.renderer.gpu, self.settings, subject.moment(0).pose.cloud
+        return [
+            {
+                "backend": contender.backend,
+                "scene": subject.name,
+                "scene_hash": subject.hash,
+                "credit": subject.credit,
+                "n": len(cloud),
+                "noise": subject.noise,
+                "params": {} if contender.params is None else asdict(contender.params),
+                "sweep": contender.sweep or group.sweep,
+                "size": list(settings.size),
+                "seed": settings.seed,
+                "views": views,
+                "repeat": settings.repeat,
+                "frames": settings.frames,
+                **tally.numbers(views),
+                "timer": gpu.timers.kind,
+                "device": gpu.device,
+                "driver": gpu.driver,
+                "version": __version__,
+            }
+            for contender, tally in tallies.items()
+        ]
+
+
+def _request(contender: Contender, moment: Moment, camera: Camera) -> Request:
+    """What a contender is asked for; its pose is one that the renderer has not seen."""
+    if contender.backend == CEILING:
+        pose = replace(moment.pose, cloud=moment.mesh.points, views=())
+        return Request(pose, camera, baselines.mesh(moment.mesh), look=LOOK)
+    drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
+    return Request(replace(moment.pose), camera, drawn, contender.params, LOOK)
+
+
+def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:
+    """The picture of reference, backend and differences."""
+    from PIL import Image
+
+    reference = judge.reference
+    true = {"image": judge.image, "depth": reference.depth, "normal": reference.normal}
+    drawn = {"image": surface.image(), "depth": surface.depth, "normal": surface.normal}
+    panels = side_by_side(true, drawn, footprint(reference.view, reference.depth))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as temporary:
+        Image.fromarray(panels).save(temporary)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """No garbage collection within."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
