@@ -91,7 +91,8 @@ def test_what_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:
     [
         ("{", "is no row"),
         ("[1, 2]", "not a JSON object"),
-        ('{"backend": "points"}', "without scene, scene_hash"),
+        ('{"backend": "points"}', "without a usable scene, scene_hash"),
+        (json.dumps({**a_row(), "errors": 3}), "without a usable errors"),
     ],
 )
 def test_a_broken_line_is_named(tmp_path: Path, line: str, what: str) -> None:

@@ -278,10 +278,8 @@ def _cloud(axes: Axes, rows: list[Row], metric: Metric, look: dict[str, Any]) ->
     time = METRICS["gpu_ms"]
     defaults = [row for row in rows if row["sweep"] == ""]
     for sweep in sorted({row["sweep"] for row in rows} - {""}):
-        line = sorted(
-            [*defaults, *(row for row in rows if row["sweep"] == sweep)],
-            key=lambda row: row["params"].get(sweep, math.nan),
-        )
+        line = [row for row in rows if row["sweep"] in ("", sweep) and sweep in row["params"]]
+        line.sort(key=lambda row: (isinstance(row["params"][sweep], str), row["params"][sweep]))
         x, y = [time.of(row) for row in line], [size(metric, row) for row in line]
         axes.plot(x, y, **look, linewidth=0.6, markersize=3.5, alpha=0.75)
     for row in defaults:

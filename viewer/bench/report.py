@@ -18,6 +18,7 @@ from . import plots
 from .pictures import PANELS
 from .results import (
     CEILING,
+    COSTS,
     FLOOR,
     METRICS,
     NOTES,
@@ -95,7 +96,7 @@ def write_report(folder: Path) -> Path:
     if not rows and not numerics:
         raise InputError("no results to report", folder, "Run scan4d bench first")
     metrics, scenes = error_metrics(rows), _defaults(rows)
-    shown = list(METRICS.values())[:7] + metrics
+    shown = COSTS + metrics
     page = _template().render(
         about=about(rows),
         columns=[METRICS[name] for name in _SUMMARY],

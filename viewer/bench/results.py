@@ -21,7 +21,13 @@ SPREADS = ("gpu_ms", "cpu_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
 _IDENTITY = ("backend", "scene", _SCENE, "n", "noise", "params", "size", "seed", "views")
-_NEEDED = {RESULTS: (*_IDENTITY, "gpu_ms", "errors"), NUMERICS: ("row", "backend", "held")}
+_NEEDED: dict[str, dict[str, Any]] = {
+    RESULTS: {
+        "backend": str, "scene": str, _SCENE: str, "n": int, "noise": int | float, "params": dict,
+        "size": list, "seed": int, "views": int, "sweep": str, "gpu_ms": dict, "errors": dict,
+    },
+    NUMERICS: {"row": str, "backend": str, "held": bool},
+}  # fmt: skip
 
 # --- what is measured -----------------------------------------------------------------
 
@@ -52,7 +58,7 @@ class Metric:
         return f"{name} [{self.unit}]" if self.unit else name
 
 
-_COSTS = [
+COSTS = [
     Metric("gpu_ms", "ms", "time of one picture on the GPU, median over the views"),
     Metric("cpu_ms", "ms", "time of the call that draws one picture, median over the views"),
     Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
@@ -101,7 +107,7 @@ _ERRORS = [
         for name, unit, text in (("color", "", "colour"), ("normal", "°", "normal"))
     ),
 ]
-METRICS = {metric.name: metric for metric in [*_COSTS, *_ERRORS]}
+METRICS = {metric.name: metric for metric in [*COSTS, *_ERRORS]}
 
 
 def error_metrics(rows: Iterable[Row]) -> list[Metric]:
@@ -165,13 +171,13 @@ def read_rows(path: Path) -> list[Row]:
     return rows
 
 
-def _parsed(line: str, needed: Iterable[str]) -> Row:
+def _parsed(line: str, needed: dict[str, Any]) -> Row:
     """One row; raises ValueError for what is none."""
     row = json.loads(line)
     if not isinstance(row, dict):
         raise ValueError("not a JSON object")
-    if missing := [name for name in needed if name not in row]:
-        raise ValueError(f"without {', '.join(missing)}")
+    if missing := [name for name, kind in needed.items() if not isinstance(row.get(name), kind)]:
+        raise ValueError(f"without a usable {', '.join(missing)}")
     return _from_json(row)
 
 
