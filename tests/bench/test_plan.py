@@ -43,6 +43,11 @@ def test_counts_and_noise_vary_on_two_scenes_each() -> None:
     assert all(not c.sweep for g in groups if g.sweep for c in g.contenders)
 
 
+def test_what_is_usual_for_a_scene_is_measured_once() -> None:
+    groups = plan(["torus", "torus-simulated"], NAMES, counts=(100_000, 20), noises=(0.5, 1.0))
+    assert [(g.count, g.noise) for g in groups] == [(None, None), (None, None), (20, None), (None, 1.0)]
+
+
 def test_parameters_may_be_swept_on_some_scenes_only() -> None:
     first, second = plan(["sphere", "torus"], NAMES, counts=(), noises=(), swept_scenes=1)
     assert len(first.contenders) > len(second.contenders) == 2 + len(NAMES)

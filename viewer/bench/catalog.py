@@ -34,6 +34,8 @@ _PHONE = "range/truedepth_head_30"
 _PHONE_TOLERANCE = 2e-3  # m
 _MOST_POINTS = 100_000_000
 
+Sweep = Literal["n", "noise"]  # what may vary of a scene
+
 
 @dataclass(frozen=True)
 class _Request:
@@ -50,12 +52,14 @@ class _Request:
 class _Scene:
     """How a scene is made. needs: what of the data folder; counts: whether it comes in any number of points.
 
-    noise: what the scanner's is unless told; None: there is no virtual scanner.
+    count: how many it has unless told; None: that is known when it is read. noise: what the scanner's is
+    unless told; None: there is no virtual scanner.
     """
 
     make: Callable[[_Request], Subject]
     needs: tuple[str, ...] = ()
     counts: bool = False
+    count: int | None = None
     noise: float | None = None
 
 
@@ -67,7 +71,7 @@ def _analytic(shape: Shape, sampler: Sampler, mesh: Callable[[], Mesh]) -> _Scen
 
         return Subject(name=request.name, load=load)
 
-    return _Scene(make, counts=True)
+    return _Scene(make, counts=True, count=_COUNT)
 
 
 def _model(file: str, credit: str, up: str = "+y", inside_out: bool = False) -> _Scene:
@@ -215,6 +219,9 @@ _REAL = {
 _SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _SIMULATED | _REAL
 
 
+_FILE = _Scene(_file, counts=True)  # of a user's own mesh
+
+
 def names(data: Path | None) -> dict[str, str]:
     """Every scene by name, with the reason why it cannot be had; "" where it can.
 
@@ -242,7 +249,7 @@ def subject(
             if Path(name_or_file).name != name_or_file or Path(name_or_file).suffix:
                 raise InputError("no such file", name_or_file)
             raise unknown_name("scene", name_or_file, list(_SCENES))
-        scene, needs = _Scene(_file, counts=True), [Path(name_or_file)]
+        scene, needs = _FILE, [Path(name_or_file)]
     elif reason := _missing(scene, data):
         raise InputError(reason, name_or_file)
     else:
@@ -259,10 +266,20 @@ def subject(
     return scene.make(_Request(name, tuple(needs), count, noise, seed))
 
 
-def varies(name_or_file: str, what: Literal["n", "noise"]) -> bool:
+def varies(name_or_file: str, what: Sweep) -> bool:
     """Whether a scene can be had with any number of points ("n"), or with any noise."""
-    scene = _SCENES.get(name_or_file, _Scene(_still, counts=True))
+    scene = _scene(name_or_file)
     return scene.counts if what == "n" else scene.noise is not None
+
+
+def usual(name_or_file: str, what: Sweep) -> float | None:
+    """The number of points or the noise of a scene unless another is asked for; None: not known yet."""
+    scene = _scene(name_or_file)
+    return scene.count if what == "n" else scene.noise
+
+
+def _scene(name_or_file: str) -> _Scene:
+    return _SCENES.get(name_or_file, _FILE)
 
 
 def _missing(scene: _Scene, data: Path | None) -> str:

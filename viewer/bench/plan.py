@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 from ..backends import backend
 from . import catalog
+from .catalog import Sweep
 from .results import CEILING, FLOOR
 
 COUNTS = (10_000, 100_000, 1_000_000, 10_000_000)
 NOISES = (0.0, 0.5, 1.0, 2.0, 4.0)  # footprints of a scanner's pixel
-Sweep = Literal["n", "noise"]
-
 _SWEPT_SCENES = 2
 _PREFERRED = ("torus", "dragon", "torus-simulated", "bunny-simulated")  # to vary counts and noise on
 
@@ -56,29 +55,29 @@ def plan(
     """The groups to measure. scenes, backends: names, or files of meshes.
 
     Each scene meets the defaults of all backends, and every value that their declarations sweep; then
-    counts and noise vary on two scenes each, with the defaults. swept_scenes: on how many scenes parameters
-    are swept; None: on all. Raises InputError for unknown backends.
+    counts and noise vary on two scenes each, with the defaults, but for what is usual for the scene.
+    swept_scenes: on how many scenes anything is swept; None: no limit. Raises InputError for unknown
+    backends.
     """
+    limit = len(scenes) if swept_scenes is None else swept_scenes
     defaults = [Contender(FLOOR), Contender(CEILING)]
     defaults += [Contender(name, backend(name).params()) for name in backends]
     swept = [*defaults, *(contender for name in backends for contender in _sweeps(name))]
-    groups = [
-        Group(scene, tuple(swept if swept_scenes is None or place < swept_scenes else defaults))
-        for place, scene in enumerate(scenes)
-    ]
-    sweeps: tuple[tuple[Sweep, Sequence], ...] = (("n", counts), ("noise", noises))
-    for sweep, values in sweeps:
-        for scene, value in product(_varying(scenes, sweep), values):
-            groups.append(
-                Group(scene, tuple(defaults), **{"count" if sweep == "n" else sweep: value}, sweep=sweep)
-            )
+    groups = [Group(scene, tuple(swept if place < limit else defaults)) for place, scene in enumerate(scenes)]
+    varied = min(limit, _SWEPT_SCENES)
+    for scene, count in product(_varying(scenes, "n")[:varied], counts):
+        if count != catalog.usual(scene, "n"):
+            groups.append(Group(scene, tuple(defaults), count=count, sweep="n"))
+    for scene, noise in product(_varying(scenes, "noise")[:varied], noises):
+        if noise != catalog.usual(scene, "noise"):
+            groups.append(Group(scene, tuple(defaults), noise=noise, sweep="noise"))
     return groups
 
 
 def _varying(scenes: Sequence[str], sweep: Sweep) -> list[str]:
-    """The scenes that a sweep is made on."""
+    """The scenes that a sweep can be made on, those that show most first."""
     able = [scene for scene in scenes if catalog.varies(scene, sweep)]
-    return sorted(able, key=lambda scene: scene not in _PREFERRED)[:_SWEPT_SCENES]
+    return sorted(able, key=lambda scene: scene not in _PREFERRED)
 
 
 def _sweeps(name: str) -> list[Contender]:

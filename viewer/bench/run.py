@@ -1,7 +1,6 @@
 """Measuring: contenders take turns on the views of a scene, each timed and judged.
 
-Times come from draws that are already warm; judging is outside of them. What a picture shows is
-drawn once more for the judge, so that nothing waits for it.
+Times come from draws that are already warm; judging is outside of them.
 """
 
 from __future__ import annotations
@@ -38,6 +37,8 @@ from .viewpoints import viewpoints
 
 LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the scan
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
+_SLOW = 250.0  # ms a picture
+_LOADING = 3.0  # seconds for a scene, for what is foretold
 
 Tick = Callable[[], object]
 Kind = Literal["orbit", "pose"]
@@ -48,7 +49,8 @@ Frame = tuple[Moment, Camera]
 class Settings:
     """How it is measured.
 
-    size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of.
+    size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of,
+    where they are faster than 250 ms.
     frames: of a walk, for flicker. seed: of viewpoints, samples and noise. data: the folder of real scans.
     """
 
@@ -126,29 +128,33 @@ class Bench:
 
     def steps(self, group: Group) -> int:
         """How often measuring a group ticks."""
-        walks = 2 if self._subject(group).moments > 1 else 1
-        return len(group.contenders) * (self.settings.views + walks)
+        return len(group.contenders) * (self.settings.views + self._walk_count(group))
+
+    def _walk_count(self, group: Group) -> int:
+        return 2 if self._subject(group).moments > 1 else 1
 
     def foretell(self, groups: Sequence[Group]) -> float:
-        """The seconds that measuring groups will take, from one view of a sphere that all contenders draw.
+        """The seconds that measuring groups will take, from one view of a torus that all contenders draw.
 
         That view also loads libraries and compiles shaders, so that no number holds it.
         """
         contenders = tuple(dict.fromkeys(c for group in groups for c in group.contenders))
-        sphere = Group("sphere", contenders)
+        torus = Group("torus", contenders)
         rows = []
         for size in ((96, 64), self.settings.size):
             start = time.perf_counter()
-            rows = Bench(self.renderer, replace(self.settings, size=size, views=1, frames=2)).measure(sphere)
+            rows = Bench(self.renderer, replace(self.settings, size=size, views=1, frames=2)).measure(torus)
             seconds = time.perf_counter() - start
         draws = 2 + 2 * self.settings.repeat
         drawing = sum(row["cpu_ms"]["median"] for row in rows) * draws / 1e3 / len(rows)
-        # The view itself, and a walk of two frames, each about as long.
+        # The view, and the two frames of a walk, each about as long.
         judging = max(seconds / (3 * len(rows)) - drawing, 0)
-        return sum(
-            self.steps(group) * (judging + drawing * max(1.0, (group.count or 0) / rows[0]["n"]))
-            for group in groups
-        )
+        total = 0.0
+        for group in groups:
+            pictures = self.settings.views + self._walk_count(group) * self.settings.frames
+            larger = max(1.0, (group.count or 0) / rows[0]["n"])
+            total += _LOADING + len(group.contenders) * pictures * (judging + drawing * larger)
+        return total
 
     def numerics(self, names: Sequence[str], tick: Tick = int) -> Iterator[Row]:
         """The lines of the stability suite, for each backend."""
@@ -181,14 +187,14 @@ class Bench:
         turn = view % len(tallies)  # who is first changes, so that drift hits all alike
         for contender in (*list(tallies)[turn:], *list(tallies)[:turn]):
             surface = Surface(self.renderer.gpu, self.settings.size)
-            request = _request(contender, moment, camera)
+            # A pose that the renderer has not seen: all of it is prepared anew.
+            request = _request(contender, replace(moment, pose=replace(moment.pose)), camera)
             try:
                 self._time(request, surface, tallies[contender])
             except InputError as error:
                 self.notes.append(f"{subject.name}: {contender.backend} is left out: {error}")
                 del tallies[contender]
                 continue
-            draw(self.renderer, request, surface)
             tallies[contender].errors.append(judge.errors(surface))
             if self.folder and pictured and view == 0 and not contender.sweep:
                 _save_comparison(picture_path(self.folder, subject.name, contender.backend), judge, surface)
@@ -206,9 +212,10 @@ class Bench:
             draw(self.renderer, request, surface)
             tally.upload_ms.append(surface.stats.upload_ms)
             tally.derive_ms.append(surface.stats.derive_ms)
-            call_ms(self.renderer, request, surface, 1)  # caches are filled, the picture was read back
-            calls = call_ms(self.renderer, request, surface, self.settings.repeat)
-            runs = pass_ms(self.renderer, request, surface, self.settings.repeat)
+            (warm,) = call_ms(self.renderer, request, surface, 1)
+            repeat = self.settings.repeat if warm < _SLOW else 1  # what is slow is not short of samples
+            calls = call_ms(self.renderer, request, surface, repeat)
+            runs = pass_ms(self.renderer, request, surface, repeat)
         tally.cpu_ms.append(spread(calls)["median"])
         tally.gpu_ms.append(spread([run.total() for run in runs])["median"])
         tally.passes.append({name: spread([run[name] for run in runs])["median"] for name in runs[0]})
@@ -289,12 +296,12 @@ class Bench:
 
 
 def _request(contender: Contender, moment: Moment, camera: Camera) -> Request:
-    """What a contender is asked for; its pose is one that the renderer has not seen."""
+    """What a contender is asked for."""
     if contender.backend == CEILING:
         pose = replace(moment.pose, cloud=moment.mesh.points, views=())
         return Request(pose, camera, baselines.mesh(moment.mesh), look=LOOK)
     drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
-    return Request(replace(moment.pose), camera, drawn, contender.params, LOOK)
+    return Request(moment.pose, camera, drawn, contender.params, LOOK)
 
 
 def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:
