@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.bench.truth.mesh import Mesh
 from viewer.camera import Camera
 from viewer.gpu.view import View
 from viewer.scan.points import PointCloud
@@ -72,3 +73,19 @@ def sphere_hits(
     t = np.where(root >= 0, (-b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
     hit = np.where(np.isfinite(t), t, 0)[..., None] * step + start
     return -hit[..., 2] + np.where(np.isfinite(t), 0, np.inf), (hit - center) / radius @ view.rotation
+
+
+def sphere_mesh(rings: int = 64, center: tuple[float, float, float] = (0, 0, 0), smooth: bool = True) -> Mesh:
+    """A unit sphere of quads halved, its vertices exactly on it, to float32."""
+    polar = np.linspace(0, np.pi, rings + 1)[:, None]
+    turn = np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False)[None, :]
+    p = np.stack(
+        [np.sin(polar) * np.cos(turn), np.cos(polar) + 0 * turn, -np.sin(polar) * np.sin(turn)], axis=-1
+    ).reshape(-1, 3)
+    ring, column = np.divmod(np.arange(2 * rings * rings), 2 * rings)
+    a, b = ring * 2 * rings + column, ring * 2 * rings + (column + 1) % (2 * rings)
+    faces = np.concatenate(
+        [np.stack([a, a + 2 * rings, b], 1), np.stack([b, a + 2 * rings, b + 2 * rings], 1)]
+    )
+    cloud = PointCloud.from_arrays(p + np.array(center), normals=p if smooth else None, colors=p * 0.5 + 0.5)
+    return Mesh(cloud, faces.astype(np.uint32))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import sphere, zbuffer
-from test_mesh import sphere_mesh
+from scenes import sphere, sphere_mesh, zbuffer
 
 from viewer.bench import baselines
-from viewer.bench.reference import trace
+from viewer.bench.truth.reference import trace
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pytest
-from scenes import plane
-from test_mesh import sphere_mesh
+from scenes import plane, sphere_mesh
 
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.mesh import Mesh, read_mesh, vertex_normals
-from viewer.bench.reference import trace
-from viewer.bench.scene import Scene
-from viewer.bench.shapes import Plane, Shapes, Sphere
+from viewer.bench.truth.mesh import Mesh, read_mesh, vertex_normals
+from viewer.bench.truth.reference import trace
+from viewer.bench.truth.scene import Scene
+from viewer.bench.truth.shapes import Plane, Shapes, Sphere
 from viewer.camera import Camera
 from viewer.look import Look, rgba
 from viewer.scan.points import PointCloud

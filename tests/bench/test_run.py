@@ -11,7 +11,7 @@ import pytest
 
 from viewer.backends import backend, backends
 from viewer.bench.plan import Contender, Group, plan
-from viewer.bench.results import Row
+from viewer.bench.report.results import Row
 from viewer.bench.run import Bench, Settings
 from viewer.errors import InputError
 from viewer.renderer import Renderer

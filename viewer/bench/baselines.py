@@ -17,7 +17,7 @@ from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from ..scan.points import PointCloud
-from .mesh import Faces, Mesh
+from .truth.mesh import Faces, Mesh
 
 
 @dataclass(frozen=True)

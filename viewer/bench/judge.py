@@ -18,8 +18,8 @@ from ..scan.points import PointCloud
 from ..scan.spacing import typical_spacing
 from . import metrics
 from .metrics import Errors
-from .reference import Reference, both_see, footprint, trace, visible
-from .scene import Rays, Scene
+from .truth.reference import Reference, both_see, footprint, trace, visible
+from .truth.scene import Rays, Scene
 
 _PROBES = 50_000  # points of a cloud whose visibility is looked at
 # How much nearer a picture that hides a point is, in spacings, or footprints where they are larger: of 1, 2

@@ -22,7 +22,7 @@ from ..look import Look
 from ..renderer import Renderer
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
-from .samples import Arrays, line, torus, wall
+from .scenes.samples import Arrays, line, torus, wall
 
 _NO_TURN = np.eye(3)
 

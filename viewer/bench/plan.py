@@ -8,9 +8,9 @@ from itertools import product
 from typing import Any
 
 from ..backends import backend
-from . import catalog
-from .catalog import Sweep
-from .results import CEILING, FLOOR
+from .report.results import CEILING, FLOOR
+from .scenes import catalog
+from .scenes.catalog import Sweep
 
 COUNTS = (10_000, 100_000, 1_000_000, 10_000_000)
 NOISES = (0.0, 0.5, 1.0, 2.0, 4.0)  # footprints of a scanner's pixel

@@ -25,15 +25,16 @@ from ..gpu.surface import Surface
 from ..look import Look
 from ..measure import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from ..renderer import Renderer
-from . import baselines, catalog, numerics
+from . import baselines, numerics
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
-from .pictures import picture_path, side_by_side
 from .plan import Contender, Group
-from .reference import footprint
-from .results import CEILING, FLOOR, SPREADS, Row, spread
-from .subjects import Moment, Subject
-from .viewpoints import viewpoints
+from .report.pictures import picture_path, side_by_side
+from .report.results import CEILING, FLOOR, SPREADS, Row, spread
+from .scenes import catalog
+from .scenes.subjects import Moment, Subject
+from .scenes.viewpoints import viewpoints
+from .truth.reference import footprint
 
 LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the scan
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit

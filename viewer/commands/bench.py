@@ -16,11 +16,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..backends import backend, backends
-from ..bench import catalog, numerics
+from ..bench import numerics
 from ..bench.plan import Group, plan
-from ..bench.report import write_report
-from ..bench.results import NOTES, NUMERICS, RESULTS, compare, read_rows, write_row
+from ..bench.report.page import write_report
+from ..bench.report.results import NOTES, NUMERICS, RESULTS, compare, read_rows, write_row
 from ..bench.run import Bench, Settings
+from ..bench.scenes import catalog
 from ..errors import InputError
 from ..files import whole_file
 from . import drawing

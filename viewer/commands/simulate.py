@@ -13,8 +13,8 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from ..bench.mesh import Faces, Mesh, read_faces
-from ..bench.scanner import Faults, around, capture, rig
+from ..bench.scenes.scanner import Faults, around, capture, rig
+from ..bench.truth.mesh import Faces, Mesh, read_faces
 from ..errors import InputError
 from ..export import check_output
 from ..scan import formats

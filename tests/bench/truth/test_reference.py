@@ -1,0 +1,240 @@
+"""Reference pictures: shading, visibility, the same points in two frames, and no error of their own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scenes import sphere, sphere_mesh
+
+from viewer.bench import metrics
+from viewer.bench.truth.mesh import Mesh, read_faces, read_mesh, vertex_normals
+from viewer.bench.truth.reference import both_see, footprint, trace, visible
+from viewer.bench.truth.scene import to_linear, to_srgb
+from viewer.bench.truth.shapes import Plane, Shapes, Sphere
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.look import Look
+from viewer.scan.formats import read
+from viewer.scan.points import PointCloud
+from viewer.scan.spacing import typical_spacing
+
+if TYPE_CHECKING:
+    from viewer.gpu.surface import Surface
+    from viewer.renderer import Renderer
+
+SIZE = (96, 72)
+CAMERA = Camera(eye=(2, 1.5, 3))
+
+
+def test_srgb_bytes_survive_linear_light() -> None:
+    assert (to_srgb(to_linear(np.arange(256, dtype=np.uint8))) == np.arange(256)).all()
+
+
+def test_no_picture_is_one_message() -> None:
+    with pytest.raises(InputError, match="0x5"):
+        trace(Shapes((Sphere(),)), CAMERA, (0, 5))
+
+
+# --- as a Surface --------------------------------------------------------------------------
+
+
+def test_its_surface_has_its_channels(renderer: Renderer) -> None:
+    picture = trace(sphere_mesh(), CAMERA, SIZE)
+    surface, arrays = picture.surface(renderer.gpu), picture.arrays()
+    shown = surface.arrays()
+    assert shown.keys() == arrays.keys()
+    assert all(shown[name].shape == arrays[name].shape for name in arrays)
+    for name in ("id", "coverage", "level"):
+        assert (shown[name] == arrays[name]).all()
+    assert (shown["depth"] == arrays["depth"].astype(np.float32)).all()
+    assert np.abs(shown["normal"] - arrays["normal"]).max() < 1e-6
+    assert np.abs(shown["color"] - arrays["color"]).max() < 0.005  # half a byte of sRGB, at white
+
+
+def test_nothing_seen_is_all_background(renderer: Renderer) -> None:
+    picture = trace(Shapes((Sphere(),)), Camera(eye=(0, 0, 4), target=(0, 0, 9)), SIZE)
+    image = picture.surface(renderer.gpu, Look(background="#102030")).image()
+    assert (image == [16, 32, 48, 255]).all()
+
+
+def test_a_head_light_shades_a_sphere_by_its_cosine(renderer: Renderer) -> None:
+    look = Look(light="head", ambient=0.25, diffuse=0.75, specular=0, color_by="plain", plain="#c0c0c0")
+    picture = trace(Shapes((Sphere(),)), CAMERA, SIZE)
+    image = picture.surface(renderer.gpu, look).image()[..., :3]
+    to_eye = np.array(CAMERA.eye) - picture.positions() - picture.origin
+    to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True)
+    facing = (to_eye * picture.normal[picture.covered]).sum(axis=1, keepdims=True)
+    expected = to_srgb(to_linear(np.full(3, 0xC0, np.uint8)) * (0.25 + 0.75 * facing))
+    assert np.abs(image[picture.covered].astype(int) - expected).max() <= 1
+
+
+def test_points_drawn_at_the_true_hits_look_the_same(
+    renderer: Renderer, draw: Callable[..., Surface]
+) -> None:
+    look = Look(light="head")
+    reference = trace(sphere_mesh(), CAMERA, SIZE).surface(renderer.gpu, look)
+    drawn = draw(reference.pose.cloud, CAMERA, SIZE, look=look)
+    both = (drawn.coverage > 0) & (reference.coverage > 0)
+    assert both.sum() > 0.8 * reference.coverage.sum()  # some fall on the edge to a neighbour's pixel
+    same = both & (drawn.row == reference.row)
+    difference = np.abs(drawn.image().astype(int) - reference.image().astype(int))
+    assert same.sum() > 0.8 * both.sum()
+    assert difference[same].max() <= 1
+
+
+# --- visibility ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_vertices_of_a_sphere_are_visible_on_the_near_side(projection: str) -> None:
+    mesh = sphere_mesh(48)
+    camera = Camera(eye=(2, 1.5, 3), projection=projection)
+    points = mesh.points.world()
+    eye = np.array(camera.eye)
+    to_eye = eye - points if projection == "perspective" else np.broadcast_to(eye, points.shape)
+    facing = (points * to_eye).sum(axis=1) / np.linalg.norm(to_eye, axis=1)
+    seen = visible(mesh, mesh.points.positions, camera)
+    edge = np.pi / 48  # a face's size: nearer to the outline, the faces around a vertex decide
+    assert seen[facing > edge].all()
+    assert not seen[facing < -edge].any()
+
+
+def test_a_point_behind_a_plane_is_hidden_beside_it_visible() -> None:
+    scene = Shapes((Plane(), Sphere(radius=0.1, center=(3, 3, -3))))
+    points = np.array([[0, 0, 0.5], [0, 0, 0], [0, 0, -0.5], [1.5, 0, -0.5], [0, 0, 9]]) - scene.origin
+    assert visible(scene, points, Camera(eye=(0, 0, 4))).tolist() == [True, True, False, True, False]
+
+
+def test_the_tolerance_of_visibility() -> None:
+    scene = Shapes((Sphere(),))
+    below = np.array([[0, 0, 1 - 1e-5], [0, 0, 1 - 1e-7]])
+    camera = Camera(eye=(0, 0, 4))
+    assert visible(scene, below, camera).tolist() == [False, True]
+    assert visible(scene, below, camera, tolerance=1e-4).all()
+
+
+# --- the same points in two frames ---------------------------------------------------------
+
+
+def test_pairs_of_pixels_show_the_same_points() -> None:
+    scene = sphere_mesh()
+    first, second = trace(scene, CAMERA, SIZE), trace(scene, CAMERA.orbited(5, 3), SIZE)
+    a, b = both_see(first, second)
+    assert len(a) > 0.8 * first.covered.sum()
+    where = np.full((*first.depth.shape, 3), np.nan)
+    where[first.covered] = first.positions()
+    there = np.full_like(where, np.nan)
+    there[second.covered] = second.positions()
+    apart = np.linalg.norm(where.reshape(-1, 3)[a] - there.reshape(-1, 3)[b], axis=1)
+    assert apart.max() < 5 * footprint(second.view, second.depth[second.covered]).max()
+
+
+def test_what_turns_out_of_sight_has_no_pair() -> None:
+    scene = Shapes((Sphere(),))
+    first, second = trace(scene, CAMERA, SIZE), trace(scene, CAMERA.orbited(180, 0), SIZE)
+    assert len(both_see(first, second)[0]) < 0.1 * first.covered.sum()
+
+
+def test_pairs_follow_a_moving_mesh() -> None:
+    mesh = sphere_mesh()
+    moved = Mesh(
+        PointCloud.from_arrays(mesh.points.world() + np.array([0.2, 0, 0]), origin=mesh.origin), mesh.faces
+    )
+    first, second = trace(mesh, CAMERA, SIZE), trace(moved, CAMERA, SIZE)
+    carried = mesh.carry(first.id[first.covered], first.positions(), moved)
+    a, b = both_see(first, second, carried)
+    assert len(a) > 0.8 * first.covered.sum()
+    turned = metrics.angles(first.normal.reshape(-1, 3)[a], second.normal.reshape(-1, 3)[b])
+    assert np.median(turned) < 2  # the same places of the sphere, to a pixel
+
+
+# --- no error against itself; sane errors of real backends ---------------------------------
+
+
+def test_a_reference_has_no_error_against_itself(renderer: Renderer) -> None:
+    picture = trace(sphere_mesh(), CAMERA, SIZE)
+    image = picture.surface(renderer.gpu).image()
+    frame = {"image": image, "normal": picture.normal}
+    pair = both_see(picture, picture)
+    assert (pair[0] == pair[1]).all()
+    assert len(pair[0]) == picture.covered.sum()
+    errors = (
+        metrics.coverage(picture.covered, picture.covered)
+        | metrics.depth(picture.depth, picture.depth, footprint(picture.view, picture.depth), 0.01)
+        | metrics.normals(picture.normal, picture.normal)
+        | metrics.flicker((frame, frame), (frame, frame), pair)
+    )
+    assert set(errors.values()) == {0}
+    color = metrics.color(image, image, picture.covered)
+    assert color["psnr"] == color["psnr_frame"] == math.inf
+    assert color["ssim"] == color["ssim_frame"] == pytest.approx(1, abs=1e-12)
+    assert not color["flip"] > 0
+    seen = visible(sphere_mesh(), sphere_mesh().points.positions, CAMERA)
+    assert metrics.visibility(seen, seen)["visibility_error_percent"] == 0
+
+
+@pytest.mark.parametrize("backend", ["points", "surfels"])
+def test_errors_of_a_drawn_sphere_are_of_its_spacing(draw: Callable[..., Surface], backend: str) -> None:
+    cloud = sphere(20_000)
+    picture = trace(Shapes((Sphere(),)), CAMERA, SIZE)
+    drawn = draw(cloud, CAMERA, SIZE, backend)
+    errors = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), 0.025)
+    assert errors["depth_median"] < 0.025
+    assert metrics.normals(drawn.normal, picture.normal)["normal_median"] < 3
+    coverage = metrics.coverage(drawn.coverage > 0, picture.covered)
+    assert coverage["boundary_mean"] < 1.5
+    assert coverage["spill_percent"] < 5
+
+
+@pytest.mark.parametrize("backend", ["points", "surfels"])
+def test_errors_of_the_bunny_are_sane(
+    data_dir: Path, renderer: Renderer, draw: Callable[..., Surface], backend: str
+) -> None:
+    stored = read_mesh(data_dir / "models" / "stanford_bunny_35947.ply")
+    spacing = typical_spacing(stored.points)
+    # A thousand of its vertices belong to no face: they have no normal.
+    used, faces = np.unique(stored.faces, return_inverse=True)
+    cloud = PointCloud.from_arrays(
+        stored.points.world()[used],
+        normals=vertex_normals(stored)[used],
+        radii=np.full(len(used), 1.5 * spacing),
+        origin=stored.origin,
+    )
+    mesh = Mesh(cloud, faces.reshape(-1, 3).astype(stored.faces.dtype))
+    camera, size = Camera.orbit(mesh.bounds, 20, 10), (320, 240)
+    picture, look = trace(mesh, camera, size), Look(light="head")
+    drawn = draw(cloud, camera, size, backend, look=look)
+    seen = visible(mesh, cloud.positions, camera)
+    assert 0.3 < seen.mean() < 0.6
+    depth = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), spacing)
+    assert depth["depth_median"] < spacing
+    assert depth["wrong_layer_percent"] < (2 if backend == "surfels" else 40)
+    coverage = metrics.coverage(drawn.coverage > 0, picture.covered)
+    assert coverage["hole_percent"] < (1 if backend == "surfels" else 60)
+    assert coverage["spill_percent"] < 5
+    normals = metrics.normals(drawn.normal, picture.normal)
+    assert normals["normal_median"] < 10
+    assert normals["normal_signed_median"] == pytest.approx(normals["normal_median"], rel=0.01)
+    image, true = drawn.image(), picture.surface(renderer.gpu, look).image()
+    color = metrics.color(image, true, picture.covered)
+    if backend == "surfels":
+        assert color["psnr"] > 25
+        assert color["ssim"] > 0.5
+    else:
+        assert color["psnr"] < 20  # the far side shows between the points
+
+
+def test_a_sequence_keeps_its_faces_in_a_file_of_their_own(data_dir: Path) -> None:
+    folder = data_dir / "sequences" / "crane_175"
+    faces, frames = read_faces(folder / "mesh_topology.ply"), sorted((folder / "frames").iterdir())
+    first, later = (Mesh(read(frame), faces) for frame in (frames[0], frames[5]))
+    camera = Camera.orbit(first.bounds)
+    a, b = trace(first, camera, SIZE), trace(later, camera, SIZE)
+    carried = first.carry(a.id[a.covered], a.positions(), later)
+    pairs = both_see(a, b, carried)
+    assert len(pairs[0]) > 0.3 * a.covered.sum()

@@ -1,0 +1,1 @@
+"""What is told of a benchmark: rows of results, plots, pictures, one page."""

@@ -1,0 +1,359 @@
+"""The benchmark's report: one page that needs no network, and its plots as files."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import InputError
+from ...files import whole_file
+from ...resources import resource_path
+from . import plots
+from .pictures import PANELS
+from .results import (
+    CEILING,
+    COSTS,
+    FLOOR,
+    METRICS,
+    NOTES,
+    NUMERICS,
+    RESULTS,
+    Metric,
+    Row,
+    error_metrics,
+    rank,
+    read_rows,
+    title,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# What the summary shows of each default row; then what is plotted besides.
+_SUMMARY = (
+    "gpu_ms", "cpu_ms", "prepare_ms", "bytes_gpu", "hole_percent", "spill_percent", "depth_median_px",
+    "wrong_layer_percent", "normal_mean", "psnr", "ssim", "flip", "visibility_error_percent",
+)  # fmt: skip
+_JUDGED = _SUMMARY[4:]
+_PLOTTED = (
+    *_JUDGED, "boundary_mean", "depth_bias_px", "depth_rmse_px", "depth_p95_px", "normal_signed_mean",
+    "flicker_orbit_color", "flicker_orbit_normal", "flicker_pose_color", "flicker_pose_normal",
+)  # fmt: skip
+_SWEPT_COSTS = ("gpu_ms", "prepare_ms", "bytes_gpu")
+_SWEPT_ERRORS = (
+    "hole_percent", "depth_median_px", "wrong_layer_percent", "normal_mean", "psnr",
+    "visibility_error_percent",
+)  # fmt: skip
+
+_DASH, _MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+_MANY = 2000  # marks in a figure from which a page holds it as pixels: less to load, and to draw
+_PICTURES = 4 << 20  # bytes of pictures in a page; more stay in their files
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What stands in a table: a text, a CSS class and a tooltip."""
+
+    text: str
+    kind: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure of the page: its heading, a line about it, and the element."""
+
+    title: str
+    note: str
+    body: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Side-by-side panels of a backend. source: a data URI, or empty where only the file has it."""
+
+    scene: str
+    backend: str
+    file: str
+    source: str
+
+
+def write_report(folder: Path) -> Path:
+    """Make report.html and plots/*.png of the results, numerics and pictures in a folder; gives the page.
+
+    The same rows give the same page. Raises InputError where there is nothing to report, where a file is
+    broken or cannot be written.
+    """
+    rows, numerics = (
+        read_rows(folder / name) if (folder / name).exists() else [] for name in (RESULTS, NUMERICS)
+    )
+    if not rows and not numerics:
+        raise InputError("no results to report", folder, "Run scan4d bench first")
+    metrics, scenes = error_metrics(rows), _defaults(rows)
+    shown = COSTS + metrics
+    page = _template().render(
+        about=about(rows),
+        columns=[METRICS[name] for name in _SUMMARY],
+        notes=_notes(folder),
+        judged=[METRICS[name] for name in _JUDGED],
+        overall=overall(list(scenes.values())) if len(scenes) > 1 else [],
+        scenes=[(scene, summary(own)) for scene, own in scenes.items()],
+        against=list(_against(rows, metrics, folder)),
+        swept=list(_swept(rows, folder)),
+        passes=_passes(rows, folder),
+        pictures=list(_pictures(folder)),
+        panels=PANELS,
+        numerics=stability(numerics),
+        metrics=shown,
+        every=[(title(row), [number(metric.of(row)) for metric in shown]) for row in rows],
+    )
+    path = folder / "report.html"
+    with whole_file(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return path
+
+
+def number(value: float) -> str:
+    """Three significant digits, without an exponent where that is short."""
+    if math.isnan(value):
+        return _DASH
+    if math.isinf(value):
+        return "∞" if value > 0 else f"{_MINUS}∞"
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        digits = 0 if value == 0 else max(0, 2 - math.floor(math.log10(abs(value))))
+        text = f"{value:.{digits}f}"
+    else:
+        text = f"{value:.2e}"
+    return text.replace("-", _MINUS)
+
+
+# --- tables ---------------------------------------------------------------------------
+
+
+def about(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """What all of it was measured with: names and values, several where the rows differ."""
+    fields = ("device", "driver", "timer", "size", "views", "seed", "version")
+    return [
+        (field, "; ".join(dict.fromkeys(_text(row.get(field, "unknown")) for row in rows)))
+        for field in fields
+    ]
+
+
+def summary(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
+    """The default rows of a scene: backend, kind ("floor", "ceiling" or empty), a cell for each column.
+
+    The best of each column, floor and ceiling aside, has the kind "best".
+    """
+    contest = [row for row in rows if row["backend"] not in (FLOOR, CEILING)]
+    best = {}
+    for name in _SUMMARY:
+        losses = {METRICS[name].loss(METRICS[name].of(row)) for row in contest}
+        known = [loss for loss in losses if not math.isnan(loss)]
+        best[name] = min(known) if len(known) > 1 else math.nan
+    kinds = {FLOOR: "floor", CEILING: "ceiling"}
+
+    def cell(row: Row, metric: Metric) -> Cell:
+        value = metric.of(row)
+        won = len(contest) > 1 and row in contest and metric.loss(value) == best[metric.name]
+        return Cell(_shown(metric, row), "best" if won else "", f"{metric.name} of {row['backend']}")
+
+    return [
+        (row["backend"], kinds.get(row["backend"], ""), [cell(row, METRICS[name]) for name in _SUMMARY])
+        for backend in plots.names(rows, "backend")
+        for row in rows
+        if row["backend"] == backend
+    ]
+
+
+def overall(scenes: Sequence[Sequence[Row]]) -> list[tuple[str, str, list[str]]]:
+    """Over the default rows of several scenes, for each backend: name, time against gl-points, fronts.
+
+    The time is the geometric mean of the ratios of gpu_ms. Fronts: for each judged error, in how many of
+    the scenes where it is known nothing else is both faster and better.
+    """
+    time = METRICS["gpu_ms"]
+    ratios: dict[str, list[float]] = {}
+    known: Counter[tuple[str, str]] = Counter()
+    won: Counter[tuple[str, str]] = Counter()
+    for rows in scenes:
+        floor = [time.of(row) for row in rows if row["backend"] == FLOOR]
+        contest = [row for row in rows if row["backend"] not in (FLOOR, CEILING)]
+        for row in contest:
+            ratios.setdefault(row["backend"], []).extend(time.of(row) / other for other in floor if other > 0)
+        for name in _JUDGED:
+            losses = [METRICS[name].loss(METRICS[name].of(row)) for row in contest]
+            front = plots.pareto([time.of(row) for row in contest], losses)
+            known.update((row["backend"], name) for row in contest if _known([row], METRICS[name]))
+            won.update((contest[i]["backend"], name) for i in front)
+
+    def fronts(backend: str) -> list[str]:
+        of = [(won[backend, name], known[backend, name]) for name in _JUDGED]
+        return [f"{some} of {all_}" if all_ else _DASH for some, all_ in of]
+
+    return [(name, number(_geometric_mean(ratios[name])), fronts(name)) for name in sorted(ratios)]
+
+
+def stability(lines: Sequence[Row]) -> dict[str, Any]:
+    """The table of numerics: backends, rows of (name, cells, reasons), and how many are of each kind."""
+    backends = plots.names(lines, "backend")
+    cells = {(line["row"], line["backend"]): _outcome(line) for line in lines}
+    table = []
+    for name in dict.fromkeys(line["row"] for line in lines):
+        of_row = [line for line in lines if line["row"] == name]
+        reasons = {f"tolerance: {line['reason']}": None for line in of_row if line.get("reason")}
+        for line in of_row:
+            if line.get("limit"):
+                reasons.setdefault(f"limit: {line['limit']}")
+        table.append((name, [cells.get((name, backend), Cell(_DASH)) for backend in backends], list(reasons)))
+    counts = {kind: sum(cell.kind == kind for cell in cells.values()) for kind in ("held", "failed", "limit")}
+    return {"backends": backends, "rows": table, "counts": counts}
+
+
+def _outcome(line: Row) -> Cell:
+    """Whether a row of numerics was held; where not, what went beyond its bound."""
+    bound = line.get("bound") or {}
+    units = {"pixels": (100, "% of pixels"), "depth": (1, "px of depth"), "color": (1, "levels of colour")}
+    found = {name: float(line.get(name, math.nan)) for name in units}
+    texts = {name: f"{number(found[name] * scale)} {unit}" for name, (scale, unit) in units.items()}
+    note = ", ".join(
+        f"{text} (bound {number(bound.get(name, math.nan) * units[name][0])})" for name, text in texts.items()
+    )
+    if line["held"]:
+        return Cell("held", "held", note)
+    beyond = [texts[name] for name, value in found.items() if value > bound.get(name, math.inf)]
+    kind = "limit" if line.get("limit") else "failed"
+    return Cell(f"{kind}: {', '.join(beyond)}" if beyond else kind, kind, note)
+
+
+def _defaults(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """The rows with default parameters of each scene, by its heading."""
+    scenes: dict[str, list[Row]] = {}
+    for row in rows:
+        if row["sweep"] == "":
+            noise = f", noise {number(row['noise'])}" if row["noise"] else ""
+            count = f"{row['n']:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+            heading = f"{row['scene']}: {count} points{noise}"
+            scenes.setdefault(heading, []).append(row)
+    return scenes
+
+
+def _geometric_mean(values: Sequence[float]) -> float:
+    known = [math.log(value) for value in values if value > 0]
+    return math.exp(sum(known) / len(known)) if known else math.nan
+
+
+def _shown(metric: Metric, row: Row) -> str:
+    """The value of a metric; of a spread all three numbers, of bytes millions."""
+    value, spread = metric.of(row), row.get(metric.name)
+    if metric.unit == "bytes":
+        return f"{number(value / 1e6)} MB"
+    if isinstance(spread, dict):
+        return f"{number(value)} [{number(spread['p5'])}{_DASH}{number(spread['p95'])}]"
+    return number(value)
+
+
+def _notes(folder: Path) -> list[str]:
+    """What the run said that the numbers do not: scenes left out, that it was stopped."""
+    path = folder / NOTES
+    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+
+
+def _text(value: Any) -> str:
+    return "\N{MULTIPLICATION SIGN}".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+# --- plots ----------------------------------------------------------------------------
+
+
+def _against(rows: Sequence[Row], metrics: Sequence[Metric], folder: Path) -> Iterator[Plot]:
+    """Time against each metric that any row knows."""
+    for metric in metrics:
+        known = sum(math.isfinite(metric.of(row)) for row in rows)
+        if metric.name in _PLOTTED and known:
+            figure = plots.time_against_error(rows, metric)
+            yield _plot(figure, f"time-{metric.name}", metric.name, metric.help, folder, known)
+
+
+def _swept(rows: Sequence[Row], folder: Path) -> Iterator[Plot]:
+    """Costs and errors against the number of points, errors against noise, scene by scene."""
+    for sweep, word, names in (
+        ("n", "points", _SWEPT_COSTS + _SWEPT_ERRORS),
+        ("noise", "noise", _SWEPT_ERRORS),
+    ):
+        for scene in plots.names(rows, "scene"):
+            of_scene = plots.swept(rows, scene, sweep)
+            known = [METRICS[name] for name in names if _known(of_scene, METRICS[name])]
+            if known:
+                figure = plots.along(rows, scene, sweep, known)
+                yield _plot(figure, f"{word}-{_slug(scene)}", f"{scene}: against {word}", "", folder)
+
+
+def _passes(rows: Sequence[Row], folder: Path) -> Plot | None:
+    defaults = [row for row in rows if row["sweep"] == "" and row.get("passes")]
+    if not defaults:
+        return None
+    marks = 3 * sum(len(row["passes"]) for row in defaults)  # a bar is drawn by more than a mark
+    return _plot(plots.passes(defaults), "passes", "Passes", "", folder, marks)
+
+
+def _known(rows: Iterable[Row], metric: Metric) -> bool:
+    return any(not math.isnan(metric.of(row)) for row in rows)
+
+
+def _plot(figure: Figure, name: str, heading: str, note: str, folder: Path, marks: int = 0) -> Plot:
+    """Write the figure as plots/NAME.png, and give it for the page."""
+    from markupsafe import Markup, escape
+
+    path = folder / "plots" / f"{name}.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plots.png(figure, path)
+    if marks > _MANY:
+        body = f'<img class="plot" alt="{escape(heading)}" src="{_inline(path)}">'
+    else:
+        body = plots.svg(figure, name)
+    return Plot(heading, note, Markup(body))
+
+
+def _slug(name: str) -> str:
+    return "".join(letter if letter.isalnum() else "-" for letter in name)
+
+
+# --- pictures -------------------------------------------------------------------------
+
+
+def _pictures(folder: Path) -> Iterator[Picture]:
+    """The pictures of a folder by name; of too many for a page the last are left in their files."""
+    room = _PICTURES
+    found = [(*path.stem.partition("--")[::2], path) for path in (folder / "pictures").glob("*.png")]
+    for scene, backend, path in sorted(found, key=lambda each: (each[0], rank(each[1]))):
+        source = _inline(path) if room > 0 else ""
+        room -= len(source)
+        yield Picture(scene, backend, f"pictures/{path.name}", source)
+
+
+def _inline(path: Path) -> str:
+    """A picture as a data URI, in WebP: a fraction of the size. Raises InputError for what is no picture."""
+    from PIL import Image
+
+    stream = BytesIO()
+    try:
+        with Image.open(path) as image:
+            image.convert("RGB").save(stream, "webp", quality=75, method=4)
+    except OSError as error:
+        raise InputError(f"is no picture: {error}", path, "Remove it, or run the benchmark again") from error
+    return f"data:image/webp;base64,{base64.b64encode(stream.getvalue()).decode()}"
+
+
+def _template() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+    )
+    return environment.from_string(resource_path("assets", "report.html").read_text(encoding="utf-8"))

@@ -1,0 +1,290 @@
+"""Rows of a benchmark: how they are written, read and compared, and what their numbers mean."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from ...errors import InputError
+
+Row = dict[str, Any]
+
+RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
+FLOOR, CEILING = "gl-points", "mesh"  # the backends that frame all others
+SPREADS = ("gpu_ms", "cpu_ms", "derive_ms", "upload_ms")
+
+_SCENE = "scene_hash"
+_IDENTITY = ("backend", "scene", _SCENE, "n", "noise", "params", "size", "seed", "views")
+_NEEDED: dict[str, dict[str, Any]] = {
+    RESULTS: {
+        "backend": str, "scene": str, _SCENE: str, "n": int, "noise": int | float, "params": dict,
+        "size": list, "seed": int, "views": int, "sweep": str, "gpu_ms": dict, "errors": dict,
+    },
+    NUMERICS: {"row": str, "backend": str, "held": bool},
+}  # fmt: skip
+
+# --- what is measured -----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number of a row. best: "low" or "high", which is good; "zero" for what has a sign."""
+
+    name: str
+    unit: str
+    help: str
+    best: str = "low"
+
+    def of(self, row: Row) -> float:
+        """Its value in a row, the median of a spread; NaN where the row has none."""
+        if self.name == "prepare_ms":
+            return sum(_number(row.get(part)) for part in ("derive_ms", "upload_ms"))
+        return _number(row[self.name] if self.name in row else row["errors"].get(self.name))
+
+    def loss(self, value: float) -> float:
+        """The value so that less is better."""
+        return {"low": value, "high": -value, "zero": abs(value)}[self.best]
+
+    @property
+    def label(self) -> str:
+        """Name and unit, as it stands at an axis."""
+        name = f"|{self.name}|" if self.best == "zero" else self.name
+        return f"{name} [{self.unit}]" if self.unit else name
+
+
+COSTS = [
+    Metric("gpu_ms", "ms", "time of one picture on the GPU, median over the views"),
+    Metric("cpu_ms", "ms", "time of the call that draws one picture, median over the views"),
+    Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
+    Metric("derive_ms", "ms", "data derived from a pose on the CPU"),
+    Metric("upload_ms", "ms", "a pose and its derived data brought to the GPU"),
+    Metric("bytes_gpu", "bytes", "what lies on the GPU for one pose"),
+    Metric("peak_rss", "bytes", "the most memory that the process held"),
+]
+_ERRORS = [
+    Metric("hole_percent", "%", "true silhouette that is left empty"),
+    Metric("spill_percent", "%", "covered pixels outside the true silhouette, in parts of it"),
+    Metric("boundary_mean", "px", "distance between drawn and true outline, mean"),
+    Metric("boundary_p95", "px", "distance between drawn and true outline, 95th percentile"),
+    *(
+        Metric(f"depth_{name}{suffix}", unit, f"{text}, {units}", best)
+        for suffix, unit, units in (("_px", "px", "pixel footprints"), ("", "units", "scan units"))
+        for name, text, best in (
+            ("bias", "mean depth error, positive is too far", "zero"),
+            ("rmse", "root mean square of the depth error", "low"),
+            ("median", "median size of the depth error", "low"),
+            ("p95", "95th percentile of the size of the depth error", "low"),
+        )
+    ),
+    Metric("wrong_layer_percent", "%", "pixels more than four point spacings off in depth"),
+    *(
+        Metric(f"normal{suffix}_{name}", "°", f"angle to the true normal, {text}{sign}")
+        for suffix, sign in (("", ", sign ignored"), ("_signed", ""))
+        for name, text in (("mean", "mean"), ("median", "median"), ("p95", "95th percentile"))
+    ),
+    *(
+        Metric(f"{name}{suffix}", unit, f"{text}, {where}", best)
+        for suffix, where in (("", "inside the true silhouette"), ("_frame", "whole frame"))
+        for name, unit, text, best in (
+            ("psnr", "dB", "peak signal-to-noise ratio of the shaded picture", "high"),
+            ("ssim", "", "structural similarity of the shaded picture, 1 is equal", "high"),
+            ("flip", "", "difference that an eye sees when pictures alternate, 0 to 1", "low"),
+        )
+    ),
+    Metric("false_positives", "points", "points found visible that are hidden"),
+    Metric("false_negatives", "points", "points found hidden that are visible"),
+    Metric("correct", "points", "points whose visibility was found right", "high"),
+    Metric("visibility_error_percent", "%", "false positives and negatives, in parts of the correct"),
+    *(
+        Metric(f"flicker_{kind}_{name}", unit, f"change of {text} {between} that the truth has not", "zero")
+        for kind, between in (("orbit", "along a camera orbit"), ("pose", "from pose to pose"))
+        for name, unit, text in (("color", "", "colour"), ("normal", "°", "normal"))
+    ),
+]
+METRICS = {metric.name: metric for metric in [*COSTS, *_ERRORS]}
+
+
+def error_metrics(rows: Iterable[Row]) -> list[Metric]:
+    """The errors that any of the rows has, known ones first, in the order of docs/benchmark.md."""
+    found = {name for row in rows for name in row["errors"]}
+    return [metric for metric in _ERRORS if metric.name in found] + [
+        Metric(name, "", "") for name in sorted(found - METRICS.keys())
+    ]
+
+
+def rank(backend: str) -> tuple[bool, bool, str]:
+    """The key that sorts backends: by name, between floor and ceiling."""
+    return backend == CEILING, backend != FLOOR, backend
+
+
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Median, 5th and 95th percentile; NaN where there is no value."""
+    if not len(values):
+        return dict.fromkeys(("median", "p5", "p95"), math.nan)
+    p5, median, p95 = (float(value) for value in np.quantile(values, (0.05, 0.5, 0.95)))
+    return {"median": median, "p5": p5, "p95": p95}
+
+
+def _number(value: Any) -> float:
+    """Of a number, a spread (its median) or None (NaN)."""
+    if isinstance(value, dict):
+        value = value.get("median")
+    return math.nan if value is None else float(value)
+
+
+# --- files ----------------------------------------------------------------------------
+
+
+def write_row(stream: TextIO, row: Row) -> None:
+    """Append a row as one line of JSON, at once. NaN becomes null, infinity the string "Infinity"."""
+    stream.write(json.dumps(_to_json(row), allow_nan=False, ensure_ascii=False) + "\n")
+    stream.flush()
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of a file of JSON lines, or of the results in a folder; null becomes NaN.
+
+    A last line without its end, as a crash leaves it, is left out.
+    Raises InputError, with the line, for what is no row.
+    """
+    if path.is_dir():
+        path = path / RESULTS
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read: {error}", path, "Name a results.jsonl or its folder") from error
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        if line.strip():
+            try:
+                rows.append(_parsed(line, _NEEDED.get(path.name, _NEEDED[RESULTS])))
+            except ValueError as error:
+                if number < len(lines):
+                    hint = "Remove the line, or run the benchmark again"
+                    raise InputError(f"is no row: {error}", f"{path}, line {number}", hint) from error
+    return rows
+
+
+def _parsed(line: str, needed: dict[str, Any]) -> Row:
+    """One row; raises ValueError for what is none."""
+    row = json.loads(line)
+    if not isinstance(row, dict):
+        raise ValueError("not a JSON object")
+    if missing := [name for name, kind in needed.items() if not isinstance(row.get(name), kind)]:
+        raise ValueError(f"without a usable {', '.join(missing)}")
+    return _from_json(row)
+
+
+def _to_json(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _to_json(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_to_json(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else _INFINITIES[value]
+    return value
+
+
+def _from_json(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _from_json(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_from_json(item) for item in value]
+    if isinstance(value, str):
+        return _FROM_TEXT.get(value, value)
+    return math.nan if value is None else value
+
+
+_INFINITIES = {math.inf: "Infinity", -math.inf: "-Infinity"}
+_FROM_TEXT = {text: value for value, text in _INFINITIES.items()}
+
+# --- comparison -----------------------------------------------------------------------
+
+# Errors this near each other are the same: drivers round differently.
+_SAME_RELATIVE, _SAME_ABSOLUTE = 0.01, 1e-6
+
+
+def key(row: Row) -> str:
+    """What identifies a row: what was drawn, with what, and how often."""
+    return _identity(row, _IDENTITY)
+
+
+def title(row: Row) -> str:
+    """A row in words: backend, scene, points, noise, and the parameter that it varies."""
+    words = [f"{row['backend']}, {row['scene']}, {row['n']} points"]
+    if row["noise"]:
+        words.append(f"noise {row['noise']:g}")
+    if row.get("sweep") in row["params"]:
+        words.append(f"{row['sweep']}={row['params'][row['sweep']]}")
+    return ", ".join(words)
+
+
+def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
+    """What got slower or worse, then faster or better, then what cannot be compared; a line each.
+
+    Slower: each median is outside the other's 5th to 95th percentile. Worse: an error that grew by more
+    than 1 %. Times are compared only where device, driver and timer are the same.
+    """
+    unhashed = tuple(name for name in _IDENTITY if name != _SCENE)
+    before, after = ({_identity(row, unhashed): row for row in rows} for rows in (old, new))
+    losses: list[str] = []
+    gains: list[str] = []
+    notes: list[str] = []
+    for identity in [*before, *(identity for identity in after if identity not in before)]:
+        was, now = before.get(identity), after.get(identity)
+        if was is None or now is None:
+            notes.append(
+                f"missing in the {'old' if was is None else 'new'} results: {title(was or now or {})}"
+            )
+            continue
+        if was[_SCENE] != now[_SCENE]:
+            notes.append(f"not compared, the scene changed ({_SCENE}): {title(now)}")
+            continue
+        if _machine(was) == _machine(now):
+            losses += (f"slower: {title(now)}: {change}" for change in _slower(was, now))
+            gains += (f"faster: {title(now)}: {change}" for change in _slower(was, now, back=True))
+        else:
+            notes.append(f"times not compared: {_machine(was)} is now {_machine(now)}")
+        losses += (f"worse: {title(now)}: {change}" for change in _worse(was, now))
+        gains += (f"better: {title(now)}: {change}" for change in _worse(was, now, back=True))
+    return [*losses, *gains, *dict.fromkeys(notes)]
+
+
+def _identity(row: Row, names: Iterable[str]) -> str:
+    return json.dumps([_to_json(row[name]) for name in names], sort_keys=True)
+
+
+def _machine(row: Row) -> str:
+    return ", ".join(str(row.get(name, "unknown")) for name in ("device", "driver", "timer"))
+
+
+def _slower(was: Row, now: Row, back: bool = False) -> Iterator[str]:
+    """The times that got slower; back: faster."""
+    for name in SPREADS:
+        if not (isinstance(was.get(name), dict) and isinstance(now.get(name), dict)):
+            continue
+        quick, slow = (now[name], was[name]) if back else (was[name], now[name])
+        if slow["median"] > quick["p95"] and quick["median"] < slow["p5"]:
+            before, after = was[name]["median"], now[name]["median"]
+            ratio = f" (x{after / before:.2f})" if before > 0 else ""
+            yield f"{name} {before:.4g} -> {after:.4g}{ratio}"
+
+
+def _worse(was: Row, now: Row, back: bool = False) -> Iterator[str]:
+    """The errors that got worse; back: better. From a number to none is worse."""
+    for metric in error_metrics([was, now]):
+        before, after = metric.of(was), metric.of(now)
+        good, bad = (metric.loss(value) for value in ((after, before) if back else (before, after)))
+        if math.isnan(good) or good == bad:
+            continue
+        same = max(_SAME_RELATIVE * max(abs(good), abs(bad)), _SAME_ABSOLUTE)
+        if math.isnan(bad) or (math.isinf(same) and bad > good) or bad - good > same:
+            yield f"{metric.name} {before:.4g} -> {after:.4g}"

@@ -1,0 +1,293 @@
+"""The scenes of the benchmark by name, and meshes of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ...errors import InputError, unknown_name
+from ...scan.demo import DemoSource
+from ...scan.open import find_source
+from ...scan.points import PointCloud
+from ...scan.pose import Pose
+from ...scan.times import DEFAULT_FPS, paced_times
+from ..truth import tessellation
+from ..truth.mesh import Mesh, read_faces, read_mesh
+from ..truth.shapes import Box, Plane, Shape, Shapes, Sphere, Torus
+from . import samples
+from .real_scans import DepthFrames, placed_scans
+from .samples import Sampler
+from .simulated import simulated
+from .subjects import Moment, Subject, chosen, smooth
+
+_STANFORD = "Stanford Computer Graphics Laboratory"
+_CYBERWARE = "Cyberware"
+_COUNT = 100_000  # points of an analytic scene
+_NOISE = 0.5  # of a virtual scanner, in footprints of its pixels
+_FACES_FILE = "mesh_topology.ply"  # beside the frames of a sequence that moves one mesh
+_HEAD_TOLERANCE = 0.5  # mm: 99 % of the mesh is within 0.07 mm of the exact surface
+_PHONE = "range/truedepth_head_30"
+_PHONE_TOLERANCE = 2e-3  # m
+_MOST_POINTS = 100_000_000
+
+Sweep = Literal["n", "noise"]  # what may vary of a scene
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What is asked for. paths: what the scene needs; noise: in pixel footprints of the scanner."""
+
+    name: str
+    paths: tuple[Path, ...]
+    count: int | None
+    noise: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """How a scene is made. needs: what of the data folder; counts: whether it comes in any number of points.
+
+    count: how many it has unless told; None: that is known when it is read. noise: what the scanner's is
+    unless told; None: there is no virtual scanner.
+    """
+
+    make: Callable[[_Request], Subject]
+    needs: tuple[str, ...] = ()
+    counts: bool = False
+    count: int | None = None
+    noise: float | None = None
+
+
+def _analytic(shape: Shape, sampler: Sampler, mesh: Callable[[], Mesh]) -> _Scene:
+    def make(request: _Request) -> Subject:
+        def load(_: int) -> Moment:
+            cloud = samples.cloud(sampler, request.count or _COUNT)
+            return Moment(Pose(0, 0.0, request.name, cloud), Shapes((shape,)), mesh())
+
+        return Subject(name=request.name, load=load)
+
+    return _Scene(make, counts=True, count=_COUNT)
+
+
+def _model(file: str, credit: str, up: str = "+y", inside_out: bool = False) -> _Scene:
+    make = partial(_still, credit=credit, up=up, inside_out=inside_out)
+    return _Scene(make, (f"models/{file}",), counts=True)
+
+
+def _still(request: _Request, credit: str = "", up: str = "+y", inside_out: bool = False) -> Subject:
+    """A mesh that does not move. inside_out: whether its faces run clockwise as stored."""
+    (file,) = request.paths
+
+    def load(_: int) -> Moment:
+        stored = read_mesh(file)
+        mesh = Mesh(stored.points, stored.faces[:, ::-1]) if inside_out else stored
+        return _of_mesh(smooth(mesh), request, 0, 0.0, file.name)
+
+    return Subject(name=request.name, load=load, up=up, credit=credit)
+
+
+def _file(request: _Request) -> Subject:
+    """A mesh file that a user names: read at once, so that what is wrong with it is told at once."""
+    made = _still(request)
+    try:
+        made.moment(0)
+    except InputError as error:
+        hint = error.hint or "A scene needs a mesh: faces, not points alone"
+        raise InputError(error.what, error.where or request.name, hint) from error
+    return made
+
+
+def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
+    """A mesh that moves: a folder of frames, their faces in the frames or once beside them."""
+
+    def make(request: _Request) -> Subject:
+        (path,) = request.paths
+        source = find_source(path)
+        labels = [source.label(index) for index in range(len(source))]
+        times, shared = paced_times(labels, DEFAULT_FPS), path / _FACES_FILE
+        faces_of = cache(read_faces)
+
+        def load(index: int) -> Moment:
+            points = source.load(index)
+            assert isinstance(points, PointCloud), "the formats with faces hold points"
+            faces = faces_of(shared) if shared.exists() else read_faces(path / labels[index])
+            return _of_mesh(smooth(Mesh(points, faces)), request, index, float(times[index]), labels[index])
+
+        return Subject(name=request.name, load=load, moments=len(source), up=up, credit=credit)
+
+    return _Scene(make, (f"sequences/{folder}",), counts=True)
+
+
+def _of_mesh(mesh: Mesh, request: _Request, index: int, time: float, label: str) -> Moment:
+    """The moment of a mesh whose vertices, or as many points of it as are asked for, are the scan.
+
+    A vertex without a normal, between faces back to back, has no side and is no point of the scan.
+    """
+    assert mesh.points.normals is not None
+    sided = np.flatnonzero(mesh.points.normals.any(axis=1))
+    if not len(sided):
+        raise InputError("no face of the mesh has an area", label)
+    if request.count is None:
+        cloud = chosen(mesh.points, sided)
+    else:
+        cloud = samples.on_mesh(mesh, request.count, request.seed)
+    return Moment(Pose(index, time, label, cloud), mesh, mesh)
+
+
+def _demo(request: _Request) -> Subject:
+    """The demo scan. Its points are exact, its truth is a mesh of the exact surface."""
+    from ..truth.head_mesh import head_mesh
+
+    source = DemoSource()
+    times = source.times()
+
+    def load(index: int) -> Moment:
+        time, mesh = float(times[index]), head_mesh(float(times[index]))
+        return Moment(Pose(index, time, source.label(index), source.load(index)), mesh, mesh)
+
+    return Subject(name=request.name, load=load, moments=len(source), tolerance=_HEAD_TOLERANCE)
+
+
+def _laser(folder: str, model: str, tolerance: float) -> _Scene:
+    """Laser scans, put together as they were for the model that was made of them."""
+
+    def make(request: _Request) -> Subject:
+        scans, truth = request.paths
+
+        def load(_: int) -> Moment:
+            mesh = smooth(read_mesh(truth))
+            return Moment(Pose(0, 0.0, scans.name, placed_scans(scans)), mesh, mesh)
+
+        return Subject(name=request.name, load=load, tolerance=tolerance, credit=_STANFORD)
+
+    return _Scene(make, (f"range/{folder}", f"models/{model}"))
+
+
+def _phone(request: _Request) -> Subject:
+    """A phone's depth images, a moment each."""
+    frames = DepthFrames(*request.paths)
+    return Subject(
+        name=request.name,
+        load=frames.moment,
+        moments=len(frames),
+        tolerance=_PHONE_TOLERANCE,
+        credit="StandardCyborg",
+    )
+
+
+def _simulated(name: str, scene: _Scene) -> _Scene:
+    """What a virtual scanner, four pods all round, sees of another scene."""
+
+    def make(request: _Request) -> Subject:
+        return simulated(scene.make(replace(request, name=name)), request.noise, request.seed)
+
+    return replace(scene, make=make, counts=False, noise=_NOISE)
+
+
+_ANALYTIC = {
+    "sphere": _analytic(Sphere(), samples.sphere, tessellation.sphere),
+    "plane": _analytic(Plane(), samples.square, tessellation.square),
+    "box": _analytic(Box(), samples.cube, tessellation.cube),
+    "torus": _analytic(Torus(), samples.torus, tessellation.torus),
+    "demo": _Scene(_demo),
+}
+_MESHES = {
+    "bunny": _model("stanford_bunny_35947.ply", _STANFORD),
+    "armadillo": _model("stanford_armadillo_43243.ply", _STANFORD),
+    "horse": _model("cyberware_horse_48485.ply", _CYBERWARE, up="+z", inside_out=True),
+    "dragon-100k": _model("stanford_dragon_100250.ply", _STANFORD),
+    "igea": _model("cyberware_igea_134345.ply", _CYBERWARE),
+    "dragon": _model("stanford_dragon_437645.ply", _STANFORD),
+    "crane": _sequence("crane_175", "Vlasic et al., MIT CSAIL"),
+    "horse-gallop": _sequence("horse_gallop_48", "Sumner and Popovic"),
+    "owlii": _sequence("owlii_basketball_player_10", "Owlii"),
+}
+_SIMULATED = {
+    f"{name}-simulated": _simulated(name, scene)
+    for name, scene in ({"torus": _ANALYTIC["torus"]} | _MESHES).items()
+}
+_REAL = {
+    "dragon-scans": _laser("stanford_dragon_stand_scans", "stanford_dragon_437645.ply", 1e-3),
+    "bunny-scans": _laser("stanford_bunny_scans", "stanford_bunny_35947.ply", 2e-3),
+    "truedepth-head": _Scene(_phone, (_PHONE, f"{_PHONE}/fused_reference_45428.ply")),
+}
+_SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _SIMULATED | _REAL
+
+
+_FILE = _Scene(_file, counts=True)  # of a user's own mesh
+
+
+def names(data: Path | None) -> dict[str, str]:
+    """Every scene by name, with the reason why it cannot be had; "" where it can.
+
+    data: the folder of real scans, None: there is none.
+    """
+    return {name: _missing(scene, data) for name, scene in _SCENES.items()}
+
+
+def subject(
+    name_or_file: str,
+    data: Path | None,
+    *,
+    count: int | None = None,
+    noise: float | None = None,
+    seed: int = 0,
+) -> Subject:
+    """The subject of a scene's name, or of a PLY or OBJ file with faces.
+
+    count: of points; None: as many as it has. noise: standard deviation of depth of a virtual scanner, in
+    footprints of its pixels; None: 0.5. seed: of all chance. Raises InputError.
+    """
+    scene = _SCENES.get(name_or_file)
+    if scene is None:
+        if not Path(name_or_file).is_file():
+            if Path(name_or_file).name != name_or_file or Path(name_or_file).suffix:
+                raise InputError("no such file", name_or_file)
+            raise unknown_name("scene", name_or_file, list(_SCENES))
+        scene, needs = _FILE, [Path(name_or_file)]
+    elif reason := _missing(scene, data):
+        raise InputError(reason, name_or_file)
+    else:
+        needs = [Path(data or "") / need for need in scene.needs]
+    if count is not None and not (scene.counts and 1 <= count <= _MOST_POINTS):
+        known = f"1 to {_MOST_POINTS:,}" if scene.counts else "only as many as were scanned"
+        raise InputError(f"cannot be had with {count:,} points", name_or_file, f"It has {known}")
+    if noise and scene.noise is None:
+        raise InputError("has no noise", name_or_file, "Noise is the virtual scanner's: NAME-simulated")
+    if noise is not None and not (0 <= noise < np.inf):
+        raise InputError(f"the noise of a scanner is 0 or more, not {noise}", name_or_file)
+    noise = (scene.noise or 0.0) if noise is None else noise
+    name = name_or_file if name_or_file in _SCENES else Path(name_or_file).name
+    return scene.make(_Request(name, tuple(needs), count, noise, seed))
+
+
+def varies(name_or_file: str, what: Sweep) -> bool:
+    """Whether a scene can be had with any number of points ("n"), or with any noise."""
+    scene = _scene(name_or_file)
+    return scene.counts if what == "n" else scene.noise is not None
+
+
+def usual(name_or_file: str, what: Sweep) -> float | None:
+    """The number of points or the noise of a scene unless another is asked for; None: not known yet."""
+    scene = _scene(name_or_file)
+    return scene.count if what == "n" else scene.noise
+
+
+def _scene(name_or_file: str) -> _Scene:
+    return _SCENES.get(name_or_file, _FILE)
+
+
+def _missing(scene: _Scene, data: Path | None) -> str:
+    """What a scene lacks; "": nothing."""
+    for need in scene.needs:
+        if data is None:
+            return f"needs {need} of the data folder"
+        if not (data / need).exists():
+            return f"no {need} in {data}"
+    return ""

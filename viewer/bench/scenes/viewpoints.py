@@ -1,0 +1,107 @@
+"""Where a benchmark looks from: all round a subject, from far and from near."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...camera import Camera
+from ...errors import InputError
+from ...geometry import Vector, up_vector
+from ..truth.mesh import Mesh
+from ..truth.reference import trace
+from ..truth.scene import Rays
+from .samples import evenly
+
+COVERAGE = (0.25, 0.85)  # of the picture's pixels (Slomp 2014, VII)
+_CLOSE = 0.005  # how near a view comes to the coverage that it should have
+_PIXELS = 2400  # of the pictures that coverage is measured in
+_NEAREST, _FARTHEST = 0.05, 20.0  # distances to the subject that are tried, in radii of its bounds
+_HALVINGS = 16
+_TRIES = 50  # directions a view
+
+
+def viewpoints(
+    mesh: Mesh, count: int, size: tuple[int, int], *, up: str = "+y", seed: int = 0
+) -> list[Camera]:
+    """Cameras in evenly spread directions whose pictures a mesh covers by evenly spread 25 % to 85 %.
+
+    size: (width, height) of the pictures, pixels. Each looks at the point of the surface that is nearest
+    to the middle when seen from afar, and comes nearer until the coverage is right; a direction in which
+    it never is (a plane edge on) is left out for the next one. The order of coverages is shuffled.
+    Raises InputError where there is no such view.
+    """
+    if count < 1:
+        raise InputError(f"a scene is seen from 1 or more viewpoints, not {count}")
+    rng = np.random.default_rng(seed)
+    low, high = COVERAGE[0] + 2 * _CLOSE, COVERAGE[1] - 2 * _CLOSE
+    wanted = low + (high - low) * (rng.permutation(count) + 0.5) / count
+    cameras: list[Camera] = []
+    for direction in _directions(_TRIES * count, rng.random(2)):
+        camera = _look(mesh, direction, float(wanted[len(cameras)]), size, up)
+        if camera is not None:
+            cameras.append(camera)
+        if len(cameras) == count:
+            return cameras
+    raise InputError(
+        f"only {len(cameras)} of {count} views fill {COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of a picture"
+    )
+
+
+def coverage(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> float:
+    """The share of a picture's pixels that a mesh covers, from a few thousand rays. size: pixels."""
+    return float(trace(mesh, camera, _small(size)).covered.mean())
+
+
+def _directions(count: int, shift: NDArray[np.float64]) -> Rays:
+    """Unit vectors (N, 3), evenly spread as far as they are followed."""
+    u, v = evenly(np.arange(count), shift).T
+    height, turn = 2 * u - 1, 2 * np.pi * v
+    out = np.sqrt(1 - height**2)
+    return np.stack([out * np.cos(turn), height, out * np.sin(turn)], axis=1)
+
+
+def _look(mesh: Mesh, direction: Rays, wanted: float, size: tuple[int, int], up: str) -> Camera | None:
+    """A camera in a direction (3,) from the mesh that is covered as wanted, where there is one."""
+    target = _middle(mesh, direction, size, up)
+    if target is None:
+        return None
+    low, high = np.log(np.array([_NEAREST, _FARTHEST]) * mesh.bounds.radius)
+    for _ in range(_HALVINGS):
+        distance = np.exp((low + high) / 2)
+        camera = Camera(eye=_vector(target + distance * direction), target=_vector(target), up=up_vector(up))
+        error = coverage(mesh, camera, size) - wanted
+        if abs(error) <= _CLOSE:
+            return camera
+        low, high = (np.log(distance), high) if error > 0 else (low, np.log(distance))
+    return None
+
+
+def _middle(mesh: Mesh, direction: Rays, size: tuple[int, int], up: str) -> Rays | None:
+    """The point of the mesh, absolute, that is nearest to the middle of a picture from afar.
+
+    The picture is orthographic: so nothing is before the point all along the direction.
+    """
+    center = mesh.bounds.center
+    camera = Camera(
+        eye=_vector(center + mesh.bounds.radius * direction),
+        target=_vector(center),
+        up=up_vector(up),
+        projection="orthographic",
+    ).fit(mesh.bounds, size[0] / size[1])
+    picture = trace(mesh, camera, _small(size))
+    seen = np.argwhere(picture.covered)
+    if not len(seen):
+        return None
+    nearest = np.square(seen + 0.5 - np.array(picture.covered.shape) / 2).sum(axis=1).argmin()
+    return picture.positions()[nearest] + picture.origin
+
+
+def _small(size: tuple[int, int]) -> tuple[int, int]:
+    factor = min(1.0, np.sqrt(_PIXELS / (size[0] * size[1])))
+    return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
+
+
+def _vector(values: Rays) -> Vector:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

@@ -1,0 +1,201 @@
+"""Reference pictures: what a camera truly sees of a scene, by casting a ray through each pixel's centre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...camera import Camera
+from ...errors import InputError
+from ...gpu.context import Gpu
+from ...gpu.pose import GpuPose
+from ...gpu.shade import shade
+from ...gpu.surface import Surface
+from ...gpu.view import View
+from ...look import Look
+from ...scan.points import PointCloud
+from .scene import NOTHING, Hits, Rays, Scene, distance_to_ball, to_srgb
+
+_CHUNK = 1 << 18  # rays cast at a time
+# A hit may come before its own point by so many steps of float32 at the size of the scene: the ray's
+# start, its direction and the hit are each rounded to a few.
+_ROUNDING = 32 * float(np.finfo(np.float32).eps)
+
+_SAME = 4  # footprints between depths that are of one surface
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The exact first hit at each pixel's centre, with the channels of a Surface. Row 0 is the top.
+
+    view: what it was seen from, relative to origin (3,).
+    depth: (H, W) float64, scan units along the view axis; +inf where nothing is.
+    normal: (H, W, 3) float32, world space, unit length. color: (H, W, 3) float32, linear.
+    id: (H, W) uint32, the face. Normal and colour are 0, the id 0xFFFFFFFF where nothing is.
+    """
+
+    view: View
+    origin: NDArray[np.float64]
+    depth: NDArray[np.float64]
+    normal: NDArray[np.float32]
+    color: NDArray[np.float32]
+    id: NDArray[np.uint32]
+
+    @property
+    def covered(self) -> NDArray[np.bool_]:
+        """(H, W), where something is."""
+        return np.isfinite(self.depth)
+
+    def arrays(self) -> dict[str, NDArray]:
+        """The channels by the names of `Surface.arrays`."""
+        return {
+            "color": self.color,
+            "normal": self.normal,
+            "depth": self.depth,
+            "coverage": self.covered.astype(np.float32),
+            "value": np.full(self.depth.shape, np.nan, np.float32),
+            "id": self.id,
+            "level": np.where(self.covered, 0, 255).astype(np.uint8),
+        }
+
+    def positions(self) -> Rays:
+        """(N, 3) float64, the hits relative to the origin, in the order of the covered pixels."""
+        starts, steps = pixel_rays(self.view, np.flatnonzero(self.covered))
+        return starts + self.depth[self.covered][:, None] * steps
+
+    def surface(self, gpu: Gpu, look: Look | None = None) -> Surface:
+        """A shaded Surface of it, one point a covered pixel: so it is shaded as any backend's is.
+
+        A look that colours by depth or height needs its own `low` and `high`: what is not seen is not known.
+        """
+        gpu.activate()
+        hits = PointCloud(
+            positions=self.positions().astype(np.float32),
+            origin=self.origin,
+            normals=self.normal[self.covered],
+            colors=np.pad(to_srgb(self.color[self.covered]), ((0, 0), (0, 1)), constant_values=255),
+            ids=self.id[self.covered],
+        )
+        rows = np.full(self.depth.shape, NOTHING, np.uint32)
+        rows[self.covered] = np.arange(len(hits))
+        surface = Surface(gpu, self.view.size)
+        surface.start(GpuPose(gpu, hits), self.view)
+        surface.depths.buffer.write(self.depth.astype(np.float32))
+        surface.rows.buffer.write(rows)
+        shade(surface, look or Look())
+        return surface
+
+
+def trace(scene: Scene, camera: Camera, size: tuple[int, int]) -> Reference:
+    """The reference picture of a scene. size: (width, height), pixels.
+
+    What is nearer than the camera's near plane or behind its far plane is not there, as for a backend.
+    Raises InputError for a size that is no picture.
+    """
+    width, height = size
+    if width < 1 or height < 1:
+        raise InputError(f"a picture of {width}x{height} pixels cannot be drawn")
+    view = View.of(camera, size, scene.origin, scene.bounds)
+    parts = []
+    for start in range(0, width * height, _CHUNK):
+        pixels = np.arange(start, min(start + _CHUNK, width * height))
+        parts.append(_cast(scene, *pixel_rays(view, pixels), view.near, view.far))
+    depth, normal, color, face = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("distance", "normal", "color", "face")
+    )
+    return Reference(
+        view=view,
+        origin=scene.origin,
+        depth=depth.reshape(height, width),
+        normal=normal.astype(np.float32).reshape(height, width, 3),
+        color=color.astype(np.float32).reshape(height, width, 3),
+        id=face.reshape(height, width),
+    )
+
+
+def visible(
+    scene: Scene, positions: NDArray[np.floating], camera: Camera, tolerance: float | None = None
+) -> NDArray[np.bool_]:
+    """Which points nothing of the scene hides from the camera's eye, (N,).
+
+    positions: (N, 3), relative to the scene's origin. tolerance: how far a hit may lie before the point,
+    scan units; None: 32 float32 epsilons (3.8e-6) of the radius of the scene's bounds. Points behind the
+    eye are not visible; the edges of the picture, near and far do not count.
+    """
+    if tolerance is None:
+        tolerance = _ROUNDING * scene.bounds.radius
+    view = View.of(camera, (1, 1), scene.origin, scene.bounds)
+    seen = np.zeros(len(positions), bool)
+    for start in range(0, len(positions), _CHUNK):
+        points = positions[start : start + _CHUNK].astype(np.float64)
+        local = points @ view.rotation.T + view.translation
+        ahead = np.flatnonzero(-local[:, 2] > 0)
+        if not len(ahead):
+            continue
+        depth = -local[ahead, 2]
+        across = local[ahead, :2] / (depth[:, None] if view.perspective else 1)
+        starts, steps = _rays(view, across)
+        hits = _cast(scene, starts, steps, 0.0, np.inf)
+        hidden = (depth - hits.distance) * np.linalg.norm(steps, axis=1) > tolerance
+        seen[start + ahead] = ~hidden
+    return seen
+
+
+def both_see(
+    first: Reference, second: Reference, moved: Rays | None = None
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The pixels of two pictures that show the same surface points: two lists of indices into H * W.
+
+    moved: where the hits of the first picture are at the moment of the second, (N, 3) relative to the
+    second's origin, in the order of the covered pixels; None: where they were. A point is seen in the
+    second where the depth there is within four pixel footprints of its own.
+    """
+    if moved is None:
+        moved = first.positions() + (first.origin - second.origin)
+    view, source = second.view, np.flatnonzero(first.covered)
+    inside = view.contains(moved)
+    source, moved = source[inside], moved[inside]
+    pixels, depth = view.project(moved)
+    column, row = np.floor(pixels).astype(np.intp).T
+    there = second.depth[row, column]
+    same = np.abs(there - depth) <= _SAME * footprint(view, depth)
+    return source[same], (row * view.size[0] + column)[same]
+
+
+def footprint(view: View, depth: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The edge of the square that a pixel covers at a depth, scan units, of the shape of `depth`."""
+    return (np.asarray(depth, np.float64) if view.perspective else np.ones(depth.shape)) / view.scale
+
+
+def pixel_rays(view: View, pixels: NDArray[np.integer]) -> tuple[Rays, Rays]:
+    """Rays through the centres of pixels (N,), indices into H * W: starts and steps, (N, 3) each.
+
+    Relative to the view's origin; start + t * step has depth t.
+    """
+    row, column = np.divmod(pixels, view.size[0])
+    across = np.stack([column + 0.5 - view.size[0] / 2, view.size[1] / 2 - row - 0.5], axis=1)
+    return _rays(view, across / view.scale)
+
+
+def _rays(view: View, across: NDArray[np.float64]) -> tuple[Rays, Rays]:
+    """Rays through view space (x, y) (N, 2): at depth 1 in perspective, anywhere else."""
+    ahead = np.zeros((len(across), 3))
+    ahead[:, 2] = -1
+    flat = np.pad(across, ((0, 0), (0, 1)))
+    starts, steps = (np.zeros_like(flat), flat + ahead) if view.perspective else (flat, ahead)
+    return (starts - view.translation) @ view.rotation, steps @ view.rotation
+
+
+def _cast(scene: Scene, starts: Rays, steps: Rays, near: float, far: float) -> Hits:
+    """The first hits between two depths; distances are depths."""
+    center, radius = scene.bounds.center - scene.origin, scene.bounds.radius
+    entry = np.maximum(distance_to_ball(starts - center, steps, 1.01 * radius), near)
+    hits = scene.cast(starts + entry[:, None] * steps, steps)
+    hits.distance[:] += entry
+    beyond = hits.distance > far
+    hits.distance[beyond], hits.face[beyond] = np.inf, NOTHING
+    hits.normal[beyond], hits.color[beyond] = 0, 0
+    return hits
