@@ -119,3 +119,10 @@ def test_the_demo_head_is_hit_where_its_surface_is() -> None:
     assert 0.2 < picture.covered.mean() < 0.8
     assert np.abs(surface_value(hits, 0.8)).max() < 1e-6
     assert np.abs(np.linalg.norm(picture.normal[picture.covered], axis=1) - 1).max() < 1e-6
+
+
+def test_a_ray_that_enters_the_ball_on_the_surface_hits_it_there() -> None:
+    torus = Torus(ring=1.0, tube=0.4)  # reaches 1.4 from its centre
+    inwards = np.array([[-1.0, 0, 0], [-1, 0.3, 0], [-0.5, -0.2, 0.4]])
+    starts = np.array([1.4, 0, 0]) - 3 * inwards
+    np.testing.assert_allclose(torus.distance(starts, inwards), 3, rtol=1e-12)

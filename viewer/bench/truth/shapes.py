@@ -238,9 +238,10 @@ def first_zero(
     """
     length = np.linalg.norm(steps, axis=1)
     found = np.full(len(starts), np.inf)
-    t = distance_to_ball(starts, steps, reach)
+    outside = 1.001 * reach  # where the surface touches the ball it is still ahead
+    t = distance_to_ball(starts, steps, outside)
     at = starts + t[:, None] * steps
-    rays = np.flatnonzero(_dot(at, at) <= (1.001 * reach) ** 2)
+    rays = np.flatnonzero(_dot(at, at) <= (1.001 * outside) ** 2)
     here = value(at[rays])
     while len(rays):
         step = np.clip(caution * np.abs(here), _FINEST * reach, _COARSEST * reach) / length[rays]
@@ -253,7 +254,7 @@ def first_zero(
             found[who] = _zero_between(
                 value, starts[who], steps[who], (t[who], here[crossed]), (ahead[crossed], there[crossed])
             )
-        leaving = (_dot(points, points) > reach**2) & (_dot(points, steps[rays]) > 0)
+        leaving = (_dot(points, points) > outside**2) & (_dot(points, steps[rays]) > 0)
         on = ~(crossed | leaving)
         t[rays] = ahead
         rays, here = rays[on], there[on]
