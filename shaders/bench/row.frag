@@ -1,4 +1,4 @@
-// The row and the depth of what is drawn, between near and far.
+// The row and the depth of what is drawn, between near and far. FACES: rows are faces, else points.
 #include "common/view.glsl"
 
 flat in uint row;
@@ -9,6 +9,6 @@ layout(location = 1) out float out_depth;
 void main() {
     float depth = linear_depth(gl_FragCoord.z);
     if (depth > view_far) discard;
-    out_row = row;
+    out_row = FACES != 0 ? uint(gl_PrimitiveID) : row;
     out_depth = depth;
 }

@@ -47,9 +47,7 @@ class _Points:
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw the points; always complete."""
-        program = pose.gpu.program(("bench/points.vert", "bench/row.frag"))
-        content = [(pose.array("positions").buffer, "3f", "in_position")]
-        _rasterise(pose.gpu, surface, program, content, moderngl.POINTS, len(pose.cloud))
+        _rasterise(pose, surface, moderngl.POINTS, len(pose.cloud))
         return False
 
 
@@ -77,9 +75,7 @@ class _Triangles:
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw the triangles, then find what each covered pixel sees of its own; always complete."""
         gpu, faces = pose.gpu, frame.derived.corners
-        program = gpu.program(("bench/mesh.vert", "bench/mesh.frag"))
-        content = [(pose.array("positions").buffer, "3f", "in_position")]
-        _rasterise(gpu, surface, program, content, moderngl.TRIANGLES, frame.derived.count, faces.buffer)
+        _rasterise(pose, surface, moderngl.TRIANGLES, frame.derived.count, faces.buffer)
 
         colored = pose.cloud.colors is not None
         resolve = gpu.compute("bench/mesh.comp", {"HAS_COLORS": int(colored)})
@@ -110,16 +106,15 @@ class _FaceBuffer:
 
 
 def _rasterise(
-    gpu: Gpu,
-    surface: Surface,
-    program: moderngl.Program,
-    content: list[tuple],
-    mode: int,
-    count: int,
-    indices: moderngl.Buffer | None = None,
+    pose: GpuPose, surface: Surface, mode: int, count: int, indices: moderngl.Buffer | None = None
 ) -> None:
-    """Draw into the Surface with a strict depth test. count: vertices, or indices."""
-    target = surface.raster()
+    """Draw into the Surface with a strict depth test; rows are points, or faces where there are indices.
+
+    count: of vertices, or of indices.
+    """
+    gpu, target = pose.gpu, surface.raster()
+    program = gpu.program(("bench/row.vert", "bench/row.frag"), {"FACES": int(indices is not None)})
+    content = [(pose.array("positions").buffer, "3f", "in_position")]
     with gpu.timers.measure("raster"):
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)

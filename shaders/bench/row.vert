@@ -1,4 +1,4 @@
-// GL_POINTS of one pixel.
+// A vertex where it is; a point has its number for a row.
 #include "common/view.glsl"
 
 layout(location = 0) in vec3 in_position;
