@@ -331,7 +331,6 @@ def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """No garbage collection within."""
-    gc.collect()
     gc.disable()
     try:
         yield
