@@ -59,7 +59,9 @@ def test_the_truth_has_no_errors(renderer: Renderer, projection: str) -> None:
     assert errors["psnr"] == errors["psnr_frame"] == math.inf
     assert errors["ssim"] == errors["ssim_frame"] == 1
     assert not errors["flip"] > 0
-    assert errors["visibility_error_percent"] < 5  # just behind the outline, which is a pixel wide
+    assert (
+        errors["visibility_error_percent"] < 7
+    )  # behind the outline, where a pixel covers most of the surface
     for name, error in errors.items():
         if name.startswith(("hole", "spill", "boundary", "depth", "wrong_layer")):
             assert error == 0, name
@@ -76,6 +78,30 @@ def test_a_plane_moved_back_by_d_has_a_bias_of_d(renderer: Renderer, d: float) -
     assert errors["depth_bias_px"] == pytest.approx(d * truth.reference.view.scale / 4, rel=1e-6)
     assert errors["wrong_layer_percent"] == 100  # farther than four spacings of 0.1
     assert errors["normal_p95"] == 0
+
+
+@pytest.mark.parametrize("slant", [0, 60, 75, 85])
+@pytest.mark.parametrize("spacing", [0.1, 0.01])
+def test_a_slanted_surface_does_not_hide_its_own_points(
+    renderer: Renderer, slant: int, spacing: float
+) -> None:
+    truth, turn = Shapes((Plane(),)), np.radians(slant)
+    cloud = plane(round(1.9 / spacing), depth=0, spacing=spacing)
+    camera = Camera(eye=(4 * np.sin(turn), 0, 4 * np.cos(turn)))
+    errors = judge(renderer, truth, camera, cloud).errors(picture(renderer, truth, camera))
+    assert counts(errors)[:2] == (0, 0)
+    assert counts(errors)[2] > 100
+
+
+def test_far_points_of_one_sheet_are_no_wrong_layer(renderer: Renderer) -> None:
+    """Where points are finer than pixels, these set how far depths of a sheet lie apart."""
+    truth, camera = Shapes((Sphere(),)), Camera(eye=(0, 0, 8))
+    fine, coarse = plane(21, depth=0, spacing=1e-4), plane(21, depth=0, spacing=0.1)
+    drawn = picture(renderer, Shapes((Sphere(center=(0.03, 0, 0)),)), camera)  # half a pixel aside
+    for cloud in (fine, coarse):
+        errors = judge(renderer, truth, camera, cloud).errors(drawn)
+        assert errors["depth_rmse_px"] > 0.1
+        assert errors["wrong_layer_percent"] == 0
 
 
 def test_an_empty_picture_is_all_hole_and_hides_nothing(renderer: Renderer) -> None:

@@ -75,7 +75,7 @@ def test_nothing_drawn_is_all_hole_and_has_no_outline() -> None:
 
 def test_a_plane_moved_by_d_has_a_depth_bias_of_d() -> None:
     true = np.where(disc(20), 8.0, np.inf)
-    errors = metrics.depth(true + 0.25, true, footprint=np.full(SIZE, 0.5), spacing=0.1)
+    errors = metrics.depth(true + 0.25, true, footprint=np.full(SIZE, 0.5), step=0.1)
     assert (
         errors["depth_bias"] == errors["depth_rmse"] == errors["depth_median"] == errors["depth_p95"] == 0.25
     )
@@ -87,7 +87,7 @@ def test_a_quarter_of_pixels_on_another_sheet_is_a_quarter_of_wrong_layer() -> N
     true = np.full(SIZE, 5.0)
     drawn = true.copy()
     drawn[:, :20] += 1
-    errors = metrics.depth(drawn, true, np.ones(SIZE), spacing=0.1)
+    errors = metrics.depth(drawn, true, np.ones(SIZE), step=0.1)
     assert errors["wrong_layer_percent"] == 25
     assert errors["depth_median"] == 0
     assert errors["depth_rmse"] == 0.5

@@ -22,9 +22,7 @@ from .truth.reference import Reference, both_see, footprint, trace, visible
 from .truth.scene import Rays, Scene
 
 _PROBES = 50_000  # points of a cloud whose visibility is looked at
-# How much nearer a picture that hides a point is, in spacings, or footprints where they are larger: of 1, 2
-# and 4 the factor with the least error when surfels draw the bunny.
-_HIDES = 2.0
+_STEEPEST = 0.1  # the least cosine that counts: 84 degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +46,14 @@ class Probes:
 class Judge:
     """What one view truly shows. Judges any Surface of that view.
 
-    image: (H, W, 4) uint8, the reference, shaded in `look`. spacing: of the points drawn, scan units.
+    image: (H, W, 4) uint8, the reference, shaded in `look`. steps: (H, W), how far depths of one
+    sheet may lie apart, scan units.
     """
 
     reference: Reference
     look: Look
     image: NDArray[np.uint8]
-    spacing: float
+    steps: NDArray[np.float64]
     probes: Probes
 
     @classmethod
@@ -76,13 +75,13 @@ class Judge:
         Raises InputError for a size that is no picture.
         """
         reference = trace(truth, camera, size)
-        spacing = typical_spacing(cloud)
+        steps = _steps(reference, typical_spacing(cloud))
         return cls(
             reference=reference,
             look=look,
             image=reference.surface(gpu, look).image(),
-            spacing=spacing,
-            probes=_probes(truth, camera, reference, cloud, spacing, tolerance),
+            steps=steps,
+            probes=_probes(truth, camera, reference, cloud, steps, tolerance),
         )
 
     def errors(self, surface: Surface) -> Errors:
@@ -96,7 +95,7 @@ class Judge:
         true_depth = reference.depth.astype(np.float32)  # rounded as what is drawn is
         return (
             metrics.coverage(drawn, true)
-            | metrics.depth(depth, true_depth, footprint(reference.view, true_depth), self.spacing)
+            | metrics.depth(depth, true_depth, footprint(reference.view, true_depth), self.steps)
             | metrics.normals(surface.normal[both], reference.normal[both])
             | metrics.color(surface.image(self.look), self.image, true)
             | metrics.visibility(self.probes.found(depth), self.probes.seen)
@@ -139,12 +138,22 @@ class Walk:
         }
 
 
+def _steps(reference: Reference, spacing: float) -> NDArray[np.float64]:
+    """How far depths of one sheet may lie apart at each pixel, (H, W), scan units.
+
+    The spacing of the points, or what the pixel covers of the surface where that is more.
+    """
+    depth = np.where(reference.covered, reference.depth, 0.0)
+    slant = np.where(reference.covered, reference.incidence(), 1.0)
+    return np.maximum(spacing, footprint(reference.view, depth) / np.maximum(slant, _STEEPEST))
+
+
 def _probes(
     truth: Scene,
     camera: Camera,
     reference: Reference,
     cloud: PointCloud,
-    spacing: float,
+    steps: NDArray[np.float64],
     tolerance: float | None,
 ) -> Probes:
     """Some points of the cloud that lie in the picture; the same of the cloud for every view.
@@ -159,9 +168,8 @@ def _probes(
     points = points[view.contains(points)]
     pixels, depth = view.project(points)
     column, row = np.floor(pixels).astype(np.intp).T
-    slack = _HIDES * np.maximum(spacing, footprint(view, depth)) + (tolerance or 0.0)
     return Probes(
         pixels=row * view.size[0] + column,
-        limit=depth - slack,
+        limit=depth - steps[row, column] - (tolerance or 0.0),
         seen=visible(truth, points, camera, tolerance),
     )

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-WRONG_LAYER = 4.0  # local spacings between two depths that are of two sheets
+WRONG_LAYER = 4.0  # steps between two depths that are of two sheets
 _COUNTS = ("false_positives", "false_negatives", "correct")
 _WINDOW = 11  # pixels, of SSIM
 _REACH = 10  # pixels to each side that a pixel of the FLIP map depends on; SSIM: 5
@@ -42,16 +42,16 @@ def depth(
     drawn: NDArray[np.floating],
     true: NDArray[np.floating],
     footprint: NDArray[np.floating],
-    spacing: float | NDArray[np.floating],
+    step: float | NDArray[np.floating],
 ) -> Errors:
     """Depth errors where both pictures show something, in scan units and (`_px`) in pixel footprints.
 
     drawn, true: (H, W), +inf where nothing is. footprint: (H, W), of a pixel at the true depth, scan units.
-    spacing: of the points there, scan units, one number or (H, W).
+    step: how far depths of one sheet may lie apart, scan units, one number or (H, W).
     """
     both = np.isfinite(drawn) & np.isfinite(true)
     error = drawn[both].astype(np.float64) - true[both]
-    spacing = np.broadcast_to(spacing, both.shape)[both]
+    step = np.broadcast_to(step, both.shape)[both]
     errors: Errors = {}
     for unit, values in (("", error), ("_px", error / footprint[both])):
         size = np.abs(values)
@@ -61,7 +61,7 @@ def depth(
             f"depth_median{unit}": _quantile(size, 0.5),
             f"depth_p95{unit}": _quantile(size, 0.95),
         }
-    wrong = _count(np.abs(error) > WRONG_LAYER * spacing)
+    wrong = _count(np.abs(error) > WRONG_LAYER * step)
     return errors | {"wrong_layer_percent": _percent(wrong, len(error))}
 
 

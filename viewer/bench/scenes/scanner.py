@@ -15,7 +15,7 @@ from ...camera import Camera
 from ...errors import InputError
 from ...scan.points import Bounds
 from ...scan.range_view import RangeView
-from ..truth.reference import Reference, pixel_rays, trace
+from ..truth.reference import Reference, trace
 from ..truth.scene import Scene
 
 MOST_PODS = 8
@@ -134,7 +134,7 @@ def _measure(
     picture: Reference, pod: Camera, faults: Faults, rng: np.random.Generator, name: str, unit: str
 ) -> RangeView:
     """The range view that comes of a true picture."""
-    view, cosine = picture.view, _incidence(picture)
+    view, cosine = picture.view, picture.incidence()
     # Whole images, all of them, each time: so one fault does not change the chances of another.
     noise = rng.standard_normal(cosine.shape)
     lost, wrong, place = rng.random((3, *cosine.shape))
@@ -166,15 +166,6 @@ def _measure(
         name=name,
         unit=unit,
     )
-
-
-def _incidence(picture: Reference) -> NDArray[np.float64]:
-    """The cosine between the surface's normal and the ray, (H, W), 0 to 1; 0 where nothing is."""
-    _, rays = pixel_rays(picture.view, np.flatnonzero(picture.covered))
-    along = np.abs((rays * picture.normal[picture.covered]).sum(axis=1)) / np.linalg.norm(rays, axis=1)
-    cosine = np.zeros(picture.depth.shape)
-    cosine[picture.covered] = np.minimum(along, 1)
-    return cosine
 
 
 def _quantised(depth: NDArray[np.float64], disparity_at_1: float, step: float) -> NDArray[np.float64]:

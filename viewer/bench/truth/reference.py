@@ -65,6 +65,14 @@ class Reference:
         starts, steps = pixel_rays(self.view, np.flatnonzero(self.covered))
         return starts + self.depth[self.covered][:, None] * steps
 
+    def incidence(self) -> NDArray[np.float64]:
+        """The cosine between the surface's normal and the ray, (H, W), 0 to 1; 0 where nothing is."""
+        _, rays = pixel_rays(self.view, np.flatnonzero(self.covered))
+        along = np.abs((rays * self.normal[self.covered]).sum(axis=1)) / np.linalg.norm(rays, axis=1)
+        cosine = np.zeros(self.depth.shape)
+        cosine[self.covered] = np.minimum(along, 1)
+        return cosine
+
     def surface(self, gpu: Gpu, look: Look | None = None) -> Surface:
         """A shaded Surface of it, one point a covered pixel: so it is shaded as any backend's is.
 
