@@ -9,12 +9,14 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from command_line import Run
 
 from viewer.bench.report.results import RESULTS, read_rows
+from viewer.bench.run import Bench
 from viewer.commands import bench
 
 SMALL = ("--quick", "--size", "96x64", "--views", 1, "--backend", "points")
@@ -92,6 +94,9 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
         (["--size", "8x8"], ["8x8", "1920x1280"]),
         (["--views", "0"], ["0"]),
         (["--suite", "speed"], ["speed", "numerics"]),
+        (["--seed", "-1"], ["-1"]),
+        (["--suite", "numerics", "--compare", "."], ["--compare"]),
+        (["--scene", "sphere", "--size", "20000x20000"], ["20000x20000", "too large"]),
     ],
 )
 def test_what_cannot_be_is_one_message(
@@ -100,6 +105,50 @@ def test_what_cannot_be_is_one_message(
     message = refused("bench", "-o", tmp_path / "out", *arguments)
     assert all(word in message for word in words), message
     assert not (tmp_path / "out").exists()
+
+
+def test_two_files_of_one_name_are_refused(refused: Refused, tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_ply(tmp_path / folder / "ball.ply")
+    files = (tmp_path / "a" / "ball.ply", tmp_path / "b" / "ball.ply")
+    assert "ball.ply" in refused("bench", "--scene", *files, "-o", tmp_path / "out")
+
+
+def test_a_damaged_scene_is_left_out_and_the_others_are_measured(run: Run, tmp_path: Path) -> None:
+    models = tmp_path / "data" / "models"
+    models.mkdir(parents=True)
+    (models / "stanford_bunny_35947.ply").write_bytes(b"ply, once")
+    damaged = ("--data", tmp_path / "data", "--suite", "scenes")
+    done = run("bench", *damaged, *SMALL, "--scene", "plane", "bunny", "plane", "-o", tmp_path / "out")
+    assert done.code == 0
+    assert "bunny is left out" in done.err
+    assert {row["scene"] for row in read_rows(tmp_path / "out")} == {"plane"}
+    assert "bunny is left out" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+    done = run("bench", *damaged, *SMALL, "--scene", "bunny", "-o", tmp_path / "none")
+    assert done.code == 2
+    assert not (tmp_path / "none" / "report.html").exists()
+
+
+@pytest.mark.parametrize("views", [0, 2])
+def test_ctrl_c_before_the_first_row_leaves_former_results(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, views: int
+) -> None:
+    """While the time is foretold, which takes two views, and before the first that counts."""
+    (tmp_path / RESULTS).write_text("former\n")
+    before, view = iter(range(views)), Bench._view
+
+    def interrupted(*arguments: Any, **keywords: Any) -> None:
+        if next(before, None) is None:
+            raise KeyboardInterrupt
+        view(*arguments, **keywords)
+
+    monkeypatch.setattr(Bench, "_view", interrupted)
+    done = run("bench", "--scene", "sphere", "--suite", "scenes", *SMALL, "-o", tmp_path)
+    assert (done.code, done.err) == (1, "scan4d: stopped\n")
+    assert (tmp_path / RESULTS).read_text() == "former\n"
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_points_without_faces_are_no_scene(refused: Refused, tmp_path: Path) -> None:

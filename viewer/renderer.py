@@ -35,12 +35,14 @@ class _Resident:
 
     @property
     def nbytes(self) -> int:
-        estimated = self.gpu_pose.cloud.nbytes - self.gpu_pose.stored.nbytes
-        return (
-            self.gpu_pose.uploaded_bytes
-            + estimated
-            + sum(p.derived.nbytes for p in self.derived.values() if p.derived)
-        )
+        """Bytes on the GPU."""
+        derived = sum(p.derived.nbytes for p in self.derived.values() if p.derived)
+        return self.gpu_pose.uploaded_bytes + derived
+
+    @property
+    def held_bytes(self) -> int:
+        """The same, and the estimates that it keeps on the CPU."""
+        return self.nbytes + self.gpu_pose.cloud.nbytes - self.gpu_pose.stored.nbytes
 
     def release(self) -> None:
         for job in self.jobs.values():
@@ -72,6 +74,10 @@ class Renderer:
         """Bytes that poses hold on the GPU."""
         return sum(r.nbytes for r in self._resident.values())
 
+    @property
+    def _held_bytes(self) -> int:
+        return sum(r.held_bytes for r in self._resident.values())
+
     def bytes_of(self, pose: Pose) -> int:
         """Bytes that one pose holds on the GPU, with what was derived from it; 0 where it is not there."""
         return self._resident[id(pose)].nbytes if id(pose) in self._resident else 0
@@ -85,7 +91,7 @@ class Renderer:
         if key not in self._resident:
             self._resident[key] = _Resident(weakref.ref(pose), GpuPose(self.gpu, pose.cloud))
         self._resident.move_to_end(key)
-        while len(self._resident) > 1 and self.nbytes > self.budget_bytes:
+        while len(self._resident) > 1 and self._held_bytes > self.budget_bytes:
             self._resident.popitem(last=False)[1].release()
         return self._resident[key].gpu_pose
 

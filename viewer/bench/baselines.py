@@ -19,6 +19,8 @@ from ..gpu.surface import Surface
 from ..scan.points import PointCloud
 from .truth.mesh import Faces, Mesh
 
+FLOOR, CEILING = "gl-points", "mesh"
+
 
 @dataclass(frozen=True)
 class NoParams:
@@ -27,12 +29,12 @@ class NoParams:
 
 def gl_points() -> Backend:
     """Each point as one pixel, as the driver's GL_POINTS draws it."""
-    return Backend("gl-points", _Points())
+    return Backend(FLOOR, _Points())
 
 
 def mesh(truth: Mesh) -> Backend:
     """The triangles of a mesh, rasterised; for a pose whose cloud are the vertices, with normals."""
-    return Backend("mesh", _Triangles(truth.faces))
+    return Backend(CEILING, _Triangles(truth.faces))
 
 
 class _Points:

@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any
 
 from ..backends import backend
-from .report.results import CEILING, FLOOR
+from .baselines import CEILING, FLOOR
 from .scenes import catalog
 from .scenes.catalog import Sweep
 

@@ -6,12 +6,12 @@ Times come from draws that are already warm; judging is outside of them.
 from __future__ import annotations
 
 import gc
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
+from math import nan
 from pathlib import Path
 from typing import Literal
 
@@ -26,11 +26,12 @@ from ..look import Look
 from ..measure import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from ..renderer import Renderer
 from . import baselines, numerics
+from .baselines import CEILING, FLOOR
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
 from .plan import Contender, Group
 from .report.pictures import picture_path, side_by_side
-from .report.results import CEILING, FLOOR, SPREADS, Row, spread
+from .report.results import SPREADS, Row, spread
 from .scenes import catalog
 from .scenes.subjects import Moment, Subject
 from .scenes.viewpoints import viewpoints
@@ -40,10 +41,8 @@ LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the 
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
 # What takes longer is not repeated as often: it stands out of the noise.
 _SLOW = 250.0  # ms
-_PREPARED = 5  # views that prepare a pose anew in any case
-_LOADING = 3.0  # seconds for a scene, for what is foretold
+PREPARED = 5  # views that prepare a pose anew in any case
 
-Tick = Callable[[], object]
 Kind = Literal["orbit", "pose"]
 Frame = tuple[Moment, Camera]
 
@@ -87,7 +86,7 @@ class _Tally:
     def knows_preparation(self) -> bool:
         """Whether it is so slow that a few samples will do."""
         known = self.derive_ms
-        return len(known) >= _PREPARED and spread(known)["median"] > _SLOW
+        return len(known) >= PREPARED and spread(known)["median"] > _SLOW
 
     def numbers(self, views: int) -> Row:
         """What a row holds of the first views."""
@@ -103,92 +102,95 @@ class _Tally:
             "peak_rss": max(memory, default=None),
             "errors": aggregate(by_view) | self.flicker,
             "errors_by_view": by_view,
+            "times_by_view": {name: getattr(self, name)[:views] for name in ("gpu_ms", "cpu_ms")},
         }
 
 
 class Bench:
-    """Measures groups, one after another. renderer: what draws. folder: where comparing pictures go."""
+    """Measures groups, one after another. renderer: what draws. folder: where comparing pictures go.
+
+    Raises InputError for pictures that are too large for the driver.
+    """
 
     def __init__(self, renderer: Renderer, settings: Settings, folder: Path | None = None) -> None:
+        Surface(renderer.gpu, settings.size).release()  # raises before anything is traced
         self.renderer, self.settings, self.folder = renderer, settings, folder
+        self.tick: Callable[[], object] = int  # called after each step
         self.stopped = False
         self.notes: list[str] = []
         self._subject = lru_cache(maxsize=1)(settings.subject)
         self._looked_at: tuple[Moment, list[Camera]] | None = None
 
-    def measure(self, group: Group, tick: Tick = int) -> list[Row]:
+    def measure(self, group: Group) -> list[Row]:
         """The rows of a group. Where Ctrl-C stopped it, of the views that all have seen; `stopped` is set.
 
-        A contender that cannot draw the scene is left out, and `notes` says why. tick: called `steps` times.
+        A contender that cannot draw the scene is left out, and `notes` says why. Calls `tick` as often as
+        `steps` says.
         Raises InputError for scenes that cannot be had.
         """
         subject = self._subject(group)
         tallies = {contender: _Tally() for contender in group.contenders}
         try:
             for view in range(self.settings.views):
-                self._view(subject, view, tallies, tick, pictured=not group.sweep)
+                self._view(subject, view, tallies, pictured=not group.sweep)
             for kind, frames, walk in self._walks(subject):
                 for contender, tally in tallies.items():
-                    tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
-                    tick()
+                    try:
+                        tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
+                    except InputError as error:
+                        self.note(f"{subject.name}: no flicker of {contender.backend}: {error}")
+                    self.tick()
         except KeyboardInterrupt:
             self.stopped = True
         return self._rows(group, subject, tallies)
 
     def steps(self, group: Group) -> int:
         """How often measuring a group ticks."""
-        return len(group.contenders) * (self.settings.views + self._walk_count(group))
+        return len(group.contenders) * (self.settings.views + self.walks(group))
 
-    def _walk_count(self, group: Group) -> int:
+    def walks(self, group: Group) -> int:
+        """How many walks of frames a group has at most."""
         return 2 if self._subject(group).moments > 1 else 1
 
-    def foretell(self, groups: Sequence[Group]) -> float:
-        """The seconds that measuring groups will take, from one view of a torus that all contenders draw.
+    def note(self, text: str) -> None:
+        """Say once what is not as it was asked for."""
+        if text not in self.notes:
+            self.notes.append(text)
 
-        That view also loads libraries and compiles shaders, so that no number holds it.
+    def numerics(self, names: Sequence[str]) -> Iterator[Row]:
+        """The lines of the stability suite, for each backend; what one cannot draw is its limit.
+
+        Ctrl-C ends it; `stopped` is set.
         """
-        contenders = tuple(dict.fromkeys(c for group in groups for c in group.contenders))
-        torus = Group("torus", contenders)
-        rows = []
-        for size in ((96, 64), self.settings.size):
-            start = time.perf_counter()
-            rows = Bench(self.renderer, replace(self.settings, size=size, views=1, frames=2)).measure(torus)
-            seconds = time.perf_counter() - start
-        draws = 2 + 2 * self.settings.repeat
-        drawing = sum(row["cpu_ms"]["median"] for row in rows) * draws / 1e3 / len(rows)
-        # The view, and the two frames of a walk, each about as long.
-        judging = max(seconds / (3 * len(rows)) - drawing, 0)
-        total = 0.0
-        for group in groups:
-            pictures = self.settings.views + self._walk_count(group) * self.settings.frames
-            larger = max(1.0, (group.count or 0) / rows[0]["n"])
-            total += _LOADING + len(group.contenders) * pictures * (judging + drawing * larger)
-        return total
-
-    def numerics(self, names: Sequence[str], tick: Tick = int) -> Iterator[Row]:
-        """The lines of the stability suite, for each backend."""
-        for name in names:
-            for row in numerics.rows():
+        for name, row in product(names, numerics.rows()):
+            limit = row.limit_of(backend(name))
+            try:
                 found = row.compare(self.renderer, backend(name))
-                yield {
-                    "row": row.name,
-                    "backend": name,
-                    **asdict(found),
-                    "bound": asdict(row.tolerance.bound),
-                    "held": row.tolerance.holds(found),
-                    "limit": row.limit_of(backend(name)),
-                    "reason": row.tolerance.reason,
-                    "device": self.renderer.gpu.device,
-                    "driver": self.renderer.gpu.driver,
-                    "version": __version__,
-                }
-                tick()
+            except InputError as error:
+                found, limit = numerics.Difference(nan, nan, nan), str(error)
+            except KeyboardInterrupt:
+                self.stopped = True
+            if self.stopped:
+                return
+            yield {
+                "row": row.name,
+                "backend": name,
+                **asdict(found),
+                "bound": asdict(row.tolerance.bound),
+                "held": row.tolerance.holds(found),
+                "limit": limit,
+                "reason": row.tolerance.reason,
+                **self._where(),
+            }
+            self.tick()
+
+    def _where(self) -> Row:
+        gpu = self.renderer.gpu
+        return {"timer": gpu.timers.kind, "device": gpu.device, "driver": gpu.driver, "version": __version__}
 
     # --- one view ---------------------------------------------------------------------
 
-    def _view(
-        self, subject: Subject, view: int, tallies: dict[Contender, _Tally], tick: Tick, pictured: bool
-    ) -> None:
+    def _view(self, subject: Subject, view: int, tallies: dict[Contender, _Tally], pictured: bool) -> None:
         """Let all contenders draw a view, time them and judge them. pictured: save how they compare."""
         moment = subject.moment(view * subject.moments // self.settings.views)
         camera = self._cameras(subject, moment)[view]
@@ -202,14 +204,14 @@ class Bench:
             try:
                 self._time(request, surface, tally, anew)
             except InputError as error:
-                self.notes.append(f"{subject.name}: {contender.backend} is left out: {error}")
+                self.note(f"{subject.name}: {contender.backend} is left out: {error}")
                 del tallies[contender]
                 continue
             tally.errors.append(judge.errors(surface))
             if self.folder and pictured and view == 0 and not contender.sweep:
                 _save_comparison(picture_path(self.folder, subject.name, contender.backend), judge, surface)
             surface.release()
-            tick()
+            self.tick()
 
     def _judge(self, subject: Subject, moment: Moment, camera: Camera) -> Judge:
         size, cloud = self.settings.size, moment.pose.cloud
@@ -237,7 +239,11 @@ class Bench:
         """Where all views look from, to where the subject is at a moment."""
         if self._looked_at is None or self._looked_at[0] is not moment:
             views, size, seed = self.settings.views, self.settings.size, self.settings.seed
-            self._looked_at = moment, viewpoints(moment.mesh, views, size, up=subject.up, seed=seed)
+            try:
+                cameras = viewpoints(moment.mesh, views, size, up=subject.up, seed=seed)
+            except InputError as error:
+                raise InputError(error.what, subject.name) from error
+            self._looked_at = moment, cameras
         return self._looked_at[1]
 
     # --- from frame to frame ----------------------------------------------------------
@@ -280,7 +286,7 @@ class Bench:
         views = min((len(tally.errors) for tally in tallies.values()), default=0)
         if not views:
             return []
-        gpu, settings, cloud = self.renderer.gpu, self.settings, subject.moment(0).pose.cloud
+        settings, cloud = self.settings, subject.moment(0).pose.cloud
         return [
             {
                 "backend": contender.backend,
@@ -297,10 +303,7 @@ class Bench:
                 "repeat": settings.repeat,
                 "frames": settings.frames,
                 **tally.numbers(views),
-                "timer": gpu.timers.kind,
-                "device": gpu.device,
-                "driver": gpu.driver,
-                "version": __version__,
+                **self._where(),
             }
             for contender, tally in tallies.items()
         ]

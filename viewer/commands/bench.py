@@ -10,16 +10,19 @@ from __future__ import annotations
 import os
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 from ..backends import backend, backends
 from ..bench import numerics
+from ..bench.forecast import forecast
 from ..bench.plan import Group, plan
 from ..bench.report.page import write_report
-from ..bench.report.results import NOTES, NUMERICS, RESULTS, compare, read_rows, write_row
+from ..bench.report.results import NOTES, NUMERICS, RESULTS, Row, compare, read_rows, write_row
 from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
 from ..errors import InputError
@@ -71,59 +74,75 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--size", type=_size, metavar="WxH", help="of the pictures, default 1920x1280")
     parser.add_argument("--views", type=_count, metavar="N", help="of each scene, default 20")
-    parser.add_argument("--seed", type=int, metavar="N", help="of viewpoints, samples and noise, default 0")
+    parser.add_argument("--seed", type=_seed, metavar="N", help="of viewpoints, samples and noise, default 0")
 
 
 def run(args: Namespace) -> int:
     """Measure, report, compare. 1 where Ctrl-C stopped it."""
     _check_libraries()
+    if args.compare and args.suite == "numerics":
+        raise InputError("--compare is for the scenes", "--suite numerics")
     old = read_rows(args.compare) if args.compare else None
-    names = args.backend or list(backends())
+    names = list(dict.fromkeys(args.backend or backends()))
     for name in names:
         backend(name)  # wrong names are told before anything is drawn
-    settings, notes = _settings(args), list[str]()
-    groups = _groups(args, settings, names, notes) if args.suite != "numerics" else []
+    settings = _settings(args)
+    groups, missing = _groups(args, settings, names) if args.suite != "numerics" else ([], [])
     tested = names if args.suite != "scenes" else []
-    _prepare_folder(args.out, [*([RESULTS] if groups else []), *([NUMERICS] if tested else [])])
-
     bench = Bench(drawing.renderer(args.device), settings, args.out)
-    stopped = False
-    try:
-        _foretell(bench, groups, tested)
-        _measure(bench, groups, args.out)
-        _test(bench, tested, args.out)
-    except KeyboardInterrupt:
-        stopped = True
-        notes.append("Stopped before the end.")
-    _write_notes(args.out, [*notes, *bench.notes])
+    _make_folder(args.out)
+    for name in missing:
+        warn(name)
+
+    _foretell(bench, groups, tested)
+    measured = [
+        _write(args.out / RESULTS, bench, sum(map(bench.steps, groups)), _measured(bench, groups)),
+        _write(args.out / NUMERICS, bench, _lines(tested), bench.numerics(tested)),
+    ]
+    if not any(measured):
+        if bench.stopped:
+            raise KeyboardInterrupt
+        raise InputError("; ".join(bench.notes) or "there is nothing to measure")
+    stopped = ["Stopped before the end."] if bench.stopped else []
+    _write_notes(args.out, [*missing, *bench.notes, *stopped])
     print(write_report(args.out))
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
-    return int(stopped)
+    return int(bench.stopped)
 
 
-def _measure(bench: Bench, groups: Sequence[Group], out: Path) -> None:
-    """Write the rows of all groups, those that Ctrl-C stopped too."""
-    if not groups:
-        return
-    with (
-        open(out / RESULTS, "w", encoding="utf-8") as stream,
-        progress(sum(bench.steps(group) for group in groups)) as tick,
-    ):
-        for group in groups:
-            for row in bench.measure(group, tick):
-                write_row(stream, row)
-            if bench.stopped:
-                raise KeyboardInterrupt
+def _measured(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
+    """The rows of all groups until Ctrl-C. A scene that turns out damaged is noted and left out."""
+    for group in groups:
+        if bench.stopped:
+            return
+        try:
+            yield from bench.measure(group)
+        except InputError as error:
+            bench.note(f"{group.scene} is left out: {error}")
+            warn(bench.notes[-1])
 
 
-def _test(bench: Bench, names: Sequence[str], out: Path) -> None:
-    """Write the lines of the stability suite."""
-    if not names:
-        return
-    with open(out / NUMERICS, "w", encoding="utf-8") as stream, progress(_lines(names)) as tick:
-        for line in bench.numerics(names, tick):
-            write_row(stream, line)
+def _write(path: Path, bench: Bench, steps: int, rows: Iterator[Row]) -> bool:
+    """Write rows as they come; whether there were any.
+
+    Those of an earlier run stay where they are until there is a new one, then beside it as old-*.
+    """
+    with progress(steps) as bench.tick:
+        first = next(rows, None)
+        if first is None:
+            return False
+        try:
+            if path.is_file() and path.stat().st_size:
+                path.replace(path.with_name(f"old-{path.name}"))
+            with open(path, "w", encoding="utf-8") as stream:
+                for row in chain([first], rows):
+                    write_row(stream, row)
+        except OSError as error:
+            raise InputError(
+                f"cannot be written: {error.strerror or error}", path, "Check free space"
+            ) from error
+    return True
 
 
 def _lines(names: Sequence[str]) -> int:
@@ -131,9 +150,9 @@ def _lines(names: Sequence[str]) -> int:
 
 
 def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str]) -> None:
-    """Say how much there is to do and how long it will take, from one view of a sphere."""
+    """Say how much there is to do and how long it will take."""
     if groups:
-        seconds = bench.foretell(groups)
+        seconds = forecast(bench, groups)
         rows = sum(len(group.contenders) for group in groups)
         minutes = f"{seconds / 60:.0f} minutes" if seconds >= 100 else f"{seconds:.0f} seconds"
         scenes = len({group.scene for group in groups})
@@ -152,30 +171,25 @@ def _settings(args: Namespace) -> Settings:
     return replace(_QUICK if args.quick else Settings(), **{k: v for k, v in told.items() if v is not None})
 
 
-def _groups(args: Namespace, settings: Settings, names: Sequence[str], notes: list[str]) -> list[Group]:
-    """What to measure; what cannot be had is noted, unless it was asked for by name."""
-    missing = catalog.names(settings.data)
-    scenes = args.scene or [name for name in (_QUICK_SCENES if args.quick else missing) if not missing[name]]
+def _groups(args: Namespace, settings: Settings, names: Sequence[str]) -> tuple[list[Group], list[str]]:
+    """What to measure, and what of all scenes cannot be had. Raises InputError for those that were named."""
+    missing = {name: reason for name, reason in catalog.names(settings.data).items() if reason}
+    known = _QUICK_SCENES if args.quick else catalog.names(settings.data)
+    scenes = list(dict.fromkeys(args.scene or [name for name in known if name not in missing]))
     if args.quick:
         groups = plan(scenes, names, _QUICK_COUNTS, _QUICK_NOISES, swept_scenes=1)
     else:
         groups = plan(scenes, names)
-    for group in groups:
-        settings.subject(group)  # raises where it cannot be had
-    if not args.scene:
-        notes += [f"{name} is left out: {reason}" for name, reason in missing.items() if reason]
-    for note in notes:
-        warn(note)
-    return groups
+    called = Counter(settings.subject(group).name for group in groups if not group.sweep)
+    if twice := [name for name, count in called.items() if count > 1]:
+        raise InputError(f"two scenes are called {twice[0]}", "--scene", "Rename one of the files")
+    left_out = [] if args.scene else [f"{name} is left out: {reason}" for name, reason in missing.items()]
+    return groups, left_out
 
 
-def _prepare_folder(out: Path, files: Sequence[str]) -> None:
-    """Make the folder; results of an earlier run that will be made anew stay beside as old-*."""
+def _make_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for name in files:
-            if (out / name).exists():
-                (out / name).replace(out / f"old-{name}")
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror or error}", out) from error
 
@@ -203,4 +217,10 @@ def _size(text: str) -> tuple[int, int]:
 def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise ArgumentTypeError(f"'{text}' is no number of at least 1")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise ArgumentTypeError(f"'{text}' is no seed; give a number such as 7")
     return int(text)

@@ -287,9 +287,17 @@ def test_nothing_to_report_is_said(tmp_path: Path) -> None:
 
 
 def test_a_broken_picture_is_said(folder: Path) -> None:
-    (folder / "pictures" / "torus--broken.png").write_bytes(b"not a picture")
+    picture_path(folder, "torus", "points").write_bytes(b"not a picture")
     with pytest.raises(InputError, match="is no picture"):
         write_report(folder)
+
+
+def test_pictures_and_plots_of_former_results_are_not_told(folder: Path) -> None:
+    for stale in (picture_path(folder, "cube", "points"), folder / "plots" / "stale.png"):
+        stale.parent.mkdir(exist_ok=True)
+        Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(stale)
+    assert "cube" not in write_report(folder).read_text(encoding="utf-8")
+    assert not (folder / "plots" / "stale.png").exists()
 
 
 def test_every_known_error_is_explained() -> None:

@@ -15,7 +15,6 @@ from viewer.bench.report.results import (
     Row,
     compare,
     error_metrics,
-    key,
     read_rows,
     spread,
     write_row,
@@ -110,12 +109,6 @@ def test_a_missing_or_binary_file_is_one_message(tmp_path: Path) -> None:
             read_rows(tmp_path / name)
 
 
-def test_the_key_is_what_was_drawn_and_not_what_came_out() -> None:
-    assert key(a_row(ms=1.0, errors={"hole_percent": 9.0}, device="another")) == key(a_row())
-    for change in ({"params": {"size": 3.0}}, {"noise": 0.1}, {"seed": 1}, {"scene_hash": "f"}, {"views": 4}):
-        assert key(a_row(**change)) != key(a_row())
-
-
 def test_the_spread_of_a_hundred_and_one_steps() -> None:
     assert spread([float(i) for i in range(100, -1, -1)]) == {"median": 50.0, "p5": 5.0, "p95": 95.0}
     assert all(math.isnan(value) for value in spread([]).values())
@@ -206,3 +199,18 @@ def test_every_metric_is_in_the_docs() -> None:
     text = (Path(__file__).resolve().parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
     known = error_metrics([a_row(dict.fromkeys(METRICS, 0.0))])
     assert [metric.name for metric in known if f"`{metric.name}`" not in text] == []
+
+
+def test_every_view_a_fifth_slower_is_slower_however_different_the_views_are() -> None:
+    views = [float(ms) for ms in range(10, 30)]
+
+    def timed(factor: float) -> dict[str, object]:
+        times = [ms * factor for ms in views]
+        return a_row(gpu_ms=spread(times), times_by_view={"gpu_ms": times})
+
+    assert any("slower" in line and "gpu_ms" in line for line in compare([timed(1)], [timed(1.2)]))
+    assert any("faster" in line and "gpu_ms" in line for line in compare([timed(1.2)], [timed(1)]))
+    assert compare([timed(1)], [timed(1.04)]) == []
+    one_slow = timed(1)
+    one_slow["times_by_view"] = {"gpu_ms": [3 * views[0], *views[1:]]}
+    assert compare([timed(1)], [one_slow]) == []

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 from ...errors import InputError
 from ...files import whole_file
 from ...resources import resource_path
+from ..baselines import CEILING, FLOOR
 from . import plots
-from .pictures import PANELS
+from .pictures import PANELS, picture_path
 from .results import (
-    CEILING,
     COSTS,
-    FLOOR,
     METRICS,
     NOTES,
     NUMERICS,
@@ -95,6 +94,8 @@ def write_report(folder: Path) -> Path:
     )
     if not rows and not numerics:
         raise InputError("no results to report", folder, "Run scan4d bench first")
+    for stale in (folder / "plots").glob("*.png"):
+        stale.unlink()
     metrics, scenes = error_metrics(rows), _defaults(rows)
     shown = COSTS + metrics
     page = _template().render(
@@ -107,7 +108,7 @@ def write_report(folder: Path) -> Path:
         against=list(_against(rows, metrics, folder)),
         swept=list(_swept(rows, folder)),
         passes=_passes(rows, folder),
-        pictures=list(_pictures(folder)),
+        pictures=list(_pictures(folder, rows)),
         panels=PANELS,
         numerics=stability(numerics),
         metrics=shown,
@@ -327,14 +328,16 @@ def _slug(name: str) -> str:
 # --- pictures -------------------------------------------------------------------------
 
 
-def _pictures(folder: Path) -> Iterator[Picture]:
-    """The pictures of a folder by name; of too many for a page the last are left in their files."""
+def _pictures(folder: Path, rows: Iterable[Row]) -> Iterator[Picture]:
+    """The pictures of the rows; of too many for a page the last are left in their files."""
     room = _PICTURES
-    found = [(*path.stem.partition("--")[::2], path) for path in (folder / "pictures").glob("*.png")]
-    for scene, backend, path in sorted(found, key=lambda each: (each[0], rank(each[1]))):
-        source = _inline(path) if room > 0 else ""
-        room -= len(source)
-        yield Picture(scene, backend, f"pictures/{path.name}", source)
+    shown = {(row["scene"], row["backend"]) for row in rows}
+    for scene, backend in sorted(shown, key=lambda each: (each[0], rank(each[1]))):
+        path = picture_path(folder, scene, backend)
+        if path.is_file():
+            source = _inline(path) if room > 0 else ""
+            room -= len(source)
+            yield Picture(scene, backend, f"pictures/{path.name}", source)
 
 
 def _inline(path: Path) -> str:

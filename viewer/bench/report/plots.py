@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...files import whole_file
-from .results import CEILING, FLOOR, METRICS, Metric, Row, rank
+from ..baselines import CEILING, FLOOR
+from .results import METRICS, Metric, Row, rank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

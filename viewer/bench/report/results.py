@@ -12,11 +12,11 @@ from typing import Any, TextIO
 import numpy as np
 
 from ...errors import InputError
+from ..baselines import CEILING, FLOOR
 
 Row = dict[str, Any]
 
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
-FLOOR, CEILING = "gl-points", "mesh"  # the backends that frame all others
 SPREADS = ("gpu_ms", "cpu_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -210,11 +210,7 @@ _FROM_TEXT = {text: value for value, text in _INFINITIES.items()}
 
 # Errors this near each other are the same: drivers round differently.
 _SAME_RELATIVE, _SAME_ABSOLUTE = 0.01, 1e-6
-
-
-def key(row: Row) -> str:
-    """What identifies a row: what was drawn, with what, and how often."""
-    return _identity(row, _IDENTITY)
+_SAME_TIME = 1.05  # the ratio of times that are the same
 
 
 def title(row: Row) -> str:
@@ -230,8 +226,9 @@ def title(row: Row) -> str:
 def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
     """What got slower or worse, then faster or better, then what cannot be compared; a line each.
 
-    Slower: each median is outside the other's 5th to 95th percentile. Worse: an error that grew by more
-    than 1 %. Times are compared only where device, driver and timer are the same.
+    Slower: by 5 % in the median of the views, and in 95 % of them. Preparations, which are not the views',
+    are slower where each median is outside the other's 5th to 95th percentile. Worse: an error that grew by
+    more than 1 %. Times are compared only where device, driver and timer are the same.
     """
     unhashed = tuple(name for name in _IDENTITY if name != _SCENE)
     before, after = ({_identity(row, unhashed): row for row in rows} for rows in (old, new))
@@ -271,11 +268,20 @@ def _slower(was: Row, now: Row, back: bool = False) -> Iterator[str]:
     for name in SPREADS:
         if not (isinstance(was.get(name), dict) and isinstance(now.get(name), dict)):
             continue
-        quick, slow = (now[name], was[name]) if back else (was[name], now[name])
-        if slow["median"] > quick["p95"] and quick["median"] < slow["p5"]:
+        quick, slow = (now, was) if back else (was, now)
+        if _is_slower(name, quick, slow):
             before, after = was[name]["median"], now[name]["median"]
             ratio = f" (x{after / before:.2f})" if before > 0 else ""
             yield f"{name} {before:.4g} -> {after:.4g}{ratio}"
+
+
+def _is_slower(name: str, quick: Row, slow: Row) -> bool:
+    """Whether a time of one row is beyond the spread of the other's."""
+    pairs = [row.get("times_by_view", {}).get(name, []) for row in (quick, slow)]
+    if pairs[0] and len(pairs[0]) == len(pairs[1]):
+        ratios = spread([after / before for before, after in zip(*pairs, strict=True) if before > 0])
+        return ratios["median"] > _SAME_TIME and ratios["p5"] > 1
+    return slow[name]["median"] > quick[name]["p95"] and quick[name]["median"] < slow[name]["p5"]
 
 
 def _worse(was: Row, now: Row, back: bool = False) -> Iterator[str]:

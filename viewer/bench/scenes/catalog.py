@@ -98,7 +98,7 @@ def _file(request: _Request) -> Subject:
     try:
         made.moment(0)
     except InputError as error:
-        hint = error.hint or "A scene needs a mesh: faces, not points alone"
+        hint = error.hint or ("A scene needs a mesh, not points alone" if "no faces" in error.what else None)
         raise InputError(error.what, error.where or request.name, hint) from error
     return made
 
@@ -247,6 +247,8 @@ def subject(
     scene = _SCENES.get(name_or_file)
     if scene is None:
         if not Path(name_or_file).is_file():
+            if Path(name_or_file).is_dir():
+                raise InputError("is a folder, not a mesh", name_or_file, "Name a PLY or OBJ file")
             if Path(name_or_file).name != name_or_file or Path(name_or_file).suffix:
                 raise InputError("no such file", name_or_file)
             raise unknown_name("scene", name_or_file, list(_SCENES))
@@ -277,6 +279,12 @@ def usual(name_or_file: str, what: Sweep) -> float | None:
     """The number of points or the noise of a scene unless another is asked for; None: not known yet."""
     scene = _scene(name_or_file)
     return scene.count if what == "n" else scene.noise
+
+
+def is_bare(name_or_file: str) -> bool:
+    """Whether its points come as a scanner gives them, without normals."""
+    scene = _scene(name_or_file)
+    return scene.noise is not None or any(need.startswith("range/") for need in scene.needs)
 
 
 def _scene(name_or_file: str) -> _Scene:
