@@ -64,7 +64,7 @@ COSTS = [
     Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
     Metric("derive_ms", "ms", "data derived from a pose on the CPU"),
     Metric("upload_ms", "ms", "a pose and its derived data brought to the GPU"),
-    Metric("bytes_gpu", "bytes", "what lies on the GPU for one pose"),
+    Metric("bytes_gpu", "bytes", "what lies on the GPU for one pose and its picture"),
     Metric("peak_rss", "bytes", "the most memory that the process held"),
 ]
 _ERRORS = [
