@@ -52,8 +52,8 @@ class Settings:
     """How it is measured.
 
     size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of,
-    where they are faster than 250 ms.
-    frames: of a walk, for flicker. seed: of viewpoints, samples and noise. data: the folder of real scans.
+    where they are faster than 250 ms. frames: of a walk, for flicker. seed: of viewpoints, samples and
+    noise. data: the folder of real scans.
     """
 
     size: tuple[int, int] = (1920, 1280)
@@ -125,8 +125,7 @@ class Bench:
         """The rows of a group. Where Ctrl-C stopped it, of the views that all have seen; `stopped` is set.
 
         A contender that cannot draw the scene is left out, and `notes` says why. Calls `tick` as often as
-        `steps` says.
-        Raises InputError for scenes that cannot be had.
+        `steps` says. Raises InputError for scenes that cannot be had.
         """
         subject = self._subject(group)
         tallies = {contender: _Tally() for contender in group.contenders}
@@ -195,7 +194,7 @@ class Bench:
         moment = subject.moment(view * subject.moments // self.settings.views)
         camera = self._cameras(subject, moment)[view]
         judge = self._judge(subject, moment, camera)
-        turn = view % len(tallies)  # who is first changes, so that drift hits all alike
+        turn = view % max(1, len(tallies))  # who is first changes, so that drift hits all alike
         for contender in (*list(tallies)[turn:], *list(tallies)[:turn]):
             surface, tally = Surface(self.renderer.gpu, self.settings.size), tallies[contender]
             anew = not tally.knows_preparation  # then of a pose that the renderer has not seen
