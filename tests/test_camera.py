@@ -101,6 +101,12 @@ def test_changing_the_projection_keeps_the_size_at_the_target() -> None:
     assert np.allclose(pixels(camera, point), pixels(there_and_back, point))
 
 
+def test_what_was_fitted_in_one_projection_keeps_its_size_in_the_other() -> None:
+    fitted = Camera.orbit(BOX, 20, 10, projection="orthographic")
+    point = np.array([fitted.target]) + fitted.rotation()[1] * 0.5
+    assert np.allclose(pixels(fitted, point), pixels(fitted.projected("perspective"), point))
+
+
 def test_zooming_an_orthographic_view_scales_it() -> None:
     camera = Camera.orbit(BOX, projection="orthographic")
     assert camera.zoomed(2).view_height == pytest.approx(camera.view_height / 2)

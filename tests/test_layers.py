@@ -15,8 +15,9 @@ LAYERS = (
     {"errors", "files", "geometry", "params", "resources", "camera", "look", "scan"},
     {"gpu"},
     {"backends"},
-    {"renderer", "frame", "measure", "export"},
-    {"app", "bench", "__init__"},
+    {"renderer", "frame", "measure", "export", "pick"},
+    {"recording", "__init__"},
+    {"app", "bench"},
     {"cli", "commands"},
 )
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}

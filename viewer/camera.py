@@ -17,6 +17,7 @@ from .scan.points import Bounds
 
 PROJECTIONS = ("perspective", "orthographic")
 _FIT_MARGIN = 1.04
+_STEEPEST = 89.5  # elevation in degrees that orbiting reaches
 
 # Where azimuth 0 looks from, for each up axis: the front, at right angles to up.
 _FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
@@ -200,20 +201,29 @@ class Camera:
         height = self.height and self.height * distance / self.distance
         return replace(self, eye=_vector(eye), height=height)
 
-    def orbited(self, azimuth: float, elevation: float) -> Camera:
+    def orbited(self, azimuth: float, elevation: float, about: Vector | None = None) -> Camera:
         """Turned about the target: azimuth about up, then elevation, in degrees.
 
+        about: another point to turn about, scan units; it keeps its place in the picture.
         Elevation stops short of the poles, so that the picture never flips.
         """
         up = np.array(self.up) / np.linalg.norm(self.up)
-        offset = np.subtract(self.eye, self.target)
-        offset = _rotate(offset, up, math.radians(azimuth))
-        now = math.degrees(math.asin(np.clip(offset @ up / np.linalg.norm(offset), -1, 1)))
-        step = float(np.clip(now + elevation, -89.5, 89.5)) - now
-        axis = np.cross(up, offset)
-        if np.linalg.norm(axis) > 1e-9 * np.linalg.norm(offset):
-            offset = _rotate(offset, axis / np.linalg.norm(axis), -math.radians(step))
-        return replace(self, eye=_vector(np.array(self.target) + offset))
+        arm = np.subtract(self.eye, self.target)
+        turned = _rotate(arm, up, math.radians(azimuth))
+        now = math.degrees(math.asin(np.clip(turned @ up / np.linalg.norm(turned), -1, 1)))
+        limit = max(_STEEPEST, abs(now))
+        step = float(np.clip(now + elevation, -limit, limit)) - now
+        axis = np.cross(up, turned)
+        length = np.linalg.norm(axis)
+        axis = axis / length if length > 1e-9 * np.linalg.norm(arm) else np.zeros(3)
+
+        def turn(v: NDArray[np.float64]) -> NDArray[np.float64]:
+            v = _rotate(v, up, math.radians(azimuth))
+            return _rotate(v, axis, -math.radians(step)) if axis.any() else v
+
+        center = np.array(self.target if about is None else about)
+        target = center + turn(self.target - center)
+        return replace(self, eye=_vector(target + turn(arm)), target=_vector(target))
 
     def panned(self, right: float, up: float) -> Camera:
         """Moved with its target along the picture's axes, in heights of the picture."""
@@ -228,7 +238,23 @@ class Camera:
 
     def projected(self, projection: str) -> Camera:
         """The same view in the other projection: what is at the target keeps its size."""
-        return replace(self, projection=projection, height=self.view_height)
+        camera = replace(self, projection=projection, height=self.view_height)
+        if projection == "orthographic":
+            return camera
+        return camera.at_distance(self.view_height / (2 * math.tan(math.radians(self.fov_y) / 2)))
+
+    def focused(self, point: Vector) -> Camera:
+        """The same picture, its target moved along the view axis to the depth of a point.
+
+        Unchanged where the point is not in front of the eye.
+        """
+        back = self.rotation()[2]
+        depth = float(np.subtract(self.eye, point) @ back)
+        target = _vector(np.array(self.eye) - back * depth)
+        if depth <= 0 or target == self.eye:  # the latter far from the origin, by rounding
+            return self
+        height = self.view_height if self.projection == "orthographic" else self.height
+        return replace(self, target=target, height=height)
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:

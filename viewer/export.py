@@ -1,13 +1,15 @@
 """Writing pictures: PNG, EXR, NPZ, MP4 films, numbered files and contact sheets.
 
 PNG and MP4 show the picture as the look has it; EXR and NPZ hold the Surface behind it,
-unshaded. Every file takes its name only when it is complete.
+unshaded. PNG and EXR can carry a description, a text that says how they were made. Every file
+takes its name only when it is complete.
 """
 
 from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -28,9 +30,12 @@ if TYPE_CHECKING:
 
 PICTURE_SUFFIXES = (".png", ".exr", ".npz")
 FILM_SUFFIX = ".mp4"
+OUTPUT_SUFFIXES = (*PICTURE_SUFFIXES, FILM_SUFFIX)
+DESCRIBED_SUFFIXES = (".png", ".exr")
+FRAME_RATES = (1.0, 240.0)  # what players can be expected to show
 
 _NUMBER = re.compile("%(0?[0-9]*)d")
-_FRAME_RATES = (1.0, 240.0)  # what players can be expected to show
+_DESCRIPTION = "scan4d"  # the key of a PNG's text, the name of an EXR's attribute
 _THUMBNAIL_WIDTH = 320  # pixels
 _SHEET_GAP = 4  # pixels
 _MPEG4_BIT_RATE = 20_000_000
@@ -76,31 +81,36 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
 
 
 @contextmanager
-def pictures(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Surface, int], None]]:
-    """A function that puts a surface, with its number, where the path says: file, files or film.
+def pictures(
+    path: Path, size: tuple[int, int], fps: float
+) -> Iterator[Callable[[Surface, int, str | None], None]]:
+    """A function that puts a surface, its number and description where the path says: file, files, film.
 
     size: (width, height). fps: of a film. Raises InputError where something cannot be written.
     """
     if path.suffix.lower() == FILM_SUFFIX:
         with film(path, size, fps) as add:
-            yield lambda surface, number: add(surface.image())
+            yield lambda surface, number, description: add(surface.image())
     else:
-        yield lambda surface, number: write_picture(surface, numbered(path, number))
+        yield lambda surface, number, description: write_picture(surface, numbered(path, number), description)
 
 
 # --- pictures -------------------------------------------------------------------------------
 
 
-def write_picture(surface: Surface, path: Path | str) -> None:
-    """Write a surface as the suffix says: .png, .exr or .npz. Raises InputError."""
+def write_picture(surface: Surface, path: Path | str, description: str | None = None) -> None:
+    """Write a surface as the suffix says: .png, .exr or .npz. Raises InputError.
+
+    description: a text that .png and .exr carry (see `read_description`).
+    """
     path = Path(path)
     check_output(path, PICTURE_SUFFIXES, several=False)
     with whole_file(path) as temporary:
         match path.suffix.lower():
             case ".png":
-                _write_png(surface.image(), temporary)
+                _write_png(surface.image(), temporary, description)
             case ".exr":
-                _write_exr(surface, temporary)
+                _write_exr(surface, temporary, description)
             case ".npz":
                 _write_npz(surface.arrays(), temporary)
 
@@ -111,13 +121,48 @@ def write_png(image: NDArray[np.uint8], path: Path | str) -> None:
         _write_png(image, temporary)
 
 
-def _write_png(image: NDArray[np.uint8], path: Path) -> None:
+def read_description(path: Path) -> str:
+    """The description that a .png or .exr carries. Raises InputError where there is none."""
+    try:
+        text = (_png_texts if path.suffix.lower() == ".png" else _exr_header)(path).get(_DESCRIPTION)
+    except Exception as error:  # whatever a damaged picture does to a reader
+        if isinstance(error, OSError) and error.errno:
+            raise InputError(f"cannot be read: {error.strerror}", path, "Check its name") from error
+        raise InputError("cannot be read as a picture", path, "It is damaged, or of another kind") from error
+    if not isinstance(text, str):
+        hint = "Those that 'scan4d render' and the window save are"
+        raise InputError("is not a picture that tells how it was made", path, hint)
+    return text
+
+
+def _png_texts(path: Path) -> dict[Any, Any]:
+    """Without decoding the picture: ours stand before it."""
     from PIL import Image
 
-    Image.fromarray(image).save(path, compress_level=1, compress_type=Z_RLE)  # fast, and small for pictures
+    with warnings.catch_warnings(), Image.open(path, formats=["PNG"]) as image:
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        return dict(image.info)
 
 
-def _write_exr(surface: Surface, path: Path) -> None:
+def _exr_header(path: Path) -> dict[str, Any]:
+    import OpenEXR
+
+    with open(path, "rb"), OpenEXR.File(str(path), header_only=True) as file:  # open tells what is missing
+        return dict(file.header())
+
+
+def _write_png(image: NDArray[np.uint8], path: Path, description: str | None = None) -> None:
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    texts = PngInfo()
+    if description is not None:
+        texts.add_itxt(_DESCRIPTION, description)
+    # Fast, and small for pictures.
+    Image.fromarray(image).save(path, compress_level=1, compress_type=Z_RLE, pnginfo=texts)
+
+
+def _write_exr(surface: Surface, path: Path, description: str | None = None) -> None:
     """R, G, B: linear colour, A: coverage, Z: depth; normal.X .Y .Z, value; id, level as integers."""
     import OpenEXR
 
@@ -132,6 +177,8 @@ def _write_exr(surface: Surface, path: Path) -> None:
         "level": arrays["level"].astype(np.uint32),
     }
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    if description is not None:
+        header[_DESCRIPTION] = description
     contiguous = {name: np.ascontiguousarray(channel) for name, channel in channels.items()}
     with open(path, "wb") as stream:  # by a stream, failures come as OSError
         OpenEXR.File(header, contiguous).write(stream)
@@ -162,7 +209,7 @@ def film(
 
     path, (width, height) = Path(path), size
     odd = ((0, height % 2), (0, width % 2), (0, 0))
-    rate = Fraction(min(max(fps, _FRAME_RATES[0]), _FRAME_RATES[1])).limit_denominator(1001)
+    rate = Fraction(min(max(fps, FRAME_RATES[0]), FRAME_RATES[1])).limit_denominator(1001)
     try:
         with whole_file(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
             stream = _video_stream(container, rate)

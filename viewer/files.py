@@ -1,10 +1,11 @@
-"""Files that are whole or not there."""
+"""Files that are whole or not there, and names that are free."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 from .errors import InputError
@@ -27,3 +28,8 @@ def whole_file(path: Path | str) -> Iterator[Path]:
         raise InputError(what, path, "Check free space and permissions") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def free_file(folder: Path, suffix: str) -> Path:
+    """scan4d_0001 with this suffix, or the next number that no file in the folder has."""
+    return next(path for n in count(1) if not (path := folder / f"scan4d_{n:04d}{suffix}").exists())

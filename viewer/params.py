@@ -50,7 +50,7 @@ class Parameter:
         else:
             try:
                 result = self.type(value)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 result = None
             if result is not None and self.type is float and not math.isfinite(result):
                 result = None

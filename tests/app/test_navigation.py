@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.app import navigation
 from viewer.camera import Camera
+from viewer.geometry import up_vector
 from viewer.gpu.view import View
 from viewer.scan.points import Bounds
 
@@ -57,6 +58,86 @@ def test_orbit_turns_the_subject_with_the_mouse(camera: Camera) -> None:
         shift = (pixel(moved, front) - pixel(camera, front)) * [1, -1]
         assert shift @ [right, up] > 0.05 * np.linalg.norm([right, up])
         assert abs(shift @ [up, right]) < 0.2 * np.linalg.norm(shift)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_orbit_keeps_the_pivot_at_its_pixel_and_the_subject_rigid(camera: Camera) -> None:
+    pivot = (0.5, -0.3, 0.8)
+    moved = camera
+    for right, up in [(0.2, 0.1), (-0.4, 0.3), (0.1, -0.6)]:
+        moved = navigation.orbit(moved, right, up, pivot)
+        assert pixel(moved, np.array(pivot)) == pytest.approx(pixel(camera, np.array(pivot)))
+    assert moved.distance == pytest.approx(camera.distance)
+    assert np.linalg.norm(moved.rotation() - camera.rotation()) > 0.5, "it has turned"
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_focusing_on_a_point_keeps_the_picture(camera: Camera) -> None:
+    point = (0.5, -0.3, 0.8)
+    focused = camera.focused(point)
+    assert focused.eye == camera.eye
+    others = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    for other in others:
+        assert pixel(focused, other) == pytest.approx(pixel(camera, other))
+    right, up = navigation.place(focused, point)
+    assert at_target_depth(focused, right, up) == pytest.approx(point), "at the target's depth"
+    # And so zooming and panning hold on to it.
+    for moved, shift in [
+        (navigation.wheel(focused, 3, (right, up), 1.0), (0, 0)),
+        (navigation.pan(focused, 0.1, 0.2), (0.1, 0.2)),
+    ]:
+        assert navigation.place(moved, point) == pytest.approx((right + shift[0], up + shift[1]))
+
+
+def test_a_point_behind_the_eye_is_no_pivot() -> None:
+    camera = CAMERAS[0]
+    behind = np.array(camera.eye) + camera.rotation()[2]
+    assert camera.focused(tuple(behind)) == camera
+    assert navigation.place(camera, tuple(behind)) is None
+    far = Camera(eye=(1e7, 1e7, 1e7), target=(1e7 - 1, 1e7 - 1e-3, 1e7))
+    beside = (1e7, float(np.nextafter(1e7, 0)), 1e7)
+    assert far.focused(beside) == far, "nor one that rounding puts into the eye"
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_place_is_the_pixel_in_heights(camera: Camera) -> None:
+    for point in np.random.default_rng(1).uniform(-1, 1, (20, 3)):
+        right, up = navigation.place(camera, tuple(point))
+        assert pixel(camera, point) == pytest.approx([150 + 200 * right, 100 - 200 * up])
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("up", ["+y", "-y", "+z", "-x"])
+def test_views_show_the_side_they_name(camera: Camera, up: str) -> None:
+    """A subject that stands upright and faces the front: its left hand, nose and crown."""
+    crown = np.array(up_vector(up), float)
+    nose = np.array({"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}[up[1]], float)
+    left = np.cross(crown, nose)
+    toward = {"front": nose, "back": -nose, "left": left, "right": -left, "top": crown, "bottom": -crown}
+    # Up in the picture; seen from the top or the bottom, the back of the head or the face.
+    above = {"top": -nose, "bottom": nose}
+    assert list(navigation.VIEWS) == list(toward)
+    for side, axis in toward.items():
+        seen = navigation.view_from(side, camera, BOUNDS, 1.5, up)
+        rotation = seen.rotation()
+        np.testing.assert_allclose(rotation[2], axis, atol=2e-5)
+        np.testing.assert_allclose(rotation[1], above.get(side, crown), atol=2e-5)
+        assert (seen.projection, seen.fov_y) == (camera.projection, camera.fov_y)
+        places = np.array([pixel(seen, corner) for corner in BOUNDS.corners()]) / SIZE
+        assert places.min() > 0
+        assert places.max() < 1
+        assert np.abs(places[:, 1] - 0.5).max() > 0.45, "fitted"
+
+
+@pytest.mark.parametrize("side", ["top", "bottom"])
+def test_from_the_poles_orbiting_turns_about_the_scans_up_without_a_jump(side: str) -> None:
+    seen = navigation.view_from(side, CAMERAS[0], BOUNDS, 1.5, "+y")
+    turned = navigation.orbit(seen, 0.25, 0)
+    np.testing.assert_allclose(turned.rotation()[2], seen.rotation()[2], atol=5e-5)
+    assert turned.rotation()[1] @ seen.rotation()[1] == pytest.approx(np.cos(np.pi / 4))
+    tilted = navigation.orbit(seen, 0, -0.25 if side == "bottom" else 0.25)
+    angle = np.degrees(np.arccos(tilted.rotation()[2] @ seen.rotation()[2]))
+    assert angle == pytest.approx(45, abs=0.01)
 
 
 def test_half_a_view_height_is_a_quarter_turn() -> None:

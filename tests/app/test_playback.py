@@ -5,11 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 from viewer.app.playback import Playback
+from viewer.app.player import Pace
 from viewer.app.session import Session
 from viewer.errors import InputError
 from viewer.scan.points import PointCloud
@@ -47,9 +49,18 @@ class Frames:
 def started() -> Iterator[Callable[..., tuple[Playback, Frames]]]:
     opened: list[tuple[Playback, Frames]] = []
 
-    def start(count: int = 10, broken: int | None = None) -> tuple[Playback, Frames]:
+    def start(
+        count: int = 10, broken: int | None = None, all_read: bool = False, **pace: Any
+    ) -> tuple[Playback, Frames]:
         source = Frames(count, broken)
-        opened.append((Playback(Timeline(source, np.arange(count) / 10), Session("scan")), source))
+        timeline = Timeline(source, np.arange(count) / 10)
+        playback = Playback(timeline, Session("scan", pace=Pace(**pace)))
+        opened.append((playback, source))
+        if all_read:
+            source.gate.release(1000)
+            timeline.prefetch(0)
+            until(lambda: [*map(len, timeline.cached())] == [count])
+            assert shown(playback, 0.0) == 0
         return opened[-1]
 
     yield start
@@ -132,3 +143,97 @@ def test_the_loop_begins_anew_at_the_latest_pose_behind(started: Callable) -> No
     playback.toggle(0.0)
     until(lambda: len(playback.timeline.cached()) == 1 and len(playback.timeline.cached()[0]) == 4)
     assert [shown(playback, t) for t in (0.05, 0.15, 0.25, 0.35, 0.45)] == [0, 1, 2, 3, 0]
+
+
+def test_frames_that_drawing_is_too_late_for_are_counted(started: Callable) -> None:
+    playback, _ = started(all_read=True)
+    playback.toggle(0.0)
+    assert [shown(playback, t) for t in (0.05, 0.11, 0.21)] == [0, 1, 2]
+    assert playback.dropped == 0
+    assert [shown(playback, t) for t in (0.55, 0.61, 0.85)] == [5, 6, 8]  # 3, 4 and 7 were late
+    assert playback.dropped == 3
+    assert shown(playback, 2.15) == 1  # 9, all of the next round and 0
+    assert playback.dropped == 3 + 12
+    playback.toggle(2.2)
+    playback.toggle(3.0)
+    assert playback.dropped == 0
+
+
+def test_frames_that_were_not_read_in_time_are_counted_broken_ones_not(started: Callable) -> None:
+    playback, source = started(broken=3)
+    source.gate.release()
+    until(lambda: shown(playback, 0.0) == 0)
+    playback.toggle(0.0)
+    assert shown(playback, 0.11) == 0
+    assert playback.dropped == 0  # 1 is late, but may still come
+    assert shown(playback, 0.21) == 0
+    assert playback.dropped == 1
+    source.gate.release(1000)
+    until(lambda: shown(playback, 0.22) == 2)
+    until(lambda: [*map(len, playback.timeline.cached())] == [3, 6])
+    assert [shown(playback, t) for t in (0.35, 0.45, 0.65)] == [2, 4, 6]
+    assert playback.dropped == 2
+
+
+def test_every_frame_waits_for_the_disk_and_drops_none(started: Callable) -> None:
+    playback, source = started(every_frame=True)
+    source.gate.release()
+    until(lambda: shown(playback, 0.0) == 0)
+    playback.toggle(0.0)
+    assert [shown(playback, t) for t in (0.11, 0.5, 7.0)] == [0, 0, 0]
+    source.gate.release()
+    until(lambda: shown(playback, 8.0) == 1)
+    source.gate.release(1000)
+    until(lambda: [*map(len, playback.timeline.cached())] == [10])
+    assert [shown(playback, t) for t in (8.09, 8.11, 8.9, 9.9)] == [1, 2, 3, 4]
+    assert playback.dropped == 0
+
+
+def test_every_frame_goes_on_past_a_broken_one(started: Callable) -> None:
+    playback, source = started(broken=2, every_frame=True)
+    source.gate.release(1000)
+    playback.timeline.prefetch(0)
+    until(lambda: playback.timeline.broken and sum(map(len, playback.timeline.cached())) == 9)
+    shown(playback, 0.0)
+    playback.toggle(0.0)
+    assert [shown(playback, t) for t in (0.15, 0.25, 0.35, 0.45)] == [1, 1, 3, 4]
+    assert playback.dropped == 0
+
+
+def test_reverse_reads_ahead_backwards_and_shows_the_latest_pose_behind(started: Callable) -> None:
+    playback, source = started(reverse=True)
+    source.gate.release()
+    until(lambda: shown(playback, 0.0) == 0)
+    playback.toggle(0.0)
+    until(lambda: source.loads == [0, 9])
+    source.gate.release()
+    until(lambda: shown(playback, 0.15) == 9)
+    until(lambda: source.loads == [0, 9, 8])
+    assert shown(playback, 0.35) == 9  # 7 is due
+    assert playback.dropped == 1
+    playback.change(0.35, reverse=False)
+    source.gate.release(1000)
+    until(lambda: shown(playback, 0.36) == 7)
+    until(lambda: shown(playback, 0.41) == 8)
+
+
+def test_a_change_outlives_the_scan(started: Callable) -> None:
+    playback, _ = started(all_read=True)
+    playback.change(0.0, speed=2.0, loop=False)
+    other = Playback(Timeline(Frames(3), np.arange(3) / 10), playback.session)
+    assert (other.player.pace.speed, other.player.pace.loop) == (2.0, False)
+    other.close()
+
+
+def test_the_rate_is_what_was_shown_lately(started: Callable) -> None:
+    playback, _ = started(all_read=True, speed=2.0)
+    playback.toggle(0.0)
+    assert playback.rate == 0
+    for step in range(1, 60):
+        shown(playback, step / 20 + 0.001)
+    assert playback.rate == pytest.approx(20)
+    assert playback.player.rate == pytest.approx(20)
+    for step in range(1, 20):
+        shown(playback, 3 + step / 5 + 0.002)  # drawn late: five pictures a second
+    assert playback.rate == pytest.approx(5)
+    assert playback.dropped == 4 + 18 * 3

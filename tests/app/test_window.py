@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,13 +16,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+from written import picture
 
-from viewer.backends import backend
+from viewer import cli
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame, shared_renderer
+from viewer.frame import render_frame, shared_renderer
 from viewer.gpu.surface import Surface
-from viewer.look import Look
+from viewer.gpu.view import View
+from viewer.pick import pick
+from viewer.recording import Recording
 from viewer.scan.open import open_scan
+from viewer.scan.points import Bounds
 
 SIZE = (1280, 720)
 
@@ -45,7 +51,8 @@ class Screenshot:
         from PIL import Image
 
         app.screen.do("key", "p")
-        with Image.open(app.expect(r"Saved (.+)")[1]) as file:
+        self.path = Path(app.expect(r"Saved (.+)")[1])
+        with Image.open(self.path) as file:
             self.description: dict[str, Any] = json.loads(file.text["scan4d"])  # type: ignore[attr-defined]
             self.pixels = np.asarray(file)
 
@@ -55,14 +62,38 @@ class Screenshot:
 
     def drawn_headless(self) -> NDArray[np.uint8]:
         """The same picture, made from its description without a window."""
-        d = self.description
-        surface = Surface(shared_renderer().gpu, tuple(d["size"]))
-        with open_scan(d["scan"]) as timeline:
-            pose = timeline.pose(d["pose"])
-        params = backend(d["backend"]).params(d["params"])
-        request = Request(pose, self.camera, d["backend"], params, Look(**d["look"]))
-        render_frame(shared_renderer(), request, surface)
-        return surface.image()
+        return replayed(self.path, "again.png")[0]
+
+    def surface(self) -> Surface:
+        """What each pixel of the same picture sees."""
+        (entry,) = Recording.load(self.path).entries
+        surface = Surface(shared_renderer().gpu, entry.size)
+        with open_scan(entry.scan) as timeline:
+            render_frame(shared_renderer(), entry.request(timeline.pose(entry.pose)), surface)
+        return surface
+
+
+def replayed(path: Path, out: str) -> list[NDArray[np.uint8]]:
+    """What `scan4d render --replay` makes of a picture or a recording, in a new folder beside it."""
+    folder = Path(tempfile.mkdtemp(dir=path.parent))
+    assert cli.main(["render", "--replay", str(path), "-o", str(folder / out)]) == 0
+    return [picture(file) for file in sorted(folder.iterdir())]
+
+
+def seen_pixel(surface: Surface) -> tuple[int, int]:
+    """The pixel nearest to a place off the centre of the picture whose neighbours show something too."""
+    seen = surface.level == 0
+    inside = seen[2:-2, 2:-2] & seen[:-4, 2:-2] & seen[4:, 2:-2] & seen[2:-2, :-4] & seen[2:-2, 4:]
+    y, x = np.nonzero(inside)
+    place = 0.45 * surface.size[0], 0.4 * surface.size[1]
+    nearest = np.hypot(x - place[0], y - place[1]).argmin()
+    return int(x[nearest]) + 2, int(y[nearest]) + 2
+
+
+def surface_view(camera: Camera, shot: Screenshot) -> View:
+    """Another camera's view of a screenshot's size; from the world's origin."""
+    box = Bounds(np.array(camera.target) - 1, np.array(camera.target) + 1)
+    return View.of(camera, tuple(shot.description["size"]), np.zeros(3), box)
 
 
 def difference(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> int:
@@ -92,7 +123,7 @@ def drag(app: RunningApp, button: int, start: tuple[int, int], end: tuple[int, i
 
 def on_track(share: float) -> tuple[int, int]:
     """A place on the timeline's track."""
-    return int(SIZE[0] * (0.25 + 0.74 * share)), SIZE[1] - 55
+    return int(SIZE[0] * (0.37 + 0.47 * share)), SIZE[1] - 78
 
 
 def test_opens_plays_scrubs_switches_and_saves_what_is_shown(hands: RunningApp) -> None:
@@ -152,7 +183,81 @@ def test_the_mouse_orbits_pans_zooms_and_f_fits(hands: RunningApp) -> None:
     assert fitted.rotation() == pytest.approx(turned.rotation(), abs=1e-9)
 
 
+def under_mouse(app: RunningApp, x: int, y: int) -> str:
+    app.screen.do("mousemove", x, y)
+    return app.expect(r"under the mouse: (.+)")[1]
+
+
+def test_the_line_under_the_timeline_says_what_is_seen(hands: RunningApp) -> None:
+    hands.screen.do("key", "f", "mousemove", *(v - 1 for v in SIZE))
+    hands.settle()
+    shot = Screenshot(hands)
+    surface = shot.surface()
+    x, y = seen_pixel(surface)
+    picked = pick(surface, x, y)
+    assert picked is not None
+    told = under_mouse(hands, x, y).split("; ")
+    assert [float(v) for v in told[0].rsplit(" ", 1)[0].split(", ")] == pytest.approx(
+        picked.position, abs=1e-2
+    )
+    assert told[1:3] == [f"frame {shot.description['pose'] + 1}/5", f"point {picked.id}, measured"]
+    assert "colour #" + bytes(picked.color[:3]).hex() in told
+    hands.screen.do("mousemove", 3, 3)
+    hands.expect(r"under the mouse: \n")
+
+
+def test_a_double_click_sets_the_point_that_the_view_turns_about(hands: RunningApp) -> None:
+    hands.screen.do("key", "f", "mousemove", *(v - 1 for v in SIZE))
+    hands.settle()
+    start = Screenshot(hands)
+    surface = start.surface()
+    x, y = seen_pixel(surface)
+    picked = pick(surface, x, y)
+    hands.screen.do("mousemove", x, y, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1)
+    hands.settle()
+    clicked = Screenshot(hands)
+    assert clicked.camera.eye == start.camera.eye
+    assert difference(clicked.pixels, start.pixels) <= 1, "nothing jumps"
+    drag(hands, 1, (400, 300), (500, 340))
+    turned = assert_true_picture(hands).camera
+    assert np.linalg.norm(turned.rotation() - start.camera.rotation()) > 0.3
+    assert np.linalg.norm(np.subtract(turned.target, start.camera.target)) > 0
+    where = surface_view(turned, start).project(picked.position[None])[0][0]
+    assert where == pytest.approx([x + 0.5, y + 0.5], abs=0.02)
+
+    # A double click on nothing changes nothing; fitting turns about the middle again.
+    hands.screen.do("mousemove", 3, 3, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1)
+    hands.settle()
+    assert Screenshot(hands).camera == turned
+    hands.screen.do("key", "f")
+    drag(hands, 1, (400, 300), (500, 300))
+    assert Screenshot(hands).camera.target == pytest.approx(start.camera.target)
+
+
+@pytest.mark.slow
+def test_views_and_projection_by_keys(hands: RunningApp) -> None:
+    """The subject's left side is on its left view, as the up axis and the front have it."""
+    backs = []
+    for number in range(1, 7):
+        hands.screen.do("keydown", "ctrl", "sleep", 0.1, "key", number, "sleep", 0.1, "keyup", "ctrl")
+        hands.settle()
+        backs.append(Screenshot(hands).camera.rotation()[2])
+    front, left, top = [0, 0, 1], [1, 0, 0], [0, 1, 0]
+    expected = np.array([front, np.negative(front), left, np.negative(left), top, np.negative(top)])
+    np.testing.assert_allclose(backs, expected, atol=1e-4)
+    hands.screen.do("key", "o")
+    hands.settle()
+    flat = assert_true_picture(hands)
+    assert flat.camera.projection == "orthographic"
+    hands.screen.do("keydown", "ctrl", "sleep", 0.1, "key", 1, "sleep", 0.1, "keyup", "ctrl", "sleep", 0.3)
+    hands.screen.do("key", "o")
+    hands.settle()
+    assert Screenshot(hands).camera.projection == "perspective"
+    hands.screen.do("key", "f")
+
+
 def test_idle_it_draws_nothing_and_takes_no_processor_time(hands: RunningApp) -> None:
+    hands.screen.do("mousemove", 470, 310)  # over the scan: a paused mouse asks for nothing new
     hands.settle(1.0)  # longer than a tooltip takes to appear
     frames, seconds = hands.log().count("drawn"), hands.cpu_seconds()
     time.sleep(5)
@@ -169,6 +274,62 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(hands: RunningApp) ->
     assert after.description["params"] == {"point_size": 32}
     drag(hands, 1, (1250, 82), (1000, 82))
     assert difference(Screenshot(hands).pixels, before.pixels) == 0
+
+
+def test_a_recording_holds_what_was_shown_and_is_drawn_again(
+    screen: Screen, tmp_path: Path, data_dir: Path
+) -> None:
+    with running_app(screen, tmp_path, data_dir / "sequences" / "hands_knot_5") as app:
+        red = is_red(screen.picture()[:60, :200]).sum()
+        screen.do("key", "r")
+        app.expect("Recording")
+        app.settle()
+        assert is_red(screen.picture()[:60, :200]).sum() > red + 50, "a mark says that it records"
+        shots = [Screenshot(app)]
+        for key, line in [
+            ("Right", "drew frame 1"), ("b", "drew frame 1 with surfels"), ("b", "drew frame 1 with points"),
+        ]:  # fmt: skip
+            screen.do("key", key)
+            app.expect(line)
+            app.settle()
+            shots.append(Screenshot(app))
+        drag(app, 1, (300, 300), (400, 300))
+        shots.append(Screenshot(app))
+        screen.do("key", "r")
+        path = Path(app.expect(r"Saved (.+\.json)")[1])
+        app.settle()
+        assert is_red(screen.picture()[:60, :200]).sum() == red
+        screen.do("key", "Right")
+        app.expect("drew frame 2")
+    recording = Recording.load(path)
+    entries = recording.entries
+    again = replayed(path, "%03d.png")
+    assert len(again) == len(entries)
+    assert all(one != other for one, other in itertools.pairwise(entries)), "no more than what changed"
+    assert [e.pose for e in entries] == [0] + [1] * (len(entries) - 1)
+    stamps = [entry.at for entry in entries]
+    assert stamps == sorted(stamps)
+    assert stamps[-1] < recording.seconds
+    described = [Recording.load(shot.path).entries[0] for shot in shots]
+    assert [entries[number] for number in (0, 1, 2, 3, -1)] == described
+    assert len(entries) > 5, "the camera moved in steps"
+    for number, shot in zip((0, 1, 2, 3, -1), shots, strict=True):
+        assert difference(again[number], shot.pixels) <= 1
+
+
+def is_red(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    red, green, blue = np.moveaxis(pixels.astype(int), 2, 0)
+    return (red > 180) & (green < 110) & (blue < 110)
+
+
+def test_closing_saves_what_is_being_recorded(screen: Screen, tmp_path: Path, data_dir: Path) -> None:
+    with running_app(screen, tmp_path, data_dir / "sequences" / "hands_knot_5" / "00001.ply") as app:
+        screen.do("key", "r")
+        app.expect("Recording")
+        screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
+        assert app.process.wait(PATIENCE) == 0
+        path = Path(app.expect(r"Saved (.+\.json)")[1])
+    assert [entry.pose for entry in Recording.load(path).entries] == [0]
 
 
 def test_escape_does_not_quit_and_ctrl_q_does(screen: Screen, tmp_path: Path, data_dir: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shutil
@@ -95,6 +96,11 @@ class RunningApp:
             assert running, f"the app has ended:\n{self.log()}"
             time.sleep(0.02)
         raise AssertionError(f"no '{pattern}' in:\n{self.log()[self._read :]}")
+
+    def frames(self) -> list[int]:
+        """All frames drawn so far, each one once while it stays."""
+        drawn = re.findall(r"drew frame (\d+) ", self.log())
+        return [int(frame) for frame, _ in itertools.groupby(drawn)]
 
     def settle(self, seconds: float = 0.4) -> None:
         """Wait until it has drawn nothing for so long."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -12,14 +12,18 @@ from typing import Any
 from ..backends import backends
 from ..camera import Camera
 from ..errors import InputError
+from ..export import write_picture
+from ..files import free_file
 from ..gpu.context import Gpu
 from ..look import Look
+from ..pick import Picked
+from ..recording import Entry, Recorder, fingerprint
 from ..scan.open import open_scan
 from ..scan.timeline import Timeline
-from . import layout, theme
+from . import layout, navigation, theme
 from .picture import Picture
 from .playback import Playback
-from .screenshot import save_screenshot
+from .pointed import describe
 from .session import Session
 from .window import Window
 
@@ -33,7 +37,10 @@ class App:
     """What the window shows and can do. Panels read it and call its commands.
 
     session: what the user has chosen. playback: the scan. picture: the 3D view.
-    notes: all that the user was told. gesture: what a drag in the view does, None without one.
+    recorder: takes down what is shown, None while nothing is recorded.
+    theme: of the panels. notes: all that the user was told. pointed: what the mouse points at,
+    None where at nothing; pointed_words: the same in words. gesture: what a drag in the view
+    does, None without one.
     """
 
     def __init__(
@@ -48,12 +55,16 @@ class App:
     ) -> None:
         self.scans = list(scans)
         self.session = Session(self.scans[0], look=Look(up=up))
+        self.theme = theme.DEFAULT
         self.notes: list[str] = []
+        self.pointed: Picked | None = None
+        self.pointed_words: list[str] = []
         self.gesture: str | None = None
+        self.recorder: Recorder | None = None
         self.opening: str | None = None
         self._opening: Future[Timeline] | None = None
         self._unit, self._fps, self._up = unit, fps, up
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="open")
+        self._worker = ThreadPoolExecutor(2, thread_name_prefix="open")
         self._reported: Any = None
         self.window = window
         self.picture = Picture(Gpu(window.ctx))
@@ -77,9 +88,34 @@ class App:
         """Play from the current frame, or pause."""
         self.playback.toggle(time.monotonic())
 
-    def toggle_loop(self) -> None:
-        """Play round the end, or stop there."""
-        self.playback.toggle_loop(time.monotonic())
+    def change_pace(self, **changes: Any) -> None:
+        """Change fields of the `Pace`: speed, direction, loop, mode."""
+        self.playback.change(time.monotonic(), **changes)
+        log.debug("%s", self.session.pace)
+
+    def change_speed(self, direction: int) -> None:
+        """Play faster for 1, slower for -1."""
+        self.change_pace(speed=self.session.pace.next_speed(direction))
+
+    def toggle_pace(self, field: str) -> None:
+        """Switch a field of the `Pace` on or off: reverse, loop or every_frame."""
+        self.change_pace(**{field: not getattr(self.session.pace, field)})
+
+    def set_theme(self, name: str) -> None:
+        """Show panels in the colours of one of `theme.PALETTES`; the picture's are the look's."""
+        self.theme = name
+        theme.set_colors(self.palette)
+        self.window.touch()
+
+    def next_theme(self) -> None:
+        """Dark to light and back."""
+        names = list(theme.PALETTES)
+        self.set_theme(names[(names.index(self.theme) + 1) % len(names)])
+
+    @property
+    def palette(self) -> theme.Palette:
+        """The colours of the panels."""
+        return theme.PALETTES[self.theme]
 
     def seek(self, index: int) -> None:
         """Go to a frame."""
@@ -94,6 +130,45 @@ class App:
         if self.playback.pose and self.session.camera:
             bounds = self.picture.bounds(self.playback.pose)
             self.session.camera = self.session.camera.fit(bounds, self._aspect)
+            self.session.pivot = None
+
+    def look_from(self, side: str) -> None:
+        """Show all of the current pose from a side of `navigation.VIEWS`."""
+        if self.playback.pose and self.session.camera:
+            bounds = self.picture.bounds(self.playback.pose)
+            camera, aspect = self.session.camera, self._aspect
+            self.session.camera = navigation.view_from(side, camera, bounds, aspect, self._up)
+            self.session.pivot = None
+
+    def project(self, projection: str) -> None:
+        """Show the same in a projection of `camera.PROJECTIONS`."""
+        if self.session.camera:
+            self.session.camera = self.session.camera.projected(projection)
+
+    def switch_projection(self) -> None:
+        """Perspective to orthographic and back."""
+        if self.session.camera:
+            is_flat = self.session.camera.projection == "orthographic"
+            self.project("perspective" if is_flat else "orthographic")
+
+    def point_at(self, pixel: tuple[int, int] | None) -> None:
+        """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
+        picked = self.picture.pick(pixel) if pixel else None
+        if picked is self.pointed:
+            return
+        self.pointed, self.pointed_words = picked, []
+        if picked is not None and self.picture.request is not None:
+            pose, timeline = self.picture.request.pose, self.playback.timeline
+            frame = f"frame {pose.index + 1}/{len(timeline)}"
+            self.pointed_words = describe(picked, frame, timeline.unit, self.picture.bounds(pose).radius)
+        log.debug("under the mouse: %s", "; ".join(self.pointed_words))
+
+    def set_pivot(self) -> None:
+        """Orbit about the surface under the mouse from now on; the picture stays as it is."""
+        if self.pointed and self.session.camera:
+            x, y, z = (float(v) for v in self.pointed.position)
+            self.session.pivot = x, y, z
+            self.session.camera = self.session.camera.focused(self.session.pivot)
 
     def next_backend(self) -> None:
         """Draw with the next backend."""
@@ -104,14 +179,46 @@ class App:
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, without panels, in the working directory."""
-        surface, request = self.picture.surface, self.picture.request
-        if not self.picture.is_there or surface is None or request is None:
+        surface, entry = self.picture.surface, self._shown()
+        if surface is None or entry is None:
             self.note("There is no picture to save.")
+        else:
+            self._save(".png", lambda path: write_picture(surface, path, entry.description()))
+
+    def toggle_recording(self) -> None:
+        """Take down what is shown from now on; or stop, and save it in the working directory."""
+        now = time.monotonic()
+        if self.recorder is None:
+            self.recorder = Recorder(now)
+            self._record()
+            self.note("Recording what is shown. R stops it.")
             return
+        recorder, self.recorder = self.recorder, None
+        if len(recorder):
+            self._save(".json", recorder.finish(now).save)
+        else:
+            self.note("Nothing was shown while recording.")
+
+    def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
+        """Write a file under the next free name, and say so."""
+        path = free_file(Path.cwd(), suffix)
         try:
-            self.note(f"Saved {save_screenshot(surface, request, self.session.scan, Path.cwd())}")
+            write(path)
+            self.note(f"Saved {path}")
         except InputError as error:
             self.note(str(error))
+
+    def _shown(self) -> Entry | None:
+        """What the picture shows, None where there is none."""
+        surface, request = self.picture.surface, self.picture.request
+        if not self.picture.is_there or surface is None or request is None:
+            return None
+        return Entry.of(request, self.session.scan, self._hash.result(), surface.size)
+
+    def _record(self) -> None:
+        """Take down what is shown where that is being recorded."""
+        if self.recorder is not None and (entry := self._shown()) is not None:
+            self.recorder.note(entry, time.monotonic())
 
     def open(self, scan: str) -> None:
         """Open another scan on a worker; the current one stays until it is there."""
@@ -162,6 +269,7 @@ class App:
     def _start(self, timeline: Timeline) -> Playback:
         self.picture.clear()
         self._messages_read = 0
+        self._hash = self._worker.submit(fingerprint, timeline.files)  # for what is saved
         self.window.title = f"{timeline.name} - Scan4D"
         return Playback(timeline, self.session)
 
@@ -171,7 +279,7 @@ class App:
         self._view_size = max(width, 1), max(height, 1)
         if self._draw_picture() and not self.moving:
             self.window.touch(frames=1)  # for what the panel says about it
-        self.window.fill(theme.PANEL)
+        self.window.fill(self.palette.panel)
         if self.picture.is_there:
             self.picture.present(left, bottom)
         self.window.end()
@@ -184,7 +292,10 @@ class App:
         if self.session.camera is None:
             bounds = self.picture.bounds(pose)
             self.session.camera = Camera.orbit(bounds, aspect=self._aspect, up=self._up)
-        return self.picture.draw(self.session.request(pose), self._view_size, self.moving)
+        drew = self.picture.draw(self.session.request(pose), self._view_size, self.moving)
+        if drew:
+            self._record()
+        return drew
 
     @property
     def moving(self) -> bool:
@@ -196,7 +307,9 @@ class App:
         return self._view_size[0] / self._view_size[1]
 
     def close(self) -> None:
-        """Let go of everything but the window."""
+        """Save what is being recorded, and let go of everything but the window."""
+        if self.recorder is not None:
+            self.toggle_recording()
         self._worker.shutdown(wait=False, cancel_futures=True)
         self.playback.close()
         self.picture.release()

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .app import App
 
 _PANEL_WIDTH = 21.0  # in heights of the font
-_BAR_HEIGHT = 4.8
+_BAR_HEIGHT = 6.2
 # No background: the window is filled with the panels' colour before.
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -40,6 +40,7 @@ def draw(app: App) -> tuple[float, float, float, float]:
     imgui.end()
     _place("timeline", 0, height, whole.x, whole.y - height)
     timeline_bar.draw(app)
+    view.draw_pointed(app)
     imgui.end()
     return 0, 0, width, height
 

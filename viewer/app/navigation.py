@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..camera import Camera
+from ..geometry import Vector
+from ..scan.points import Bounds
+
+# (azimuth, elevation) in degrees; left and right are the subject's. Just short of the poles,
+# a hundredth of a pixel, so that the scan's up axis stays the one that orbiting turns about.
+_POLE = 89.999
+VIEWS = {
+    "front": (0.0, 0.0),
+    "back": (180.0, 0.0),
+    "left": (90.0, 0.0),
+    "right": (-90.0, 0.0),
+    "top": (0.0, _POLE),
+    "bottom": (0.0, -_POLE),
+}
 
 _DEGREES_PER_HEIGHT = 180.0  # a drag over the whole height turns from one pole to the other
 _ZOOM_PER_HEIGHT = 8.0  # factor
@@ -10,9 +26,31 @@ _ZOOM_PER_NOTCH = 1.15  # factor
 _NEAREST, _FARTHEST = 1e-5, 1e3  # distances to the target, in radii of the scan
 
 
-def orbit(camera: Camera, right: float, up: float) -> Camera:
-    """The subject turns with the mouse, about the target."""
-    return camera.orbited(-right * _DEGREES_PER_HEIGHT, -up * _DEGREES_PER_HEIGHT)
+def view_from(side: str, camera: Camera, bounds: Bounds, aspect: float, up: str) -> Camera:
+    """All of the bounds seen from a side of `VIEWS`, in the camera's projection.
+
+    aspect: width / height of the view. up: the scan's up axis.
+    """
+    azimuth, elevation = VIEWS[side]
+    return Camera.orbit(
+        bounds, azimuth, elevation, aspect=aspect, up=up, fov_y=camera.fov_y, projection=camera.projection
+    )
+
+
+def place(camera: Camera, point: Vector) -> tuple[float, float] | None:
+    """Where a point is in the picture: to the right of and above its centre; None behind the eye."""
+    right, up, back = camera.rotation() @ np.subtract(point, camera.eye)
+    if back >= 0:
+        return None
+    height = camera.view_height
+    if camera.projection == "perspective":
+        height *= -back / camera.distance
+    return float(right / height), float(up / height)
+
+
+def orbit(camera: Camera, right: float, up: float, pivot: Vector | None = None) -> Camera:
+    """The subject turns with the mouse, about the pivot, which keeps its place; None: the target."""
+    return camera.orbited(-right * _DEGREES_PER_HEIGHT, -up * _DEGREES_PER_HEIGHT, pivot)
 
 
 def pan(camera: Camera, right: float, up: float) -> Camera:

@@ -13,6 +13,7 @@ from ..frame import Request, render_frame
 from ..gpu.context import Gpu
 from ..gpu.present import Presenter
 from ..gpu.surface import Surface
+from ..pick import Picked, pick
 from ..renderer import Renderer
 from ..scan.points import Bounds
 from ..scan.pose import Pose
@@ -41,6 +42,7 @@ class Picture:
         self._drawn: Any = None
         self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
+        self._picked: tuple[tuple[int, int], Picked | None] | None = None
 
     def draw(self, request: Request, size: tuple[int, int], moving: bool) -> bool:
         """Draw a request, unless the picture already shows it; whether it did. size: pixels."""
@@ -51,6 +53,7 @@ class Picture:
         if wanted == self._drawn and time.monotonic() < self.better_at:
             return False
         self._drawn, self.request, self.problem, self.better_at = wanted, request, None, math.inf
+        self._picked = None
         try:
             surface = self._surface_of(size)
             refinable = render_frame(self.renderer, request, surface, wait=False, moving=moving)
@@ -82,9 +85,17 @@ class Picture:
         if self.surface is not None:
             self._presenter.present(self.surface, left, bottom)
 
+    def pick(self, pixel: tuple[int, int]) -> Picked | None:
+        """What a pixel shows, without its spacing; read from the GPU once for each place and picture."""
+        if self.surface is None or not self.is_there:
+            return None
+        if self._picked is None or self._picked[0] != pixel:
+            self._picked = pixel, pick(self.surface, *pixel, spacing=False)
+        return self._picked[1]
+
     def clear(self) -> None:
         """Show nothing until the next request."""
-        self._drawn = self.request = self.problem = self._bounded = None
+        self._drawn = self.request = self.problem = self._bounded = self._picked = None
         self.better_at = math.inf
 
     def bounds(self, pose: Pose) -> Bounds:

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
 from ..errors import InputError
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from .player import Player
 from .session import Session
 
+_RATE_SPAN = 1.0  # seconds over which shown frames are counted, longer where few are due
+_RATE_FRAMES = 4
+
 
 class Playback:
     """Moves `session.index` along a timeline and finds the pose to show.
 
     pose: the one that is shown, None before the first. Where reading is slower than
-    playing, it is the latest one that is there.
+    playing, it is the latest one that is there. dropped: readable frames that were not there
+    at their time, since playing began; none where every frame is shown.
     """
 
     def __init__(self, timeline: Timeline, session: Session) -> None:
         self.timeline = timeline
         self.session = session
-        self.player = Player(timeline.times)
+        self.player = Player(timeline.times, session.pace)
         self.pose: Pose | None = None
+        self.dropped = 0
+        self._shown: deque[float] = deque()  # when poses were, lately
         session.index = min(session.index, len(timeline) - 1)
         timeline.request(session.index)
 
@@ -39,14 +49,18 @@ class Playback:
         if self.player.playing:
             self.player.pause()
         else:
+            self.dropped = 0
+            self._shown.clear()
             self.session.index = self.player.play(self.session.index, now)
-            self.timeline.prefetch(self.session.index)
+            self._read_ahead()
 
-    def toggle_loop(self, now: float) -> None:
-        """Play round the end, or stop there."""
-        self.player.loop = not self.player.loop
+    def change(self, now: float, **changes: Any) -> None:
+        """Change fields of the `Pace`; playing goes on from the frame shown."""
+        self.session.pace = replace(self.session.pace, **changes)
+        self.player.change(self.session.pace, now)
+        self._shown.clear()
         if self.player.playing:
-            self.player.play(self.session.index, now)
+            self._read_ahead()
 
     def seek(self, index: int, now: float) -> None:
         """Go to a frame; playing goes on from there."""
@@ -54,8 +68,7 @@ class Playback:
             return
         self.session.index = index
         self.timeline.request(index)
-        if self.player.playing:
-            self.player.play(index, now)
+        self.player.enter(index, now)
 
     def step(self, count: int, now: float) -> None:
         """Pause, and go some frames on."""
@@ -64,19 +77,39 @@ class Playback:
 
     def advance(self, now: float) -> None:
         """Take in what time and the timeline's worker have brought."""
-        index = self.player.due(self.session.index, now)
-        if index != self.session.index:
-            self.session.index = index
-            self.timeline.prefetch(index)
-        self.pose = self._best_pose() or self.pose
+        late = self.waiting
+        if late and self.session.pace.every_frame:
+            self.player.enter(self.session.index, now)  # its time begins when it is there
+        if frames := self.player.due(now):
+            missed = ([self.session.index] if late else []) + frames[:-1]
+            self.dropped += len([frame for frame in missed if frame not in self.timeline.broken])
+            self.session.index = frames[-1]
+            self._read_ahead()
+        pose = self._best_pose()
+        if pose is not None and pose is not self.pose:
+            self.pose = pose
+            self._shown.append(now)
+        span = max(_RATE_SPAN, _RATE_FRAMES / self.player.rate)
+        while self._shown and self._shown[0] < now - span:
+            self._shown.popleft()
+
+    @property
+    def rate(self) -> float:
+        """Frames a second that were shown lately; 0 until there are two."""
+        seconds = self._shown[-1] - self._shown[0] if self._shown else 0.0
+        return (len(self._shown) - 1) / seconds if seconds else 0.0
+
+    def _read_ahead(self) -> None:
+        self.timeline.prefetch(self.session.index, self.session.pace.direction)
 
     def _best_pose(self) -> Pose | None:
-        wanted = self.session.index
+        wanted, pace = self.session.index, self.session.pace
         pose = self.timeline.ready(wanted)
-        if pose is not None or self.pose is None or not self.player.playing:
+        if pose is not None or self.pose is None or pace.every_frame or not self.player.playing:
             return pose
         held = [self.pose.index, *(index for run in self.timeline.cached() for index in run)]
-        return self.timeline.ready(min(held, key=lambda index: (wanted - index) % len(self.timeline)))
+        nearest = min(held, key=lambda index: (wanted - index) * pace.direction % len(self.timeline))
+        return self.timeline.ready(nearest)
 
     def close(self) -> None:
         """Stop reading."""

@@ -10,65 +10,120 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from numpy.typing import NDArray
 
 from . import theme, widgets
+from .player import SPEEDS
 
 if TYPE_CHECKING:
     from .app import App
 
-_TRACK, _CACHED, _BROKEN, _HEAD = 0x33383F, 0x4A6B86, 0xD2544B, 0xF0F2F5
+_SPEED_WIDTH = 4.6  # in heights of the font
+_SHORTEST_TRACK = 8.0
 
 
 def draw(app: App) -> None:
     """Declare the bar in the current ImGui window."""
-    playback = app.playback
-    player, several = playback.player, len(playback.timeline) > 1
-    if widgets.icon_button(icons.ICON_FA_STEP_BACKWARD, "Previous frame (Left)", several):
-        app.step(-1)
-    imgui.same_line()
-    icon = icons.ICON_FA_PAUSE if player.playing else icons.ICON_FA_PLAY
-    if widgets.icon_button(icon, "Play or pause (Space)", several):
-        app.toggle_play()
-    imgui.same_line()
-    if widgets.icon_button(icons.ICON_FA_STEP_FORWARD, "Next frame (Right)", several):
-        app.step(1)
-    imgui.same_line()
-    loop = imgui.checkbox("loop", player.loop)[0]
-    imgui.set_item_tooltip("Play round the end (L)")
-    if loop:
-        app.toggle_loop()
-    imgui.same_line()
+    several = len(app.playback.timeline) > 1
+    imgui.begin_disabled(not several)
+    _draw_steps(app)
+    _draw_pace(app)
+    imgui.end_disabled()
     _draw_place(app)
-    imgui.same_line()
-    _draw_track(app)
+    report = _report(app) if app.playback.player.playing else ""
+    # Its width stays while it says nothing: the track must not move under the mouse.
+    room = imgui.calc_text_size("100 of 100 fps, 10000 dropped").x + imgui.get_style().item_spacing.x
+    width = imgui.get_content_region_avail().x
+    is_wide = several and width - room > _SHORTEST_TRACK * imgui.get_font_size()
+    _draw_track(app, width - room if is_wide else width)
+    if is_wide:
+        imgui.same_line()
+        imgui.text_disabled(report)
+        imgui.set_item_tooltip(
+            "Frames a second that are shown, and that the scan has at this speed; frames that were left out, "
+            "as they were not read or drawn at their time"
+        )
     _draw_status(app)
+
+
+def _draw_steps(app: App) -> None:
+    """Buttons that go somewhere or start to."""
+    playing = app.playback.player.playing
+    for icon, tooltip, act in (
+        (icons.ICON_FA_FAST_BACKWARD, "First frame (Home)", lambda: app.seek(0)),
+        (icons.ICON_FA_STEP_BACKWARD, "Previous frame (Left)", lambda: app.step(-1)),
+        (icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY, "Play or pause (Space)", app.toggle_play),
+        (icons.ICON_FA_STEP_FORWARD, "Next frame (Right)", lambda: app.step(1)),
+    ):
+        if widgets.icon_button(icon, tooltip):
+            act()
+        imgui.same_line()
+
+
+def _draw_pace(app: App) -> None:
+    """How it plays."""
+    pace, accent = app.session.pace, app.palette.accent
+    for icon, tooltip, field in (
+        (icons.ICON_FA_REDO, "Play round the end (L)", "loop"),
+        (icons.ICON_FA_BACKWARD, "Play backward (Shift+Space)", "reverse"),
+        (
+            icons.ICON_FA_FILM,
+            "Show every frame, however long it takes, rather than keep time (E)",
+            "every_frame",
+        ),
+    ):
+        if widgets.icon_button(icon, tooltip, accent if getattr(pace, field) else None):
+            app.toggle_pace(field)
+        imgui.same_line()
+    imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())
+    titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
+    chosen = float(widgets.choose("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
+    imgui.set_item_tooltip("Speed: slower ([), faster (]), 1x (Backspace)")
+    if chosen != pace.speed:
+        app.change_pace(speed=chosen)
+    imgui.same_line()
 
 
 def _draw_place(app: App) -> None:
     """Time and frame, in a width that does not change while playing."""
     timeline, index = app.playback.timeline, app.session.index
-    last = f"{timeline.times[-1]:.2f} s    {len(timeline)}/{len(timeline)}"
     left = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
-    imgui.text(f"{timeline.times[index]:.2f} s    {index + 1}/{len(timeline)}")
+    imgui.text(_place(timeline.times[index], index, len(timeline)))
     imgui.set_item_tooltip(timeline.label(index))
-    imgui.same_line(left + imgui.calc_text_size(last).x + imgui.get_font_size())
+    widest = max(
+        imgui.calc_text_size(_place(time, len(timeline) - 1, len(timeline))).x
+        for time in (timeline.times[0], timeline.times[-1])
+    )
+    imgui.same_line(left + widest + imgui.get_font_size())
 
 
-def _draw_track(app: App) -> None:
-    """The frames over time: cached ones lighter, broken ones red. A press or a drag goes there."""
-    size = ImVec2(imgui.get_content_region_avail().x, imgui.get_frame_height())
+def _place(time: float, index: int, count: int) -> str:
+    return f"{time:.2f} s    {index + 1}/{count}"
+
+
+def _report(app: App) -> str:
+    playback, pace = app.playback, app.session.pace
+    shown, due = (
+        f"{rate:.0f}" if playback.player.rate >= 10 else f"{rate:.1f}"
+        for rate in (playback.rate, playback.player.rate)
+    )
+    return f"{shown} of {due} fps, " + ("every frame" if pace.every_frame else f"{playback.dropped} dropped")
+
+
+def _draw_track(app: App, width: float) -> None:
+    """The frames over time: cached ones coloured, broken ones red. A press or a drag goes there."""
+    size = ImVec2(width, imgui.get_frame_height())
     if size.x < 1:
         return
     imgui.invisible_button("track", size)
-    playback = app.playback
+    playback, palette = app.playback, app.palette
     track = _Track(playback.player.edges, imgui.get_item_rect_min(), size)
     if imgui.is_item_active() or imgui.is_item_deactivated():
         app.seek(playback.player.frame_at(track.time(imgui.get_mouse_pos().x)))
-    track.bar(0, len(playback.timeline), _TRACK)
+    track.bar(0, len(playback.timeline), palette.frame[0])
     for run in playback.timeline.cached():
-        track.bar(run.start, run.stop, _CACHED)
+        track.bar(run.start, run.stop, palette.cached)
     for index in playback.timeline.broken:
-        track.bar(index, index + 1, _BROKEN)
-    track.head(app.session.index, _HEAD if playback.problem is None else _BROKEN)
+        track.bar(index, index + 1, palette.broken)
+    track.head(app.session.index, palette.text if playback.problem is None else palette.broken)
 
 
 class _Track:
@@ -102,13 +157,17 @@ class _Track:
 
 
 def _draw_status(app: App) -> None:
+    """The latest message, and the names of scan and frame, shortened where they are long."""
     imgui.spacing()
     playback = app.playback
-    name = f"{playback.timeline.name}   {playback.timeline.label(app.session.index)}"
-    right = imgui.get_content_region_avail().x - imgui.calc_text_size(name).x
+    width, gap = imgui.get_content_region_avail().x, 2 * imgui.get_font_size()
+    names = playback.timeline.name, playback.timeline.label(app.session.index)
+    name = "   ".join(widgets.shortened(one, width / 4) for one in names)
+    left = width - imgui.calc_text_size(name).x
     if app.notes:
-        imgui.text_disabled(app.notes[-1])
+        imgui.text_disabled(widgets.shortened(app.notes[-1], left - gap))
         imgui.set_item_tooltip(app.notes[-1])
         imgui.same_line()
-    imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + right)
+    imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)
     imgui.text_disabled(name)
+    imgui.set_item_tooltip("\n".join(names))

@@ -2,33 +2,55 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
 from ..camera import Camera
+from ..geometry import Vector
 from . import navigation, theme
 
 if TYPE_CHECKING:
     from .app import App
+
+_PIVOT = 0xF0C24B
+_POINTED, _GAP = "Under the mouse: ", "    "
 
 _BUTTONS = (
     imgui.ButtonFlags_.mouse_button_left
     | imgui.ButtonFlags_.mouse_button_middle
     | imgui.ButtonFlags_.mouse_button_right
 )
+_RED = 0xE0483E  # 0xRRGGBB
 
 
 def draw(app: App) -> None:
     """Declare the view in the current ImGui window, which it fills."""
     size = imgui.get_content_region_avail()
     imgui.invisible_button("view", size, _BUTTONS)
+    app.point_at(_pixel(app) if imgui.is_item_hovered() else None)
     if app.session.camera is not None and app.playback.pose is not None:
         radius = app.picture.bounds(app.playback.pose).radius
+        if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
+            app.set_pivot()
         app.session.camera = _navigate(app, app.session.camera, size, radius)
+        if app.session.pivot and imgui.is_item_hovered():
+            _draw_pivot(app.session.camera, app.session.pivot, size)
     text = _note(app)
     if text:
         _draw_note(text, size)
+    if app.recorder is not None:
+        _draw_recording_mark()
+
+
+def draw_pointed(app: App) -> None:
+    """Declare the line that says what is under the mouse: as much of it as there is room for."""
+    words = app.pointed_words
+    room = imgui.get_content_region_avail().x
+    while words and imgui.calc_text_size(text := _POINTED + _GAP.join(words)).x > room:
+        words = words[:-1]
+    imgui.text_disabled(text if words else "")
 
 
 def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
@@ -40,15 +62,35 @@ def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
         right, up = io.mouse_delta.x / size.y, -io.mouse_delta.y / size.y
         if app.gesture == "zoom":
             camera = navigation.zoom(camera, up, radius)
+        elif app.gesture == "pan":
+            camera = navigation.pan(camera, right, up)
         else:
-            move = navigation.orbit if app.gesture == "orbit" else navigation.pan
-            camera = move(camera, right, up)
+            camera = navigation.orbit(camera, right, up, app.session.pivot)
     if not imgui.is_item_active():
         app.gesture = None
     if imgui.is_item_hovered() and io.mouse_wheel:
         at = imgui.get_mouse_pos() - imgui.get_item_rect_min() - size * 0.5
         camera = navigation.wheel(camera, io.mouse_wheel, (at.x / size.y, -at.y / size.y), radius)
     return camera
+
+
+def _pixel(app: App) -> tuple[int, int]:
+    """The picture's pixel under the mouse."""
+    at = (imgui.get_mouse_pos() - imgui.get_item_rect_min()) * app.window.pixel_ratio
+    return math.floor(at.x), math.floor(at.y)
+
+
+def _draw_pivot(camera: Camera, pivot: Vector, size: ImVec2) -> None:
+    """A ring round the point that the view turns about."""
+    place = navigation.place(camera, pivot)
+    if place is None:
+        return
+    center = imgui.get_item_rect_min() + size * 0.5 + ImVec2(place[0] * size.y, -place[1] * size.y)
+    radius = 0.4 * imgui.get_font_size()
+    draw_list = imgui.get_window_draw_list()
+    # Light on dark, so that it is seen on any surface.
+    draw_list.add_circle(center, radius, theme.packed(0x000000, 0.6), thickness=0.25 * radius + 2)
+    draw_list.add_circle(center, radius, theme.packed(_PIVOT), thickness=0.25 * radius)
 
 
 def _gesture(io: imgui.IO) -> str:
@@ -80,8 +122,21 @@ def _draw_note(text: str, size: ImVec2) -> None:
     corner = ImVec2((size.x - extent.x) / 2, 2 * em)
     draw_list = imgui.get_window_draw_list()
     pad = ImVec2(em, 0.6 * em)
-    draw_list.add_rect_filled(corner - pad, corner + extent + pad, theme.packed(theme.PANEL, 0.92), 0.4 * em)
+    behind = imgui.get_color_u32(imgui.Col_.window_bg, 0.92)
+    draw_list.add_rect_filled(corner - pad, corner + extent + pad, behind, 0.4 * em)
     imgui.set_cursor_pos(corner)
     imgui.push_text_wrap_pos(corner.x + wrap)
     imgui.text_unformatted(text)
     imgui.pop_text_wrap_pos()
+
+
+def _draw_recording_mark() -> None:
+    """A red dot in the upper left corner."""
+    em, text = imgui.get_font_size(), "recording"
+    corner, extent = ImVec2(em, em), imgui.calc_text_size(text)
+    draw_list = imgui.get_window_draw_list()
+    corners = corner, corner + ImVec2(extent.x + 2.4 * em, extent.y + 0.8 * em)
+    draw_list.add_rect_filled(*corners, imgui.get_color_u32(imgui.Col_.window_bg, 0.92), 0.4 * em)
+    draw_list.add_circle_filled(corner + ImVec2(em, 0.4 * em + extent.y / 2), 0.36 * em, theme.packed(_RED))
+    imgui.set_cursor_pos(corner + ImVec2(1.8 * em, 0.4 * em))
+    imgui.text_unformatted(text)

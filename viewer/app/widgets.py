@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ..look import rgba
 from ..params import Parameter, describe
+from . import theme
 
 T = TypeVar("T")
 _LABEL_SHARE = 0.46  # of the width
@@ -119,11 +121,21 @@ def _edit_text(name: str, value: str) -> str:
     return new if entered else value
 
 
-def icon_button(icon: str, tooltip: str, enabled: bool = True) -> bool:
-    """A square button with one icon; True when it is pressed."""
-    imgui.begin_disabled(not enabled)
+def shortened(text: str, width: float) -> str:
+    """As much of a text as there is room for, with an ellipsis where it is not all."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    kept = bisect(range(len(text)), width, key=lambda length: imgui.calc_text_size(text[:length] + "...").x)
+    return text[: max(kept - 1, 0)] + "..."
+
+
+def icon_button(icon: str, tooltip: str, color: int | None = None) -> bool:
+    """A square button with one icon; True when it is pressed. color: 0xRRGGBB of the icon."""
     side = imgui.get_frame_height()
+    if color is not None:
+        imgui.push_style_color(imgui.Col_.text, theme.packed(color))
     pressed = imgui.button(icon, ImVec2(1.3 * side, side))
-    imgui.end_disabled()
+    if color is not None:
+        imgui.pop_style_color()
     imgui.set_item_tooltip(tooltip)
     return pressed

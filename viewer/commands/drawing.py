@@ -10,12 +10,29 @@ import numpy as np
 
 from .. import frame
 from ..camera import Camera
+from ..frame import Request
 from ..gpu.context import headless
 from ..gpu.surface import Surface
+from ..recording import Entry
 from ..renderer import Renderer
 from ..scan.points import Bounds
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Pictures to draw.
+
+    count: how many are drawn. size: of the first one, and of a film. fps: of a film.
+    pictures: number of the file, request, and entry that tells all of it; where one request
+    comes several times in a row, its picture is put several times and drawn once.
+    """
+
+    count: int
+    size: tuple[int, int]
+    fps: float
+    pictures: Iterator[tuple[int, Request, Entry]]
 
 
 @dataclass(frozen=True)
@@ -58,11 +75,31 @@ def renderer(device: int | None) -> Renderer:
 
 
 @contextmanager
+def canvases(
+    device: int | None, size: tuple[int, int]
+) -> Iterator[tuple[Renderer, Callable[[tuple[int, int]], Surface]]]:
+    """A headless renderer, and a function that gives the surface of a size; it holds one at a time.
+
+    size: of the first one. Raises InputError where that cannot be drawn.
+    """
+    its_renderer = renderer(device)
+    held = [Surface(its_renderer.gpu, size)]
+
+    def surface_of(size: tuple[int, int]) -> Surface:
+        if held[-1].size != size:
+            held.pop().release()
+            held.append(Surface(its_renderer.gpu, size))
+        return held[-1]
+
+    try:
+        yield its_renderer, surface_of
+    finally:
+        for surface in held:
+            surface.release()
+
+
+@contextmanager
 def canvas(device: int | None, size: tuple[int, int]) -> Iterator[tuple[Renderer, Surface]]:
     """A headless renderer and a surface to draw to."""
-    its_renderer = renderer(device)
-    surface = Surface(its_renderer.gpu, size)
-    try:
-        yield its_renderer, surface
-    finally:
-        surface.release()
+    with canvases(device, size) as (its_renderer, surface_of):
+        yield its_renderer, surface_of(size)

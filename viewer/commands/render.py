@@ -2,7 +2,8 @@
 
 OUT is a .png, .exr or .npz file, a .mp4 film, or for several pictures a numbered pattern
 such as out%04d.png. PNG and MP4 show the look; EXR and NPZ hold what each pixel sees.
-The camera is fitted to the first pose drawn and stays where it is.
+The camera is fitted to the first pose drawn and stays where it is. --replay draws again what
+a recording or a picture tells.
 """
 
 from __future__ import annotations
@@ -12,35 +13,44 @@ import math
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError
-from ..export import FILM_SUFFIX, PICTURE_SUFFIXES, check_output, pictures
+from ..export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, check_output, pictures
 from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look
 from ..measure import draw
 from ..params import parse
+from ..recording import Entry, fingerprint
+from ..scan.open import DEMO
 from ..scan.timeline import Timeline
-from . import drawing, stats
+from . import drawing, replay, stats
 from .console import progress
-from .drawing import Shot
+from .drawing import Plan, Shot
 from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline, read_poses
+
+_SIZE = (1920, 1280)
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d render`."""
-    parser.add_argument("scan", metavar="SCAN", nargs="?", default="demo", help=SCAN_HELP)
+    parser.add_argument("scan", metavar="SCAN", nargs="?", help=SCAN_HELP)
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
         help=".png .exr .npz .mp4, or a pattern with %%04d",
     )  # fmt: skip
+    parser.add_argument(
+        "--replay", type=Path, metavar="FILE",
+        help="draw again what a recording (.json) or a picture (.png, .exr) tells; takes no SCAN",
+    )  # fmt: skip
     add_pose_arguments(parser)
     picture = parser.add_argument_group("the picture")
-    picture.add_argument("--size", type=_size, default=(1920, 1280), metavar="WxH", help="default 1920x1280")
+    picture.add_argument("--size", type=_size, metavar="WxH", help="default 1920x1280")
     picture.add_argument(
         "--backend", metavar="NAME", help="default: surfels where normals are stored, else points"
     )
@@ -55,7 +65,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     camera = parser.add_argument_group("from where").add_mutually_exclusive_group()
     camera.add_argument("--camera", type=Camera.load, metavar="FILE.json", help="as a file has it")
     camera.add_argument(
-        "--orbit", type=_orbit, default=(0.0, 0.0), metavar="AZIMUTH,ELEVATION[,DISTANCE]",
+        "--orbit", type=_orbit, metavar="AZIMUTH,ELEVATION[,DISTANCE]",
         help="degrees, and scan units; without a distance, fitted",
     )  # fmt: skip
     camera.add_argument(
@@ -74,32 +84,51 @@ def run(args: Namespace) -> int:
         raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
     if args.stats:
         check_output(args.stats, (".json",), several=False)
+    with (replay.planned if args.replay else _planned)(args) as plan:
+        _draw(plan, args)
+    print(args.out)
+    return 0
+
+
+@contextmanager
+def _planned(args: Namespace) -> Iterator[Plan]:
+    """The pictures that the arguments describe."""
     look, values = parse(Look, {"up": args.up, **dict(args.look)}, "look"), dict(args.set)
     if args.backend:
         find_backend(args.backend).params(values)  # wrong names are told before anything is read
-    with open_timeline(args, args.scan) as timeline:
+    scan, size = args.scan or DEMO, args.size or _SIZE
+    with open_timeline(args, scan) as timeline:
         indices = chosen_poses(args, timeline) or [0]
         shots = drawing.shots(indices, args.turntable)
-        check_output(args.out, (*PICTURE_SUFFIXES, FILM_SUFFIX), several=len(shots) > 1)
+        check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
         fps = drawing.film_rate(timeline, indices, args.fps)
-        draws = len(shots) * stats.draw_count(args.repeat)
-        frames = []
-        with (
-            drawing.canvas(args.device, args.size) as (renderer, surface),
-            pictures(args.out, args.size, fps) as put,
-            progress(draws) as tick,
-        ):
-            for shot, request in _requests(args, timeline, shots, look, values):
-                if args.stats:
-                    frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
-                else:
-                    draw(renderer, request, surface)
-                    tick()
-                put(surface, shot.number)
-            if args.stats:
-                _write_json(stats.summary(renderer, surface, request, frames), args.stats)
-    print(args.out)
-    return 0
+        hash = fingerprint(timeline.files) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
+        pictures = (
+            (shot.number, request, Entry.of(request, scan, hash, size))
+            for shot, request in _requests(args, timeline, shots, size, look, values)
+        )
+        yield Plan(len(shots), size, fps, pictures)
+
+
+def _draw(plan: Plan, args: Namespace) -> None:
+    """Draw a plan, and write its pictures and what they took."""
+    frames, drawn = [], None
+    with (
+        drawing.canvases(args.device, plan.size) as (renderer, surface_of),
+        pictures(args.out, plan.size, plan.fps) as put,
+        progress(plan.count * stats.draw_count(args.repeat)) as tick,
+    ):
+        for number, request, entry in plan.pictures:
+            surface = surface_of(entry.size)
+            if request is not drawn and args.stats:
+                frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
+            elif request is not drawn:
+                draw(renderer, request, surface)
+                tick()
+            drawn = request
+            put(surface, number, entry.description())
+        if args.stats:
+            _write_json(stats.summary(renderer, surface, request, frames), args.stats)
 
 
 def _write_json(data: dict[str, Any], path: Path) -> None:
@@ -111,12 +140,13 @@ def _requests(
     args: Namespace,
     timeline: Timeline,
     shots: list[Shot],
+    size: tuple[int, int],
     look: Look,
     values: dict[str, object],
 ) -> Iterator[tuple[Shot, Request]]:
     """What to draw for each shot. The first pose settles the backend, several the camera."""
     chosen = None
-    camera_of = _camera(args, timeline, shots)
+    camera_of = _camera(args, timeline, shots, size)
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or choose(pose.cloud, args.backend, values)
         for shot in shots:
@@ -124,15 +154,17 @@ def _requests(
                 yield shot, Request(pose, camera_of(shot), *chosen, look)
 
 
-def _camera(args: Namespace, timeline: Timeline, shots: list[Shot]) -> Callable[[Shot], Camera]:
+def _camera(
+    args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int]
+) -> Callable[[Shot], Camera]:
     """The camera of each shot."""
     if args.camera:
         return lambda shot: args.camera
-    aspect = args.size[0] / args.size[1]
+    aspect = size[0] / size[1]
     bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:
         return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, args.up)
-    camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=args.up)
+    camera = Camera.orbit(bounds, *(args.orbit or ()), aspect=aspect, up=args.up)
     return lambda shot: camera
 
 

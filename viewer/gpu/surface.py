@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -19,6 +20,7 @@ from .pose import FORMATS, GpuPose
 from .view import View
 
 NOTHING = 0xFFFFFFFF
+EMPTY = 255  # the level of a pixel that shows nothing
 _CHUNK = 1 << 20  # points counted at a time
 _OWN_BYTES = {"normals": 12, "colors": 4}  # a pixel
 
@@ -39,6 +41,14 @@ class Stats:
     derive_ms: float = 0.0
     passes: list[tuple[str, float]] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+
+
+class Texel(NamedTuple):
+    """One pixel of a Surface, as its properties of the same names have it."""
+
+    depth: float
+    row: int
+    level: int
 
 
 class Surface:
@@ -200,7 +210,15 @@ class Surface:
     @property
     def level(self) -> NDArray[np.uint8]:
         """(H, W) uint8: 0 measured, 255 nothing."""
-        return np.where(self.row != NOTHING, 0, 255).astype(np.uint8)
+        return _levels(self.row)
+
+    def texel(self, x: int, y: int) -> Texel:
+        """One pixel, without copying the others. x: from the left, y: from the top."""
+        self.gpu.activate()
+        place = 4 * (y * self.size[0] + x)
+        depth = np.frombuffer(self.depths.buffer.read(4, offset=place), np.float32)[0]
+        row = np.frombuffer(self.rows.buffer.read(4, offset=place), np.uint32)[0]
+        return Texel(float(depth), int(row), int(_levels(row)))
 
     @property
     def value(self) -> NDArray[np.float32]:
@@ -278,6 +296,10 @@ class Surface:
         out = np.full((*rows.shape, *values.shape[1:]), nothing, values.dtype)
         out[found] = values[rows[found]]
         return out
+
+
+def _levels(rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
+    return np.where(rows != NOTHING, 0, EMPTY).astype(np.uint8)
 
 
 def _linear_table() -> NDArray[np.float32]:

@@ -76,6 +76,15 @@ class View:
         center = np.array(self.size) / 2
         return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
 
+    def unproject(self, pixels: NDArray[np.floating], depth: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Positions (N, 3), relative to the origin, of pixel coordinates (N, 2) at depths (N,).
+
+        The inverse of `project`, in float64.
+        """
+        scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
+        offsets = (pixels - np.array(self.size) / 2) * np.array([1, -1]) / scale[:, None]
+        return (np.column_stack([offsets, -depth]) - self.translation) @ self.rotation
+
     def depths(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
         """Depths (...) of points (..., 3), relative to the origin."""
         return -(positions @ self.rotation[2] + self.translation[2])

@@ -27,6 +27,10 @@ class FrameSource(Protocol):
     def unit(self) -> str | None:
         """The name of its unit of length, or None where the scan does not tell."""
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that hold its frames; none where they are made up."""
+
     def __len__(self) -> int:
         """How many frames there are; at least one."""
 
@@ -45,23 +49,23 @@ class FileSequence:
 
     def __init__(self, paths: Sequence[Path], name: str) -> None:
         self.name = name
-        self._paths = list(paths)
+        self.files = tuple(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))
 
     @property
     def unit(self) -> str | None:
         """As the first file tells, where its format knows units."""
         try:
-            return formats.read_unit(self._paths[0])
+            return formats.read_unit(self.files[0])
         except InputError:  # asking for its pose will tell
             return None
 
     def __len__(self) -> int:
-        return len(self._paths)
+        return len(self.files)
 
     def label(self, index: int) -> str:
         """The file's name; with its folder where the sequence spans several."""
-        return self._paths[index].relative_to(self._folder).as_posix()
+        return self.files[index].relative_to(self._folder).as_posix()
 
     def times(self) -> NDArray[np.float64] | None:
         """From a times.csv beside the frames, or beside their folder where that is called `frames`."""
@@ -74,7 +78,7 @@ class FileSequence:
         return None
 
     def load(self, index: int) -> Scanned:
-        path = self._paths[index]
+        path = self.files[index]
         if (count := formats.frame_count(path)) > 1:
             raise InputError(
                 f"holds {count} frames, where each file of a sequence holds one", path, "Open this file alone"
@@ -89,6 +93,7 @@ class MultiFrameFile:
 
     def __init__(self, path: Path, count: int) -> None:
         self.name = path.name
+        self.files = (path,)
         self._path = path
         self._count = count
 

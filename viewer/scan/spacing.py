@@ -27,21 +27,27 @@ def spacings(cloud: PointCloud) -> NDArray[np.float64]:
     k points within s sqrt(k / pi), so the distance to the sixth neighbour gives s; copies of
     a point do not count.
     """
-    points = cloud.positions
-    count = len(points)
+    count = len(cloud)
     if count < 2:
         return np.ones(1)
-    probes = points[np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int)]
-    found = []
-    for probe in probes:
-        squared = sum((points[:, axis] - probe[axis]) ** 2 for axis in range(3))
-        for nearest in _NEAREST:
-            near = np.argpartition(squared, min(nearest, count) - 1)[:nearest]
-            _, first = np.unique(points[near], axis=0, return_index=True)
-            if len(first) > _NEIGHBOR:
-                break
-        distinct = np.sort(squared[near[first]])[1:]  # without the probe itself
-        k = min(_NEIGHBOR, len(distinct))
-        if k:
-            found.append(float(np.sqrt(distinct[k - 1] / (k / np.pi))))
+    rows = np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int)
+    found = [spacing for row in rows if (spacing := spacing_at(cloud, row)) is not None]
     return np.array(found or [1.0])
+
+
+def spacing_at(cloud: PointCloud, row: int) -> float | None:
+    """The distance between neighbours around one point, scan units; None where all points are
+    copies of it.
+
+    It looks at every point once: about 15 ms for a million. See `spacings`.
+    """
+    points = cloud.positions
+    squared = sum((points[:, axis] - points[row, axis]) ** 2 for axis in range(3))
+    for nearest in _NEAREST:
+        near = np.argpartition(squared, min(nearest, len(points)) - 1)[:nearest]
+        _, first = np.unique(points[near], axis=0, return_index=True)
+        if len(first) > _NEIGHBOR:
+            break
+    distinct = np.sort(squared[near[first]])[1:]  # without the point itself
+    k = min(_NEIGHBOR, len(distinct))
+    return float(np.sqrt(distinct[k - 1] / (k / np.pi))) if k else None

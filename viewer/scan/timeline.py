@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -86,6 +87,11 @@ class Timeline:
             except InputError:
                 continue
             yield pose
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that hold its frames; none for the demo."""
+        return self._source.files
 
     def label(self, index: int) -> str:
         """The name of a frame, for example its file's."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,7 @@ class DemoSource:
 
     name = "demo"
     unit = "mm"
+    files: tuple[Path, ...] = ()
     fps = 25.0
 
     def __len__(self) -> int:

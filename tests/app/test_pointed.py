@@ -1,0 +1,53 @@
+"""What the line under the timeline says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.app.pointed import describe
+from viewer.pick import Picked
+
+
+def test_it_says_where_what_and_how_it_was_seen() -> None:
+    picked = Picked(
+        np.array([12.345678, -0.5, 1e3]),
+        level=0,
+        row=3,
+        id=7,
+        point=np.array([12.0, -0.5, 1e3]),
+        color=np.array([255, 128, 0, 255], np.uint8),
+        normal=np.array([0, 0.6, 0.8], np.float32),
+        scalars={"temperature": 36.6123456789, "label": 4},
+    )
+    assert describe(picked, "frame 3/25", "mm", 150.0) == [
+        "12.35, -0.50, 1000.00 mm",
+        "frame 3/25",
+        "point 7, measured",
+        "temperature 36.6123",
+        "label 4",
+        "colour #ff8000",
+        "normal 0.00, 0.60, 0.80",
+    ]
+
+
+def test_what_was_filled_is_no_point() -> None:
+    assert describe(Picked(np.zeros(3), level=2), "frame 1/1", "units", 1.0)[1:] == [
+        "frame 1/1",
+        "filled from level 2",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("radius", "text"),
+    [
+        (0.12, "10000000.12346"),
+        (99.0, "10000000.123"),
+        (5e6, "10000000"),
+        (0.0, "10000000.1235"),
+        (1e-30, "10000000.123456789"),
+    ],
+)
+def test_positions_have_the_digits_that_matter_for_the_scans_size(radius: float, text: str) -> None:
+    words = describe(Picked(np.full(3, 1e7 + 0.123456789), level=0), "", "m", radius)[0]
+    assert words == f"{text}, {text}, {text} m"

@@ -1,0 +1,71 @@
+"""Picking on what is seen: what one pixel of a Surface shows, never a point behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .gpu.surface import EMPTY, NOTHING, Surface
+from .scan.spacing import spacing_at
+
+
+@dataclass(frozen=True, eq=False)
+class Picked:
+    """What a pixel shows: a place on the surface, and the point of the scan that gave it.
+
+    position: (3,) float64, scan units: the surface at the pixel's centre.
+    level: 0 measured, n filled from level n; the fields below are empty where it was filled.
+    row: the point's place in the cloud's arrays. id: its index in the file.
+    point: (3,) float64, scan units: the point itself. color: (4,) uint8, sRGB and alpha.
+    normal: (3,) float32. These two are the scan's own, None where it has none.
+    scalars: name -> number.
+    spacing: distance between the points around it, scan units: how uncertain `point` is as a
+    place on the body. None where it was not asked for or all points coincide.
+    """
+
+    position: NDArray[np.float64]
+    level: int
+    row: int | None = None
+    id: int | None = None
+    point: NDArray[np.float64] | None = None
+    color: NDArray[np.uint8] | None = None
+    normal: NDArray[np.float32] | None = None
+    scalars: Mapping[str, float] = field(default_factory=dict)
+    spacing: float | None = None
+
+    @property
+    def measured(self) -> bool:
+        """Whether a point of the scan is seen, rather than a filled hole."""
+        return self.level == 0
+
+
+def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | None:
+    """What pixel (x, y) shows, row 0 at the top; None where it shows nothing or is none of the picture.
+
+    Reads one pixel from the GPU. spacing: whether to find the spacing too, which looks at
+    every point of the cloud (see `spacing_at`).
+    """
+    if not (0 <= x < surface.size[0] and 0 <= y < surface.size[1]):
+        return None
+    depth, row, level = surface.texel(x, y)
+    if level == EMPTY:
+        return None
+    cloud = surface.pose.stored
+    center = np.array([[x + 0.5, y + 0.5]])
+    position = surface.view.unproject(center, np.array([depth]))[0] + cloud.origin
+    if row == NOTHING:
+        return Picked(position, level)
+    return Picked(
+        position,
+        level,
+        row,
+        id=row if cloud.ids is None else int(cloud.ids[row]),
+        point=cloud.positions[row] + cloud.origin,
+        color=None if cloud.colors is None else cloud.colors[row].copy(),
+        normal=None if cloud.normals is None else cloud.normals[row].copy(),
+        scalars={name: values[row].item() for name, values in cloud.scalars.items()},
+        spacing=spacing_at(cloud, row) if spacing else None,
+    )

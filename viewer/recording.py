@@ -1,0 +1,304 @@
+"""Recordings: what was shown, as plain data that draws the same pictures again.
+
+A recording is a JSON file, an entry a line:
+
+    {
+    "format": 1, "version": "0.1.0", "seconds": 2.4, "entries": [
+    {"at": 0.0, "scan": "knot", "hash": ..., "pose": 0, "time": 0.0, "size": [1280, 720], "camera": {...},
+     "backend": "points", "params": {...}, "look": {...}},
+    {"at": 0.52, "pose": 1, "time": 0.04}
+    ]}
+
+The first entry is complete, every other one tells what has changed. Each PNG and EXR that Scan4D writes
+holds its own complete entry, with `format` and `version` beside it, and is a recording of one entry.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from . import __version__
+from .backends import backend as find_backend
+from .camera import Camera
+from .errors import InputError, unknown_name
+from .export import read_description
+from .files import whole_file
+from .frame import Request
+from .look import Look
+from .params import parse
+from .scan.pose import Pose
+
+FORMAT = 1
+_HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
+_MOST_BYTES = 256 * 2**20  # of a recording
+_MOST_SECONDS = 86_400.0
+_TICK = 0.001  # seconds that time stamps are rounded to
+_DAMAGED = "It is damaged, or no recording of Scan4D; record it again"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One picture that was shown: all that is needed to draw it again.
+
+    scan: as the user named it. hash: of its files (see `fingerprint`), None where there is none.
+    pose: its index. time: the pose's, seconds. size: (width, height) in pixels. params: the backend's
+    own `Params`. at: seconds since the recording began; entries that differ in it alone are equal.
+    """
+
+    scan: str
+    hash: str | None
+    pose: int
+    time: float
+    size: tuple[int, int]
+    camera: Camera
+    backend: str
+    params: Any
+    look: Look
+    at: float = field(default=0.0, compare=False)
+
+    @classmethod
+    def of(cls, request: Request, scan: str, hash: str | None, size: tuple[int, int]) -> Entry:
+        """The entry of a picture that was asked for with a backend's name and its parameters."""
+        return cls(
+            scan, hash, request.pose.index, float(request.pose.time), size,
+            request.camera, str(request.backend), request.params, request.look,
+        )  # fmt: skip
+
+    def request(self, pose: Pose) -> Request:
+        """The picture to draw. pose: number `self.pose` of the scan."""
+        return Request(pose, self.camera, self.backend, self.params, self.look)
+
+    def to_json(self, before: Entry | None = None) -> dict[str, Any]:
+        """A JSON object, without `at`. before: leave out what is as it was there."""
+        changed = (f.name for f in fields(self) if f.compare)
+        if before is not None:
+            changed = (name for name in changed if getattr(self, name) != getattr(before, name))
+        return {name: _plain(getattr(self, name)) for name in changed}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Entry:
+        """The entry of a complete JSON object. Raises InputError for whatever is wrong in it."""
+        data = {"at": 0.0, **data}
+        known = [f.name for f in fields(cls)]
+        for name in data:
+            if name not in known:
+                raise unknown_name("field", name, known)
+        for name in known:
+            if name not in data:
+                raise InputError(f"has no '{name}'", hint=_DAMAGED)
+        read = {name: _checked(name, data[name]) for name in known}
+        backend = find_backend(read["backend"])
+        read["size"] = tuple(read["size"])
+        read["camera"] = Camera.from_json(read["camera"])
+        read["params"] = backend.params(read["params"])
+        read["look"] = parse(Look, read["look"], "look")
+        return cls(**read)
+
+    def description(self) -> str:
+        """The JSON text that a picture carries."""
+        return json.dumps(_head() | self.to_json())
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was shown, in the order of time. entries: at least one. seconds: how long it took."""
+
+    entries: tuple[Entry, ...]
+    seconds: float = 0.0
+
+    def save(self, path: Path) -> None:
+        """Write its JSON. Raises InputError where it cannot be written."""
+        before = (None, *self.entries[:-1])
+        lines = (
+            json.dumps({"at": entry.at} | entry.to_json(last))
+            for entry, last in zip(self.entries, before, strict=True)
+        )
+        head = json.dumps(_head() | {"seconds": self.seconds}).strip("{}")
+        text = f'{{\n{head}, "entries": [\n' + ",\n".join(lines) + "\n]}\n"
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> Recording:
+        """Read a recording, or the entry that a .png or .exr of Scan4D carries.
+
+        Raises InputError, which names the file and the entry, for whatever is wrong in it.
+        """
+        data = _read_json(path)
+        if not isinstance(data, dict) or "format" not in data:
+            raise InputError("is no recording", path, "Use a JSON that the window has recorded, or a picture")
+        if data["format"] != FORMAT:
+            what = f"has the format {data['format']!r:.40}, this Scan4D ({__version__}) reads {FORMAT}"
+            raise InputError(what, path, f"It was written by version {data.get('version')!r:.40}; use that")
+        entries = data.get("entries")
+        if entries is None:
+            complete = {name: value for name, value in data.items() if name not in _head()}
+            return cls((_parsed(complete, path),))
+        if not isinstance(entries, list) or not entries:
+            raise InputError("has no entries", path, _DAMAGED)
+        read = _read_changes(entries, path)
+        seconds = _placed(lambda: _checked("seconds", data.get("seconds", 0.0)), path)
+        return cls(read, max(seconds, read[-1].at))
+
+    def paced(self, fps: float) -> list[Entry]:
+        """What a film shows: picture k, at k / fps seconds, is the entry that was shown then.
+
+        An entry that was gone before the next picture of the film is left out; the last one is always in it.
+        """
+        starts = [math.ceil((entry.at - _TICK / 2) * fps) for entry in self.entries]
+        count = max(round(self.seconds * fps), starts[-1] + 1)
+        return [self.entries[bisect_right(starts, number) - 1] for number in range(count)]
+
+
+class Recorder:
+    """Takes down what is shown. now: by the clock, seconds."""
+
+    def __init__(self, now: float) -> None:
+        self._began = now
+        self._entries: list[Entry] = []
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def note(self, entry: Entry, now: float) -> None:
+        """Take down what is shown from now on, unless it is what was shown before."""
+        if not self._entries or entry != self._entries[-1]:
+            self._entries.append(replace(entry, at=self._since(now)))
+
+    def finish(self, now: float) -> Recording:
+        """All that was noted, which must be something."""
+        return Recording(tuple(self._entries), self._since(now))
+
+    def _since(self, now: float) -> float:
+        return round(now - self._began, 3)
+
+
+def fingerprint(files: Sequence[Path]) -> str | None:
+    """A hash that tells whether a scan is still the same: its kind, and 16 hex digits of a SHA-256.
+
+    "sha256:" is of the bytes of a single file, as sha256sum gives it; "files:" is of the names and sizes of
+    several files, or of one above 256 MiB. None where there are no files, or they cannot be read.
+    """
+    try:
+        if len(files) == 1 and os.path.getsize(files[0]) <= _HASHED_BYTES:
+            with open(files[0], "rb") as stream:
+                return f"sha256:{hashlib.file_digest(stream, 'sha256').hexdigest()[:16]}"
+        listed = "\n".join(f"{os.path.getsize(file)} {file.name}" for file in files)
+    except OSError:
+        return None
+    return f"files:{hashlib.sha256(listed.encode()).hexdigest()[:16]}" if files else None
+
+
+# --- reading --------------------------------------------------------------------------------
+
+
+def _read_json(path: Path) -> Any:
+    """The JSON of a file, or of the description in a picture."""
+    try:
+        if path.suffix.lower() in (".png", ".exr"):
+            text = read_description(path)
+        elif path.stat().st_size > _MOST_BYTES:
+            raise InputError("is too large for a recording", path)
+        else:
+            text = path.read_text(encoding="utf-8")
+        return json.loads(text)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", path, "Check its name") from error
+    except (ValueError, RecursionError) as error:  # of the text's encoding as well
+        raise InputError(f"is not JSON ({error})", path, _DAMAGED) from error
+
+
+def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
+    """The entries, each with what the one before tells and it does not."""
+    entries: list[Entry] = []
+    complete: dict[str, Any] = {}
+    for number, change in enumerate(changes):
+        where = f"{path}, entry {number}"
+        if not isinstance(change, dict):
+            raise InputError("is no JSON object", where, _DAMAGED)
+        complete |= change
+        entries.append(_parsed(complete, where))
+        if number and entries[-1].at < entries[-2].at:
+            raise InputError("is earlier than the entry before it", where, "Put the entries in order of 'at'")
+    return tuple(entries)
+
+
+def _parsed(complete: Mapping[str, Any], where: object) -> Entry:
+    return _placed(lambda: Entry.from_json(complete), where)
+
+
+def _placed(read: Callable[[], Any], where: object) -> Any:
+    """What a function reads; its InputError says where."""
+    try:
+        return read()
+    except InputError as error:
+        inner = "" if error.where is None else f"{error.where}: "
+        raise InputError(inner + error.what, where, error.hint) from error
+    except OverflowError as error:  # a number of hundreds of digits
+        raise InputError(f"holds a number that is too large ({error})", where, _DAMAGED) from error
+
+
+def _whole(value: Any) -> bool:
+    return type(value) is int and 0 <= value < 2**31
+
+
+def _finite(value: Any) -> bool:
+    return type(value) in (int, float) and math.isfinite(value)
+
+
+def _stamp(value: Any) -> bool:
+    return _finite(value) and 0 <= value <= _MOST_SECONDS
+
+
+def _object(value: Any) -> bool:
+    return isinstance(value, dict)
+
+
+def _word(value: Any) -> bool:
+    return isinstance(value, str) and value != "" and "\0" not in value
+
+
+_KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "scan": (_word, "the name of a scan"),
+    "hash": (lambda value: value is None or _word(value), "a hash"),
+    "pose": (_whole, "the number of a pose"),
+    "time": (_finite, "a time in seconds"),
+    "size": (lambda v: isinstance(v, list) and len(v) == 2 and all(map(_whole, v)), "width and height"),
+    "camera": (_object, "a camera"),
+    "backend": (_word, "the name of a renderer"),
+    "params": (_object, "parameters by name"),
+    "look": (_object, "a look"),
+    "at": (_stamp, "a time within a day, in seconds"),
+    "seconds": (_stamp, "a time within a day, in seconds"),
+}
+
+
+def _checked(name: str, value: Any) -> Any:
+    fits, kind = _KINDS[name]
+    if not fits(value):
+        raise InputError(f"'{name}' is not {kind} but {value!r:.40}", hint=_DAMAGED)
+    return value
+
+
+# --- writing --------------------------------------------------------------------------------
+
+
+def _head() -> dict[str, Any]:
+    return {"format": FORMAT, "version": __version__}
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it."""
+    if isinstance(value, Camera):
+        return value.to_json()
+    if isinstance(value, tuple):
+        return list(value)
+    return asdict(value) if hasattr(value, "__dataclass_fields__") else value
