@@ -210,7 +210,7 @@ _FROM_TEXT = {text: value for value, text in _INFINITIES.items()}
 
 # Errors this near each other are the same: drivers round differently.
 _SAME_RELATIVE, _SAME_ABSOLUTE = 0.01, 1e-6
-_SAME_TIME = 1.05  # the ratio of times that are the same
+_SAME_TIME, _SAME_MS = 1.1, 0.1  # ratio and difference of times that are the same
 
 
 def title(row: Row) -> str:
@@ -226,7 +226,7 @@ def title(row: Row) -> str:
 def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
     """What got slower or worse, then faster or better, then what cannot be compared; a line each.
 
-    Slower: by 5 % in the median of the views, and in 95 % of them. Preparations, which are not the views',
+    Slower: by 10 % in the median of the views, and in 95 % of them. Preparations, which are not the views',
     are slower where each median is outside the other's 5th to 95th percentile. Worse: an error that grew by
     more than 1 %. Times are compared only where device, driver and timer are the same.
     """
@@ -277,11 +277,14 @@ def _slower(was: Row, now: Row, back: bool = False) -> Iterator[str]:
 
 def _is_slower(name: str, quick: Row, slow: Row) -> bool:
     """Whether a time of one row is beyond the spread of the other's."""
+    before, after = quick[name]["median"], slow[name]["median"]
+    if after - before < _SAME_MS or after < _SAME_TIME * before:
+        return False
     pairs = [row.get("times_by_view", {}).get(name, []) for row in (quick, slow)]
     if pairs[0] and len(pairs[0]) == len(pairs[1]):
         ratios = spread([after / before for before, after in zip(*pairs, strict=True) if before > 0])
         return ratios["median"] > _SAME_TIME and ratios["p5"] > 1
-    return slow[name]["median"] > quick[name]["p95"] and quick[name]["median"] < slow[name]["p5"]
+    return after > quick[name]["p95"] and before < slow[name]["p5"]
 
 
 def _worse(was: Row, now: Row, back: bool = False) -> Iterator[str]:
