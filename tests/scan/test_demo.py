@@ -135,7 +135,7 @@ def test_points_cover_the_surface(demo: DemoSource, index: int) -> None:
     """Random places of the surface are within the radius of a point that faces the same way."""
     cloud, time = demo.load(index), seconds(demo, index)
     scattered = sampling._scattered(head.skin, sampling._skin_shows, 1500, np.random.default_rng(2))
-    places, normals = sampling._projected(head.skin, scattered)
+    places, normals = sampling.projected(head.skin, scattered)
     places, normals = places[:, head.eyes(*places) > 0.3], normals[:, head.eyes(*places) > 0.3]
     places, normals, _ = motion.move(places, normals, time)
     rows, distances = nearest(places.T, cloud.world())

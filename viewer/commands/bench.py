@@ -8,8 +8,7 @@ Ctrl-C stops it and keeps what was measured.
 from __future__ import annotations
 
 import os
-import re
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -27,7 +26,7 @@ from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
 from ..errors import InputError
 from ..files import whole_file
-from . import drawing
+from . import arguments, drawing
 from .console import progress, warn
 
 _SUITES = ("scenes", "numerics")
@@ -72,9 +71,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--compare", type=Path, metavar="OLD", help="say what got slower or worse than in these results"
     )
-    parser.add_argument("--size", type=_size, metavar="WxH", help="of the pictures, default 1920x1280")
-    parser.add_argument("--views", type=_count, metavar="N", help="of each scene, default 20")
-    parser.add_argument("--seed", type=_seed, metavar="N", help="of viewpoints, samples and noise, default 0")
+    parser.add_argument(
+        "--size", type=arguments.size, metavar="WxH", help="of the pictures, default 1920x1280"
+    )
+    parser.add_argument("--views", type=arguments.count, metavar="N", help="of each scene, default 20")
+    parser.add_argument(
+        "--seed", type=arguments.seed, metavar="N", help="of viewpoints, samples and noise, default 0"
+    )
 
 
 def run(args: Namespace) -> int:
@@ -167,6 +170,11 @@ def _settings(args: Namespace) -> Settings:
     data = args.data or os.environ.get("SCAN4D_DATA") or beside
     if data is not None and not Path(data).is_dir():
         raise InputError("is no folder of real scans", data, "Name one with --data")
+    if args.size and min(args.size) < _LEAST:
+        small = "x".join(map(str, args.size))
+        raise InputError(
+            f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
+        )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
     return replace(_QUICK if args.quick else Settings(), **{k: v for k, v in told.items() if v is not None})
 
@@ -205,22 +213,3 @@ def _check_libraries() -> None:
         raise InputError(
             f"the benchmark needs {', '.join(missing)}", hint="Install them: pip install 'scan4d[bench]'"
         )
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch("([0-9]{1,5})[xX]([0-9]{1,5})", text)
-    if not match or min(int(match[1]), int(match[2])) < _LEAST:
-        raise ArgumentTypeError(f"'{text}' is no size of at least {_LEAST} pixels, such as 1920x1280")
-    return int(match[1]), int(match[2])
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise ArgumentTypeError(f"'{text}' is no number of at least 1")
-    return int(text)
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise ArgumentTypeError(f"'{text}' is no seed; give a number such as 7")
-    return int(text)

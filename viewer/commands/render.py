@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,7 +28,7 @@ from ..params import parse
 from ..recording import Entry, fingerprint
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
-from . import drawing, replay, stats
+from . import arguments, drawing, replay, stats
 from .console import progress
 from .drawing import Plan, Shot
 from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline, read_poses
@@ -50,7 +49,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add_pose_arguments(parser)
     picture = parser.add_argument_group("the picture")
-    picture.add_argument("--size", type=_size, metavar="WxH", help="default 1920x1280")
+    picture.add_argument("--size", type=arguments.size, metavar="WxH", help="default 1920x1280")
     picture.add_argument(
         "--backend", metavar="NAME", help="default: surfels where normals are stored, else points"
     )
@@ -69,12 +68,15 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="degrees, and scan units; without a distance, fitted",
     )  # fmt: skip
     camera.add_argument(
-        "--turntable", type=_count, metavar="N", help="all round in N pictures; several poses play on the way"
+        "--turntable",
+        type=arguments.count,
+        metavar="N",
+        help="all round in N pictures; several poses play on the way",
     )
     measuring = parser.add_argument_group("measuring")
     measuring.add_argument("--stats", type=Path, metavar="FILE.json", help="write what the pictures took")
     measuring.add_argument(
-        "--repeat", type=_count, metavar="N", help="medians of N draws after two warm-ups in --stats"
+        "--repeat", type=arguments.count, metavar="N", help="medians of N draws after two warm-ups in --stats"
     )
 
 
@@ -168,13 +170,6 @@ def _camera(
     return lambda shot: camera
 
 
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch("([0-9]+)[xX]([0-9]+)", text)
-    if not match:
-        raise ArgumentTypeError(f"'{text}' is no size; give width and height as in 1920x1280")
-    return int(match[1]), int(match[2])
-
-
 def _assignment(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not (name and equals):
@@ -190,9 +185,3 @@ def _orbit(text: str) -> tuple[float, ...]:
     if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
         raise ArgumentTypeError(f"'{text}' is no AZIMUTH,ELEVATION[,DISTANCE] such as 30,15")
     return numbers
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise ArgumentTypeError(f"'{text}' is no number of at least 1")
-    return int(text)

@@ -6,7 +6,6 @@ a numbered pattern such as out%04d.exr, with the times beside it in times.csv.
 
 from __future__ import annotations
 
-import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +19,7 @@ from ..export import check_output
 from ..scan import formats
 from ..scan.pose import Pose
 from ..scan.range_view import merge
+from . import arguments
 from .console import progress
 from .scans import add_pose_arguments, chosen_poses, frame_files, framing, open_timeline, read_poses
 
@@ -47,7 +47,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     places.add_argument("--azimuths", type=float, nargs="+", metavar="A", help="of each pod, degrees")
     pods.add_argument("--elevation", type=float, default=0.0, metavar="E", help="of all pods, degrees")
     pods.add_argument(
-        "--size", type=_size, default=(640, 480), metavar="WxH", help="of a range image, default 640x480"
+        "--size",
+        type=arguments.size,
+        default=(640, 480),
+        metavar="WxH",
+        help="of a range image, default 640x480",
     )
     pods.add_argument("--fov", type=float, default=30.0, metavar="F", help="vertical, degrees, default 30")
     faults = parser.add_argument_group("its faults")
@@ -65,7 +69,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     faults.add_argument(
         "--grazing", type=float, default=90.0, metavar="DEGREES", help="no depth beyond this incidence"
     )
-    faults.add_argument("--seed", type=_seed, default=0, metavar="N", help="of all chance, default 0")
+    faults.add_argument(
+        "--seed", type=arguments.seed, default=0, metavar="N", help="of all chance, default 0"
+    )
 
 
 def run(args: Namespace) -> int:
@@ -137,21 +143,8 @@ def _mesh(pose: Pose, faces: Faces) -> Mesh:
         ) from error
 
 
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch("0*([1-9][0-9]{0,5})[xX]0*([1-9][0-9]{0,5})", text)
-    if not match:
-        raise ArgumentTypeError(f"'{text}' is no size; give width and height as in 640x480")
-    return int(match[1]), int(match[2])
-
-
 def _numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise ArgumentTypeError(f"'{text}' is no number, nor several with commas such as 0.5,1.0") from None
-
-
-def _seed(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) < 20):
-        raise ArgumentTypeError(f"'{text}' is no seed; give a number such as 7")
-    return int(text)

@@ -5,7 +5,6 @@ The exact surface takes a millisecond a ray (`DemoHead`); this mesh of it takes 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -14,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scan.demo import colors, head
-from ...scan.demo.dual import coordinates
-from ...scan.demo.motion import move, normalized
-from ...scan.demo.shapes import Scalar
+from ...scan.demo.motion import move
+from ...scan.demo.sampling import Solid, projected
 from ...scan.points import PointCloud
 from .isosurface import grid_values, isosurface
 from .mesh import Faces, Mesh
 
-_Solid = Callable[[Scalar, Scalar, Scalar], Scalar]
 _Runs = tuple[tuple[tuple[float, float], ...], ...]
 
 # Grid lines along x, y and z as runs of (first, step), mm; they end at the last. The slit between the closed
@@ -68,7 +65,10 @@ def _rest() -> _Rest:
     """The head at rest: skin and eyeballs by marching cubes, their vertices brought to the surface."""
     skin, skin_faces = _surface(head.skin, _SKIN_LINES)
     eyes, eye_faces = _surface(head.eyes, _EYE_LINES)
-    parts = [_projected(head.skin, skin.T), _projected(head.eyes, eyes.T)]
+    parts = [
+        projected(solid, places.T, _NEWTON_STEPS, _LONGEST_STEP)
+        for solid, places in ((head.skin, skin), (head.eyes, eyes))
+    ]
     positions, normals = (np.concatenate(rows, axis=1) for rows in zip(*parts, strict=True))
     return _Rest(
         positions=positions,
@@ -79,7 +79,7 @@ def _rest() -> _Rest:
     )
 
 
-def _surface(solid: _Solid, runs: _Runs) -> tuple[NDArray[np.float64], Faces]:
+def _surface(solid: Solid, runs: _Runs) -> tuple[NDArray[np.float64], Faces]:
     """The mesh of a solid: vertices (V, 3) and faces."""
 
     def values(points: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -92,17 +92,3 @@ def _surface(solid: _Solid, runs: _Runs) -> tuple[NDArray[np.float64], Faces]:
     )
     lines = (x, y, z)
     return isosurface(grid_values(values, lines, _REACH), lines)
-
-
-def _projected(solid: _Solid, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points (3, N) near a surface brought to it by Newton's steps, and the unit normals there (3, N)."""
-    parts = [points[:, start : start + _BATCH] for start in range(0, points.shape[1], _BATCH)]
-    normals = []
-    for number, part in enumerate(parts):
-        for _ in range(_NEWTON_STEPS):
-            here = solid(*coordinates(part))
-            step = here.gradient * (here.value / np.square(here.gradient).sum(axis=0))
-            part = part - np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
-        parts[number] = part
-        normals.append(normalized(solid(*coordinates(part)).gradient))
-    return np.concatenate(parts, axis=1), np.concatenate(normals, axis=1)

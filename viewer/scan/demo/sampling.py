@@ -76,14 +76,14 @@ def _spread(solid: Solid, shows: Shows, count: int, rng: np.random.Generator) ->
     Random points, moved apart along the surface by repulsion until their distances are even
     (Witkin and Heckbert 1994, 4).
     """
-    points, normals = _projected(solid, _scattered(solid, shows, count, rng))
+    points, normals = projected(solid, _scattered(solid, shows, count, rng))
     for _ in range(_RELAXATIONS):
         near, distances = _neighbors(points, normals)
         reach = _even_spacing(points, distances)
         push = 0.3 * reach * np.maximum(1.0 - distances / reach, 0.0)
         away = (points[:, None, :] - points[:, near]) / np.maximum(distances, 1e-9)
-        points, normals = _projected(solid, points + (push * away).sum(axis=1), 1)
-    points, normals = _projected(solid, points)
+        points, normals = projected(solid, points + (push * away).sum(axis=1), 1)
+    points, normals = projected(solid, points)
     spacing = _even_spacing(points, distances)
     order = np.lexsort((points[1], points[2] < 0.0))  # by height, the front first, as `move` likes it
     order = order[shows(points[:, order], 0.0) & (np.abs(solid(*points[:, order])) < _EXACT)]
@@ -111,17 +111,20 @@ def _scattered(solid: Solid, shows: Shows, count: int, rng: np.random.Generator)
     return np.concatenate(found, axis=1)[:, :count]
 
 
-def _projected(
-    solid: Solid, points: NDArray[np.float64], steps: int = 6
+def projected(
+    solid: Solid, points: NDArray[np.float64], steps: int = 6, longest: float = 0.5
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points (3, N) brought to the surface by Newton steps, and the normals there (3, N)."""
+    """Points (3, N) brought to the surface by Newton steps, and the normals there (3, N).
+
+    longest: a step along each axis, mm.
+    """
     parts = [points[:, i : i + _BATCH] for i in range(0, points.shape[1], _BATCH)]
     normals = []
     for index, part in enumerate(parts):
         for _ in range(steps):
             solid_here = solid(*coordinates(part))
             step = solid_here.gradient * (solid_here.value / np.square(solid_here.gradient).sum(axis=0))
-            part = part - np.clip(step, -0.5, 0.5)
+            part = part - np.clip(step, -longest, longest)
         parts[index] = part
         normals.append(normalized(solid(*coordinates(part)).gradient))
     return np.concatenate(parts, axis=1), np.concatenate(normals, axis=1)
