@@ -15,7 +15,7 @@ LAYERS = (
     {"errors", "files", "geometry", "params", "resources", "camera", "look", "scan"},
     {"gpu"},
     {"backends"},
-    {"renderer", "frame", "measure", "export", "pick"},
+    {"renderer", "frame", "timing", "export", "pick"},
     {"recording", "__init__"},
     {"app", "bench"},
     {"cli", "commands"},

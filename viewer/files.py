@@ -30,6 +30,13 @@ def whole_file(path: Path | str) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def user_folder() -> Path:
+    """Where the settings of this user are kept; it need not be there yet."""
+    import platformdirs
+
+    return platformdirs.user_config_path("scan4d", appauthor=False)
+
+
 def free_file(folder: Path, suffix: str) -> Path:
     """scan4d_0001 with this suffix, or the next number that no file in the folder has."""
     return next(path for n in count(1) if not (path := folder / f"scan4d_{n:04d}{suffix}").exists())

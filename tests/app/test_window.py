@@ -100,14 +100,26 @@ def difference(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> int:
     return int(np.abs(one[..., :3].astype(int) - other[..., :3]).max())
 
 
+def shown(app: RunningApp) -> NDArray[np.uint8]:
+    """The 3D view on the screen."""
+    left, top, width, height = app.view()
+    return app.screen.picture()[top : top + height, left : left + width]
+
+
+def on_screen(app: RunningApp, x: int, y: int) -> tuple[int, int]:
+    """Where a pixel of the 3D view is."""
+    left, top, *_ = app.view()
+    return left + x, top + y
+
+
 def assert_true_picture(app: RunningApp) -> Screenshot:
     """What is on the screen is what was saved, and what comes out without a screen."""
     app.screen.do("mousemove", *(v - 1 for v in SIZE))  # the pointer is part of the screen's picture
     app.settle()
     shot = Screenshot(app)
+    app.screen.do("key", "Escape")  # away with the note that it was saved
     app.settle()
-    width, height = shot.description["size"]
-    assert difference(app.screen.picture()[:height, :width], shot.pixels) <= 1
+    assert difference(shown(app), shot.pixels) <= 1
     assert difference(shot.drawn_headless(), shot.pixels) <= 1
     assert np.ptp(shot.pixels[..., :3]) > 100, "there is something in the picture"
     return shot
@@ -123,7 +135,7 @@ def drag(app: RunningApp, button: int, start: tuple[int, int], end: tuple[int, i
 
 def on_track(share: float) -> tuple[int, int]:
     """A place on the timeline's track."""
-    return int(SIZE[0] * (0.37 + 0.47 * share)), SIZE[1] - 78
+    return int(SIZE[0] * (0.37 + 0.47 * share)), SIZE[1] - 55
 
 
 def test_opens_plays_scrubs_switches_and_saves_what_is_shown(hands: RunningApp) -> None:
@@ -184,7 +196,7 @@ def test_the_mouse_orbits_pans_zooms_and_f_fits(hands: RunningApp) -> None:
 
 
 def under_mouse(app: RunningApp, x: int, y: int) -> str:
-    app.screen.do("mousemove", x, y)
+    app.screen.do("mousemove", *on_screen(app, x, y))
     return app.expect(r"under the mouse: (.+)")[1]
 
 
@@ -202,7 +214,7 @@ def test_the_line_under_the_timeline_says_what_is_seen(hands: RunningApp) -> Non
     )
     assert told[1:3] == [f"frame {shot.description['pose'] + 1}/5", f"point {picked.id}, measured"]
     assert "colour #" + bytes(picked.color[:3]).hex() in told
-    hands.screen.do("mousemove", 3, 3)
+    hands.screen.do("mousemove", *on_screen(hands, 3, 3))
     hands.expect(r"under the mouse: \n")
 
 
@@ -213,7 +225,8 @@ def test_a_double_click_sets_the_point_that_the_view_turns_about(hands: RunningA
     surface = start.surface()
     x, y = seen_pixel(surface)
     picked = pick(surface, x, y)
-    hands.screen.do("mousemove", x, y, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1)
+    place = on_screen(hands, x, y)
+    hands.screen.do("mousemove", *place, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1)
     hands.settle()
     clicked = Screenshot(hands)
     assert clicked.camera.eye == start.camera.eye
@@ -226,7 +239,8 @@ def test_a_double_click_sets_the_point_that_the_view_turns_about(hands: RunningA
     assert where == pytest.approx([x + 0.5, y + 0.5], abs=0.02)
 
     # A double click on nothing changes nothing; fitting turns about the middle again.
-    hands.screen.do("mousemove", 3, 3, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1)
+    nothing = on_screen(hands, 3, 3)
+    hands.screen.do("mousemove", *nothing, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1)
     hands.settle()
     assert Screenshot(hands).camera == turned
     hands.screen.do("key", "f")
@@ -268,11 +282,11 @@ def test_idle_it_draws_nothing_and_takes_no_processor_time(hands: RunningApp) ->
 def test_a_parameter_and_the_look_are_changed_in_the_panel(hands: RunningApp) -> None:
     """The first row below the renderer is the points' size: a slider from 0 to 32."""
     before = Screenshot(hands)
-    drag(hands, 1, (1110, 82), (1250, 82))
+    drag(hands, 1, (1110, 138), (1250, 138))
     after = assert_true_picture(hands)
     assert before.description["params"] == {"point_size": 0}
     assert after.description["params"] == {"point_size": 32}
-    drag(hands, 1, (1250, 82), (1000, 82))
+    drag(hands, 1, (1250, 138), (1000, 138))
     assert difference(Screenshot(hands).pixels, before.pixels) == 0
 
 
@@ -280,11 +294,11 @@ def test_a_recording_holds_what_was_shown_and_is_drawn_again(
     screen: Screen, tmp_path: Path, data_dir: Path
 ) -> None:
     with running_app(screen, tmp_path, data_dir / "sequences" / "hands_knot_5") as app:
-        red = is_red(screen.picture()[:60, :200]).sum()
+        red = is_red(shown(app)[:60, :200]).sum()
         screen.do("key", "r")
         app.expect("Recording")
         app.settle()
-        assert is_red(screen.picture()[:60, :200]).sum() > red + 50, "a mark says that it records"
+        assert is_red(shown(app)[:60, :200]).sum() > red + 50, "a mark says that it records"
         shots = [Screenshot(app)]
         for key, line in [
             ("Right", "drew frame 1"), ("b", "drew frame 1 with surfels"), ("b", "drew frame 1 with points"),
@@ -298,7 +312,7 @@ def test_a_recording_holds_what_was_shown_and_is_drawn_again(
         screen.do("key", "r")
         path = Path(app.expect(r"Saved (.+\.json)")[1])
         app.settle()
-        assert is_red(screen.picture()[:60, :200]).sum() == red
+        assert is_red(shown(app)[:60, :200]).sum() == red
         screen.do("key", "Right")
         app.expect("drew frame 2")
     recording = Recording.load(path)

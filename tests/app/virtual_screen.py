@@ -109,6 +109,11 @@ class RunningApp:
             drawn = now
             time.sleep(seconds)
 
+    def view(self) -> tuple[int, int, int, int]:
+        """The 3D view on the screen: left, top, width, height."""
+        left, top, width, height = re.findall(r"view at (\d+),(\d+) (\d+)x(\d+)", self.log())[-1]
+        return int(left), int(top), int(width), int(height)
+
     def cpu_seconds(self) -> float:
         """Processor time that it has taken."""
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
@@ -123,7 +128,7 @@ def running_app(screen: Screen, folder: Path, *scans: object) -> Iterator[Runnin
         process = subprocess.Popen(
             [sys.executable, "-c", _RUN, *map(str, scans)],
             cwd=folder,
-            env={**screen.env, "PYTHONPATH": str(ROOT)},
+            env={**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(folder / "config")},
             stderr=stream,
         )
     app = RunningApp(screen, process, log)

@@ -18,10 +18,10 @@ from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request
 from viewer.gpu.surface import Surface
-from viewer.measure import draw
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.timing import draw
 
 SETTINGS = Settings(size=(120, 80), views=3, repeat=1, frames=2)
 DEFAULTS = tuple(plan(["torus"], list(backends()), counts=(), noises=(), swept_scenes=0)[0].contenders)

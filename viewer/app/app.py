@@ -13,14 +13,16 @@ from ..backends import backends
 from ..camera import Camera
 from ..errors import InputError
 from ..export import write_picture
-from ..files import free_file
+from ..files import free_file, user_folder
 from ..gpu.context import Gpu
 from ..look import Look
 from ..pick import Picked
 from ..recording import Entry, Recorder, fingerprint
 from ..scan.open import open_scan
 from ..scan.timeline import Timeline
-from . import layout, navigation, theme
+from . import keys, layout, levels, navigation, theme
+from .help import Help
+from .notices import Notices
 from .picture import Picture
 from .playback import Playback
 from .pointed import describe
@@ -38,9 +40,9 @@ class App:
 
     session: what the user has chosen. playback: the scan. picture: the 3D view.
     recorder: takes down what is shown, None while nothing is recorded.
-    theme: of the panels. notes: all that the user was told. pointed: what the mouse points at,
-    None where at nothing; pointed_words: the same in words. gesture: what a drag in the view
-    does, None without one.
+    theme: of the panels. notices: what the user was told. keys: which do what. help: its open pages.
+    pointed: what the mouse points at, None where at nothing; pointed_words: the same in words.
+    gesture: what a drag in the view does, None without one.
     """
 
     def __init__(
@@ -56,7 +58,11 @@ class App:
         self.scans = list(scans)
         self.session = Session(self.scans[0], look=Look(up=up))
         self.theme = theme.DEFAULT
-        self.notes: list[str] = []
+        self.notices = Notices()
+        self.help: Help = Help()
+        self.keys, problems = keys.load(self._keys_file)
+        for problem in problems:
+            self.note(problem)
         self.pointed: Picked | None = None
         self.pointed_words: list[str] = []
         self.gesture: str | None = None
@@ -68,7 +74,7 @@ class App:
         self._reported: Any = None
         self.window = window
         self.picture = Picture(Gpu(window.ctx))
-        self._view_size = window.buffer_size
+        self._view_place = (0, 0, *window.buffer_size)  # left, bottom, width, height: pixels
         if self.picture.gpu.software:
             self.note(f"Drawn in software ({self.picture.gpu.device}); a graphics card is faster.")
         self.playback: Playback = self._start(timeline)
@@ -76,9 +82,8 @@ class App:
     # --- commands ---------------------------------------------------------------------
 
     def note(self, text: str) -> None:
-        """Tell the user something; it stays in the list of messages."""
-        log.info("%s", text)
-        self.notes.append(text)
+        """Tell the user something."""
+        self.notices.tell(text)
 
     def quit(self) -> None:
         """Close the window."""
@@ -118,8 +123,8 @@ class App:
         return theme.PALETTES[self.theme]
 
     def seek(self, index: int) -> None:
-        """Go to a frame."""
-        self.playback.seek(index, time.monotonic())
+        """Go to a frame; -1 is the last one."""
+        self.playback.seek(index % len(self.playback.timeline), time.monotonic())
 
     def step(self, count: int) -> None:
         """Pause, and go some frames on."""
@@ -148,8 +153,13 @@ class App:
     def switch_projection(self) -> None:
         """Perspective to orthographic and back."""
         if self.session.camera:
-            is_flat = self.session.camera.projection == "orthographic"
-            self.project("perspective" if is_flat else "orthographic")
+            self.project("perspective" if self.is_orthographic else "orthographic")
+
+    @property
+    def is_orthographic(self) -> bool:
+        """Whether the camera is."""
+        camera = self.session.camera
+        return camera is not None and camera.projection == "orthographic"
 
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
@@ -170,12 +180,61 @@ class App:
             self.session.pivot = x, y, z
             self.session.camera = self.session.camera.focused(self.session.pivot)
 
+    @property
+    def backend(self) -> str | None:
+        """The name of the backend that draws; None before the first pose."""
+        return self.session.chosen(self.playback.pose)[0] if self.playback.pose else None
+
+    @property
+    def _params(self) -> Any:
+        """Its parameters; None before the first pose."""
+        return self.session.chosen(self.playback.pose)[1] if self.playback.pose else None
+
+    @_params.setter
+    def _params(self, params: Any) -> None:
+        if self.backend is not None:
+            self.session.params[self.backend] = params
+
+    def choose_backend(self, name: str) -> None:
+        """Draw with a backend."""
+        self.session.backend = name
+
     def next_backend(self) -> None:
         """Draw with the next backend."""
-        if self.playback.pose:
+        if self.backend is not None:
             names = list(backends())
-            name, _ = self.session.chosen(self.playback.pose)
-            self.session.backend = names[(names.index(name) + 1) % len(names)]
+            self.choose_backend(names[(names.index(self.backend) + 1) % len(names)])
+
+    @property
+    def levels(self) -> dict[int, bool]:
+        """The backend's pyramid levels and whether they are on; empty where it has none."""
+        return {} if self._params is None else levels.levels(self._params)
+
+    def toggle_level(self, number: int) -> None:
+        """Switch one of the backend's pyramid levels on or off."""
+        self._params = levels.toggled(self._params, number)
+
+    @property
+    def is_filling(self) -> bool:
+        """Whether all levels that fill holes are on."""
+        return self._params is not None and levels.is_filling(self._params)
+
+    def toggle_filling(self) -> None:
+        """Switch all levels that fill holes on or off."""
+        self._params = levels.with_filling(self._params, not self.is_filling)
+
+    @property
+    def _keys_file(self) -> Path:
+        return user_folder() / keys.FILE
+
+    def write_keys(self) -> None:
+        """Write the file of keys where there is none yet, and tell where it is."""
+        try:
+            if not self._keys_file.exists():
+                keys.write_template(self._keys_file)
+            self.note(f"The keys are in {self._keys_file}; edit it and start Scan4D again.")
+        except InputError as error:
+            self.note(str(error))
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, without panels, in the working directory."""
@@ -191,7 +250,7 @@ class App:
         if self.recorder is None:
             self.recorder = Recorder(now)
             self._record()
-            self.note("Recording what is shown. R stops it.")
+            self.note("Recording what is shown, until you stop it.")
             return
         recorder, self.recorder = self.recorder, None
         if len(recorder):
@@ -238,7 +297,8 @@ class App:
     def _patience(self, now: float) -> float:
         """Seconds to wait for events before looking at what else has changed."""
         look = _AWAIT if self.playback.waiting or self._opening else _WATCH
-        return min(look, self.playback.player.until_next(now), self.picture.better_at - now)
+        changes = self.playback.player.until_next(now), self.notices.next_change(now)
+        return min(look, *changes, self.picture.better_at - now)
 
     def _advance(self, now: float) -> bool:
         """Take in what time and workers have brought; True where there is something to show."""
@@ -249,7 +309,8 @@ class App:
         for message in timeline.messages[self._messages_read :]:
             self._messages_read += 1
             self.note(message.text)
-        report = (self.playback.pose, self.session.index, timeline.cached(), len(self.notes), self.opening)
+        told = self.notices.count, len(self.notices.shown(now))
+        report = (self.playback.pose, self.session.index, timeline.cached(), told, self.opening)
         changed, self._reported = report != self._reported, report
         return changed or now >= self.picture.better_at
 
@@ -275,8 +336,12 @@ class App:
 
     def _draw(self) -> None:
         self.window.begin()
-        left, bottom, width, height = self.window.to_pixels(*layout.draw(self))
-        self._view_size = max(width, 1), max(height, 1)
+        place = self.window.to_pixels(*layout.draw(self))
+        left, bottom, width, height = place
+        if place != self._view_place:
+            self._view_place = place
+            top = self.window.buffer_size[1] - bottom - height
+            log.debug("view at %d,%d %dx%d pixels", left, top, width, height)
         if self._draw_picture() and not self.moving:
             self.window.touch(frames=1)  # for what the panel says about it
         self.window.fill(self.palette.panel)
@@ -301,6 +366,11 @@ class App:
     def moving(self) -> bool:
         """Whether the scan plays or the camera is dragged."""
         return self.playback.player.playing or self.gesture is not None
+
+    @property
+    def _view_size(self) -> tuple[int, int]:
+        """In pixels."""
+        return max(self._view_place[2], 1), max(self._view_place[3], 1)
 
     @property
     def _aspect(self) -> float:

@@ -1,75 +1,141 @@
-"""Which key does what. One table: for handling, and for the list that the panel shows."""
+"""Which keys do what: the usual ones, and those of the user's file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from . import navigation
+from ..errors import InputError, unknown_name
+from ..files import whole_file
+from .commands import COMMANDS
 
 if TYPE_CHECKING:
     from .app import App
 
+FILE = "keys.toml"
+_MODIFIERS = {"Ctrl": imgui.Key.mod_ctrl, "Shift": imgui.Key.mod_shift, "Alt": imgui.Key.mod_alt}
+_NAMED = {
+    "Space": "space", "Enter": "enter", "Tab": "tab", "Backspace": "backspace", "Delete": "delete",
+    "Insert": "insert", "Right": "right_arrow", "Left": "left_arrow", "Up": "up_arrow", "Down": "down_arrow",
+    "Home": "home", "End": "end", "PageUp": "page_up", "PageDown": "page_down", "[": "left_bracket",
+    "]": "right_bracket", ",": "comma", ".": "period", "-": "minus", "=": "equal", "/": "slash",
+    ";": "semicolon", "'": "apostrophe", "\\": "backslash", "`": "grave_accent",
+}  # fmt: skip
+_KEYS = {
+    **{name: getattr(imgui.Key, attribute) for name, attribute in _NAMED.items()},
+    **{letter: getattr(imgui.Key, letter.lower()) for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
+    **{digit: getattr(imgui.Key, f"_{digit}") for digit in "0123456789"},
+    **{f"F{n}": getattr(imgui.Key, f"f{n}") for n in range(1, 13)},
+}
+_HEAD = """\
+# The keys of Scan4D. Take the '#' away from a line and change its keys; "" is none. Scan4D reads this
+# when it starts. Keys: letters, digits, F1 to F12, {named};
+# before them Ctrl+, Shift+, Alt+. Escape ends what is going on and cannot be changed.
 
-@dataclass(frozen=True)
-class Command:
-    """A key and what it does. repeats: again and again while it is held."""
-
-    key: str
-    chord: int
-    does: str
-    act: Callable[[App], None]
-    repeats: bool = False
-
-
-def _view(number: int, side: str) -> Command:
-    chord = imgui.Key.mod_ctrl | getattr(imgui.Key, f"_{number}")
-    return Command(f"Ctrl+{number}", chord, f"{side} view", lambda app: app.look_from(side))
-
-
-COMMANDS = (
-    Command("Space", imgui.Key.space, "play, pause", lambda app: app.toggle_play()),
-    Command("Right", imgui.Key.right_arrow, "next frame", lambda app: app.step(1), repeats=True),
-    Command("Left", imgui.Key.left_arrow, "previous frame", lambda app: app.step(-1), repeats=True),
-    Command("Home", imgui.Key.home, "first frame", lambda app: app.seek(0)),
-    Command("End", imgui.Key.end, "last frame", lambda app: app.seek(len(app.playback.timeline) - 1)),
-    Command("L", imgui.Key.l, "loop on, off", lambda app: app.toggle_pace("loop")),
-    Command(
-        "Shift+Space", imgui.Key.mod_shift | imgui.Key.space, "play backward, forward",
-        lambda app: app.toggle_pace("reverse"),
-    ),
-    Command("[", imgui.Key.left_bracket, "slower", lambda app: app.change_speed(-1), repeats=True),
-    Command("]", imgui.Key.right_bracket, "faster", lambda app: app.change_speed(1), repeats=True),
-    Command("Backspace", imgui.Key.backspace, "speed 1x", lambda app: app.change_pace(speed=1.0)),
-    Command("E", imgui.Key.e, "every frame, real time", lambda app: app.toggle_pace("every_frame")),
-    Command("T", imgui.Key.t, "light, dark theme", lambda app: app.next_theme()),
-    Command("F", imgui.Key.f, "fit the view", lambda app: app.fit()),
-    *(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),
-    Command("O", imgui.Key.o, "orthographic, perspective", lambda app: app.switch_projection()),
-    Command("B", imgui.Key.b, "next renderer", lambda app: app.next_backend()),
-    Command("P", imgui.Key.p, "save the picture", lambda app: app.screenshot()),
-    Command("R", imgui.Key.r, "record, stop recording", lambda app: app.toggle_recording()),
-    Command("Ctrl+Q", imgui.Key.mod_ctrl | imgui.Key.q, "quit", lambda app: app.quit()),
-)  # fmt: skip
-MOUSE = (
-    ("Double click", "turn about what is there"),
-    ("Left drag", "orbit"),
-    ("Middle drag, Shift+left", "pan"),
-    ("Wheel, right drag", "zoom"),
-)
+[keys]
+"""
 
 
-def key_of(does: str) -> str:
-    """The key of what a command does."""
-    return next(command.key for command in COMMANDS if command.does == does)
+def chord(text: str) -> int:
+    """The ImGui chord of keys such as "Ctrl+Shift+1". Raises InputError."""
+    *modifiers, key = text.split("+") if text != "+" else [text]
+    for name in modifiers:
+        if name not in _MODIFIERS:
+            raise unknown_name("modifier key", name, list(_MODIFIERS))
+    if key.upper() not in _KEYS and key not in _KEYS:
+        raise unknown_name("key", key, list(_KEYS))
+    value = int(_KEYS.get(key, _KEYS.get(key.upper(), 0)))
+    for name in modifiers:
+        value |= int(_MODIFIERS[name])
+    return value
 
 
-def handle(app: App) -> None:
-    """Do what the keys pressed since the last frame say; keys typed into a text go there."""
-    for command in COMMANDS:
-        flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
-        if imgui.shortcut(command.chord, flags):
-            command.act(app)
+class Keys:
+    """The keys of every command. of: command's name -> its keys as text, empty for none."""
+
+    def __init__(self, changes: Mapping[str, str] | None = None) -> None:
+        self.of = {name: command.key for name, command in COMMANDS.items()} | dict(changes or {})
+        self._chords = [(COMMANDS[name], chord(text)) for name, text in self.of.items() if text]
+
+    def handle(self, app: App) -> None:
+        """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there."""
+        if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
+            return
+        for command, pressed in self._chords:
+            flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
+            if imgui.shortcut(pressed, flags) and command.can(app):
+                command.act(app)
+
+
+def load(path: Path) -> tuple[Keys, list[str]]:
+    """The keys that a TOML file gives, and what is wrong in it; the usual keys where there is no file.
+
+    What is wrong is left out: the usual keys hold for it.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        given = tomllib.loads(text)
+    except FileNotFoundError:
+        return Keys(), []
+    except (OSError, ValueError) as error:  # of encoding and of TOML
+        return Keys(), [str(InputError(f"cannot be read ({error})", path, "The usual keys hold"))]
+    changes, problems = _checked(given)
+    return Keys(changes), [str(InputError(problem.what, path, problem.hint)) for problem in problems]
+
+
+def _checked(given: Mapping[str, Any]) -> tuple[dict[str, str], list[InputError]]:
+    """The keys of a file that can be used, and what cannot."""
+    problems = [unknown_name("table", name, ["keys"]) for name in given if name != "keys"]
+    table = given.get("keys", {})
+    if not isinstance(table, dict):
+        return {}, [InputError("'keys' is not a table", hint="Write [keys] above the lines")]
+    changes = {}
+    for name, text in table.items():
+        try:
+            if name not in COMMANDS:
+                raise unknown_name("command", name, list(COMMANDS))
+            if not isinstance(text, str):
+                raise InputError(f"the keys of '{name}' are not text", hint=f'Write {name} = "Ctrl+K"')
+            if text:
+                chord(text)
+            changes[name] = text
+        except InputError as problem:
+            problems.append(problem)
+    return _without_clashes(changes, problems), problems
+
+
+def _without_clashes(changes: dict[str, str], problems: list[InputError]) -> dict[str, str]:
+    """Leave out changes, last first, until no keys do two things; the usual keys have none."""
+    while True:
+        taken: dict[int, str] = {}
+        for name, text in ({n: c.key for n, c in COMMANDS.items()} | changes).items():
+            if not text:
+                continue
+            other = taken.setdefault(chord(text), name)
+            if other != name:
+                guilty = next(n for n in reversed(changes) if n in (name, other))
+                what = f"{text} is to do both '{other}' and '{name}'"
+                problems.append(
+                    InputError(what, hint=f"Give one of them other keys. '{guilty}' keeps its usual ones")
+                )
+                del changes[guilty]
+                break
+        else:
+            return changes
+
+
+def write_template(path: Path) -> None:
+    """Write a file that names every command and its usual keys. Raises InputError where it cannot."""
+    named = " ".join(_NAMED)
+    lines = [f"# {name} = {_quoted(command.key)}  # {command.title}" for name, command in COMMANDS.items()]
+    with whole_file(path) as temporary:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(_HEAD.format(named=named) + "\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\") + '"'

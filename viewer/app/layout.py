@@ -1,4 +1,4 @@
-"""How the window is divided: the 3D view, a panel at its right, the timeline below."""
+"""How the window is divided: menus and toolbar, the 3D view, a panel at its right, the timeline below."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import keys, panel, timeline_bar, view
+from . import help, menu, panel, timeline_bar, view
 
 if TYPE_CHECKING:
     from .app import App
 
 _PANEL_WIDTH = 21.0  # in heights of the font
-_BAR_HEIGHT = 6.2
+_BAR_HEIGHT = 4.8
 # No background: the window is filled with the panels' colour before.
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -24,25 +24,41 @@ _STILL = (
 
 def draw(app: App) -> tuple[float, float, float, float]:
     """Declare all widgets; returns the 3D view: left, top, width, height in ImGui's coordinates."""
-    keys.handle(app)
+    app.keys.handle(app)
     whole = imgui.get_io().display_size
+    top = _draw_head(app, whole.x)
     em = imgui.get_font_size()
     # Whole numbers, so that the picture's edges fall on pixels.
     width = max(1, int(whole.x - min(_PANEL_WIDTH * em, 0.5 * whole.x)))
-    height = max(1, int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y)))
+    bottom = int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y))
+    height = max(1, bottom - top)
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-    _place("view", 0, 0, width, height)
+    _place("view", 0, top, width, height)
     imgui.pop_style_var()
     view.draw(app)
     imgui.end()
-    _place("panel", width, 0, whole.x - width, height)
+    _place("panel", width, top, whole.x - width, height)
     panel.draw(app)
     imgui.end()
-    _place("timeline", 0, height, whole.x, whole.y - height)
+    _place("timeline", 0, bottom, whole.x, whole.y - bottom)
     timeline_bar.draw(app)
-    view.draw_pointed(app)
     imgui.end()
-    return 0, 0, width, height
+    help.draw(app)
+    return 0, top, width, height
+
+
+def _draw_head(app: App, width: float) -> int:
+    """Declare menus and toolbar; returns where what is below them begins."""
+    below = menu.draw_bar(app)
+    padding = imgui.get_style().window_padding
+    padding = ImVec2(padding.x, 0.4 * padding.y)  # not the style's own, which the next line changes
+    imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
+    height = imgui.get_frame_height() + 2 * padding.y
+    _place("toolbar", 0, below, width, height)
+    menu.draw_toolbar(app)
+    imgui.end()
+    imgui.pop_style_var()
+    return int(below + height)
 
 
 def _place(name: str, left: float, top: float, width: float, height: float) -> None:

@@ -1,4 +1,4 @@
-"""The panel at the right: scan, renderer, look, statistics, messages and keys."""
+"""The panel at the right: scan, renderer, projection, look, statistics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2, imgui
 from ..backends import backend, backends
 from ..camera import PROJECTIONS
 from ..look import COLOR_BY
-from . import keys, navigation, theme, widgets
+from . import widgets
 
 if TYPE_CHECKING:
     from ..gpu.surface import Stats
@@ -32,21 +32,10 @@ def draw(app: App) -> None:
     if pose is not None:
         if _section("Renderer"):
             _draw_renderer(app, pose)
-        if _section("Views"):
-            _draw_views(app)
         if _section("Look"):
             choices = {"color_by": [*COLOR_BY, *pose.cloud.scalars]}
             app.session.look = widgets.edit(app.session.look, choices)
-    if _section("Window", is_open=False):
-        widgets.label("Theme", "Of the panels (T); the look has the picture's background")
-        chosen = widgets.choose("theme", app.theme, list(theme.PALETTES))
-        if chosen != app.theme:
-            app.set_theme(chosen)
-    if _section("Messages", is_open=False):
-        for note in app.notes:
-            imgui.text_wrapped(note)
-    if _section("Keys", is_open=False):
-        _draw_keys()
+            _draw_projection(app)
     imgui.end_child()
     imgui.separator()
     _draw_statistics(app)
@@ -78,20 +67,8 @@ def _draw_renderer(app: App, pose: Pose) -> None:
     session.params[name] = widgets.edit(params)
 
 
-def _draw_views(app: App) -> None:
-    """Opposite sides one below the other, and the projection."""
-    sides = list(navigation.VIEWS)
-    columns = len(sides) // 2
-    gap = imgui.get_style().item_spacing.x
-    width = (imgui.get_content_region_avail().x - gap * (columns - 1)) / columns
-    for row in (sides[::2], sides[1::2]):
-        for side in row:
-            if imgui.button(side.capitalize(), ImVec2(width, 0)):
-                app.look_from(side)
-            imgui.set_item_tooltip(f"See the {side} ({keys.key_of(f'{side} view')})")
-            if side != row[-1]:
-                imgui.same_line()
-    widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth (O)")
+def _draw_projection(app: App) -> None:
+    widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth")
     now = app.session.camera.projection if app.session.camera else PROJECTIONS[0]
     chosen = widgets.choose("projection", now, PROJECTIONS)
     if chosen != now:
@@ -128,11 +105,3 @@ def _row(name: str, text: str) -> None:
     imgui.text_disabled(name)
     imgui.same_line(6 * imgui.get_font_size())
     imgui.text(text)
-
-
-def _draw_keys() -> None:
-    rows = [*keys.MOUSE, *((command.key, command.does) for command in keys.COMMANDS)]
-    for name, does in rows:
-        imgui.text_disabled(name)
-        imgui.same_line(11 * imgui.get_font_size())
-        imgui.text(does)

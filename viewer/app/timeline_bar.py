@@ -1,4 +1,4 @@
-"""The bar at the bottom: playing, the frames as a track, and the latest message."""
+"""The bar at the bottom: playing, the frames as a track, and what is under the mouse."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _SPEED_WIDTH = 4.6  # in heights of the font
 _SHORTEST_TRACK = 8.0
+_GAP = "    "  # between what is said of the place under the mouse
 
 
 def draw(app: App) -> None:
@@ -156,18 +157,27 @@ class _Track:
         self.draw_list.add_rect_filled(*corners, theme.packed(color), half)
 
 
+def _pointed(app: App, room: float) -> str:
+    """As much of what is under the mouse as there is room for."""
+    words = app.pointed_words
+    while words and imgui.calc_text_size(text := _GAP.join(words)).x > room:
+        words = words[:-1]
+    return text if words else ""
+
+
 def _draw_status(app: App) -> None:
-    """The latest message, and the names of scan and frame, shortened where they are long."""
+    """What is under the mouse, else the latest message; the names of scan and frame."""
     imgui.spacing()
     playback = app.playback
     width, gap = imgui.get_content_region_avail().x, 2 * imgui.get_font_size()
     names = playback.timeline.name, playback.timeline.label(app.session.index)
     name = "   ".join(widgets.shortened(one, width / 4) for one in names)
     left = width - imgui.calc_text_size(name).x
-    if app.notes:
-        imgui.text_disabled(widgets.shortened(app.notes[-1], left - gap))
-        imgui.set_item_tooltip(app.notes[-1])
-        imgui.same_line()
+    text = _pointed(app, left - gap)
+    if not text and app.notices.all:
+        text = widgets.shortened(app.notices.all[-1].text, left - gap)
+    imgui.text_disabled(text)
+    imgui.same_line()
     imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)
     imgui.text_disabled(name)
     imgui.set_item_tooltip("\n".join(names))

@@ -9,13 +9,12 @@ from imgui_bundle import ImVec2, imgui
 
 from ..camera import Camera
 from ..geometry import Vector
-from . import navigation, theme
+from . import navigation, notices, theme
 
 if TYPE_CHECKING:
     from .app import App
 
 _PIVOT = 0xF0C24B
-_POINTED, _GAP = "Under the mouse: ", "    "
 
 _BUTTONS = (
     imgui.ButtonFlags_.mouse_button_left
@@ -40,17 +39,9 @@ def draw(app: App) -> None:
     text = _note(app)
     if text:
         _draw_note(text, size)
+    notices.draw(app, size)
     if app.recorder is not None:
         _draw_recording_mark()
-
-
-def draw_pointed(app: App) -> None:
-    """Declare the line that says what is under the mouse: as much of it as there is room for."""
-    words = app.pointed_words
-    room = imgui.get_content_region_avail().x
-    while words and imgui.calc_text_size(text := _POINTED + _GAP.join(words)).x > room:
-        words = words[:-1]
-    imgui.text_disabled(text if words else "")
 
 
 def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
@@ -120,23 +111,14 @@ def _draw_note(text: str, size: ImVec2) -> None:
     wrap = max(10 * em, min(0.7 * size.x, 40 * em))
     extent = imgui.calc_text_size(text, wrap_width=wrap)
     corner = ImVec2((size.x - extent.x) / 2, 2 * em)
-    draw_list = imgui.get_window_draw_list()
-    pad = ImVec2(em, 0.6 * em)
-    behind = imgui.get_color_u32(imgui.Col_.window_bg, 0.92)
-    draw_list.add_rect_filled(corner - pad, corner + extent + pad, behind, 0.4 * em)
-    imgui.set_cursor_pos(corner)
-    imgui.push_text_wrap_pos(corner.x + wrap)
-    imgui.text_unformatted(text)
-    imgui.pop_text_wrap_pos()
+    notices.draw_text(text, corner, extent, wrap, ImVec2(em, 0.6 * em))
 
 
 def _draw_recording_mark() -> None:
     """A red dot in the upper left corner."""
     em, text = imgui.get_font_size(), "recording"
-    corner, extent = ImVec2(em, em), imgui.calc_text_size(text)
-    draw_list = imgui.get_window_draw_list()
-    corners = corner, corner + ImVec2(extent.x + 2.4 * em, extent.y + 0.8 * em)
-    draw_list.add_rect_filled(*corners, imgui.get_color_u32(imgui.Col_.window_bg, 0.92), 0.4 * em)
-    draw_list.add_circle_filled(corner + ImVec2(em, 0.4 * em + extent.y / 2), 0.36 * em, theme.packed(_RED))
-    imgui.set_cursor_pos(corner + ImVec2(1.8 * em, 0.4 * em))
-    imgui.text_unformatted(text)
+    extent = imgui.calc_text_size(text)
+    corner = ImVec2(2.6 * em, 1.4 * em)
+    notices.draw_text(text, corner, extent, extent.x + em, ImVec2(1.6 * em, 0.4 * em))
+    center = imgui.get_window_pos() + corner + ImVec2(-0.8 * em, extent.y / 2)
+    imgui.get_window_draw_list().add_circle_filled(center, 0.36 * em, theme.packed(_RED))

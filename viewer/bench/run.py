@@ -23,8 +23,8 @@ from ..files import whole_file
 from ..frame import Request
 from ..gpu.surface import Surface
 from ..look import Look
-from ..measure import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from ..renderer import Renderer
+from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from . import baselines, numerics
 from .baselines import CEILING, FLOOR
 from .judge import Judge, Walk

@@ -23,11 +23,11 @@ from ..export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, check_output, pictures
 from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look
-from ..measure import draw
 from ..params import parse
 from ..recording import Entry, fingerprint
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
+from ..timing import draw
 from . import arguments, drawing, replay, stats
 from .console import progress
 from .drawing import Plan, Shot

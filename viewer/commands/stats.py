@@ -9,8 +9,8 @@ from typing import Any
 
 from ..frame import Request
 from ..gpu.surface import Surface
-from ..measure import call_ms, pass_ms, peak_rss
 from ..renderer import Renderer
+from ..timing import call_ms, pass_ms, peak_rss
 
 _WARM_UPS = 2
 

@@ -15,7 +15,7 @@ from ..errors import InputError, NoOpenGLError
 from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
 from ..look import Look
-from ..measure import draw
+from ..timing import draw
 from . import drawing
 from .console import progress
 from .doctor import display

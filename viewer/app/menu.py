@@ -1,0 +1,90 @@
+"""The menu bar and the toolbar, drawn from the table of commands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import ImVec2, imgui
+
+from . import theme
+from .commands import COMMANDS, MENUS, TOOLBAR, Command, Listing, Menu
+
+if TYPE_CHECKING:
+    from .app import App
+
+
+def draw_bar(app: App) -> float:
+    """Declare the menu bar of the window; returns its height."""
+    if imgui.begin_main_menu_bar():
+        for menu in MENUS:
+            _draw(app, menu)
+        imgui.end_main_menu_bar()
+    return imgui.get_frame_height()
+
+
+def draw_toolbar(app: App) -> None:
+    """Declare the toolbar in the current ImGui window: as many buttons as there is room for."""
+    gap = imgui.get_style().item_spacing.x
+    room = imgui.get_content_region_avail().x
+    for group in TOOLBAR:
+        if group is not TOOLBAR[0]:
+            _draw_line(gap)
+        for name in group:
+            command = COMMANDS[name]
+            width = imgui.calc_text_size(command.short).x + 2 * imgui.get_style().frame_padding.x
+            if imgui.get_cursor_pos_x() + width > room:
+                return
+            _draw_button(app, command)
+            imgui.same_line()
+
+
+def _draw_line(gap: float) -> None:
+    """Between groups of buttons."""
+    imgui.same_line(0, 2 * gap)
+    top = imgui.get_cursor_screen_pos() - ImVec2(gap, 0)
+    bottom = top + ImVec2(0, imgui.get_frame_height())
+    imgui.get_window_draw_list().add_line(top, bottom, imgui.get_color_u32(imgui.Col_.separator))
+
+
+def _draw_button(app: App, command: Command) -> None:
+    is_on = command.is_on is not None and command.is_on(app)
+    imgui.begin_disabled(not command.can(app))
+    if is_on:
+        imgui.push_style_color(imgui.Col_.text, theme.packed(app.palette.accent))
+    if imgui.button(command.short):
+        command.act(app)
+    if is_on:
+        imgui.pop_style_color()
+    imgui.end_disabled()
+    keys = app.keys.of[command.name]
+    imgui.set_item_tooltip(f"{command.title} ({keys})" if keys else command.title)
+
+
+def _draw(app: App, entry: Command | Listing | Menu) -> None:
+    if isinstance(entry, Command):
+        is_on = entry.is_on is not None and entry.is_on(app)
+        if imgui.menu_item(entry.title, app.keys.of[entry.name], is_on, entry.can(app))[0]:
+            entry.act(app)
+    elif imgui.begin_menu(entry.title):
+        if isinstance(entry, Listing):
+            _draw_items(app, entry)
+        else:
+            _draw_groups(app, entry)
+        imgui.end_menu()
+
+
+def _draw_groups(app: App, menu: Menu) -> None:
+    for group in menu.groups:
+        if group is not menu.groups[0]:
+            imgui.separator()
+        for entry in group:
+            _draw(app, entry)
+
+
+def _draw_items(app: App, listing: Listing) -> None:
+    items = list(listing.items(app))
+    for number, (title, act, is_on) in enumerate(items):
+        if imgui.menu_item(f"{title}##{number}", "", is_on)[0]:
+            act()
+    if not items:
+        imgui.text_disabled("none")
