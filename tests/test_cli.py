@@ -337,16 +337,16 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
 def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
     run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from viewer import measure
+    from viewer import timing
 
     drawn: list[bool] = []
-    draw = measure.draw
+    draw = timing.draw
 
     def counted(renderer: Renderer, *rest: object) -> object:
         drawn.append(renderer.gpu.timers.enabled)
         return draw(renderer, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(measure, "draw", counted)
+    monkeypatch.setattr(timing, "draw", counted)
     ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--stats", tmp_path / "s.json")
     assert run(*ball, "--repeat", 4).code == 0
     assert drawn == [False] * (2 + 4) + [True] * 4
@@ -699,6 +699,13 @@ def test_view_falls_back_to_pictures(run: Run, scans: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("no_display")
+def test_view_leaves_out_what_is_missing_among_several(run: Run, scans: Path, tmp_path: Path) -> None:
+    done = run("view", scans / "ball.npz", scans / "gone.npz", "--fallback", tmp_path)
+    assert done.code == 0
+    assert done.err.count("gone.npz: no such file") == 1
+    assert list(tmp_path.glob("*.mp4"))
+
+
 def test_the_fallback_keeps_several_scans_apart(run: Run, scans: Path, tmp_path: Path) -> None:
     assert run("view", scans / "ball.npz", scans / "ball.npz", "--fallback", tmp_path).code == 0
     assert [name for name in names(tmp_path) if name.endswith("mp4")] == ["0_ball_npz.mp4", "1_ball_npz.mp4"]
@@ -722,8 +729,8 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     assert run("view", ball, "demo", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
     assert run("view").code == 0
     assert calls == [
-        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1}),
-        (["demo"], {"unit": None, "fps": None, "up": "+y", "device": None}),
+        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, "replay": None}),
+        (["demo"], {"unit": None, "fps": None, "up": "+y", "device": None, "replay": None}),
     ]
 
 

@@ -187,7 +187,7 @@ class Noise:
 resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 with export.pictures(export.Path({str(tmp_path / ("a" + suffix))!r}), (640, 480), 25) as put:
     for number in range(30):
-        put(Noise(), number, None)
+        put(Noise(), number, None, None)
 """
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1]

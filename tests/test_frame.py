@@ -1,10 +1,9 @@
 from __future__ import annotations
 
-import threading
+import os
 import time
 from dataclasses import dataclass, replace
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,15 +11,18 @@ from scenes import NOTHING, sphere
 
 import viewer
 from viewer.backends import Backend
+from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.errors import InputError
-from viewer.frame import Request, choose, render_frame
+from viewer.frame import Request, bring, choose, fallback, is_prepared, render_frame
+from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.params import param
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.task import checkpoint
 
 BARE = PointCloud.from_arrays(sphere(4000).positions)
 
@@ -93,44 +95,43 @@ class _Params:
 
 
 class _Uploaded:
-    def __init__(self, array: np.ndarray) -> None:
-        self.array, self.nbytes, self.released = array, array.nbytes, False
+    def __init__(self, arrays: tuple[np.ndarray, int]) -> None:
+        self.array, self.process = arrays
+        self.nbytes, self.released = self.array.nbytes, False
 
     def release(self) -> None:
         self.released = True
 
 
+def every_nth(cloud: PointCloud, params: _Params) -> tuple[np.ndarray, int]:
+    """Every n-th position, and the process that looked for them."""
+    return cloud.positions[:: params.step], os.getpid()
+
+
 @pytest.fixture
-def deriving() -> tuple[Backend, list[Any]]:
-    """A backend that derives every n-th position, and the threads that it did so on."""
-    module, threads = ModuleType("deriving"), []
-
-    def derive(cloud: PointCloud, params: _Params) -> np.ndarray:
-        threads.append(threading.current_thread())
-        return cloud.positions[:: params.step]
-
+def deriving() -> Backend:
+    """A backend that derives every n-th position."""
+    module = ModuleType("deriving")
     vars(module).update(
+        TITLE="Deriving",
         Params=_Params,
         needs=lambda cloud, params: (),
-        derive=derive,
+        derive=every_nth,
         upload=lambda gpu, arrays: _Uploaded(arrays),
     )
-    return Backend("deriving", module), threads
+    return Backend("deriving", module)
 
 
-def test_derived_data_is_made_once_counted_and_evicted(
-    renderer: Renderer, deriving: tuple[Backend, list[Any]]
-) -> None:
-    backend, threads = deriving
+def test_derived_data_is_made_once_counted_and_evicted(renderer: Renderer, deriving: Backend) -> None:
     own = Renderer(renderer.gpu, budget_bytes=1)
     pose = Pose(0, 0.0, "x", sphere(1000))
     resident = own.resident(pose)
-    first = own.prepare(resident, backend, _Params(), Look(), wait=True)
+    first = own.prepare(resident, deriving, _Params(), Look(), wait=True)
     assert first is not None
-    assert own.prepare(resident, backend, _Params(shade=5), Look(), wait=True) is first, "draws only"
-    other = own.prepare(resident, backend, _Params(step=5), Look(), wait=True)
+    assert own.prepare(resident, deriving, _Params(shade=5), Look(), wait=True) is first, "draws only"
+    other = own.prepare(resident, deriving, _Params(step=5), Look(), wait=True)
     assert other is not None
-    assert len(threads) == 2
+    assert first.derived.process == other.derived.process == os.getpid()
     assert own.nbytes == first.derived.nbytes + other.derived.nbytes == 12 * (500 + 200)
     own.resident(replace(pose, index=1))
     assert own.nbytes == 0
@@ -138,13 +139,96 @@ def test_derived_data_is_made_once_counted_and_evicted(
     own.release()
 
 
-def test_derive_runs_on_the_worker_and_uploads_do_not(
-    renderer: Renderer, deriving: tuple[Backend, list[Any]]
+def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancelled(
+    renderer: Renderer, deriving: Backend
 ) -> None:
-    backend, threads = deriving
     own = Renderer(renderer.gpu)
-    resident = own.resident(Pose(0, 0.0, "x", sphere(1000)))
-    while own.prepare(resident, backend, _Params(), Look(), wait=False) is None:
+    pose = Pose(0, 0.0, "x", sphere(1000))
+    resident = own.resident(pose)
+    assert not own.is_prepared(pose, deriving, _Params(), Look())
+    assert own.prepare(resident, deriving, _Params(), Look(), wait=False) is None
+    task = own.preparing
+    assert task is not None
+    assert task.name == "Preparing Deriving"
+    task.cancel()
+    assert own.preparing is None
+    while (prepared := own.prepare(resident, deriving, _Params(), Look(), wait=False)) is None:
+        assert own.preparing is not task, "what was cancelled begins anew"
         time.sleep(0.001)
-    assert threads[0] is not threading.main_thread()
+    assert prepared.derived.process != os.getpid()
+    np.testing.assert_array_equal(prepared.derived.array, pose.cloud.positions[::2])
+    assert own.is_prepared(pose, deriving, _Params(), Look())
+    assert own.preparing is None
     own.release()
+
+
+def for_ever(cloud: PointCloud, params: _Params) -> None:
+    """Says which process it is by its progress, and never ends."""
+    checkpoint(float(os.getpid()))
+    while True:
+        time.sleep(1)
+
+
+def test_releasing_ends_what_is_being_prepared(renderer: Renderer, deriving: Backend) -> None:
+    own = Renderer(renderer.gpu)
+    vars(deriving.module)["derive"] = for_ever
+    pose = Pose(0, 0.0, "x", sphere(1000))
+    resident = own.resident(pose)
+    own.prepare(resident, deriving, _Params(), Look(), wait=False)
+    task = own.preparing
+    assert task is not None
+    while task.progress is None:
+        time.sleep(0.001)
+    own.release()
+    assert task.cancelled
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(task.progress), 0)
+
+
+def test_large_arrays_are_uploaded_in_slices(renderer: Renderer) -> None:
+    points = np.random.default_rng(0).random((1_000_000, 3), dtype=np.float32)
+    pose = GpuPose(renderer.gpu, PointCloud.from_arrays(points, colors=points))
+    calls = 1
+    while not pose.upload(["positions", "colors"], budget_ms=0):
+        calls += 1
+    assert calls == 3, "4 MiB a slice"
+    assert pose.uploaded_bytes == 16_000_000
+    uploaded = np.frombuffer(pose.array("positions").buffer.read(), np.float32).reshape(-1, 3)
+    np.testing.assert_array_equal(uploaded, pose.cloud.positions)
+    assert pose.upload(["positions"], budget_ms=0)
+    assert pose.uploaded_bytes == 16_000_000
+
+
+def test_an_upload_that_has_begun_is_finished_when_something_reads_it(renderer: Renderer) -> None:
+    points = np.random.default_rng(0).random((1_000_000, 3), dtype=np.float32)
+    pose = GpuPose(renderer.gpu, PointCloud.from_arrays(points))
+    assert not pose.upload(["positions"], budget_ms=0)
+    uploaded = np.frombuffer(pose.array("positions").buffer.read(), np.float32).reshape(-1, 3)
+    np.testing.assert_array_equal(uploaded, pose.cloud.positions)
+
+
+def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> None:
+    own = Renderer(renderer.gpu)
+    pose = Pose(0, 0.0, "x", sphere(1000))
+    request = Request(pose, Camera.orbit(pose.cloud.bounds()), "surfels")
+    assert bring(own, request, budget_ms=1000)
+    assert own.bytes_of(pose) == 1000 * (12 + 12), "positions and normals"
+    bare = Request(Pose(0, 0.0, "x", BARE), request.camera, "surfels", look=Look(color_by="normal"))
+    assert bring(own, bare, budget_ms=1000)
+    assert not is_prepared(own, bare)
+    assert is_prepared(own, fallback(bare))
+    own.release()
+
+
+def test_estimates_are_the_same_whoever_makes_them(renderer: Renderer) -> None:
+    pose, surfels = Pose(0, 0.0, "x", BARE), find_backend("surfels")
+    clouds = []
+    for wait in (True, False):
+        own = Renderer(renderer.gpu)
+        resident = own.resident(pose)
+        while own.prepare(resident, surfels, surfels.params({"radius": "own"}), Look(), wait) is None:
+            time.sleep(0.01)
+        clouds.append(resident.cloud)
+        own.release()
+    np.testing.assert_array_equal(clouds[0].normals, clouds[1].normals)
+    np.testing.assert_array_equal(clouds[0].radii, clouds[1].radii)

@@ -12,11 +12,23 @@ PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 
 # A part of the package may import its own layer and those before it.
 LAYERS = (
-    {"errors", "files", "geometry", "params", "resources", "camera", "look", "scan"},
+    {
+        "errors",
+        "files",
+        "geometry",
+        "params",
+        "resources",
+        "camera",
+        "look",
+        "marks",
+        "task",
+        "helper",
+        "scan",
+    },
     {"gpu"},
     {"backends"},
-    {"renderer", "frame", "timing", "export", "pick"},
-    {"recording", "__init__"},
+    {"renderer", "frame", "timing", "export", "pick", "measurement"},
+    {"recording", "render_job", "__init__"},
     {"app", "bench"},
     {"cli", "commands"},
 )

@@ -11,7 +11,7 @@ from scenes import looking_down_z, plane, sphere, sphere_hits
 from viewer.camera import Camera
 from viewer.gpu.surface import EMPTY, NOTHING, Surface, Texel
 from viewer.gpu.view import View
-from viewer.pick import pick
+from viewer.pick import is_seen, pick
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]
@@ -139,3 +139,15 @@ def test_unprojecting_undoes_projecting(projection: str) -> None:
     view = View.of(camera, SIZE, np.array([1.0, 2, 3]), cloud.bounds())
     points = cloud.positions - np.array([1.0, 2, 3])
     np.testing.assert_allclose(view.unproject(*view.project(points)), points, atol=1e-12)
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_a_place_is_seen_unless_something_is_before_it(draw: Draw, projection: str) -> None:
+    surface = draw(plane(30, depth=4.0), CAMERAS[projection], SIZE, "surfels")  # 1.5 wide, of 3 in view
+    assert is_seen(surface, (0.2, 0.1, -4.0), 0.01)
+    assert is_seen(surface, (0.2, 0.1, -3.0), 0.01), "before the plane"
+    assert not is_seen(surface, (0.2, 0.1, -5.0), 0.01)
+    assert is_seen(surface, (0.2, 0.1, -5.0), 1.1)
+    assert is_seen(surface, (1.3, 0, -4.0), 0.0), "beside the plane, where nothing is"
+    assert not is_seen(surface, (1.9, 0, -4.0), 0.0), "outside the picture"
+    assert not is_seen(surface, (0, 0, 2.0), 10.0), "behind the eye"

@@ -18,6 +18,7 @@ from viewer.errors import InputError
 from viewer.export import write_png
 from viewer.frame import Request
 from viewer.look import Look
+from viewer.marks import Marks
 from viewer.recording import FORMAT, Entry, Recorder, Recording, fingerprint
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -27,7 +28,7 @@ FIRST = Entry(
     scan="knot", hash="files:0123456789abcdef", pose=0, time=0.0, size=(96, 64),
     camera=Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5), backend="points",
     params=backend("points").params({"point_size": 5}),
-    look=Look(color_by="height", low=1e-17, eye_dome=True),
+    look=Look(color_by="height", low=1e-17, eye_dome=True), marks=Marks(scale_bar=True), unit="mm",
 )  # fmt: skip
 SECOND = replace(FIRST, pose=1, time=0.04, at=0.52)
 THIRD = replace(SECOND, backend="surfels", params=backend("surfels").params(), at=1.5)
@@ -59,10 +60,25 @@ def test_a_recording_tells_only_what_has_changed_an_entry_a_line(tmp_path: Path)
 
 def test_an_entry_holds_all_of_a_request() -> None:
     request = Request(POSE, FIRST.camera, "points", FIRST.params, FIRST.look)
-    entry = Entry.of(request, "knot", None, (96, 64))
+    entry = Entry.of(request, "knot", None, (96, 64), "mm")
     assert (entry.pose, entry.time) == (3, 0.12)
     again = Entry.from_json(json.loads(json.dumps(entry.to_json()))).request(POSE)
     assert vars(again) == vars(request)
+
+
+def test_what_earlier_versions_did_not_tell_has_its_default(tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    data = json.loads(path.read_text())
+    for name in ("marks", "unit"):
+        del data["entries"][0][name]
+    path.write_text(json.dumps(data))
+    assert Recording.load(path).entries[0] == replace(FIRST, marks=Marks(), unit=None)
+
+
+def test_an_anonymous_description_tells_all_but_the_scan() -> None:
+    told, whole = (json.loads(FIRST.description(anonymous)) for anonymous in (True, False))
+    assert whole["scan"] == "knot"
+    assert told == whole | {"scan": None}
 
 
 def test_the_recorder_notes_what_changes_and_when() -> None:
@@ -150,6 +166,10 @@ CAMERA = FIRST.camera.to_json()
         (changed(first={"params": {"point_size": 1e999}}), ["point_size"]),
         (changed(first={"params": [5]}), ["'params'"]),
         (changed(first={"look": {"nope": 1}}), ["'nope'", "color_by"]),
+        (changed(first={"marks": {"nope": True}}), ["unknown mark 'nope'", "scale_bar"]),
+        (changed(first={"marks": {"stamp": 7}}), ["'7'", "stamp"]),
+        (changed(first={"marks": ["stamp"]}), ["'marks'"]),
+        (changed(first={"unit": 7}), ["'unit'"]),
         (changed(first={"look": {"background": "red"}}), ["'red'", "#rrggbb"]),
         (changed(first={"camera": {"nope": 1}}), ["camera field 'nope'", "eye"]),
         (changed(first={"camera": {**CAMERA, "eye": [1, 2]}}), ["eye", "three"]),

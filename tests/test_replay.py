@@ -132,6 +132,104 @@ def test_a_film_of_a_picture_is_one_picture(run: Run) -> None:
     assert len(film(Path("a.mp4"))[0]) == 1
 
 
+# --- marks ----------------------------------------------------------------------------------------
+
+MARKED = ("--marks", "scale_bar", "color_bar", "stamp", "--unit", "mm")
+
+
+def test_a_picture_with_marks_is_drawn_again_from_itself(run: Run) -> None:
+    choice = ("sequence", "--pose", 2, "--look", "color_by=height", *SMALL)
+    assert run("render", *choice, "-o", "bare.png").code == 0
+    assert run("render", *choice, *MARKED, "-o", "a.png").code == 0
+    assert not np.array_equal(picture(Path("a.png")), picture(Path("bare.png")))
+    assert run("render", "--replay", "a.png", "-o", "again.png").code == 0
+    assert Path("again.png").read_bytes() == Path("a.png").read_bytes()
+    # An EXR holds the surface alone, and still knows them.
+    assert run("render", "--replay", "a.png", "-o", "a.exr").code == 0
+    assert run("render", "--replay", "bare.png", "-o", "bare.exr").code == 0
+    exrs = [run("render", "--replay", f"{n}.exr", "-o", f"{n}.npz").code for n in ("a", "bare")]
+    assert exrs == [0, 0]
+    with np.load("a.npz") as found, np.load("bare.npz") as expected:
+        assert all(np.array_equal(bits(found[name]), bits(expected[name])) for name in expected)
+    assert run("render", "--replay", "a.exr", "-o", "again.png").code == 0
+    assert Path("again.png").read_bytes() == Path("a.png").read_bytes()
+
+
+def test_marks_are_added_to_a_recording_and_to_its_film(run: Run) -> None:
+    recorded(Path("a.json"))
+    assert run("render", "--replay", "a.json", *MARKED[:4], "-o", "p%d.png").code == 0
+    assert run("render", "--replay", "a.json", *MARKED[:4], "--fps", 20, "-o", "a.mp4").code == 0
+    first, shown = picture(Path("p0.png"))[..., :3].astype(int), film(Path("a.mp4"))[0][0]
+    assert np.abs(first - shown).mean() < 6
+    assert run("render", "--replay", "a.json", "-o", "bare%d.png").code == 0
+    bare = picture(Path("bare0.png"))[..., :3].astype(int)
+    assert np.abs(first - shown).mean() < np.abs(bare - shown).mean() / 2
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".npz"])
+def test_marks_are_for_pictures_that_show_the_look(suffix: str, refused: Callable[..., str]) -> None:
+    message = refused("render", "ball.npz", *SMALL, *MARKED, "-o", f"a{suffix}")
+    assert all(word in message for word in ("--marks", suffix, ".png", ".mp4")), message
+    message = refused("render", "ball.npz", *SMALL, "--marks", "nope", "-o", "a.png")
+    assert all(word in message for word in ("'nope'", "scale_bar", "color_bar", "stamp")), message
+
+
+# --- without names --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr", ".mp4"])
+def test_an_anonymous_picture_tells_no_name(suffix: str, run: Run, folder: Path) -> None:
+    (folder / "jane_doe.npz").write_bytes((folder / "ball.npz").read_bytes())
+    scan = folder / "jane_doe.npz"
+    assert run("render", scan, *SMALL, "--anonymous", "-o", f"a{suffix}").code == 0
+    data = Path(f"a{suffix}").read_bytes()
+    assert b"jane" not in data
+    assert str(folder).encode() not in data
+    if suffix == ".mp4":
+        return
+    assert str(fingerprint([scan])).encode() in data
+    assert run("render", scan, *SMALL, "-o", f"named{suffix}").code == 0
+    assert b"jane_doe" in Path(f"named{suffix}").read_bytes()
+
+
+def test_an_anonymous_picture_is_drawn_again_when_its_scan_is_named(
+    run: Run, refused: Callable[..., str]
+) -> None:
+    assert run("render", "ball.npz", *SMALL, "--anonymous", "-o", "a.png").code == 0
+    message = refused("render", "--replay", "a.png", "-o", "again.png")
+    assert "render SCAN --replay a.png -o again.png" in message
+    message = refused("render", "sequence", "--replay", "a.png", "-o", "again.png")
+    assert all(word in message for word in ("sequence", "not the scan of a.png", "hash")), message
+    assert not Path("again.png").exists()
+    Path("ball.npz").rename("moved.npz")
+    assert run("render", "moved.npz", "--replay", "a.png", "--anonymous", "-o", "again.png").code == 0
+    assert Path("again.png").read_bytes() == Path("a.png").read_bytes()
+
+
+# --- for programs ---------------------------------------------------------------------------------
+
+
+def test_progress_is_a_line_of_json_a_picture(run: Run) -> None:
+    recorded(Path("a.json"))
+    done = run("render", "--replay", "a.json", "--progress", "-o", "p%d.png")
+    first, *steps, last = done.out.splitlines()
+    assert list(json.loads(first)) == ["device"]
+    assert [json.loads(step) for step in steps] == [{"drawn": n, "of": 5} for n in range(1, 6)]
+    assert last == "p%d.png"
+
+
+def test_broken_frames_among_several_are_left_out(run: Run, refused: Callable[..., str]) -> None:
+    recorded(Path("a.json"))
+    Path("sequence/f1.npz").write_bytes(b"no scan")
+    done = run("render", "--replay", "a.json", "-o", "p%d.png")
+    assert done.code == 0
+    assert "frame 1 is left out" in done.err
+    assert done.err.count("\n") == 1
+    assert sorted(path.name for path in Path().glob("p*.png")) == ["p0.png", "p2.png", "p3.png", "p4.png"]
+    Recording((entry(pose=1), entry(pose=1, at=0.2, size=(64, 48)))).save(Path("b.json"))
+    assert "f1.npz" in refused("render", "--replay", "b.json", "-o", "q%d.png").splitlines()[-1]
+
+
 # --- where the scan is ----------------------------------------------------------------------------
 
 
@@ -186,8 +284,6 @@ def test_what_cannot_be_drawn_is_one_message(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["ball.npz"], ["SCAN"]),
-        (["demo"], ["SCAN"]),
         (["--pose", "0"], ["--pose"]),
         (["--time", "0"], ["--time"]),
         (["--poses", "0:2"], ["--poses"]),
@@ -200,7 +296,7 @@ def test_what_cannot_be_drawn_is_one_message(
         (["--orbit", "0,0"], ["--orbit"]),
         (["--turntable", "3"], ["--turntable"]),
         (["--up", "+z"], ["--up"]),
-        (["ball.npz", "--pose", "1", "--orbit", "3,4"], ["SCAN, --pose, --orbit"]),
+        (["ball.npz", "--pose", "1", "--orbit", "3,4"], ["--pose, --orbit"]),
         (["-o", "p.png"], ["p%04d.png", "p.mp4"]),
         (["-o", "p.jpg"], [".jpg", ".png"]),
         (["-o", "p.mp4", "--fps", "0"], ["--fps", "1 to 240"]),

@@ -1,7 +1,8 @@
-"""Reading back what was written."""
+"""Writing scans as other programs do, and reading back what was written."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,3 +30,21 @@ def film(path: Path) -> tuple[list[NDArray[np.uint8]], float]:
         stream = container.streams.video[0]
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
         return frames, float(stream.average_rate)
+
+
+def write_mesh(
+    path: Path, points: NDArray[np.floating], faces: Sequence[Sequence[int]], binary: bool = True
+) -> None:
+    """A PLY file of float32 points (N, 3) and triangles between them."""
+    kind = "binary_little_endian" if binary else "ascii"
+    head = (
+        f"ply\nformat {kind} 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\n"
+        f"property float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    if binary:
+        rows = np.array([(3, tuple(face)) for face in faces], [("count", "u1"), ("corners", "<i4", 3)])
+        body = points.astype("<f4").tobytes() + rows.tobytes()
+    else:
+        lines = [" ".join(map(str, point)) for point in points] + [" ".join(map(str, (3, *f))) for f in faces]
+        body = "\n".join([*lines, ""]).encode()
+    path.write_bytes(head.encode() + body)

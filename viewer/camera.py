@@ -12,15 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, unknown_name
-from .geometry import Vector, up_vector
+from .geometry import Vector, front_vector, up_vector
 from .scan.points import Bounds
 
 PROJECTIONS = ("perspective", "orthographic")
 _FIT_MARGIN = 1.04
 _STEEPEST = 89.5  # elevation in degrees that orbiting reaches
-
-# Where azimuth 0 looks from, for each up axis: the front, at right angles to up.
-_FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,7 @@ class Camera:
         near as shows all of the bounds at this aspect (width / height).
         """
         above = np.array(up_vector(up), float)
-        front = np.array(_FRONTS[up[1]])
+        front = np.array(front_vector(up), float)
         right = np.cross(above, front)
         a, e = math.radians(azimuth), math.radians(elevation)
         direction = (
@@ -236,6 +233,14 @@ class Camera:
         """Nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
         return self.at_distance(self.distance / factor)
 
+    def approached(self, point: Vector, factor: float) -> Camera:
+        """Nearer to a point for factor > 1, which keeps its place in the picture."""
+        about = np.array(point)
+        eye, target = (about + (np.array(p) - about) / factor for p in (self.eye, self.target))
+        return replace(
+            self, eye=_vector(eye), target=_vector(target), height=self.height and self.height / factor
+        )
+
     def projected(self, projection: str) -> Camera:
         """The same view in the other projection: what is at the target keeps its size."""
         camera = replace(self, projection=projection, height=self.view_height)
@@ -255,6 +260,18 @@ class Camera:
             return self
         height = self.view_height if self.projection == "orthographic" else self.height
         return replace(self, target=target, height=height)
+
+    def centered(self, point: Vector) -> Camera:
+        """The same direction and scale at the point's depth, with the point in the middle.
+
+        Unchanged where the point is not in front of the eye.
+        """
+        camera = self.focused(point)
+        back = self.rotation()[2]
+        shift = np.subtract(point, camera.target)
+        if float(np.subtract(self.eye, point) @ back) <= 0:
+            return self
+        return replace(camera, eye=_vector(camera.eye + shift), target=point)
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:

@@ -1,8 +1,8 @@
 """Writing pictures: PNG, EXR, NPZ, MP4 films, numbered files and contact sheets.
 
-PNG and MP4 show the picture as the look has it; EXR and NPZ hold the Surface behind it,
-unshaded. PNG and EXR can carry a description, a text that says how they were made. Every file
-takes its name only when it is complete.
+PNG and MP4 show the picture as the look has it, with its marks; EXR and NPZ hold the Surface behind
+it, unshaded and unmarked. PNG and EXR can carry a description, a text that says how they were made.
+Every file takes its name only when it is complete.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .files import whole_file
 from .look import Look, rgba
+from .marks import Legend, marked
 
 if TYPE_CHECKING:
     from .gpu.surface import Surface
@@ -32,6 +33,7 @@ PICTURE_SUFFIXES = (".png", ".exr", ".npz")
 FILM_SUFFIX = ".mp4"
 OUTPUT_SUFFIXES = (*PICTURE_SUFFIXES, FILM_SUFFIX)
 DESCRIBED_SUFFIXES = (".png", ".exr")
+UNMARKED_SUFFIXES = (".exr", ".npz")
 FRAME_RATES = (1.0, 240.0)  # what players can be expected to show
 
 _NUMBER = re.compile("%(0?[0-9]*)d")
@@ -83,42 +85,50 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
 @contextmanager
 def pictures(
     path: Path, size: tuple[int, int], fps: float
-) -> Iterator[Callable[[Surface, int, str | None], None]]:
-    """A function that puts a surface, its number and description where the path says: file, files, film.
+) -> Iterator[Callable[[Surface, int, str | None, Legend | None], None]]:
+    """A function that puts a surface, with its number, description and legend, where the path says: file,
+    files, film.
 
     size: (width, height). fps: of a film. Raises InputError where something cannot be written.
     """
     if path.suffix.lower() == FILM_SUFFIX:
         with film(path, size, fps) as add:
-            yield lambda surface, number, description: add(surface.image())
+            yield lambda surface, number, description, legend: add(_marked_image(surface, legend))
     else:
-        yield lambda surface, number, description: write_picture(surface, numbered(path, number), description)
+        yield lambda surface, number, *told: write_picture(surface, numbered(path, number), *told)
 
 
 # --- pictures -------------------------------------------------------------------------------
 
 
-def write_picture(surface: Surface, path: Path | str, description: str | None = None) -> None:
+def write_picture(
+    surface: Surface, path: Path | str, description: str | None = None, legend: Legend | None = None
+) -> None:
     """Write a surface as the suffix says: .png, .exr or .npz. Raises InputError.
 
-    description: a text that .png and .exr carry (see `read_description`).
+    description: a text that .png and .exr carry (see `read_description`). legend: of the marks on a .png.
     """
     path = Path(path)
     check_output(path, PICTURE_SUFFIXES, several=False)
     with whole_file(path) as temporary:
         match path.suffix.lower():
             case ".png":
-                _write_png(surface.image(), temporary, description)
+                _write_png(_marked_image(surface, legend), temporary, description)
             case ".exr":
                 _write_exr(surface, temporary, description)
             case ".npz":
                 _write_npz(surface.arrays(), temporary)
 
 
-def write_png(image: NDArray[np.uint8], path: Path | str) -> None:
-    """Write an image, (H, W, 3 or 4) uint8 sRGB. Raises InputError."""
+def write_png(image: NDArray[np.uint8], path: Path | str, description: str | None = None) -> None:
+    """Write an image, (H, W, 3 or 4) uint8 sRGB, and a text that it carries. Raises InputError."""
     with whole_file(path) as temporary:
-        _write_png(image, temporary)
+        _write_png(image, temporary, description)
+
+
+def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
+    image = surface.image()
+    return image if legend is None else marked(image, legend, surface.color_range)
 
 
 def read_description(path: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
@@ -27,7 +27,8 @@ def whole_file(path: Path | str) -> Iterator[Path]:
         what = f"cannot be written: {error.strerror or error}"
         raise InputError(what, path, "Check free space and permissions") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def user_folder() -> Path:
@@ -40,3 +41,8 @@ def user_folder() -> Path:
 def free_file(folder: Path, suffix: str) -> Path:
     """scan4d_0001 with this suffix, or the next number that no file in the folder has."""
     return next(path for n in count(1) if not (path := folder / f"scan4d_{n:04d}{suffix}").exists())
+
+
+def printable(name: str) -> str:
+    """A file's name as it can be shown: what is not UTF-8 in it is replaced."""
+    return os.fsencode(name).decode(errors="replace")

@@ -43,14 +43,14 @@ def render_frame(
     surface: Surface,
     *,
     wait: bool = True,
-    budget_ms: float | None = None,
-    moving: bool = False,
+    share: float = 1.0,
 ) -> bool:
     """Draw what is asked for into `surface`; True if a later call would refine it.
 
     wait: whether to wait for estimated attributes and derived data; while they are made on
-    a worker, plain points are drawn instead. Raises InputError for what the scan or the
-    parameters do not allow.
+    a worker, plain points are drawn instead. share: of the points that need to be drawn; a
+    preview with less than 1 is refined by a call with 1. Raises InputError for what the scan
+    or the parameters do not allow.
     """
     start = time.perf_counter()
     timers = renderer.gpu.timers
@@ -59,16 +59,15 @@ def render_frame(
     pose = renderer.resident(request.pose)
     backend, params = _chosen(request, pose.stored)
     prepared = renderer.prepare(pose, backend, params, request.look, wait)
+    look = request.look
     if prepared is None:
-        backend, look = find_backend(FALLBACK), _unlit(request.look)
-        params = backend.params()
-    else:
-        look = request.look
+        plain = fallback(request)
+        backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
     surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds))
     if prepared is None:
         surface.stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
-    frame = FrameView(surface.view, params, prepared and prepared.derived, budget_ms, moving)
+    frame = FrameView(surface.view, params, prepared and prepared.derived, share)
     refinable = backend.draw(pose, frame, surface)
     shade(surface, look)
 
@@ -79,6 +78,30 @@ def render_frame(
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
     return refinable or prepared is None
+
+
+def bring(renderer: Renderer, request: Request, budget_ms: float) -> bool:
+    """Upload what the backend reads of the pose, for as long as this; whether all of it is there.
+
+    A window calls it again and again before `render_frame`, so that it is not stopped by uploads.
+    """
+    pose = renderer.resident(request.pose)
+    backend, params = _chosen(request, pose.stored)
+    there = [name for name in backend.needs(pose.cloud, params) if getattr(pose.cloud, name) is not None]
+    return pose.upload(["positions", *there], budget_ms)
+
+
+def is_prepared(renderer: Renderer, request: Request) -> bool:
+    """Whether nothing has to be estimated or derived for it."""
+    backend, params = _chosen(request, renderer.resident(request.pose).stored)
+    return renderer.is_prepared(request.pose, backend, params, request.look)
+
+
+def fallback(request: Request) -> Request:
+    """The same in plain points, of which nothing is prepared: drawn while the other is."""
+    return replace(
+        request, backend=FALLBACK, params=find_backend(FALLBACK).params(), look=_unlit(request.look)
+    )
 
 
 def _chosen(request: Request, cloud: PointCloud) -> tuple[Backend, Any]:

@@ -16,8 +16,18 @@ AXES: dict[str, Vector] = {
 }
 
 
+# The front of a subject, at right angles to each up axis; azimuth 0 looks from there.
+_FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
+
+
 def up_vector(name: str) -> Vector:
     """The unit vector of an axis name such as '+y' or '-z'; raises InputError."""
     if name not in AXES:
         raise unknown_name("up axis", name, list(AXES))
     return AXES[name]
+
+
+def front_vector(up: str) -> Vector:
+    """The unit vector towards the front of a subject that stands along an up axis such as '+y'."""
+    up_vector(up)
+    return _FRONTS[up[1]]

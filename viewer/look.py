@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,8 +83,11 @@ def rgba(text: str, name: str = "colour") -> tuple[int, int, int, int]:
     return values[0], values[1], values[2], values[3] if len(values) == 4 else 255
 
 
+@cache
 def color_table(name: str) -> NDArray[np.uint8]:
-    """256 colours of a map, (256, 4) uint8 sRGB."""
+    """256 colours of a map, (256, 4) uint8 sRGB, read-only."""
     import cmap
 
-    return (np.asarray(cmap.Colormap(name).lut(256)) * 255).round().astype(np.uint8)
+    table = (np.asarray(cmap.Colormap(name).lut(256)) * 255).round().astype(np.uint8)
+    table.setflags(write=False)
+    return table

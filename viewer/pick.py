@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from .geometry import Vector
 from .gpu.surface import EMPTY, NOTHING, Surface
 from .scan.spacing import spacing_at
 
@@ -35,6 +36,12 @@ class Picked:
     normal: NDArray[np.float32] | None = None
     scalars: Mapping[str, float] = field(default_factory=dict)
     spacing: float | None = None
+
+    @property
+    def place(self) -> Vector:
+        """The position as a tuple."""
+        x, y, z = (float(v) for v in self.position)
+        return x, y, z
 
     @property
     def measured(self) -> bool:
@@ -69,3 +76,18 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
         scalars={name: values[row].item() for name, values in cloud.scalars.items()},
         spacing=spacing_at(cloud, row) if spacing else None,
     )
+
+
+def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:
+    """Whether a place lies in the picture with nothing before it.
+
+    Reads one pixel from the GPU. position: (3,), scan units. slack: how far before the place, scan units, the
+    surface may be that still is the place's own.
+    """
+    offset = np.subtract(position, surface.pose.cloud.origin)[None]
+    if not surface.view.contains(offset)[0]:
+        return False
+    pixels, depths = surface.view.project(offset)
+    x, y = (int(v) for v in pixels[0])
+    texel = surface.texel(x, y)
+    return texel.level == EMPTY or texel.depth >= depths[0] - slack

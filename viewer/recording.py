@@ -5,7 +5,7 @@ A recording is a JSON file, an entry a line:
     {
     "format": 1, "version": "0.1.0", "seconds": 2.4, "entries": [
     {"at": 0.0, "scan": "knot", "hash": ..., "pose": 0, "time": 0.0, "size": [1280, 720], "camera": {...},
-     "backend": "points", "params": {...}, "look": {...}},
+     "backend": "points", "params": {...}, "look": {...}, "marks": {...}, "unit": "mm"},
     {"at": 0.52, "pose": 1, "time": 0.04}
     ]}
 
@@ -33,14 +33,18 @@ from .export import read_description
 from .files import whole_file
 from .frame import Request
 from .look import Look
+from .marks import Legend, Marks
 from .params import parse
+from .scan.open import DEMO
 from .scan.pose import Pose
+from .scan.timeline import Timeline
 
 FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
 _MOST_BYTES = 256 * 2**20  # of a recording
 _MOST_SECONDS = 86_400.0
 _TICK = 0.001  # seconds that time stamps are rounded to
+_LATER: dict[str, Any] = {"at": 0.0, "marks": {}, "unit": None}  # what earlier files lack, and pictures
 _DAMAGED = "It is damaged, or no recording of Scan4D; record it again"
 
 
@@ -48,12 +52,13 @@ _DAMAGED = "It is damaged, or no recording of Scan4D; record it again"
 class Entry:
     """One picture that was shown: all that is needed to draw it again.
 
-    scan: as the user named it. hash: of its files (see `fingerprint`), None where there is none.
-    pose: its index. time: the pose's, seconds. size: (width, height) in pixels. params: the backend's
-    own `Params`. at: seconds since the recording began; entries that differ in it alone are equal.
+    scan: as the user named it, None where that is left out. hash: of its files (see `fingerprint`), None
+    where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
+    params: the backend's own `Params`. marks: what is drawn over it. unit: of length, as marks have it;
+    None for the scan's own. at: seconds since the recording began; entries that differ in it alone are equal.
     """
 
-    scan: str
+    scan: str | None
     hash: str | None
     pose: int
     time: float
@@ -62,19 +67,34 @@ class Entry:
     backend: str
     params: Any
     look: Look
+    marks: Marks = field(default_factory=Marks)
+    unit: str | None = None
     at: float = field(default=0.0, compare=False)
 
     @classmethod
-    def of(cls, request: Request, scan: str, hash: str | None, size: tuple[int, int]) -> Entry:
+    def of(
+        cls,
+        request: Request,
+        scan: str,
+        hash: str | None,
+        size: tuple[int, int],
+        unit: str,
+        marks: Marks | None = None,
+    ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters."""
         return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
-            request.camera, str(request.backend), request.params, request.look,
+            request.camera, str(request.backend), request.params, request.look, marks or Marks(), unit,
         )  # fmt: skip
 
     def request(self, pose: Pose) -> Request:
         """The picture to draw. pose: number `self.pose` of the scan."""
         return Request(pose, self.camera, self.backend, self.params, self.look)
+
+    def legend(self, timeline: Timeline) -> Legend:
+        """What the marks say. timeline: the scan's."""
+        unit = timeline.unit if self.unit is None else self.unit
+        return Legend(self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time)
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
         """A JSON object, without `at`. before: leave out what is as it was there."""
@@ -86,7 +106,7 @@ class Entry:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Entry:
         """The entry of a complete JSON object. Raises InputError for whatever is wrong in it."""
-        data = {"at": 0.0, **data}
+        data = {**_LATER, **data}
         known = [f.name for f in fields(cls)]
         for name in data:
             if name not in known:
@@ -100,11 +120,13 @@ class Entry:
         read["camera"] = Camera.from_json(read["camera"])
         read["params"] = backend.params(read["params"])
         read["look"] = parse(Look, read["look"], "look")
+        read["marks"] = parse(Marks, read["marks"], "mark")
         return cls(**read)
 
-    def description(self) -> str:
-        """The JSON text that a picture carries."""
-        return json.dumps(_head() | self.to_json())
+    def description(self, anonymous: bool = False) -> str:
+        """The JSON text that a picture carries. anonymous: with the hash of its scan, not its name."""
+        told = replace(self, scan=None) if anonymous else self
+        return json.dumps(_head() | told.to_json())
 
 
 @dataclass(frozen=True)
@@ -197,6 +219,27 @@ def fingerprint(files: Sequence[Path]) -> str | None:
     return f"files:{hashlib.sha256(listed.encode()).hexdigest()[:16]}" if files else None
 
 
+def is_recording(path: Path) -> bool:
+    """Whether a file is one to replay, by its suffix; an .exr may also be a scan, so it is looked into."""
+    if path.suffix.lower() != ".exr":
+        return path.suffix.lower() in (".json", ".png")
+    try:
+        return bool(read_description(path))
+    except InputError:
+        return False
+
+
+def places_of(scan: str, recording: Path) -> list[str]:
+    """Where to look for a scan that a recording names: beside the recording, then as it is named."""
+    return [DEMO] if scan == DEMO else list(dict.fromkeys([str(recording.parent / scan), scan]))
+
+
+def place_of(scan: str, recording: Path) -> str:
+    """The first of these places where something is, else the last one."""
+    places = places_of(scan, recording)
+    return next((place for place in places if os.path.exists(place)), places[-1])
+
+
 # --- reading --------------------------------------------------------------------------------
 
 
@@ -267,7 +310,7 @@ def _word(value: Any) -> bool:
 
 
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "scan": (_word, "the name of a scan"),
+    "scan": (lambda value: value is None or _word(value), "the name of a scan"),
     "hash": (lambda value: value is None or _word(value), "a hash"),
     "pose": (_whole, "the number of a pose"),
     "time": (_finite, "a time in seconds"),
@@ -276,6 +319,8 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "backend": (_word, "the name of a renderer"),
     "params": (_object, "parameters by name"),
     "look": (_object, "a look"),
+    "marks": (_object, "marks by name"),
+    "unit": (lambda value: value is None or _word(value), "a unit"),
     "at": (_stamp, "a time within a day, in seconds"),
     "seconds": (_stamp, "a time within a day, in seconds"),
 }

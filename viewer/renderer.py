@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import weakref
 from collections import OrderedDict
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -12,9 +13,12 @@ from typing import Any
 from .backends import Backend, Derived
 from .gpu.context import Gpu, headless
 from .gpu.pose import GpuPose
+from .helper import Helper
 from .look import Look, wants_normals
+from .scan.estimate import estimate
 from .scan.points import PointCloud
 from .scan.pose import Pose
+from .task import Task
 
 _MEGABYTE = 1 << 20
 
@@ -27,11 +31,24 @@ class Prepared:
 
 
 @dataclass
+class _Job:
+    """What is being prepared on the worker: (result, milliseconds)."""
+
+    task: Task
+    future: Future[tuple[Any, float]]
+
+    def cancel(self) -> bool:
+        """Stop it, now or at its next step; True where it had not begun."""
+        self.task.cancel()
+        return self.future.cancel()
+
+
+@dataclass
 class _Resident:
     pose: weakref.ref[Pose]
     gpu_pose: GpuPose
     derived: dict[Any, Prepared] = field(default_factory=dict)
-    jobs: dict[Any, Future[Any]] = field(default_factory=dict)
+    jobs: dict[Any, _Job] = field(default_factory=dict)
 
     @property
     def nbytes(self) -> int:
@@ -68,6 +85,7 @@ class Renderer:
         self.budget_bytes = budget_bytes or (128 if self.gpu.software else 1024) * _MEGABYTE
         self._resident: OrderedDict[int, _Resident] = OrderedDict()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="prepare")
+        self._helper = Helper()
 
     @property
     def nbytes(self) -> int:
@@ -101,50 +119,78 @@ class Renderer:
         """Make what a backend and a look need of a pose; None while a worker is still at it.
 
         First the attributes that the scan does not have are estimated, then the backend's
-        derive function runs; only uploads happen on this thread.
+        derive function runs; only uploads happen on this thread. Without `wait`, both are done by a
+        `Helper`, so that nothing stops this thread. What was cancelled begins anew.
         """
-        entry = next(r for r in self._resident.values() if r.gpu_pose is gpu_pose)
+        entry = self._entry(gpu_pose)
         missing = _missing(gpu_pose.cloud, backend, params, look)
         if missing:
-            result = self._run(entry, missing, lambda: _estimated(gpu_pose.cloud, missing), wait)
+            name = f"Estimating {' and '.join(missing)}"
+            bare = PointCloud(gpu_pose.cloud.positions, gpu_pose.cloud.origin)
+            result = self._run(entry, missing, name, estimate, (bare, missing), wait)
             if result is None:
                 return None
-            gpu_pose.cloud = result
-        key = (backend.name, *backend.derive_key(params))
+            gpu_pose.cloud = replace(gpu_pose.cloud, **result)
+        key = _derived_key(backend, params)
         if key not in entry.derived:
-            derive, cloud = backend.derive, gpu_pose.cloud
-            if derive is None:
+            if backend.derive is None:
                 return Prepared(None)
-            result = self._run(entry, key, lambda: derive(cloud, params), wait)
+            name = f"Preparing {backend.title}"
+            result = self._run(entry, key, name, backend.derive, (gpu_pose.cloud, params), wait)
             if result is None:
                 return None
             with gpu_pose.preparing("upload"):
                 entry.derived[key] = Prepared(backend.upload(self.gpu, result))
         return entry.derived[key]
 
-    def _run(self, entry: _Resident, key: Any, work: Any, wait: bool) -> Any:
-        def timed() -> tuple[Any, float]:
-            start = time.perf_counter()
-            return work(), (time.perf_counter() - start) * 1e3
+    def is_prepared(self, pose: Pose, backend: Backend, params: Any, look: Look) -> bool:
+        """Whether `prepare` would have nothing to estimate or derive."""
+        gpu_pose = self.resident(pose)
+        if _missing(gpu_pose.cloud, backend, params, look):
+            return False
+        return backend.derive is None or _derived_key(backend, params) in self._entry(gpu_pose).derived
 
-        if key not in entry.jobs and not wait:
-            self._drop_waiting_jobs()  # for poses that were passed meanwhile
-            entry.jobs[key] = self._worker.submit(timed)
-        if not (wait or entry.jobs[key].done()):
-            return None
-        result, ms = entry.jobs.pop(key).result() if key in entry.jobs else timed()
+    @property
+    def preparing(self) -> Task | None:
+        """What is being prepared without anybody waiting for it, None where nothing is."""
+        jobs = [job for entry in self._resident.values() for job in entry.jobs.values()]
+        return next((job.task for job in jobs if not job.task.cancelled and not job.future.done()), None)
+
+    def _entry(self, gpu_pose: GpuPose) -> _Resident:
+        return next(r for r in self._resident.values() if r.gpu_pose is gpu_pose)
+
+    def _run(
+        self, entry: _Resident, key: Any, name: str, function: Callable[..., Any], args: Any, wait: bool
+    ) -> Any:
+        """What the function returns; None while the worker is at it."""
+        job = entry.jobs.get(key)
+        if job is not None and job.task.cancelled:
+            job = None
+        if job is None and wait:
+            result, ms = _timed(lambda: function(*args))
+        else:
+            if job is None:
+                self._drop_waiting_jobs()  # for poses that were passed meanwhile
+                task = Task(name)
+                call = lambda: self._helper.call(task, function, *args)  # noqa: E731
+                job = entry.jobs[key] = _Job(task, self._worker.submit(_timed, call))
+            if not (wait or job.future.done()):
+                return None
+            del entry.jobs[key]
+            result, ms = job.future.result()
         entry.gpu_pose.add_ms("derive", ms)
         return result
 
     def _drop_waiting_jobs(self) -> None:
         for entry in self._resident.values():
-            entry.jobs = {key: job for key, job in entry.jobs.items() if not job.cancel()}
+            entry.jobs = {key: job for key, job in entry.jobs.items() if not job.future.cancel()}
 
     def release(self) -> None:
         """Delete every pose and stop the worker. The context stays open."""
-        self._worker.shutdown(wait=True, cancel_futures=True)
         while self._resident:
             self._resident.popitem()[1].release()
+        self._worker.shutdown(wait=True, cancel_futures=True)
+        self._helper.close()
         self.gpu.collect()
 
 
@@ -153,11 +199,11 @@ def _missing(cloud: PointCloud, backend: Backend, params: Any, look: Look) -> tu
     return tuple(sorted(name for name in wanted if getattr(cloud, name) is None)) if len(cloud) else ()
 
 
-def _estimated(cloud: PointCloud, missing: tuple[str, ...]) -> PointCloud:
-    from .scan.estimate import estimate_normals, estimate_radii
+def _derived_key(backend: Backend, params: Any) -> Any:
+    return (backend.name, *backend.derive_key(params))
 
-    if "normals" in missing:
-        cloud = replace(cloud, normals=estimate_normals(cloud))
-    if "radii" in missing:
-        cloud = replace(cloud, radii=estimate_radii(cloud))
-    return cloud
+
+def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    """What it returns, and the milliseconds that it took."""
+    start = time.perf_counter()
+    return work(), (time.perf_counter() - start) * 1e3

@@ -6,6 +6,9 @@ struct Point {
     uint row;
 };
 
+// What a shape's size is multiplied by, so that the points drawn make up for those left out.
+uniform float enlarged;
+
 // A corner of the amplified shape.
 struct Corner {
     vec3 view;   // view space

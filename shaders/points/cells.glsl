@@ -1,10 +1,16 @@
-// A point's cells are the pixels of its square, its key is its depth.
+// A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
 #include "common/view.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;
+#if SAMPLED
+layout(binding = 3) uniform usamplerBuffer sampled;
+#endif
 uniform int point_size;
 
 void scatter(uint i) {
+#if SAMPLED
+    i = texelFetch(sampled, int(i)).r;
+#endif
     vec3 view = to_view(texelFetch(positions, int(i)).xyz);
     float depth = -view.z;
     // Depths are positive, so their bits are in the order of their values.

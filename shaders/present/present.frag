@@ -1,10 +1,10 @@
-// One pixel of the picture for one pixel of the window, nothing in between.
+// The picture over the whole viewport. Where both have the same size, each pixel is its own.
 layout(binding = 0) uniform sampler2D picture;  // sRGB as it is, row 0 at the top
 uniform ivec2 corner;  // of the viewport, pixels from the window's lower left
+uniform ivec2 size;    // of the viewport
 out vec4 color;
 
 void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy) - corner;
-    int bottom = textureSize(picture, 0).y - 1;  // the window's rows count from there
-    color = vec4(texelFetch(picture, ivec2(at.x, bottom - at.y), 0).rgb, 1.0);
+    vec2 at = (gl_FragCoord.xy - vec2(corner)) / vec2(size);
+    color = vec4(texture(picture, vec2(at.x, 1.0 - at.y)).rgb, 1.0);  // the window's rows count from the bottom
 }

@@ -15,7 +15,7 @@ bool begin_shape(Point point) {
     float depth = -surfel_center.z;
     float radius = point.radius > 0.0 && point.radius < 3e38 ? point.radius : uniform_radius;
     // Below this a splat can fall between pixel centres, and a far scan would flicker away.
-    radius = max(radius * radius_scale, 0.7072 / scale_at(max(depth, view_near)));
+    radius = max(radius * radius_scale * enlarged, 0.7072 / scale_at(max(depth, view_near)));
 
     vec3 to_eye = view_perspective ? -surfel_center : vec3(0.0, 0.0, 1.0);
     float len = length(point.normal);

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from viewer.app.levels import is_filling, levels, toggled, with_filling
+from viewer.app.scene.levels import is_filling, levels, toggled, with_filling
 from viewer.params import param
 
 

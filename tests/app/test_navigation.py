@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.app import navigation
+from viewer.app.scene import navigation
 from viewer.camera import Camera
 from viewer.geometry import up_vector
 from viewer.gpu.view import View
@@ -89,6 +90,17 @@ def test_focusing_on_a_point_keeps_the_picture(camera: Camera) -> None:
         assert navigation.place(moved, point) == pytest.approx((right + shift[0], up + shift[1]))
 
 
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_centring_a_point_keeps_direction_and_scale(camera: Camera) -> None:
+    point = (0.5, -0.3, 0.8)
+    centered = camera.centered(point)
+    assert navigation.place(centered, point) == pytest.approx((0, 0), abs=1e-12)
+    assert centered.rotation() == pytest.approx(camera.rotation())
+    assert centered.view_height == pytest.approx(camera.focused(point).view_height)
+    behind = tuple(np.array(camera.eye) + camera.rotation()[2])
+    assert camera.centered(behind) == camera
+
+
 def test_a_point_behind_the_eye_is_no_pivot() -> None:
     camera = CAMERAS[0]
     behind = np.array(camera.eye) + camera.rotation()[2]
@@ -118,7 +130,7 @@ def test_views_show_the_side_they_name(camera: Camera, up: str) -> None:
     above = {"top": -nose, "bottom": nose}
     assert list(navigation.VIEWS) == list(toward)
     for side, axis in toward.items():
-        seen = navigation.view_from(side, camera, BOUNDS, 1.5, up)
+        seen = navigation.view_from(*navigation.VIEWS[side], camera, BOUNDS, 1.5, up)
         rotation = seen.rotation()
         np.testing.assert_allclose(rotation[2], axis, atol=2e-5)
         np.testing.assert_allclose(rotation[1], above.get(side, crown), atol=2e-5)
@@ -131,7 +143,7 @@ def test_views_show_the_side_they_name(camera: Camera, up: str) -> None:
 
 @pytest.mark.parametrize("side", ["top", "bottom"])
 def test_from_the_poles_orbiting_turns_about_the_scans_up_without_a_jump(side: str) -> None:
-    seen = navigation.view_from(side, CAMERAS[0], BOUNDS, 1.5, "+y")
+    seen = navigation.view_from(*navigation.VIEWS[side], CAMERAS[0], BOUNDS, 1.5, "+y")
     turned = navigation.orbit(seen, 0.25, 0)
     np.testing.assert_allclose(turned.rotation()[2], seen.rotation()[2], atol=5e-5)
     assert turned.rotation()[1] @ seen.rotation()[1] == pytest.approx(np.cos(np.pi / 4))
@@ -157,3 +169,28 @@ def test_zoom_stops_where_numbers_stay_sound(
         camera = zoom(camera, direction * 1.0)
     assert camera.distance == pytest.approx(2e-5 if direction > 0 else 2e3)
     assert zoom(camera, -direction).distance != pytest.approx(camera.distance)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_camera_shows_something_or_nothing_of_the_scan(camera: Camera) -> None:
+    aspect = SIZE[0] / SIZE[1]
+    assert navigation.shows(camera, BOUNDS, aspect)
+    assert navigation.shows(camera.zoomed(50), BOUNDS, aspect), "a detail"
+    assert navigation.shows(camera.panned(0.5, 0), BOUNDS, aspect)
+    assert not navigation.shows(camera.panned(9, 0), BOUNDS, aspect)
+    assert not navigation.shows(camera.panned(0, -9), BOUNDS, aspect)
+    assert not navigation.shows(camera.zoomed(1e9), BOUNDS, aspect)
+    assert not navigation.shows(camera.zoomed(1e-6), BOUNDS, aspect)
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    behind = replace(camera, eye=tuple(eye), target=tuple(2 * eye - target))
+    assert not navigation.shows(behind, BOUNDS, aspect), "it looks away"
+    far = Bounds(BOUNDS.low + 1e5, BOUNDS.high + 1e5)
+    assert not navigation.shows(camera, far, aspect)
+    assert navigation.shows(camera, Bounds(target, target), aspect), "a single point"
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_single_point_can_be_zoomed_at(camera: Camera) -> None:
+    """Its radius is 0."""
+    assert navigation.zoom(camera, 0.5, 0.0).view_height < camera.view_height
+    assert navigation.wheel(camera, -1, (0.1, 0.1), 0.0).view_height > camera.view_height

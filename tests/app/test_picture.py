@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from scenes import sphere
 
-from viewer.app import picture as picture_module
-from viewer.app.picture import Picture
+from viewer.app.scene import picture as picture_module
+from viewer.app.scene.picture import Picture
 from viewer.camera import Camera
 from viewer.frame import Request, shared_renderer
 from viewer.gpu.surface import Surface
+from viewer.look import Look
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "sphere", sphere(3000))
@@ -39,16 +43,16 @@ def test_a_pixel_is_read_once_until_mouse_or_picture_move(
     picture_pick = picture_module.pick
     monkeypatch.setattr(picture_module, "pick", counted)
     assert picture.pick((30, 20)) is None, "before the first picture"
-    picture.draw(REQUEST, SIZE, moving=False)
+    picture.draw(REQUEST, SIZE)
     first = picture.pick((30, 20))
     assert first is not None
-    picture.draw(REQUEST, SIZE, moving=False)
+    picture.draw(REQUEST, SIZE)
     assert picture.pick((30, 20)) is first
     assert picture.pick((0, 0)) is picture.pick((0, 0)) is None
     assert reads == [(30, 20), (0, 0)]
     other = replace(REQUEST, camera=REQUEST.camera.orbited(40, 0))
     picture.pick((30, 20))
-    picture.draw(other, SIZE, moving=False)
+    picture.draw(other, SIZE)
     turned = picture.pick((30, 20))
     assert turned is not None
     assert turned.row != first.row
@@ -56,13 +60,65 @@ def test_a_pixel_is_read_once_until_mouse_or_picture_move(
 
 
 def test_nothing_is_picked_where_there_is_no_picture(picture: Picture) -> None:
-    picture.draw(REQUEST, SIZE, moving=False)
+    picture.draw(REQUEST, SIZE)
     assert picture.pick((30, 20)) is not None
     broken = replace(REQUEST, look=replace(REQUEST.look, color_by="missing"))
-    picture.draw(broken, SIZE, moving=False)
+    picture.draw(broken, SIZE)
     assert picture.problem is not None
     assert picture.pick((30, 20)) is None
-    picture.draw(REQUEST, SIZE, moving=False)
+    picture.draw(REQUEST, SIZE)
     assert picture.pick((30, 20)) is not None
     picture.clear()
     assert picture.pick((30, 20)) is None
+
+
+def test_a_preview_is_drawn_in_full_at_rest_and_on_demand(picture: Picture) -> None:
+    picture.draw(REQUEST, SIZE)
+    full = shown(picture)
+    assert not picture.is_preview
+    assert picture.is_complete
+    for _ in range(2):  # both are far too slow: all that can be left out is
+        picture.took(1000.0, goal_ms=10.0)
+        picture.draw(turned(REQUEST), SIZE, held=True)
+    assert picture.is_preview
+    assert picture.surface is not None
+    assert picture.surface.size == (30, 20)
+    assert picture.size == SIZE
+    assert not picture.is_complete
+
+    assert not picture.draw(picture.request or REQUEST, SIZE, playing=True), "other poses are to come"
+    assert math.isinf(picture.better_at(playing=True))
+    assert picture.better_at(playing=False) < time.monotonic() + 1
+    picture.finish()
+    assert not picture.is_preview
+    assert picture.surface.size == SIZE
+    picture.draw(REQUEST, SIZE)
+    picture.finish()
+    for before, after in zip(full, shown(picture), strict=True):
+        np.testing.assert_array_equal(after, before)
+
+
+def test_what_is_under_the_mouse_in_a_preview_is_about_what_it_is_in_full(picture: Picture) -> None:
+    picture.draw(REQUEST, SIZE)
+    whole = picture.pick((37, 12))
+    picture.took(1000.0, goal_ms=10.0)
+    picture.draw(replace(REQUEST, look=Look(light="flat")), SIZE, held=True)
+    assert picture.is_preview
+    rough = picture.pick((37, 12))
+    assert whole is not None
+    assert rough is not None
+    assert np.linalg.norm(rough.position - whole.position) < 0.1
+    exact = picture.pick_in_full()
+    assert not picture.is_preview
+    assert exact is not None
+    np.testing.assert_array_equal(exact.position, whole.position)
+    assert picture.pick((SIZE[0] - 1, SIZE[1] - 1)) is None
+
+
+def shown(picture: Picture) -> tuple[np.ndarray, ...]:
+    assert picture.surface is not None
+    return picture.surface.image(), picture.surface.depth, picture.surface.id
+
+
+def turned(request: Request) -> Request:
+    return replace(request, camera=request.camera.orbited(10, 0))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from viewer.app.playback import Playback
-from viewer.app.player import Pace
+from viewer.app.playing.playback import Playback
+from viewer.app.playing.player import Pace
 from viewer.app.session import Session
 from viewer.errors import InputError
 from viewer.scan.points import PointCloud

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from viewer.app.player import SPEEDS, Pace, Player
+from viewer.app.playing.player import SPEEDS, Pace, Player
 
 TIMES = np.array([2.0, 2.1, 2.2, 2.5])  # the last frame lasts 0.3 s, as the gap before it
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.app.pointed import describe
+from viewer.app.scene.pointed import describe
 from viewer.pick import Picked
 
 

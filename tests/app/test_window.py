@@ -106,6 +106,13 @@ def shown(app: RunningApp) -> NDArray[np.uint8]:
     return app.screen.picture()[top : top + height, left : left + width]
 
 
+def bare(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Without the corners that the orientation cube and the scale bar lie over."""
+    pixels = pixels[..., :3].copy()
+    pixels[:112, -112:] = pixels[-64:, :200] = 0
+    return pixels
+
+
 def on_screen(app: RunningApp, x: int, y: int) -> tuple[int, int]:
     """Where a pixel of the 3D view is."""
     left, top, *_ = app.view()
@@ -119,7 +126,7 @@ def assert_true_picture(app: RunningApp) -> Screenshot:
     shot = Screenshot(app)
     app.screen.do("key", "Escape")  # away with the note that it was saved
     app.settle()
-    assert difference(shown(app), shot.pixels) <= 1
+    assert difference(bare(shown(app)), bare(shot.pixels)) <= 1
     assert difference(shot.drawn_headless(), shot.pixels) <= 1
     assert np.ptp(shot.pixels[..., :3]) > 100, "there is something in the picture"
     return shot
@@ -129,7 +136,9 @@ def drag(app: RunningApp, button: int, start: tuple[int, int], end: tuple[int, i
     """As fast as a hand: what a widget sees in one frame is not a drag."""
     middle = [(a + b) // 2 for a, b in zip(start, end, strict=True)]
     app.screen.do("mousemove", *start, "sleep", 0.1, "mousedown", button, "sleep", 0.1)
-    app.screen.do("mousemove", *middle, "sleep", 0.1, "mousemove", *end, "sleep", 0.3, "mouseup", button)
+    app.screen.do("mousemove", *middle, "sleep", 0.1, "mousemove", *end)
+    app.settle()  # ImGui's sliders leave out a move that comes with the release
+    app.screen.do("mouseup", button)
     app.settle()
 
 
@@ -271,6 +280,7 @@ def test_views_and_projection_by_keys(hands: RunningApp) -> None:
 
 
 def test_idle_it_draws_nothing_and_takes_no_processor_time(hands: RunningApp) -> None:
+    hands.screen.do("key", "Escape")  # notes would go by themselves
     hands.screen.do("mousemove", 470, 310)  # over the scan: a paused mouse asks for nothing new
     hands.settle(1.0)  # longer than a tooltip takes to appear
     frames, seconds = hands.log().count("drawn"), hands.cpu_seconds()
@@ -280,13 +290,13 @@ def test_idle_it_draws_nothing_and_takes_no_processor_time(hands: RunningApp) ->
 
 
 def test_a_parameter_and_the_look_are_changed_in_the_panel(hands: RunningApp) -> None:
-    """The first row below the renderer is the points' size: a slider from 0 to 32."""
+    """The first row below the list of scans and the renderer is the points' size: a slider from 0 to 32."""
     before = Screenshot(hands)
-    drag(hands, 1, (1110, 138), (1250, 138))
+    drag(hands, 1, (1110, 168), (1250, 168))
     after = assert_true_picture(hands)
     assert before.description["params"] == {"point_size": 0}
     assert after.description["params"] == {"point_size": 32}
-    drag(hands, 1, (1250, 138), (1000, 138))
+    drag(hands, 1, (1250, 168), (1000, 168))
     assert difference(Screenshot(hands).pixels, before.pixels) == 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import os
 import re
@@ -51,15 +52,32 @@ class Screen:
         return subprocess.run(command, env=self.env, check=True, capture_output=True, text=True).stdout
 
 
+def set_scale(display: str, scale: float) -> None:
+    """Tell programs as desktops do: by Xft.dpi, 96 at scale 1, in the resources of the root window."""
+    x11 = ctypes.CDLL("libX11.so.6")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XDefaultRootWindow.restype = ctypes.c_ulong
+    opened = ctypes.c_void_p(x11.XOpenDisplay(display.encode()))
+    root = ctypes.c_ulong(x11.XDefaultRootWindow(opened))
+    text = f"Xft.dpi:\t{96 * scale:g}\n".encode()
+    resource_manager, string, replace = 23, 31, 0  # XA_RESOURCE_MANAGER, XA_STRING, PropModeReplace
+    x11.XChangeProperty(opened, root, resource_manager, string, 8, replace, text, len(text))
+    x11.XCloseDisplay(opened)
+
+
 @contextmanager
-def virtual_screen(folder: Path, size: tuple[int, int]) -> Iterator[Screen]:
-    """A screen on a free display. Skips the test where Xvfb or xdotool is missing."""
+def virtual_screen(folder: Path, size: tuple[int, int], scale: float = 1) -> Iterator[Screen]:
+    """A screen on a free display. Skips the test where Xvfb or xdotool is missing.
+
+    scale: that programs should draw text and widgets at.
+    """
     for tool in ("Xvfb", "xdotool"):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not installed")
     reading, writing = os.pipe()
+    screen = ["-screen", "0", f"{size[0]}x{size[1]}x24"]
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", f"{size[0]}x{size[1]}x24", "-fbdir", folder],
+        ["Xvfb", "-noreset", "-displayfd", str(writing), *screen, "-fbdir", folder],
         pass_fds=[writing],
         stderr=subprocess.DEVNULL,
     )
@@ -67,6 +85,8 @@ def virtual_screen(folder: Path, size: tuple[int, int]) -> Iterator[Screen]:
     try:
         with open(reading) as line:
             display = f":{line.readline().strip()}"
+        if scale != 1:
+            set_scale(display, scale)
         yield Screen(display, folder / "Xvfb_screen0")
     finally:
         server.terminate()
@@ -135,9 +155,14 @@ def running_app(screen: Screen, folder: Path, *scans: object) -> Iterator[Runnin
     try:
         app.expect("window drawn")
         window = screen.do("search", "--name", "Scan4D").split()[-1]
-        size = screen.do("getdisplaygeometry").split()
-        screen.do("windowmove", window, 0, 0, "windowsize", window, *size)
-        app.expect("drew frame 0 .*")
+        width, height = screen.do("getdisplaygeometry").split()
+        is_full = {f"WIDTH={width}", f"HEIGHT={height}"} <= set(
+            screen.do("getwindowgeometry", "--shell", window).split()
+        )
+        screen.do("windowmove", window, 0, 0, "windowsize", window, width, height)
+        if not is_full:
+            app.expect("view at")
+        app.expect("drew frame .*")
         app.settle()
         yield app
     finally:

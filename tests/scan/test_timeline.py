@@ -22,6 +22,7 @@ from viewer.errors import InputError
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline
+from viewer.task import checkpoint
 
 POSE = 1200  # bytes of a pose of 100 points
 
@@ -303,6 +304,70 @@ def test_closing_stops_the_worker_and_frees_the_poses() -> None:
     with pytest.raises(ValueError, match="closed"):
         scan.pose(0)
     assert source.loads == [0]
+    scan.close()
+
+
+def test_closing_ends_reading_at_its_next_checkpoint() -> None:
+    source = Frames(gated=True)
+    scan = timeline(source)
+    passed: list[str] = []
+
+    def load(index: int) -> PointCloud:
+        source.loads.append(index)
+        source.gate.acquire()
+        checkpoint()
+        passed.append("the checkpoint")
+        raise AssertionError
+
+    source.load = load  # type: ignore[method-assign]
+    scan.request(0)
+    wait_until(lambda: source.loads == [0])
+    threading.Timer(0.05, source.gate.release).start()
+    scan.close()
+    assert not passed
+    assert scan.broken == {}
+    assert scan.messages == []
+
+
+def test_reading_a_frame_can_be_cancelled_and_then_it_is_left_out() -> None:
+    source = Frames(gated=True)
+    scan = timeline(source)
+    load = source.load
+
+    def load_with_checkpoint(index: int) -> PointCloud:
+        cloud = load(index)
+        checkpoint()
+        return cloud
+
+    source.load = load_with_checkpoint  # type: ignore[method-assign]
+    assert scan.reading is None
+    scan.request(0)
+    wait_until(lambda: source.loads == [0])
+    task = scan.reading
+    assert task is not None
+    assert task.name == "Reading 0.fake"
+    task.cancel()
+    source.gate.release(10)
+    wait_until(lambda: scan.broken)
+    assert str(scan.broken[0]) == "0.fake: reading was cancelled. Open it again"
+    assert [notice.index for notice in scan.messages] == [0]
+    scan.request(1)
+    wait_until(lambda: scan.ready(1))
+    wait_until(lambda: scan.reading is None)
+    scan.close()
+
+
+def test_each_pose_is_finished_by_who_has_read_it_before_anybody_gets_it() -> None:
+    scan = timeline(Frames())
+    finished: list[tuple[int, str]] = []
+    scan.finish = lambda pose: finished.append((pose.index, threading.current_thread().name))
+    scan.pose(0)
+    scan.prefetch(1)
+    wait_until(lambda: scan.ready(1))
+    assert finished[:2] == [(0, "MainThread"), (1, "scan4d-poses")]
+    scan.pose(0)
+    settle(scan)
+    assert [index for index, _ in finished].count(0) == 1
     scan.close()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 
 def run(
@@ -12,27 +13,42 @@ def run(
     fps: float | None = None,
     up: str = "+y",
     device: int | None = None,
+    replay: Path | None = None,
 ) -> int:
     """Open a window on the first of the scans and return 0 when it is closed.
 
-    scans: as a user names them (see `open_scan`); the others can be chosen in the window.
-    up: the up axis. device: has no effect on a window, which says so.
-    Raises InputError where the first scan cannot be opened, NoOpenGLError without a window.
+    scans: as a user names them (see `named_scans`); the others can be chosen in the window, which tells
+    what is wrong with those that cannot be opened. up: the up axis. device: has no effect on a window,
+    which says so. replay: a recording to show first. Raises InputError where no scan can be opened,
+    NoOpenGLError without a window.
     """
     from ..geometry import up_vector
+    from ..scan.listing import named_scans
     from ..scan.open import open_scan
 
     up_vector(up)
-    timeline = open_scan(scans[0], unit, fps)
-    from .app import App  # only now: a wrong name is told without waiting for ImGui
+    found, problems = named_scans(scans)
+    if not found:
+        raise problems[0]
+    timeline = open_scan(found[0], unit, fps)
+    from ..files import user_folder  # only now: a wrong name is told without waiting for ImGui
+    from . import settings
+    from .app import App
+    from .loop import Loop
     from .window import Window
 
-    window = Window("Scan4D")
+    remembered, notes = settings.load(user_folder() / settings.FILE)
+    window = Window("Scan4D", remembered.window)
     try:
-        app = App(window, scans, timeline, unit=unit, fps=fps, up=up)
+        app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up)
+        for note in notes:
+            app.note(note)
+        app.scans.tell(problems)
         if device is not None:
             app.note("The display's own GPU draws the window; a device number has no effect on it.")
-        app.loop()
+        if replay is not None:
+            app.capture.replay(replay)
+        Loop(app).run()
         app.close()
     finally:
         window.destroy()

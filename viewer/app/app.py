@@ -1,48 +1,55 @@
-"""The app: what the user can do, and the loop that draws only when something changed."""
+"""The app: what there is, and what the user can do with it. Its parts do most of it."""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..backends import backends
-from ..camera import Camera
-from ..errors import InputError
-from ..export import write_picture
-from ..files import free_file, user_folder
+from ..errors import InputError, Scan4DError
+from ..files import user_folder
 from ..gpu.context import Gpu
-from ..look import Look
-from ..pick import Picked
-from ..recording import Entry, Recorder, fingerprint
+from ..recording import Entry
 from ..scan.open import open_scan
 from ..scan.timeline import Timeline
-from . import keys, layout, levels, navigation, theme
+from ..task import Task, in_background
+from . import keys, settings, theme
+from .files.browser import Browser
+from .files.opening import Opened, Opening, begin
+from .files.scans import Scans, title
 from .help import Help
 from .notices import Notices
-from .picture import Picture
-from .playback import Playback
-from .pointed import describe
-from .session import Session
+from .playing.playback import Playback
+from .scene.bookmarks import Bookmarks
+from .scene.counting import Counting
+from .scene.full_view import FullView
+from .scene.picture import Picture
+from .scene.pointed import Pointer
+from .scene.rendering import Rendering
+from .scene.steering import Steering
+from .session import Left, known_as
+from .settings import Keeper, Settings
+from .tools.capture import Capture
+from .tools.exporting import Exporting
+from .tools.measuring import Measuring
 from .window import Window
 
 log = logging.getLogger(__name__)
-
-_WATCH = 0.25  # seconds between looks at what workers have done while nothing is awaited
-_AWAIT = 0.015  # the same while a pose or a scan is awaited
 
 
 class App:
     """What the window shows and can do. Panels read it and call its commands.
 
     session: what the user has chosen. playback: the scan. picture: the 3D view.
-    recorder: takes down what is shown, None while nothing is recorded.
+    capture: pictures and recordings of it. exporting: pictures and films at other sizes.
     theme: of the panels. notices: what the user was told. keys: which do what. help: its open pages.
-    pointed: what the mouse points at, None where at nothing; pointed_words: the same in words.
-    gesture: what a drag in the view does, None without one.
+    pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
+    rendering: which backend draws.
+    scans: those to go to without a dialog. browser: the dialog that finds others.
+    full_view: whether the panels are hidden. measuring: distances.
+    marks: what lies over the view. keeper: keeps what is to come back at the next start.
     """
 
     def __init__(
@@ -50,34 +57,43 @@ class App:
         window: Window,
         scans: Sequence[str],
         timeline: Timeline,
+        remembered: Settings,
         *,
         unit: str | None = None,
         fps: float | None = None,
         up: str = "+y",
     ) -> None:
-        self.scans = list(scans)
-        self.session = Session(self.scans[0], look=Look(up=up))
-        self.theme = theme.DEFAULT
+        self.scans: Scans = Scans(self, scans, remembered.recent)
+        self.browser: Browser = Browser(self)
+        self.session = remembered.session(scans[0], up)
+        self.theme = remembered.theme
         self.notices = Notices()
         self.help: Help = Help()
         self.keys, problems = keys.load(self._keys_file)
         for problem in problems:
             self.note(problem)
-        self.pointed: Picked | None = None
-        self.pointed_words: list[str] = []
-        self.gesture: str | None = None
-        self.recorder: Recorder | None = None
-        self.opening: str | None = None
-        self._opening: Future[Timeline] | None = None
-        self._unit, self._fps, self._up = unit, fps, up
-        self._worker = ThreadPoolExecutor(2, thread_name_prefix="open")
-        self._reported: Any = None
+        self.pointer: Pointer = Pointer(self)
+        self.rendering: Rendering = Rendering(self)
+        self.steering: Steering = Steering(self, remembered.cube, remembered.turn_seconds)
+        self.marks = remembered.marks
+        self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
+        self.full_view: FullView = FullView(self)
+        self.measuring: Measuring = Measuring(self)
+        self.capture: Capture = Capture(self)
+        self.counting = Counting()
+        self.exporting: Exporting = Exporting(self, remembered.export, remembered.export_marks)
+        self._opening = Opening()
+        self._unit, self._fps = unit, fps
         self.window = window
+        log.debug("%s", window.place)
+        window.text_scale = remembered.text_scale
+        self.set_theme(self.theme)
+        self.keeper = Keeper(user_folder() / settings.FILE, remembered)
         self.picture = Picture(Gpu(window.ctx))
         self._view_place = (0, 0, *window.buffer_size)  # left, bottom, width, height: pixels
         if self.picture.gpu.software:
             self.note(f"Drawn in software ({self.picture.gpu.device}); a graphics card is faster.")
-        self.playback: Playback = self._start(timeline)
+        self.playback: Playback = self._start(begin(timeline))
 
     # --- commands ---------------------------------------------------------------------
 
@@ -117,6 +133,14 @@ class App:
         names = list(theme.PALETTES)
         self.set_theme(names[(names.index(self.theme) + 1) % len(names)])
 
+    def change_text(self, direction: int) -> None:
+        """Larger text and widgets for 1, smaller for -1, the usual ones for 0."""
+        scales, now = theme.TEXT_SCALES, self.window.text_scale
+        beyond = [scale for scale in scales if (scale - now) * direction > 0]
+        nearest = min(beyond, key=lambda scale: abs(scale - now), default=now)
+        self.window.text_scale = nearest if direction else 1.0
+        self.window.touch()
+
     @property
     def palette(self) -> theme.Palette:
         """The colours of the panels."""
@@ -130,98 +154,15 @@ class App:
         """Pause, and go some frames on."""
         self.playback.step(count, time.monotonic())
 
-    def fit(self) -> None:
-        """Show all of the current pose, from the same side."""
-        if self.playback.pose and self.session.camera:
-            bounds = self.picture.bounds(self.playback.pose)
-            self.session.camera = self.session.camera.fit(bounds, self._aspect)
-            self.session.pivot = None
-
-    def look_from(self, side: str) -> None:
-        """Show all of the current pose from a side of `navigation.VIEWS`."""
-        if self.playback.pose and self.session.camera:
-            bounds = self.picture.bounds(self.playback.pose)
-            camera, aspect = self.session.camera, self._aspect
-            self.session.camera = navigation.view_from(side, camera, bounds, aspect, self._up)
-            self.session.pivot = None
-
-    def project(self, projection: str) -> None:
-        """Show the same in a projection of `camera.PROJECTIONS`."""
-        if self.session.camera:
-            self.session.camera = self.session.camera.projected(projection)
-
-    def switch_projection(self) -> None:
-        """Perspective to orthographic and back."""
-        if self.session.camera:
-            self.project("perspective" if self.is_orthographic else "orthographic")
+    @property
+    def unit(self) -> str:
+        """The scan's unit of length: as the user calls it, else as the scan tells, else "units"."""
+        return self.session.unit or self.playback.timeline.unit
 
     @property
-    def is_orthographic(self) -> bool:
-        """Whether the camera is."""
-        camera = self.session.camera
-        return camera is not None and camera.projection == "orthographic"
-
-    def point_at(self, pixel: tuple[int, int] | None) -> None:
-        """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
-        picked = self.picture.pick(pixel) if pixel else None
-        if picked is self.pointed:
-            return
-        self.pointed, self.pointed_words = picked, []
-        if picked is not None and self.picture.request is not None:
-            pose, timeline = self.picture.request.pose, self.playback.timeline
-            frame = f"frame {pose.index + 1}/{len(timeline)}"
-            self.pointed_words = describe(picked, frame, timeline.unit, self.picture.bounds(pose).radius)
-        log.debug("under the mouse: %s", "; ".join(self.pointed_words))
-
-    def set_pivot(self) -> None:
-        """Orbit about the surface under the mouse from now on; the picture stays as it is."""
-        if self.pointed and self.session.camera:
-            x, y, z = (float(v) for v in self.pointed.position)
-            self.session.pivot = x, y, z
-            self.session.camera = self.session.camera.focused(self.session.pivot)
-
-    @property
-    def backend(self) -> str | None:
-        """The name of the backend that draws; None before the first pose."""
-        return self.session.chosen(self.playback.pose)[0] if self.playback.pose else None
-
-    @property
-    def _params(self) -> Any:
-        """Its parameters; None before the first pose."""
-        return self.session.chosen(self.playback.pose)[1] if self.playback.pose else None
-
-    @_params.setter
-    def _params(self, params: Any) -> None:
-        if self.backend is not None:
-            self.session.params[self.backend] = params
-
-    def choose_backend(self, name: str) -> None:
-        """Draw with a backend."""
-        self.session.backend = name
-
-    def next_backend(self) -> None:
-        """Draw with the next backend."""
-        if self.backend is not None:
-            names = list(backends())
-            self.choose_backend(names[(names.index(self.backend) + 1) % len(names)])
-
-    @property
-    def levels(self) -> dict[int, bool]:
-        """The backend's pyramid levels and whether they are on; empty where it has none."""
-        return {} if self._params is None else levels.levels(self._params)
-
-    def toggle_level(self, number: int) -> None:
-        """Switch one of the backend's pyramid levels on or off."""
-        self._params = levels.toggled(self._params, number)
-
-    @property
-    def is_filling(self) -> bool:
-        """Whether all levels that fill holes are on."""
-        return self._params is not None and levels.is_filling(self._params)
-
-    def toggle_filling(self) -> None:
-        """Switch all levels that fill holes on or off."""
-        self._params = levels.with_filling(self._params, not self.is_filling)
+    def up(self) -> str:
+        """The scan's up axis: as the command line or the panel has it."""
+        return self.session.look.up
 
     @property
     def _keys_file(self) -> Path:
@@ -236,150 +177,135 @@ class App:
         except InputError as error:
             self.note(str(error))
 
-    def screenshot(self) -> None:
-        """Save the picture as it is shown, without panels, in the working directory."""
-        surface, entry = self.picture.surface, self._shown()
-        if surface is None or entry is None:
-            self.note("There is no picture to save.")
-        else:
-            self._save(".png", lambda path: write_picture(surface, path, entry.description()))
-
-    def toggle_recording(self) -> None:
-        """Take down what is shown from now on; or stop, and save it in the working directory."""
-        now = time.monotonic()
-        if self.recorder is None:
-            self.recorder = Recorder(now)
-            self._record()
-            self.note("Recording what is shown, until you stop it.")
-            return
-        recorder, self.recorder = self.recorder, None
-        if len(recorder):
-            self._save(".json", recorder.finish(now).save)
-        else:
-            self.note("Nothing was shown while recording.")
-
-    def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
-        """Write a file under the next free name, and say so."""
-        path = free_file(Path.cwd(), suffix)
-        try:
-            write(path)
-            self.note(f"Saved {path}")
-        except InputError as error:
-            self.note(str(error))
-
-    def _shown(self) -> Entry | None:
-        """What the picture shows, None where there is none."""
-        surface, request = self.picture.surface, self.picture.request
-        if not self.picture.is_there or surface is None or request is None:
-            return None
-        return Entry.of(request, self.session.scan, self._hash.result(), surface.size)
-
-    def _record(self) -> None:
-        """Take down what is shown where that is being recorded."""
-        if self.recorder is not None and (entry := self._shown()) is not None:
-            self.recorder.note(entry, time.monotonic())
-
     def open(self, scan: str) -> None:
-        """Open another scan on a worker; the current one stays until it is there."""
-        if self._opening is None:
-            self.opening = scan
-            self._opening = self._worker.submit(open_scan, scan, self._unit, self._fps)
+        """Open another scan on a worker, instead of one that is being opened; the current one stays
+        until a pose of it is there."""
+        index = self.session.places.get(known_as(scan), Left()).index
+        self._opening.start(scan, title(scan), index, lambda: open_scan(scan, self._unit, self._fps))
 
-    # --- the loop ---------------------------------------------------------------------
+    @property
+    def opening(self) -> str | None:
+        """The scan that is being opened, as the user named it; None where none is."""
+        return self._opening.scan
 
-    def loop(self) -> None:
-        """Run until the window is closed."""
-        while not self.window.is_closing:
-            self.window.wait(self._patience(time.monotonic()))
-            if self._advance(time.monotonic()) or self.window.due:
-                self._draw()
+    @property
+    def tasks(self) -> list[Task]:
+        """What goes on beside the window, the latest last."""
+        tasks = [self.exporting.task, self.picture.renderer.preparing, self._opening.task]
+        if self.playback.pose is None:
+            tasks.append(self.playback.timeline.reading)
+        return [task for task in tasks if task is not None]
 
-    def _patience(self, now: float) -> float:
-        """Seconds to wait for events before looking at what else has changed."""
-        look = _AWAIT if self.playback.waiting or self._opening else _WATCH
-        changes = self.playback.player.until_next(now), self.notices.next_change(now)
-        return min(look, *changes, self.picture.better_at - now)
+    def cancel(self, task: Task) -> None:
+        """Stop one of `tasks`; what was shown before it stays."""
+        is_told = task is self.playback.timeline.reading  # by what the timeline says of the frame
+        if task is self._opening.task:
+            self._opening.cancel()
+        elif task is self.picture.renderer.preparing:
+            self._choose_prepared()
+        task.cancel()
+        if not is_told:
+            self.note(f"Cancelled: {task.name}.")
 
-    def _advance(self, now: float) -> bool:
-        """Take in what time and workers have brought; True where there is something to show."""
-        if self._opening and self._opening.done():
-            self._take_opened(self._opening)
-        self.playback.advance(now)
-        timeline = self.playback.timeline
-        for message in timeline.messages[self._messages_read :]:
-            self._messages_read += 1
-            self.note(message.text)
-        told = self.notices.count, len(self.notices.shown(now))
-        report = (self.playback.pose, self.session.index, timeline.cached(), told, self.opening)
-        changed, self._reported = report != self._reported, report
-        return changed or now >= self.picture.better_at
+    def _choose_prepared(self) -> None:
+        """Go back to what was drawn before, or to plain points."""
+        if self.picture.request is not None:
+            request = self.picture.without_preparing(self.picture.request)
+            self.session.backend, self.session.look = str(request.backend), request.look
 
-    def _take_opened(self, opening: Future[Timeline]) -> None:
-        scan, self.opening, self._opening = self.opening, None, None
-        try:
-            timeline = opening.result()
-        except Exception as error:  # whatever a file brings, the window stays
-            log.debug("cannot open %s", scan, exc_info=error)
-            self.note(f"Cannot open: {error}")
-            return
-        assert scan is not None
-        self._worker.submit(self.playback.close)  # it may wait for a pose that is being read
-        self.session.turn_to(scan)
-        self.playback = self._start(timeline)
+    @property
+    def hash(self) -> str | None:
+        """Tells whether the scan is still the same, None where it has no files (see `fingerprint`)."""
+        return self._hash.result()
 
-    def _start(self, timeline: Timeline) -> Playback:
-        self.picture.clear()
-        self._messages_read = 0
-        self._hash = self._worker.submit(fingerprint, timeline.files)  # for what is saved
-        self.window.title = f"{timeline.name} - Scan4D"
-        return Playback(timeline, self.session)
+    def show(self, entry: Entry) -> None:
+        """Show what an entry of a recording does, whose scan is open and whose pose has been read."""
+        session = self.session
+        self.seek(entry.pose)
+        session.camera, session.pivot, session.look = entry.camera, None, entry.look
+        session.backend, session.params[entry.backend] = entry.backend, entry.params
+        self.picture.rest()
+        self.window.touch()
+        log.debug("replays frame %d", entry.pose)
 
-    def _draw(self) -> None:
-        self.window.begin()
-        place = self.window.to_pixels(*layout.draw(self))
-        left, bottom, width, height = place
-        if place != self._view_place:
-            self._view_place = place
-            top = self.window.buffer_size[1] - bottom - height
-            log.debug("view at %d,%d %dx%d pixels", left, top, width, height)
-        if self._draw_picture() and not self.moving:
-            self.window.touch(frames=1)  # for what the panel says about it
-        self.window.fill(self.palette.panel)
-        if self.picture.is_there:
-            self.picture.present(left, bottom)
-        self.window.end()
-        log.debug("window drawn")
+    def remembered(self) -> Settings:
+        """What is to come back at the next start."""
+        return Settings.of(
+            self.session, window=self.window.place, theme=self.theme, text_scale=self.window.text_scale,
+            marks=self.marks, cube=self.steering.cube.is_shown, turn_seconds=self.steering.turntable.seconds,
+            recent=self.scans.recent, export=self.exporting.kept,
+            export_marks=self.exporting.marks,
+        )  # fmt: skip
 
-    def _draw_picture(self) -> bool:
-        pose = self.playback.pose
-        if pose is None:
-            return False
-        if self.session.camera is None:
-            bounds = self.picture.bounds(pose)
-            self.session.camera = Camera.orbit(bounds, aspect=self._aspect, up=self._up)
-        drew = self.picture.draw(self.session.request(pose), self._view_size, self.moving)
-        if drew:
-            self._record()
-        return drew
+    # --- for the loop -----------------------------------------------------------------
 
     @property
     def moving(self) -> bool:
-        """Whether the scan plays or the camera is dragged."""
-        return self.playback.player.playing or self.gesture is not None
+        """Whether the scan plays or the camera moves."""
+        return self.playback.player.playing or self.steering.moves
+
+    def take_opened(self) -> None:
+        """Show the scan that has been opened, where one has."""
+        try:
+            opened = self._opening.take()
+        except Scan4DError as error:
+            self.note(f"Cannot open: {error}")
+            self.scans.look(self.session.scan)
+            return
+        if opened is not None:
+            scan, begun = opened
+            in_background(Task("Closing"), self.playback.close)  # it may wait for a pose that is being read
+            self.session.turn_to(scan)
+            self.playback = self._start(begun)
+            log.debug("opened %s", scan)
+
+    def _start(self, opened: Opened) -> Playback:
+        timeline, self._hash = opened
+        self.picture.clear()
+        self._messages_read = 0
+        self.window.title = f"{timeline.name} - Scan4D"
+        self.scans.opened(self.session.scan)
+        self.session.unit = self._unit or self.session.unit
+        self.steering.begin_scan()
+        return Playback(timeline, self.session)
+
+    def pass_on_messages(self) -> None:
+        """Tell what the timeline has to say."""
+        for message in self.playback.timeline.messages[self._messages_read :]:
+            self._messages_read += 1
+            self.note(message.text)
+
+    def place_view(self, place: tuple[int, int, int, int]) -> None:
+        """Take in where the 3D view is: left, bottom, width, height in pixels from the lower left."""
+        if place != self._view_place:
+            self._view_place = place
+            left, bottom, width, height = place
+            top = self.window.buffer_size[1] - bottom - height
+            log.debug("view at %d,%d %dx%d pixels", left, top, width, height)
 
     @property
-    def _view_size(self) -> tuple[int, int]:
-        """In pixels."""
+    def view_corner(self) -> tuple[int, int]:
+        """Its lower left corner, pixels."""
+        return self._view_place[:2]
+
+    @property
+    def view_size(self) -> tuple[int, int]:
+        """Its width and height, pixels."""
         return max(self._view_place[2], 1), max(self._view_place[3], 1)
 
     @property
-    def _aspect(self) -> float:
-        return self._view_size[0] / self._view_size[1]
+    def aspect(self) -> float:
+        """Its width / height."""
+        return self.view_size[0] / self.view_size[1]
 
     def close(self) -> None:
-        """Save what is being recorded, and let go of everything but the window."""
-        if self.recorder is not None:
-            self.toggle_recording()
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        """Save what is being recorded and what is to come back, and let go of everything but the window."""
+        self.capture.close()
+        self.counting.cancel()
+        if problem := self.keeper.close(self.remembered()):
+            self.note(problem)
+        self.exporting.close()
+        self.window.hide()  # what is being read may take a moment to stop
+        self._opening.cancel()
         self.playback.close()
         self.picture.release()

@@ -8,8 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..backends import backends
-from . import navigation, theme
-from .levels import LEVELS
+from . import theme
+from .scene import legend, navigation
+from .scene.levels import LEVELS
 
 if TYPE_CHECKING:
     from .app import App
@@ -59,8 +60,29 @@ def _has_frames(app: App) -> bool:
     return len(app.playback.timeline) > 1
 
 
+def _has_scans(app: App) -> bool:
+    return len(app.scans.listed) > 1
+
+
 def _has_camera(app: App) -> bool:
     return app.session.camera is not None
+
+
+def _has_bookmarks(app: App) -> bool:
+    return bool(app.session.bookmarks)
+
+
+def _can_undo(app: App) -> bool:
+    return app.measuring.here.can_undo
+
+
+def _can_redo(app: App) -> bool:
+    return app.measuring.here.can_redo
+
+
+def _measured(name: str, title: str, act: Callable[[App], None]) -> Command:
+    """Does something with all measurements."""
+    return Command(f"{name}_measurements", title, act, can=lambda app: bool(app.measuring.here.all))
 
 
 def _pace(name: str, title: str, key: str) -> Command:
@@ -74,21 +96,30 @@ def _pace(name: str, title: str, key: str) -> Command:
 def _view(number: int, side: str) -> Command:
     title = side.capitalize()
     return Command(
-        f"view_{side}", title, lambda app: app.look_from(side), f"Ctrl+{number}", can=_has_camera, short=title
-    )
+        f"view_{side}", title, lambda app: app.steering.look_from(*navigation.VIEWS[side]), f"Ctrl+{number}",
+        can=_has_camera, short=title,
+    )  # fmt: skip
 
 
 def _level(number: int) -> Command:
     title = f"Level {number}" if number else "Native level"
     return Command(
-        f"level_{number}", title, lambda app: app.toggle_level(number), str(number),
-        is_on=lambda app: app.levels.get(number, False), can=lambda app: number in app.levels,
+        f"level_{number}", title, lambda app: app.rendering.toggle_level(number), str(number),
+        is_on=lambda app: app.rendering.levels.get(number, False),
+        can=lambda app: number in app.rendering.levels,
     )  # fmt: skip
+
+
+def _mark(name: str, title: str, key: str) -> Command:
+    """Shows one of the marks over the view."""
+    return Command(
+        name, title, lambda app: legend.toggle(app, name), key, is_on=lambda app: getattr(app.marks, name)
+    )
 
 
 def _renderers(app: App) -> Iterator[Item]:
     for name, backend in backends().items():
-        yield backend.title, partial(app.choose_backend, name), name == app.backend
+        yield backend.title, partial(app.rendering.choose, name), name == app.rendering.backend
 
 
 def _themes(app: App) -> Iterator[Item]:
@@ -98,31 +129,90 @@ def _themes(app: App) -> Iterator[Item]:
 
 _FILE = Menu("File", (
     (
-        Command("screenshot", "Save picture", lambda app: app.screenshot(), "P", short="Screenshot"),
+        Command("open", "Open...", lambda app: app.browser.show(), "Ctrl+O", short="Open"),
+        Listing("Open recent", lambda app: app.scans.items(app.scans.lately)),
+        Listing("Scans", lambda app: app.scans.items(app.scans.listed)),
+        Command("next_scan", "Next scan", lambda app: app.scans.step(1), "PageDown", can=_has_scans),
+        Command("previous_scan", "Previous scan", lambda app: app.scans.step(-1), "PageUp", can=_has_scans),
+        Command("scans", "Back to the list of scans", lambda app: app.browser.show(), "Q"),
+    ),
+    (
+        Command("screenshot", "Save picture", lambda app: app.capture.screenshot(), "P", short="Screenshot"),
         Command(
-            "record", "Record", lambda app: app.toggle_recording(), "R",
-            is_on=lambda app: app.recorder is not None, short="Record",
+            "record", "Record", lambda app: app.capture.toggle_recording(), "R",
+            is_on=lambda app: app.capture.recorder is not None, short="Record",
+        ),
+        Command(
+            "replay", "Replay the recording", lambda app: app.capture.replay_last(), "Shift+R",
+            can=lambda app: app.capture.last is not None,
+        ),
+        Command(
+            "export", "Export...", lambda app: app.exporting.ask(), "Ctrl+E",
+            can=lambda app: app.exporting.can,
         ),
     ),
     (Command("quit", "Quit", lambda app: app.quit(), "Ctrl+Q"),),
 ))  # fmt: skip
-_VIEW = Menu("View", (
+_TURNTABLE = Menu("Turntable", (
     (
-        Command("fit", "Fit", lambda app: app.fit(), "F", can=_has_camera, short="Fit"),
-        Menu("From", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)),
         Command(
-            "orthographic", "Orthographic", lambda app: app.switch_projection(), "O",
-            is_on=lambda app: app.is_orthographic, can=_has_camera,
+            "turntable", "Turn", lambda app: app.steering.toggle_turntable(), "Y",
+            is_on=lambda app: app.steering.turntable.is_on, can=_has_camera,
         ),
     ),
+    (Listing("Time for a turn", lambda app: app.steering.turntable.items()),),
+))  # fmt: skip
+_BOOKMARKS = Menu("Bookmarks", (
+    (
+        Command("bookmark_add", "Add this view", lambda app: app.bookmarks.add(), "Ctrl+B", can=_has_camera),
+        Command("bookmark_next", "Next", lambda app: app.bookmarks.step(1), "N", can=_has_bookmarks),
+        Command(
+            "bookmark_previous", "Previous", lambda app: app.bookmarks.step(-1), "Shift+N",
+            can=_has_bookmarks,
+        ),
+    ),
+    (Listing("Go to", lambda app: app.bookmarks.items()),),
+))  # fmt: skip
+_VIEW = Menu("View", (
+    (
+        Command("fit", "Fit", lambda app: app.steering.fit(), "F", can=_has_camera, short="Fit"),
+        Command("center", "Centre the point", lambda app: app.steering.center(), "Z", can=_has_camera),
+        Menu("From", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)),
+        Command(
+            "orthographic", "Orthographic", lambda app: app.steering.switch_projection(), "O",
+            is_on=lambda app: app.steering.is_orthographic, can=_has_camera,
+        ),
+        _TURNTABLE,
+        _BOOKMARKS,
+    ),
+    (
+        Command(
+            "full_screen", "Full screen", lambda app: app.full_view.toggle_screen(), "F11",
+            is_on=lambda app: app.full_view.on_screen,
+        ),
+        Command(
+            "panels", "Panels", lambda app: app.full_view.toggle(), "Tab",
+            is_on=lambda app: not app.full_view.is_on,
+        ),
+        Command(
+            "cube", "Orientation cube", lambda app: app.steering.cube.toggle(),
+            is_on=lambda app: app.steering.cube.is_shown,
+        ),
+    ),
+    (_mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C")),
     (Listing("Theme", _themes), Command("theme", "Next theme", lambda app: app.next_theme(), "T")),
+    (
+        Command("text_larger", "Larger text", lambda app: app.change_text(1), "Ctrl+="),
+        Command("text_smaller", "Smaller text", lambda app: app.change_text(-1), "Ctrl+-"),
+        Command("text_usual", "Usual text", lambda app: app.change_text(0), "Ctrl+0"),
+    ),
 ))  # fmt: skip
 _LEVELS = Menu("Pyramid levels", (
     tuple(_level(number) for number in LEVELS),
     (
         Command(
-            "fill", "Fill all holes", lambda app: app.toggle_filling(), "H",
-            is_on=lambda app: app.is_filling, can=lambda app: bool(app.levels),
+            "fill", "Fill all holes", lambda app: app.rendering.toggle_filling(), "H",
+            is_on=lambda app: app.rendering.is_filling, can=lambda app: bool(app.rendering.levels),
         ),
     ),
 ))  # fmt: skip
@@ -148,10 +238,26 @@ _PLAYBACK = Menu("Playback", (
         _pace("every_frame", "Every frame", "E"),
     ),
 ))  # fmt: skip
+_MEASURING = (
+    Command(
+        "measure", "Measure", lambda app: app.measuring.toggle(), "M",
+        is_on=lambda app: app.measuring.active, can=_has_camera,
+    ),
+    Command("undo", "Undo measuring", lambda app: app.measuring.here.undo(), "Ctrl+Z", can=_can_undo),
+    Command("redo", "Redo measuring", lambda app: app.measuring.here.redo(), "Ctrl+Y", can=_can_redo),
+    Menu("Measurements", (
+        (
+            _measured("copy", "Copy as table", lambda app: app.measuring.copy()),
+            _measured("save", "Save CSV...", lambda app: app.measuring.ask_to_save()),
+            _measured("clear", "Clear", lambda app: app.measuring.here.clear()),
+        ),
+    )),
+)  # fmt: skip
 _TOOLS = Menu("Tools", (
+    _MEASURING,
     (
         Listing("Renderer", _renderers),
-        Command("backend", "Next renderer", lambda app: app.next_backend(), "B"),
+        Command("backend", "Next renderer", lambda app: app.rendering.choose_next(), "B"),
         _LEVELS,
     ),
     (_PLAYBACK,),
@@ -181,11 +287,12 @@ def _commands(entry: Any) -> Iterator[Command]:
 
 COMMANDS = {command.name: command for menu in MENUS for command in _commands(menu)}
 TOOLBAR = (
-    ("fit",), tuple(f"view_{side}" for side in navigation.VIEWS), ("screenshot", "record"),
+    ("open",), ("fit",), tuple(f"view_{side}" for side in navigation.VIEWS), ("screenshot", "record"),
 )  # fmt: skip
 MOUSE = (
     ("Left drag", "Orbit"),
     ("Middle drag, Shift+left drag", "Pan"),
     ("Wheel, right drag", "Zoom"),
     ("Double click", "Turn about what is there"),
+    ("Click while measuring", "Set an end"),
 )

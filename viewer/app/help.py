@@ -69,7 +69,7 @@ def _draw_commands(app: App, menu: Menu, path: str = "") -> None:
 def _row(name: str, does: str) -> None:
     imgui.text_disabled(name)
     imgui.same_line(_KEY_COLUMN * imgui.get_font_size())
-    imgui.text(does)
+    imgui.text_wrapped(does)
 
 
 def _draw_messages(app: App) -> None:

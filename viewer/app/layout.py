@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import help, menu, panel, timeline_bar, view
+from . import help, menu, panel, tasks
+from .playing import timeline_bar
+from .scene import view
+from .tools import export_dialog, measuring_panel
 
 if TYPE_CHECKING:
     from .app import App
@@ -25,6 +28,25 @@ _STILL = (
 def draw(app: App) -> tuple[float, float, float, float]:
     """Declare all widgets; returns the 3D view: left, top, width, height in ImGui's coordinates."""
     app.keys.handle(app)
+    place = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
+    tasks.draw(app, place)
+    help.draw(app)
+    app.browser.draw()
+    export_dialog.draw(app)
+    measuring_panel.draw_dialog(app)
+    return place
+
+
+def _draw_view_alone(app: App) -> tuple[float, float, float, float]:
+    whole = imgui.get_io().display_size
+    no_popup = not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    in_use = app.help.open or app.measuring.active
+    if imgui.is_key_pressed(imgui.Key.escape) and no_popup and not in_use:
+        app.full_view.leave()
+    return _draw_view(app, 0, int(whole.x), int(whole.y))
+
+
+def _draw_parts(app: App) -> tuple[float, float, float, float]:
     whole = imgui.get_io().display_size
     top = _draw_head(app, whole.x)
     em = imgui.get_font_size()
@@ -32,18 +54,22 @@ def draw(app: App) -> tuple[float, float, float, float]:
     width = max(1, int(whole.x - min(_PANEL_WIDTH * em, 0.5 * whole.x)))
     bottom = int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y))
     height = max(1, bottom - top)
-    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-    _place("view", 0, top, width, height)
-    imgui.pop_style_var()
-    view.draw(app)
-    imgui.end()
+    place = _draw_view(app, top, width, height)
     _place("panel", width, top, whole.x - width, height)
     panel.draw(app)
     imgui.end()
     _place("timeline", 0, bottom, whole.x, whole.y - bottom)
     timeline_bar.draw(app)
     imgui.end()
-    help.draw(app)
+    return place
+
+
+def _draw_view(app: App, top: int, width: int, height: int) -> tuple[float, float, float, float]:
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    _place("view", 0, top, width, height)
+    imgui.pop_style_var()
+    view.draw(app)
+    imgui.end()
     return 0, top, width, height
 
 
@@ -64,4 +90,7 @@ def _draw_head(app: App, width: float) -> int:
 def _place(name: str, left: float, top: float, width: float, height: float) -> None:
     imgui.set_next_window_pos(ImVec2(left, top))
     imgui.set_next_window_size(ImVec2(width, height))
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
     imgui.begin(name, flags=_STILL)
+    imgui.pop_style_var(2)

@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 def draw_bar(app: App) -> float:
     """Declare the menu bar of the window; returns its height."""
-    if imgui.begin_main_menu_bar():
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    is_there = imgui.begin_main_menu_bar()
+    imgui.pop_style_var()
+    if is_there:
         for menu in MENUS:
             _draw(app, menu)
         imgui.end_main_menu_bar()
@@ -70,6 +73,8 @@ def _draw(app: App, entry: Command | Listing | Menu) -> None:
             _draw_items(app, entry)
         else:
             _draw_groups(app, entry)
+        if imgui.is_key_pressed(imgui.Key.escape):
+            imgui.close_current_popup()
         imgui.end_menu()
 
 

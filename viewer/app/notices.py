@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
+from ..files import printable
+
 if TYPE_CHECKING:
     from .app import App
 
@@ -39,6 +41,7 @@ class Notices:
 
     def tell(self, text: str) -> None:
         """Show a message for as long as it takes to read, and keep it in the log."""
+        text = printable(text)
         log.info("%s", text)
         seconds, per_letter = _LASTS
         until = time.monotonic() + seconds + per_letter * len(text)

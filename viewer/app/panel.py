@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_4 as icons
 
 from ..backends import backend, backends
 from ..camera import PROJECTIONS
+from ..files import printable
 from ..look import COLOR_BY
 from . import widgets
+from .files.scans import title
+from .scene import counting
+from .tools import measuring_panel
 
 if TYPE_CHECKING:
     from ..gpu.surface import Stats
     from ..scan.pose import Pose
     from .app import App
 
-_STATISTICS_ROWS = 4  # without the passes
+_STATISTICS_ROWS = 7  # without the passes
+_STATISTICS_SHARE = 0.4  # of the panel's height at most
 
 
 def draw(app: App) -> None:
@@ -25,8 +30,9 @@ def draw(app: App) -> None:
     passes = len(app.picture.surface.stats.passes) if app.picture.surface else 0
     rows = imgui.get_text_line_height_with_spacing() * (_STATISTICS_ROWS + passes)
     head = imgui.get_frame_height_with_spacing() + 2 * imgui.get_style().item_spacing.y
-    imgui.begin_child("settings", ImVec2(0, -head - rows))
-    if len(app.scans) > 1:
+    height = min(head + rows, _STATISTICS_SHARE * imgui.get_content_region_avail().y)
+    imgui.begin_child("settings", ImVec2(0, -height))
+    if len(app.scans.listed) > 1:
         _draw_scans(app)
     pose = app.playback.pose
     if pose is not None:
@@ -36,9 +42,17 @@ def draw(app: App) -> None:
             choices = {"color_by": [*COLOR_BY, *pose.cloud.scalars]}
             app.session.look = widgets.edit(app.session.look, choices)
             _draw_projection(app)
+        if _section("Bookmarks", is_open=bool(app.session.bookmarks)):
+            app.bookmarks.draw(app)
+        if app.measuring.to_show:
+            imgui.set_next_item_open(True)
+        if _section("Measurements", is_open=False):
+            measuring_panel.draw(app)
     imgui.end_child()
     imgui.separator()
+    imgui.begin_child("statistics")
     _draw_statistics(app)
+    imgui.end_child()
 
 
 def _section(title: str, is_open: bool = True) -> bool:
@@ -46,13 +60,23 @@ def _section(title: str, is_open: bool = True) -> bool:
 
 
 def _draw_scans(app: App) -> None:
-    imgui.begin_disabled(app.opening is not None)
+    """The list of scans, and buttons to the one before and the next."""
+    scan, gap = app.session.scan, imgui.get_style().item_inner_spacing.x
+    for icon, step, name in (
+        (icons.ICON_FA_CHEVRON_LEFT, -1, "previous"), (icons.ICON_FA_CHEVRON_RIGHT, 1, "next"),
+    ):  # fmt: skip
+        keys = app.keys.of[f"{name}_scan"]
+        if widgets.icon_button(icon, f"{name.capitalize()} scan" + (f" ({keys})" if keys else "")):
+            app.scans.step(step)
+        imgui.same_line(0, gap)
     imgui.set_next_item_width(-1)
-    chosen = widgets.choose("scan", app.session.scan, app.scans, {s: Path(s).name for s in app.scans})
-    imgui.set_item_tooltip(app.session.scan)
-    imgui.end_disabled()
-    if chosen != app.session.scan:
-        app.open(chosen)
+    room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height()
+    if imgui.begin_combo("##scan", widgets.shortened(title(scan), room)):
+        for number, (name, act, is_open) in enumerate(app.scans.items(app.scans.listed)):
+            if imgui.selectable(f"{name}##{number}", is_open)[0]:
+                act()
+        imgui.end_combo()
+    imgui.set_item_tooltip(printable(scan))
 
 
 def _draw_renderer(app: App, pose: Pose) -> None:
@@ -72,14 +96,16 @@ def _draw_projection(app: App) -> None:
     now = app.session.camera.projection if app.session.camera else PROJECTIONS[0]
     chosen = widgets.choose("projection", now, PROJECTIONS)
     if chosen != now:
-        app.project(chosen)
+        app.steering.project(chosen)
 
 
 def _draw_statistics(app: App) -> None:
+    imgui.align_text_to_frame_padding()
     imgui.text_disabled("Statistics")
     surface, pose = app.picture.surface, app.playback.pose
     timers = app.picture.gpu.timers
-    imgui.same_line(imgui.get_content_region_avail().x - 8 * imgui.get_font_size())
+    width = imgui.get_item_rect_size().x + imgui.get_style().item_spacing.x
+    imgui.same_line(max(imgui.get_content_region_avail().x - 8 * imgui.get_font_size(), width))
     timers.enabled = imgui.checkbox("time passes", timers.enabled)[1]
     imgui.set_item_tooltip("Measure each pass of a picture; this makes it a little slower")
     if surface is None or pose is None or app.picture.request is None:
@@ -89,7 +115,9 @@ def _draw_statistics(app: App) -> None:
         "Points",
         f"{len(pose.cloud):,}" + (f" ({pose.cloud.dropped:,} dropped)" if pose.cloud.dropped else ""),
     )
-    _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.playback.timeline.unit}")
+    for name, number in counting.words(app):
+        _row(name, number)
+    _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.unit}")
     _row("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
     _row("Time", _times(surface.stats) + (f", {app.picture.rate:.0f} fps" if app.moving else ""))
     for name, milliseconds in surface.stats.passes:

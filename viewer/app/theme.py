@@ -58,22 +58,28 @@ PALETTES = {
     ),
 }  # fmt: skip
 DEFAULT = "dark"
+TEXT_SCALES = (0.75, 0.85, 1.0, 1.15, 1.35, 1.6, 2.0)  # to choose from
 
 
-def apply(scale: float) -> None:
-    """Set fonts, sizes and the default colours of the current ImGui context. scale: of the display."""
-    _add_fonts()
+def set_sizes(scale: float) -> None:
+    """Set the sizes of text and widgets of the current ImGui context.
+
+    scale: of the display, times the user's choice.
+    """
+    sizes = imgui.Style()  # scaling again what was scaled before would add up roundings
+    sizes.window_padding = ImVec2(12, 10)
+    sizes.frame_padding = ImVec2(7, 4)
+    sizes.item_spacing = ImVec2(8, 6)
+    sizes.window_border_size = 1
+    sizes.frame_rounding = sizes.grab_rounding = sizes.popup_rounding = sizes.window_rounding = 4
+    sizes.scrollbar_size = 11
+    sizes.scale_all_sizes(scale)
+    sizes.font_size_base = _FONT_SIZE
+    sizes.font_scale_dpi = scale
     style = imgui.get_style()
-    style.window_padding = ImVec2(12, 10)
-    style.frame_padding = ImVec2(7, 4)
-    style.item_spacing = ImVec2(8, 6)
-    style.window_border_size = 0
-    style.frame_rounding = style.grab_rounding = style.popup_rounding = 4
-    style.scrollbar_size = 11
-    style.scale_all_sizes(scale)
-    style.font_size_base = _FONT_SIZE
-    style.font_scale_dpi = scale
-    set_colors(PALETTES[DEFAULT])
+    for name in dir(sizes):
+        if isinstance(value := getattr(sizes, name), float | ImVec2):
+            setattr(style, name, value)
 
 
 def set_colors(palette: Palette) -> None:
@@ -82,16 +88,39 @@ def set_colors(palette: Palette) -> None:
     style, entry = imgui.get_style(), imgui.Col_
     for where, color in (
         (entry.window_bg, palette.panel), (entry.scrollbar_bg, palette.panel),
+        (entry.menu_bar_bg, palette.panel),
         (entry.text, palette.text), (entry.text_disabled, palette.faint), (entry.popup_bg, palette.popup),
         (entry.border, palette.line), (entry.separator, palette.line), (entry.check_mark, palette.accent),
-        (entry.scrollbar_grab, palette.scroll),
+        (entry.scrollbar_grab, palette.scroll), (entry.scrollbar_grab_hovered, palette.faint),
+        (entry.scrollbar_grab_active, palette.faint),
+        (entry.title_bg, palette.header[0]), (entry.title_bg_active, palette.header[2]),
+        (entry.title_bg_collapsed, palette.header[0]),
+        (entry.separator_hovered, palette.accent), (entry.separator_active, palette.accent),
+        (entry.resize_grip, palette.line), (entry.resize_grip_hovered, palette.accent),
+        (entry.resize_grip_active, palette.accent),
+        (entry.tab, palette.frame[0]), (entry.tab_hovered, palette.header[1]),
+        (entry.tab_selected, palette.header[2]), (entry.tab_selected_overline, palette.accent),
+        (entry.tab_dimmed, palette.frame[0]), (entry.tab_dimmed_selected, palette.header[2]),
+        (entry.tab_dimmed_selected_overline, palette.line),
+        (entry.table_header_bg, palette.header[0]), (entry.table_border_strong, palette.line),
+        (entry.table_border_light, palette.line),
+        (entry.text_link, palette.accent), (entry.text_selected_bg, palette.button[2]),
+        (entry.input_text_cursor, palette.text), (entry.nav_cursor, palette.accent),
+        (entry.checkbox_selected_bg, palette.frame[0]), (entry.tree_lines, palette.line),
+        (entry.plot_histogram, palette.grab[0]), (entry.plot_histogram_hovered, palette.grab[1]),
+        (entry.drag_drop_target, palette.accent), (entry.unsaved_marker, palette.accent),
         *zip((entry.frame_bg, entry.frame_bg_hovered, entry.frame_bg_active), palette.frame, strict=True),
         *zip((entry.button, entry.button_hovered, entry.button_active), palette.button, strict=True),
         *zip((entry.header, entry.header_hovered, entry.header_active), palette.header, strict=True),
         *zip((entry.slider_grab, entry.slider_grab_active), palette.grab, strict=True),
     ):  # fmt: skip
         style.set_color_(where, ImVec4(*rgb(color), 1.0))
-    style.set_color_(entry.child_bg, ImVec4(0, 0, 0, 0))
+    for where, color, alpha in (
+        (entry.child_bg, 0, 0.0), (entry.border_shadow, 0, 0.0), (entry.table_row_bg, 0, 0.0),
+        (entry.table_row_bg_alt, palette.text, 0.05), (entry.modal_window_dim_bg, 0, 0.45),
+        (entry.drag_drop_target_bg, 0, 0.0),
+    ):  # fmt: skip
+        style.set_color_(where, ImVec4(*rgb(color), alpha))
 
 
 def rgb(color: int) -> tuple[float, float, float]:
@@ -99,12 +128,20 @@ def rgb(color: int) -> tuple[float, float, float]:
     return (color >> 16) / 255, (color >> 8 & 255) / 255, (color & 255) / 255
 
 
+def mixed(one: int, other: int, share: float) -> int:
+    """A color between two, 0xRRGGBB. share: of the other, 0..1."""
+    channels = (round(255 * (a + (b - a) * share)) for a, b in zip(rgb(one), rgb(other), strict=True))
+    red, green, blue = channels
+    return red << 16 | green << 8 | blue
+
+
 def packed(color: int, alpha: float = 1.0) -> int:
     """0xRRGGBB as ImGui's draw lists take it."""
     return imgui.color_convert_float4_to_u32(ImVec4(*rgb(color), alpha))
 
 
-def _add_fonts() -> None:
+def add_fonts() -> None:
+    """The fonts of the current ImGui context."""
     fonts = imgui.get_io().fonts
     fonts.add_font_from_file_ttf(str(_FONTS / "Roboto" / "Roboto-Regular.ttf"), _FONT_SIZE)
     icons = imgui.ImFontConfig()

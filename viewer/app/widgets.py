@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -16,6 +17,7 @@ from . import theme
 
 T = TypeVar("T")
 _LABEL_SHARE = 0.46  # of the width
+_DIALOG_WIDTH = 34.0  # in heights of the font
 _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
@@ -127,6 +129,24 @@ def shortened(text: str, width: float) -> str:
         return text
     kept = bisect(range(len(text)), width, key=lambda length: imgui.calc_text_size(text[:length] + "...").x)
     return text[: max(kept - 1, 0)] + "..."
+
+
+@contextmanager
+def modal(title: str, is_open: bool) -> Iterator[bool]:
+    """A dialog in the middle of the window; whether its widgets are to be declared."""
+    if not is_open:
+        yield False
+        return
+    if not imgui.is_popup_open(title):
+        imgui.open_popup(title)
+    display = imgui.get_io().display_size
+    imgui.set_next_window_pos(display * 0.5, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(ImVec2(min(_DIALOG_WIDTH * imgui.get_font_size(), display.x), 0))
+    flags = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_saved_settings
+    is_drawn = imgui.begin_popup_modal(title, None, flags)[0]
+    yield is_drawn
+    if is_drawn:
+        imgui.end_popup()
 
 
 def icon_button(icon: str, tooltip: str, color: int | None = None) -> bool:

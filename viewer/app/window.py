@@ -7,8 +7,12 @@ in its events and draw the widgets. The loop is the app's, since theirs draw all
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import glfw
@@ -18,18 +22,25 @@ from moderngl_window.context.glfw.window import Window as GlfwWindow
 from ..errors import NoOpenGLError
 from ..gpu import gl
 from . import theme
+from .place import Place, reachable
 
 _GL = (4, 3)
 _SIZE = (1600, 1000)
 _SCREEN_SHARE = 0.9  # that a window takes at most
 _SETTLE_FRAMES = 3  # until ImGui has taken in an event: press, release, layout
 _TOOLTIP_DELAY = 0.6  # seconds; ImGui shows tooltips a moment after the last event
+_MODIFIERS = {
+    glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT,
+    glfw.KEY_LEFT_ALT, glfw.KEY_RIGHT_ALT, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER,
+}  # fmt: skip
+_UNUSED_KEY = imgui.Key.f24
 
 
 class Window(GlfwWindow):
     """Opens at once. Raises NoOpenGLError where there is no display or no OpenGL for it."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, place: Place | None = None) -> None:
+        """place: where it was before; the usual one where that is None, or on no screen any more."""
         problems: list[str] = []
 
         def note_problem(code: int, text: Any) -> None:
@@ -42,7 +53,7 @@ class Window(GlfwWindow):
         try:
             if not glfw.init():
                 raise ValueError("no display")
-            super().__init__(title=title, gl_version=_GL, size=_initial_size(), vsync=True)
+            super().__init__(title=title, gl_version=_GL, size=_initial_size(), vsync=True, visible=False)
         except Exception as error:  # moderngl and moderngl-window raise bare Exceptions
             glfw.terminate()
             raise NoOpenGLError(
@@ -50,34 +61,100 @@ class Window(GlfwWindow):
                 hint="It needs a display and OpenGL 4.3. 'scan4d render' makes pictures without a window; "
                 "'scan4d doctor' tells more",
             ) from error
+        self.dropped: list[str] = []
+        self._restore(place)
         # On a scaled display it is larger than asked for, which moderngl-window does not notice.
         self._width, self._height = glfw.get_window_size(self._window)
         self.exit_key = self.fullscreen_key = None
+        glfw.set_window_attrib(self._window, glfw.AUTO_ICONIFY, False)  # a full screen beside others stays
+        self.text_scale = 1.0
+        self._scale = 0.0  # of text and widgets in ImGui's coordinates, as it is set
+        self._is_key_pressed = False  # since a modifier changed
         self._frames_due = _SETTLE_FRAMES
         self._tooltips_at: float | None = None
-        self._note_events()
         self._start_imgui()
+        self._take_events()
 
-    def _note_events(self) -> None:
-        """Whatever happens makes frames due. ImGui's callbacks go on to call these."""
-        for attach in (
-            glfw.set_key_callback, glfw.set_char_callback, glfw.set_cursor_pos_callback,
-            glfw.set_cursor_enter_callback, glfw.set_mouse_button_callback, glfw.set_scroll_callback,
-            glfw.set_window_refresh_callback, glfw.set_window_focus_callback,
+    def _take_events(self) -> None:
+        """Whatever happens makes frames due, and goes to ImGui."""
+        backends = imgui.backends
+        for attach, forward in (
+            (glfw.set_char_callback, backends.glfw_char_callback),
+            (glfw.set_cursor_pos_callback, backends.glfw_cursor_pos_callback),
+            (glfw.set_cursor_enter_callback, backends.glfw_cursor_enter_callback),
+            (glfw.set_mouse_button_callback, backends.glfw_mouse_button_callback),
+            (glfw.set_scroll_callback, backends.glfw_scroll_callback),
+            (glfw.set_window_focus_callback, backends.glfw_window_focus_callback),
         ):  # fmt: skip
-            attach(self._window, self._note_event)
+            attach(self._window, partial(self._take_event, forward))
+        glfw.set_key_callback(self._window, self._take_key)
+        glfw.set_window_refresh_callback(self._window, self._note_event)
+        glfw.set_drop_callback(self._window, self._note_drop)  # type: ignore[arg-type]  # its stub is wrong
         self.resize_func = self._note_event
+
+    def _take_event(self, forward: Callable[..., None], window: Any, *event: Any) -> None:
+        self._note_event()
+        forward(_address(window), *event)
 
     def _note_event(self, *_: Any) -> None:
         self.touch()
         self._tooltips_at = time.monotonic() + _TOOLTIP_DELAY
 
+    def _take_key(self, window: Any, key: int, *event: int) -> None:
+        """Pass a key on to ImGui.
+
+        A frame of ImGui has one state of the modifiers, the last one. So where one changes after a key was
+        pressed, that is for the next frame: Ctrl+B typed in haste is not B.
+        """
+        if key not in _MODIFIERS:
+            self._is_key_pressed = True
+        elif self._is_key_pressed:
+            self._is_key_pressed = False
+            for down in (True, False):  # of one key ImGui takes in one change a frame
+                imgui.get_io().add_key_event(_UNUSED_KEY, down)
+        self._take_event(imgui.backends.glfw_key_callback, window, key, *event)
+
+    def _note_drop(self, _: Any, paths: list[str]) -> None:
+        self.dropped += paths
+        self._note_event()
+
+    def take_dropped(self) -> list[str]:
+        """The files and folders that were dropped onto it since the last call."""
+        paths, self.dropped = self.dropped, []
+        return paths
+
+    def _restore(self, place: Place | None) -> None:
+        """Go where it was, and show."""
+        found = place and reachable(place, [glfw.get_monitor_workarea(one) for one in glfw.get_monitors()])
+        if found:
+            glfw.set_window_pos(self._window, found.left, found.top)
+            glfw.set_window_size(self._window, found.width, found.height)
+            if found.maximised:
+                glfw.maximize_window(self._window)
+        self._last_place = found or None
+        self.visible = True
+
+    @property
+    def place(self) -> Place | None:
+        """Where it is; while it fills a screen or is an icon, where it was before that. None: never seen."""
+        seen = self._window, glfw.ICONIFIED
+        if glfw.get_window_monitor(self._window) or glfw.get_window_attrib(*seen):
+            return self._last_place
+        if glfw.get_window_attrib(self._window, glfw.MAXIMIZED):
+            before = self._last_place or Place(*glfw.get_window_pos(self._window), *_initial_size())
+            self._last_place = replace(before, maximised=True)
+        else:
+            size = glfw.get_window_size(self._window)
+            self._last_place = Place(*glfw.get_window_pos(self._window), *size)
+        return self._last_place
+
     def _start_imgui(self) -> None:
         imgui.create_context()
         imgui.get_io().set_ini_filename("")
-        imgui.backends.glfw_init_for_opengl(ctypes.cast(self._window, ctypes.c_void_p).value or 0, True)
+        imgui.backends.glfw_init_for_opengl(_address(self._window), False)
         imgui.backends.opengl3_init("#version 430")
-        theme.apply(glfw.get_window_content_scale(self._window)[0] / self.pixel_ratio)
+        theme.add_fonts()
+        theme.set_colors(theme.PALETTES[theme.DEFAULT])
 
     # --- the loop ---------------------------------------------------------------------
 
@@ -90,20 +167,35 @@ class Window(GlfwWindow):
         """Whether a frame has to be drawn for what happened in the window."""
         return self._frames_due > 0
 
-    def wait(self, seconds: float) -> None:
-        """Handle events; sleep until one comes, a frame is due or the time is over."""
+    def wait(self, seconds: float) -> float:
+        """Handle events; sleep until one comes, a frame is due or the time is over.
+
+        Returns how many seconds longer than that it took: another thread did not let this one go on.
+        """
+        start = time.monotonic()
         if self._tooltips_at is not None:
             seconds = min(seconds, self._tooltips_at - time.monotonic())
         if self.due or seconds <= 0:
-            glfw.poll_events()
-        else:
-            glfw.wait_events_timeout(seconds)
+            seconds = 0.0
+        self._handle_events(seconds)
+        late = max(0.0, time.monotonic() - start - seconds)
         if self._tooltips_at is not None and time.monotonic() >= self._tooltips_at:
             self._tooltips_at = None
             self.touch()
+        return late
+
+    def _handle_events(self, seconds: float) -> None:
+        try:
+            if seconds:
+                glfw.wait_events_timeout(seconds)
+            else:
+                glfw.poll_events()
+        except UnicodeDecodeError as error:  # by glfw's wrapper, of a dropped name
+            self._note_drop(None, [os.fsdecode(error.object)])
 
     def begin(self) -> None:
         """Begin a frame: widgets may be declared from here on."""
+        self._set_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
         imgui.new_frame()
@@ -111,6 +203,14 @@ class Window(GlfwWindow):
         queued = imgui.get_current_context().input_events_queue.size()
         self._frames_due = max(0, self._frames_due - 1)
         if queued:
+            self.touch()
+
+    def _set_scale(self) -> None:
+        """Follow the display that the window is on, and the user's choice."""
+        display = glfw.get_window_content_scale(self._window)[0] / self.pixel_ratio
+        if (scale := display * self.text_scale) != self._scale:
+            self._scale = scale
+            theme.set_sizes(scale)
             self.touch()
 
     def end(self) -> None:
@@ -133,10 +233,32 @@ class Window(GlfwWindow):
         """Pixels of the framebuffer for one of ImGui's; a minimised window has no size."""
         return self.buffer_width / self.width if self.width else 1.0
 
+    @property
+    def refresh_ms(self) -> float:
+        """How long the screen shows a frame, milliseconds; 0 where it does not tell."""
+        monitor = glfw.get_primary_monitor()
+        rate = glfw.get_video_mode(monitor).refresh_rate if monitor else 0
+        return 1e3 / rate if rate else 0.0
+
     def to_pixels(self, left: float, top: float, width: float, height: float) -> tuple[int, int, int, int]:
         """From ImGui's coordinates to the framebuffer: (left, bottom, width, height) in pixels."""
         x, y, w, h = (round(v * self.pixel_ratio) for v in (left, top, width, height))
         return x, self.buffer_height - y - h, w, h
+
+    def _set_fullscreen(self, value: bool) -> None:
+        """On the monitor that the window is on; moderngl-window takes the primary one."""
+        if value:
+            self._place = *glfw.get_window_pos(self._window), *glfw.get_window_size(self._window)
+            monitor = _monitor_at(self._place)
+            (width, height), _, refresh = glfw.get_video_mode(monitor)
+            glfw.set_window_monitor(self._window, monitor, 0, 0, width, height, refresh)
+        else:
+            no_monitor: Any = None
+            glfw.set_window_monitor(self._window, no_monitor, *self._place, glfw.DONT_CARE)
+
+    def hide(self) -> None:
+        """Take it off the screen before it is destroyed."""
+        glfw.hide_window(self._window)
 
     def destroy(self) -> None:
         """Close the window and let go of its context."""
@@ -156,3 +278,21 @@ def _initial_size() -> tuple[int, int]:
     return min(_SIZE[0], int(_SCREEN_SHARE * width / x_scale)), min(
         _SIZE[1], int(_SCREEN_SHARE * height / y_scale)
     )
+
+
+def _address(window: Any) -> int:
+    """Of a glfw window, as ImGui takes it."""
+    return ctypes.cast(window, ctypes.c_void_p).value or 0
+
+
+def _monitor_at(place: tuple[int, int, int, int]) -> Any:
+    """The monitor that shows most of a window. place: left, top, width, height on the screen."""
+
+    def shared(monitor: Any) -> int:
+        left, top = glfw.get_monitor_pos(monitor)
+        size = glfw.get_video_mode(monitor).size
+        across = min(place[0] + place[2], left + size.width) - max(place[0], left)
+        down = min(place[1] + place[3], top + size.height) - max(place[1], top)
+        return max(across, 0) * max(down, 0)
+
+    return max(glfw.get_monitors(), key=shared)

@@ -49,15 +49,15 @@ class Derived(Protocol):
 class FrameView:
     """What a backend is asked to draw: a view, its own parameters, and what it derived.
 
-    budget_ms: how long it may take before it says that more calls would refine; None: finish.
-    moving: the camera or the pose moves, so a coarser picture may do.
+    share: of the points that need to be drawn, less than 1 while the picture moves and all would
+    take too long. A backend that leaves some out says that a later call would refine the picture,
+    and counts them (`amplify` does); one that is fast enough may draw all.
     """
 
     view: View
     params: Any
     derived: Any = None
-    budget_ms: float | None = None
-    moving: bool = False
+    share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

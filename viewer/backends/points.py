@@ -52,14 +52,18 @@ def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Scatter the points; always complete."""
+    """Scatter the points; complete where all shall be drawn."""
     params: Params = frame.params
+    rows, count = surface.take_sample(frame.share)
     size = params.point_size or _touching(pose, frame.view)
-    count, pixels = len(pose.cloud), surface.size[0] * surface.size[1]
-    sparse = count * size**2 < _LIST_BELOW * pixels
+    if rows is not None:
+        size = min(round(size * math.sqrt(len(pose.cloud) / count)), _LARGEST)
+    sparse = count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
 
     def bind(program: moderngl.ComputeShader) -> None:
         pose.array("positions").bind(2)
+        if rows is not None:
+            rows.bind(3)
         pose.gpu.set(program, point_size=size)
 
     scatter(
@@ -69,17 +73,17 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.depths,
         surface.rows,
         bind,
-        defines={"POINT_SIZE": int(size == 1)},
+        defines={"POINT_SIZE": int(size == 1), "SAMPLED": int(rows is not None)},
         listed=surface.take_covered() if sparse else None,
     )
     if sparse:
         surface.stats.skipped["compact"] = "few points: they list the pixels themselves"
-    return False
+    return rows is not None
 
 
 def _touching(pose: GpuPose, view: View) -> int:
     """The size at which squares in the middle of the scan touch their neighbours, pixels."""
-    reach = pose.remember("reach", lambda: _reach(pose.cloud))
+    reach = pose.remember("reach", lambda: _reach(pose.stored))
     depth = max(float(view.depths(pose.bounds.center - pose.cloud.origin)), view.near)
     pixels = reach * view.scale / (depth if view.perspective else 1.0)
     return min(max(math.ceil(pixels), 1), _LARGEST)

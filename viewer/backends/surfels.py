@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..gpu.amplify import FEEDS, amplify
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
@@ -23,6 +25,7 @@ TITLE = "Surfels"
 _RADIUS_PER_SPACING = 1.5
 # The mask is exp(-falloff d^2), 2 % at the quad's edge (d = 1).
 _MASK_FALLOFF = 4.0
+_LARGEST_RADIUS = np.float32(3e38)  # beyond it the shader takes a radius as unknown
 
 
 @dataclass(frozen=True)
@@ -48,23 +51,31 @@ def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Splat in one pass; always complete."""
+    """Splat in one pass; complete where all points shall be drawn."""
     params: Params = frame.params
     own = {"auto": pose.stored.radii is not None, "own": True, "uniform": False}[params.radius]
-    amplify(
+    # The spacing takes longer to find than many a pose takes to draw.
+    suffices = own and pose.remember("radii suffice", lambda: _radii_suffice(pose))
+    return amplify(
         pose,
         surface,
         params.instancing,
         "surfels/surfel.glsl",
         "surfels/splat.frag",
         use_radii=own,
+        share=frame.share,
         radius_scale=params.radius_scale,
-        uniform_radius=_uniform_radius(pose),
+        uniform_radius=0.0 if suffices else _uniform_radius(pose),
         cull_back=params.cull_back,
         mask_limit=min(1.0, -math.log(params.mask_cutoff) / _MASK_FALLOFF),
     )
-    return False
+
+
+def _radii_suffice(pose: GpuPose) -> bool:
+    """Whether each point has a radius that the shader takes."""
+    radii = pose.cloud.radii
+    return radii is not None and bool(((radii > 0) & (radii < _LARGEST_RADIUS)).all())
 
 
 def _uniform_radius(pose: GpuPose) -> float:
-    return _RADIUS_PER_SPACING * pose.remember("spacing", lambda: typical_spacing(pose.cloud))
+    return _RADIUS_PER_SPACING * pose.remember("spacing", lambda: typical_spacing(pose.stored))

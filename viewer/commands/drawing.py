@@ -6,18 +6,17 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import numpy as np
-
 from .. import frame
 from ..camera import Camera
 from ..frame import Request
 from ..gpu.context import headless
 from ..gpu.surface import Surface
+from ..marks import Legend
 from ..recording import Entry
 from ..renderer import Renderer
 from ..scan.points import Bounds
 from ..scan.timeline import Timeline
-from ..scan.times import DEFAULT_FPS
+from ..scan.times import typical_rate
 
 
 @dataclass(frozen=True)
@@ -25,14 +24,14 @@ class Plan:
     """Pictures to draw.
 
     count: how many are drawn. size: of the first one, and of a film. fps: of a film.
-    pictures: number of the file, request, and entry that tells all of it; where one request
-    comes several times in a row, its picture is put several times and drawn once.
+    pictures: number of the file, request, entry that tells all of it, and legend of its marks; where one
+    request comes several times in a row, its picture is put several times and drawn once.
     """
 
     count: int
     size: tuple[int, int]
     fps: float
-    pictures: Iterator[tuple[int, Request, Entry]]
+    pictures: Iterator[tuple[int, Request, Entry, Legend]]
 
 
 @dataclass(frozen=True)
@@ -65,8 +64,7 @@ def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> 
     """Pictures a second: `fps` where given, else as fast as the poses follow each other."""
     if fps is not None:
         return fps
-    steps = np.diff(timeline.times[list(indices)])
-    return 1 / float(np.median(steps)) if len(steps) else DEFAULT_FPS
+    return typical_rate(timeline.times[list(indices)])
 
 
 def renderer(device: int | None) -> Renderer:

@@ -19,17 +19,18 @@ from typing import Any
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError
-from ..export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, check_output, pictures
+from ..export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look
+from ..marks import MARKS, Legend, marks_of
 from ..params import parse
 from ..recording import Entry, fingerprint
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
 from . import arguments, drawing, replay, stats
-from .console import progress
+from .console import progress, say
 from .drawing import Plan, Shot
 from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline, read_poses
 
@@ -45,8 +46,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--replay", type=Path, metavar="FILE",
-        help="draw again what a recording (.json) or a picture (.png, .exr) tells; takes no SCAN",
+        help="draw again what a recording (.json) or a picture (.png, .exr) tells; of SCAN, if given",
     )  # fmt: skip
+    parser.add_argument(
+        "--anonymous", action="store_true",
+        help="pictures tell the hash of their scan, and neither its name nor its path",
+    )  # fmt: skip
+    parser.add_argument(
+        "--progress", action="store_true", help="say what is drawn on standard output, a line of JSON a step"
+    )
     add_pose_arguments(parser)
     picture = parser.add_argument_group("the picture")
     picture.add_argument("--size", type=arguments.size, metavar="WxH", help="default 1920x1280")
@@ -60,6 +68,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     picture.add_argument(
         "--look", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
         help="lighting, colours and background",
+    )  # fmt: skip
+    picture.add_argument(
+        "--marks", choices=MARKS, nargs="+", metavar="MARK",
+        help=f"draw over .png and .mp4: {', '.join(MARKS)}",
     )  # fmt: skip
     camera = parser.add_argument_group("from where").add_mutually_exclusive_group()
     camera.add_argument("--camera", type=Camera.load, metavar="FILE.json", help="as a file has it")
@@ -86,6 +98,9 @@ def run(args: Namespace) -> int:
         raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
     if args.stats:
         check_output(args.stats, (".json",), several=False)
+    if args.marks and args.out.suffix.lower() in UNMARKED_SUFFIXES:
+        hint = "They hold the surface behind the picture; use .png or .mp4"
+        raise InputError(f"are not drawn on '{args.out.suffix}' files", "--marks", hint)
     with (replay.planned if args.replay else _planned)(args) as plan:
         _draw(plan, args)
     print(args.out)
@@ -105,11 +120,14 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
         fps = drawing.film_rate(timeline, indices, args.fps)
         hash = fingerprint(timeline.files) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
-        pictures = (
-            (shot.number, request, Entry.of(request, scan, hash, size))
-            for shot, request in _requests(args, timeline, shots, size, look, values)
-        )
-        yield Plan(len(shots), size, fps, pictures)
+        marks = marks_of(args.marks)
+
+        def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
+            for shot, request in _requests(args, timeline, shots, size, look, values):
+                entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
+                yield shot.number, request, entry, entry.legend(timeline)
+
+        yield Plan(len(shots), size, fps, pictures())
 
 
 def _draw(plan: Plan, args: Namespace) -> None:
@@ -118,9 +136,11 @@ def _draw(plan: Plan, args: Namespace) -> None:
     with (
         drawing.canvases(args.device, plan.size) as (renderer, surface_of),
         pictures(args.out, plan.size, plan.fps) as put,
-        progress(plan.count * stats.draw_count(args.repeat)) as tick,
+        progress(plan.count * stats.draw_count(args.repeat), args.progress) as tick,
     ):
-        for number, request, entry in plan.pictures:
+        if args.progress:
+            say(device=renderer.gpu.device)
+        for number, request, entry, legend in plan.pictures:
             surface = surface_of(entry.size)
             if request is not drawn and args.stats:
                 frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
@@ -128,7 +148,7 @@ def _draw(plan: Plan, args: Namespace) -> None:
                 draw(renderer, request, surface)
                 tick()
             drawn = request
-            put(surface, number, entry.description())
+            put(surface, number, entry.description(args.anonymous), legend)
         if args.stats:
             _write_json(stats.summary(renderer, surface, request, frames), args.stats)
 

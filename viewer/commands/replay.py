@@ -12,7 +12,8 @@ from pathlib import Path
 from ..errors import InputError
 from ..export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
 from ..frame import Request
-from ..recording import Entry, Recording, fingerprint
+from ..marks import Legend, marks_of
+from ..recording import Entry, Recording, fingerprint, places_of
 from ..scan.open import DEMO, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS
@@ -21,7 +22,7 @@ from .drawing import Plan
 
 # What the recording tells, by the names of arguments.
 _TOLD = (
-    "scan", "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
+    "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
 )  # fmt: skip
 
 
@@ -35,12 +36,12 @@ def planned(args: Namespace) -> Iterator[Plan]:
     fps = DEFAULT_FPS if args.fps is None else args.fps
     if args.out.suffix.lower() == FILM_SUFFIX:
         entries = _film(recording, fps)
-    with closing(_pictures(entries, args.replay)) as pictures:
+    with closing(_pictures(entries, args)) as pictures:
         yield Plan(len(set(map(id, entries))), entries[0].size, fps, pictures)
 
 
 def _check_arguments(args: Namespace) -> None:
-    given = ["SCAN" if name == "scan" else f"--{name}" for name in _TOLD if _is_given(getattr(args, name))]
+    given = [f"--{name}" for name in _TOLD if _is_given(getattr(args, name))]
     if args.up != "+y":
         given.append("--up")
     if given:
@@ -62,27 +63,73 @@ def _film(recording: Recording, fps: float) -> Sequence[Entry]:
     return resized.paced(fps)
 
 
-def _pictures(entries: Sequence[Entry], path: Path) -> Generator[tuple[int, Request, Entry]]:
-    """Number, request and entry of each; an entry that stays makes one request."""
+def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int, Request, Entry, Legend]]:
+    """Number, request, entry and legend of each; an entry that stays makes one request.
+
+    Broken frames among several are reported and left out. Raises InputError where none is left.
+    """
     timeline: Timeline | None = None
-    opened, source = None, None
+    opened, source, failed, drawn = None, None, None, False
     try:
         for number, entry in enumerate(entries):
-            if entry.scan != opened:
+            if timeline is None or (entry.scan, entry.hash) != opened:
                 if timeline is not None:
                     timeline.close()
-                found, timeline = _open(entry.scan, path)
-                opened, hash = entry.scan, fingerprint(timeline.files)
-                if None not in (hash, entry.hash) and hash != entry.hash:
-                    warn(f"{found}: has changed since {path.name} was made; pictures may differ")
-            assert timeline is not None
+                found, timeline, hash = _scan_of(entry, args)
+                opened = entry.scan, entry.hash
             if entry is not source:
-                request = entry.request(timeline.pose(entry.pose))
-                source, shown = entry, replace(entry, scan=found, hash=hash)
-            yield number, request, shown
+                source = entry
+                try:
+                    request, failed = entry.request(timeline.pose(entry.pose)), None
+                except InputError as error:
+                    if not _may_be_left_out(entry, timeline, entries):
+                        raise
+                    if str(error) != str(failed):
+                        warn(f"{timeline.name}: frame {entry.pose} is left out: {error}")
+                    failed = error
+                else:
+                    shown = _completed(entry, args, found, hash, timeline)
+            if failed is None:
+                drawn = True
+                yield number, request, shown, shown.legend(timeline)
+        if failed and not drawn:
+            raise failed
     finally:
         if timeline is not None:
             timeline.close()
+
+
+def _completed(entry: Entry, args: Namespace, scan: str, hash: str | None, timeline: Timeline) -> Entry:
+    """The entry with what is known by now, and with the marks and the unit that the arguments tell."""
+    marks = entry.marks if args.marks is None else marks_of(args.marks)
+    return replace(entry, scan=scan, hash=hash, marks=marks, unit=args.unit or entry.unit or timeline.unit)
+
+
+def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:
+    """Whether the entry's frame is a broken one among several."""
+    return entry.pose in timeline.broken and any(other.pose != entry.pose for other in entries)
+
+
+def _scan_of(entry: Entry, args: Namespace) -> tuple[str, Timeline, str | None]:
+    """The scan of an entry: how it was found, opened, and its hash.
+
+    Raises InputError where it is unusable, or where the one that was named is another one.
+    """
+    if args.scan is not None:
+        found, timeline = args.scan, open_scan(args.scan)
+    elif entry.scan is None:
+        hint = f"Name it: scan4d render SCAN --replay {args.replay} -o {args.out}"
+        raise InputError("does not tell its scan", args.replay, hint)
+    else:
+        found, timeline = _open(entry.scan, args.replay)
+    hash = fingerprint(timeline.files)
+    if None not in (hash, entry.hash) and hash != entry.hash:
+        if args.scan is not None:
+            timeline.close()
+            what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
+            raise InputError(what, found, "Name that one, as it was")
+        warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
+    return found, timeline, hash
 
 
 def _open(scan: str, path: Path) -> tuple[str, Timeline]:
@@ -90,8 +137,7 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
 
     Raises InputError where it is in neither place, or unusable.
     """
-    places = list(dict.fromkeys([scan] if scan == DEMO else [str(path.parent / scan), scan]))
-    for place in places:
+    for place in places_of(scan, path):
         try:
             return place, open_scan(place)
         except InputError as error:

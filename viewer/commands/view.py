@@ -1,4 +1,4 @@
-"""Open scans in a window; the demo scan where none is named.
+"""Open scans in a window; the demo scan where none is named. A recording or a picture is shown again.
 
 Where no window can be opened, --fallback plays them without one: into numbered PNGs, a
 contact sheet and a film.
@@ -15,9 +15,12 @@ from ..errors import InputError, NoOpenGLError
 from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
 from ..look import Look
+from ..recording import Recording, is_recording, place_of
+from ..scan.listing import named_scans
+from ..scan.open import DEMO
 from ..timing import draw
 from . import drawing
-from .console import progress
+from .console import progress, warn
 from .doctor import display
 from .scans import SCAN_HELP, framing, open_timeline, read_poses
 
@@ -35,15 +38,23 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Open the window, or play without one."""
-    scans = args.scans or ["demo"]
+    names, replay = args.scans or [DEMO], None
+    if len(names) == 1 and is_recording(Path(names[0])):
+        replay = Path(names[0])
+        names = [_scan_of(replay)]
+    scans, problems = named_scans(names)
+    if not scans:
+        raise problems[0]
     for scan in scans:
-        open_timeline(args, scan).close()  # wrong names are told before anything is drawn
+        open_timeline(args, scan).close()  # what is wrong is told before anything is drawn
     try:
-        return _open_window(args, scans)
+        return _open_window(args, names, replay)
     except NoOpenGLError as error:
         if args.fallback is None:
             raise
         print(f"No window: {error.what}. Playing into {args.fallback} instead.", flush=True)
+    for problem in problems:
+        warn(str(problem))
     try:
         args.fallback.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -53,7 +64,15 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _open_window(args: Namespace, scans: list[str]) -> int:
+def _scan_of(replay: Path) -> str:
+    """The scan that a recording begins with. Raises InputError where it tells none."""
+    scan = Recording.load(replay).entries[0].scan
+    if scan is None:
+        raise InputError("does not tell its scan", replay, "Open the scan, and drop this onto the window")
+    return place_of(scan, replay)
+
+
+def _open_window(args: Namespace, scans: list[str], replay: Path | None) -> int:
     if display() is None:
         raise NoOpenGLError(
             "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)",
@@ -61,7 +80,7 @@ def _open_window(args: Namespace, scans: list[str]) -> int:
         )
     from .. import app
 
-    return app.run(scans, unit=args.unit, fps=args.fps, up=args.up, device=args.device)
+    return app.run(scans, unit=args.unit, fps=args.fps, up=args.up, device=args.device, replay=replay)
 
 
 def _play(args: Namespace, scan: str, prefix: str) -> None:

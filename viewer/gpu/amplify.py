@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import moderngl
@@ -21,28 +22,33 @@ def amplify(
     shape: str,
     fragment: str,
     use_radii: bool,
+    share: float = 1.0,
     **uniforms: Any,
-) -> None:
-    """Draw every point of a pose as a shape, in id order with a strict depth test.
+) -> bool:
+    """Draw the points of a pose as shapes, in id order with a strict depth test.
 
     feed: one of FEEDS. shape: the shader file with `begin_shape` and `corner`. fragment:
     the shape's fragment shader, which writes a row and a depth. use_radii: whether points
-    bring their own radius. uniforms: of both.
+    bring their own radius. share: of the points that are drawn, enlarged (the shape multiplies
+    by the uniform `enlarged`) so that together they cover what all do; 1: all. uniforms: of
+    both. Returns whether points were left out.
     """
     gpu, count = pose.gpu, len(pose.cloud)
     target = surface.raster()
+    rows, drawn = surface.take_sample(share)
     program = gpu.program((*_STAGES[feed], fragment), {"HAS_RADIUS": int(use_radii)}, {"shape": shape})
-    gpu.set(program, **uniforms)
+    gpu.set(program, enlarged=math.sqrt(count / drawn) if drawn else 1.0, **uniforms)
     with gpu.timers.measure("splat"):
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        if count:
+        if drawn:
             attributes = [("positions", "3f", "in_position"), ("normals", "3f", "in_normal")]
             attributes += [("radii", "1f", "in_radius")] if use_radii else []
             content = [(pose.array(name).buffer, form, attribute) for name, form, attribute in attributes]
-            vertices = gpu.ctx.vertex_array(program, content)
-            vertices.render(moderngl.POINTS, vertices=count)
+            vertices = gpu.ctx.vertex_array(program, content, index_buffer=rows and rows.buffer)
+            vertices.render(moderngl.POINTS, vertices=drawn)
             vertices.release()
     with gpu.timers.measure("copy"):
         surface.take_raster()
+    return drawn < count

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, TypeVar
@@ -26,6 +26,7 @@ FORMATS = {
     "radii": gl.R32F,
 }
 _SAMPLE = 1 << 13  # values that ranges look at
+_SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
 
 
 class GpuPose:
@@ -39,6 +40,7 @@ class GpuPose:
     def __init__(self, gpu: Gpu, cloud: PointCloud) -> None:
         self.gpu = gpu
         self._arrays: dict[str, gl.BufferTexture] = {}
+        self._uploads: dict[str, _Upload] = {}  # that have begun
         if len(cloud) > gpu.max_points:
             raise InputError(
                 f"{len(cloud):,} points in one pose; this driver takes {gpu.max_points:,}",
@@ -49,23 +51,36 @@ class GpuPose:
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._facts: dict[str, Any] = {}
 
-    @cached_property
+    @property
     def bounds(self) -> Bounds:
         """The robust bounds of the cloud; a box of two units where there is no point."""
-        cloud = self.cloud
+        cloud = self.stored
         return cloud.bounds() if len(cloud) else Bounds(cloud.origin - 1, cloud.origin + 1)
 
     def array(self, name: str) -> gl.BufferTexture:
         """positions, normals, colors, radii, ids, or 'scalar:NAME'; uploaded at the first call."""
-        if name not in self._arrays:
-            values = self._values(name)
-            texels = FORMATS.get(name, gl.R32F)
-            # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
-            data = values if values.size else np.zeros(4, np.float32)
-            with self.preparing("upload"):
-                self._arrays[name] = gl.BufferTexture(self.gpu.ctx.buffer(data), texels)
-            self.uploaded_bytes += data.nbytes
+        self.upload([name])
         return self._arrays[name]
+
+    def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:
+        """Upload what is missing of these arrays, in slices until the time is over; whether all is there."""
+        missing = [name for name in names if name not in self._arrays]
+        if not missing:
+            return True
+        with self.preparing("upload"):
+            end = time.perf_counter() + budget_ms / 1e3
+            return all(self._upload(name, end) for name in missing)
+
+    def _upload(self, name: str, end: float) -> bool:
+        """Go on with an array until that time of the performance counter; whether it is there."""
+        if name not in self._uploads:
+            self._uploads[name] = _Upload(self.gpu, self._values(name))
+        if not self._uploads[name].go_on(end):
+            return False
+        buffer = self._uploads.pop(name).buffer
+        self._arrays[name] = gl.BufferTexture(buffer, FORMATS.get(name, gl.R32F))
+        self.uploaded_bytes += buffer.size
+        return True
 
     def _values(self, name: str) -> NDArray:
         if name.startswith("scalar:"):
@@ -121,7 +136,27 @@ class GpuPose:
         return taken
 
     def __del__(self) -> None:
-        self.gpu.discard(*self._arrays.values())
+        self.gpu.discard(*self._arrays.values(), *(upload.buffer for upload in self._uploads.values()))
+
+
+class _Upload:
+    """An array on its way to the GPU."""
+
+    def __init__(self, gpu: Gpu, values: NDArray) -> None:
+        # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
+        data = values if values.size else np.zeros(4, np.float32)
+        self._bytes = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
+        self._done = 0
+        self.buffer = gpu.ctx.buffer(reserve=len(self._bytes))
+
+    def go_on(self, end: float) -> bool:
+        """Upload slices until that time of the performance counter, at least one; whether all is there."""
+        while self._done < len(self._bytes):
+            self.buffer.write(self._bytes[self._done : self._done + _SLICE], offset=self._done)
+            self._done += _SLICE
+            if time.perf_counter() > end:
+                break
+        return self._done >= len(self._bytes)
 
 
 def _strided(values: NDArray) -> NDArray:

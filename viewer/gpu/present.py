@@ -9,7 +9,7 @@ from .surface import Surface
 
 
 class Presenter:
-    """Copies shaded pictures to the window's framebuffer, one pixel to one pixel."""
+    """Copies shaded pictures to the window's framebuffer, one pixel to one pixel where they are as large."""
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
@@ -17,18 +17,19 @@ class Presenter:
         self._triangle = gpu.ctx.vertex_array(self._program, [])
         self._texture: moderngl.Texture | None = None
 
-    def present(self, surface: Surface, left: int, bottom: int) -> None:
-        """Put the picture's lower left corner there, in pixels from the window's.
+    def present(self, surface: Surface, left: int, bottom: int, size: tuple[int, int]) -> None:
+        """Put the picture's lower left corner there, in pixels from the window's, stretched to that size.
 
         The window's framebuffer is bound afterwards.
         """
         ctx = self.gpu.ctx
         texture = self._texture_of(surface.size)
         texture.write(surface.picture)
+        texture.filter = (moderngl.NEAREST,) * 2 if surface.size == size else (moderngl.LINEAR,) * 2
         texture.use(0)
-        self.gpu.set(self._program, corner=(left, bottom))
+        self.gpu.set(self._program, corner=(left, bottom), size=size)
         ctx.screen.use()
-        ctx.viewport = (left, bottom, *surface.size)
+        ctx.viewport = (left, bottom, *size)
         ctx.enable_only(moderngl.NOTHING)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
 
@@ -37,6 +38,7 @@ class Presenter:
             if self._texture is not None:
                 self._texture.release()
             self._texture = self.gpu.ctx.texture(size, 4)
+            self._texture.repeat_x = self._texture.repeat_y = False
         return self._texture
 
     def release(self) -> None:

@@ -40,6 +40,9 @@ def shade(surface: Surface, look: Look) -> None:
             "OWN_NORMALS": int(surface.is_own("normals")),
         },
     )
+    surface.color_range = value_range(surface, look) if source else None
+    low, high = surface.color_range or (0.0, 1.0)
+    zero = _stored_zero(surface, look, source) if source else 0.0
     surface.bind_view()
     covered = surface.list_covered()
     with gpu.timers.measure("shade"):
@@ -60,7 +63,7 @@ def shade(surface: Surface, look: Look) -> None:
         gpu.set(
             program,
             plain=tuple(c / 255 for c in rgba(look.plain)[:3]),
-            value_range=_stored_range(surface, look, source) if source else (0, 1),
+            value_range=(low - zero, high - zero),
             height_axis=up_vector(look.up),
             light=_direction(look.azimuth, look.elevation),
             phong=(look.ambient, look.diffuse, look.specular, look.shininess),
@@ -91,18 +94,14 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     return (low if look.low is None else look.low, high if look.high is None else look.high)
 
 
-def _stored_range(surface: Surface, look: Look, source: str) -> tuple[float, float]:
-    """`value_range` less what the values on the GPU are stored relative to, taken off in float64
-    so that heights and times far from zero keep their steps."""
-    pose = surface.pose
+def _stored_zero(surface: Surface, look: Look, source: str) -> float:
+    """What the values on the GPU are stored relative to: it is taken off the range in float64, so that
+    heights and times far from zero keep their steps."""
     if source == "depth":
-        zero = 0.0
-    elif source == "height":
-        zero = float(pose.cloud.origin @ up_vector(look.up))
-    else:
-        zero = pose.scalar_zero(source)
-    low, high = value_range(surface, look)
-    return low - zero, high - zero
+        return 0.0
+    if source == "height":
+        return float(surface.pose.cloud.origin @ up_vector(look.up))
+    return surface.pose.scalar_zero(source)
 
 
 def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:

@@ -16,12 +16,13 @@ from ..scan.points import PointCloud
 from . import gl
 from .compact import IndexList, list_covered
 from .context import Gpu, Resource
+from .counts import NOTHING, count_points
 from .pose import FORMATS, GpuPose
+from .sample import sample_of
 from .view import View
 
-NOTHING = 0xFFFFFFFF
 EMPTY = 255  # the level of a pixel that shows nothing
-_CHUNK = 1 << 20  # points counted at a time
+_FEW = 1000  # points of which none is left out: it would gain nothing, and they would be missed
 _OWN_BYTES = {"normals": 12, "colors": 4}  # a pixel
 
 
@@ -31,7 +32,8 @@ class Stats:
 
     backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose,
     estimates included. passes: (name, gpu_ms), empty while timers are off.
-    skipped: what was not computed -> why.
+    skipped: what was not computed -> why. share: of the points that needed to be drawn, by the
+    order of gpu/sample.py, less than 1 in a preview. left_out: the points that are not in that share.
     """
 
     backend: str = ""
@@ -41,6 +43,8 @@ class Stats:
     derive_ms: float = 0.0
     passes: list[tuple[str, float]] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    share: float = 1.0
+    left_out: int = 0
 
 
 class Texel(NamedTuple):
@@ -57,6 +61,7 @@ class Surface:
     On the GPU: `depths` (float bits, +inf: nothing) and `rows` (the point that a pixel
     shows, 0xFFFFFFFF: none), one word a pixel; colour, normal and value are fetched by row,
     unless the backend wrote its `own`. Reading a property copies it to the CPU.
+    color_range: where the colour map began and ended when it was shaded, None where none was used.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
@@ -81,6 +86,7 @@ class Surface:
         self._block = gpu.ctx.buffer(reserve=View.BLOCK_BYTES)
         self._shown: tuple[GpuPose, View] | None = None
         self.look = Look()
+        self.color_range: tuple[float, float] | None = None
         self.stats = Stats()
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
@@ -115,6 +121,16 @@ class Surface:
             list_covered(self.gpu, self.size[0] * self.size[1], self.covered)
             self._covered_known = True
         return self.covered
+
+    def take_sample(self, share: float) -> tuple[gl.BufferTexture | None, int]:
+        """The rows to draw in place of all, for a backend that is asked for a share of the points:
+        (their list, ascending; None where it is all of them, how many there are). Counts the others."""
+        count = len(self._cloud)
+        if share >= 1 or count < _FEW:
+            return None, count
+        rows, drawn = sample_of(self.gpu).take(share, count)
+        self.stats.share, self.stats.left_out = share, count - drawn
+        return rows, drawn
 
     def raster(self) -> gl.Raster:
         """The framebuffer of backends that rasterise; `take_raster` makes it the Surface."""
@@ -246,24 +262,8 @@ class Surface:
         return {name: getattr(self, name) for name in names}
 
     def point_counts(self) -> dict[str, int]:
-        """What became of the points of the file: "in", and of these "drawn" (they have a pixel),
-        "dropped" (not finite), "outside" (the centre is not in the picture or not between near
-        and far) and "hidden" (the rest)."""
-        cloud, rows = self._cloud, self.row
-        shown = np.zeros(len(cloud), bool)
-        shown[rows[rows != NOTHING]] = True
-        hidden = 0
-        for start in range(0, len(cloud), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            hidden += int(np.count_nonzero(self.view.contains(cloud.positions[part]) & ~shown[part]))
-        drawn = int(np.count_nonzero(shown))
-        return {
-            "in": len(cloud) + cloud.dropped,
-            "drawn": drawn,
-            "dropped": cloud.dropped,
-            "outside": len(cloud) - drawn - hidden,
-            "hidden": hidden,
-        }
+        """What became of the points of the file; see `count_points`."""
+        return count_points(self._cloud, self.view, self.row, self.stats.share)
 
     def release(self) -> None:
         """Give up what it holds on the GPU now; otherwise that goes with the object."""

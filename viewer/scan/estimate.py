@@ -6,10 +6,13 @@ So neither a scan full of duplicates nor a handful of points gives NaN, zero or 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..task import checkpoint
 from .points import PointCloud
 
 Vectors = NDArray[np.float64]  # (N, 3)
@@ -25,6 +28,12 @@ _DEPTH = 1.8  # in reaches: so far behind the first point of its cell a point st
 _GRID = 1024  # cells along an axis at most
 
 
+def estimate(cloud: PointCloud, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
+    """The attributes named, "normals" and "radii", by name. See `estimate_normals`, `estimate_radii`."""
+    work = {"normals": estimate_normals, "radii": estimate_radii}
+    return {name: work[name](cloud) for name in names}
+
+
 def estimate_normals(
     cloud: PointCloud, k: int = 16, viewpoint: ArrayLike | None = None
 ) -> NDArray[np.float32]:
@@ -38,9 +47,12 @@ def estimate_normals(
     if not len(cloud):
         return np.empty((0, 3), np.float32)
     points, copies = _distinct(cloud.positions)
+    checkpoint(0.1)
     normals = _plane_normals(points, k)
+    checkpoint(0.5)
     if viewpoint is None:
         near, distances = _neighbors(points, _AGREEING)
+        checkpoint(0.8)
         normals = _facing(normals, _seen_from(points, float(np.median(distances[:, -1]))))
         normals = _facing(normals, normals[near].sum(axis=1))
     else:
@@ -64,7 +76,9 @@ def estimate_radii(cloud: PointCloud, k: int = 7) -> NDArray[np.float32]:
     points, copies = _distinct(cloud.positions)
     if len(points) == 1:
         return np.ones(len(cloud), np.float32)
+    checkpoint(0.2)
     near, distances = _neighbors(points, k + 1)
+    checkpoint(0.6)
     radii = distances[:, -1]
     usual = np.median(radii[near], axis=1)
     radii = np.clip(radii, usual / 2, usual * 2)

@@ -19,8 +19,8 @@ from .timeline import Notice, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
 
 DEMO = "demo"
-_NOTES = {".txt", ".csv"}  # beside frames of another kind these are notes, not frames
-_PRINTF = re.compile("%(0?[0-9]*)d")
+NOTES = {".txt", ".csv"}  # beside frames of another kind these are notes, not frames
+_PRINTF = re.compile("%(0?[0-9]{0,2})d")
 _NAMES_TO_COMPARE = 5000
 
 
@@ -55,7 +55,8 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
 
         return DemoSource()
     if os.path.isdir(path):
-        return _open_folder(Path(path))
+        folder = Path(path)
+        return _open_frames(folder_frames(folder), folder.resolve().name)
     if os.path.isfile(path):
         return _open_frames([Path(path)], Path(path).name)
     if os.path.exists(path):
@@ -65,18 +66,22 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
     raise _nothing_there(path)
 
 
-def _open_folder(folder: Path) -> FrameSource:
-    """The frames are in the folder, or in its folder `frames`, whatever stands beside that."""
+def folder_frames(folder: Path) -> list[Path]:
+    """The files that a folder plays as one scan, at least one, in natural order. No file is read.
+
+    They are in the folder, or in its folder `frames`, whatever stands beside that. Raises InputError
+    where there are none.
+    """
     for place in (folder / "frames", folder):
-        if place.is_dir() and (frames := _choose_frames(_entries(place), place)):
-            return _open_frames(frames, folder.resolve().name)
-    inner = sorted((entry.name for entry in _entries(folder) if entry.is_dir()), key=natural_key)
+        if os.path.isdir(place) and (frames := _choose_frames(entries(place), place)):
+            return frames
+    inner = sorted((entry.name for entry in entries(folder) if os.path.isdir(entry)), key=natural_key)
     hint = f"Its folders: {_listed(inner)}" if inner else f"Known files: {_listed(formats.known_suffixes())}"
     raise InputError("holds no scan files", folder, hint)
 
 
 def _open_pattern(pattern: str) -> FrameSource:
-    files = _matches(pattern)
+    files = matches(pattern)
     if not files:
         raise InputError("matches no file", pattern, "Check its folder, and quote it against the shell")
     frames = _choose_frames(files, pattern)
@@ -85,7 +90,7 @@ def _open_pattern(pattern: str) -> FrameSource:
     return _open_frames(frames, Path(pattern).name)
 
 
-def _matches(pattern: str) -> list[Path]:
+def matches(pattern: str) -> list[Path]:
     """The files that a glob pattern or a printf pattern names."""
     if not _PRINTF.search(pattern):
         return [Path(name) for name in glob.glob(pattern, recursive=True)]
@@ -107,10 +112,11 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     by_kind: dict[str, list[Path]] = {}
     for file in files:
         kind = file.suffix.lower()
-        if kind in known and not file.name.startswith(".") and file.name != TIMES_FILE and file.is_file():
+        is_left_aside = file.name.startswith(".") or file.name == TIMES_FILE
+        if kind in known and not is_left_aside and os.path.isfile(file):
             by_kind.setdefault(kind, []).append(file)
-    if by_kind.keys() - _NOTES:
-        by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in _NOTES}
+    if by_kind.keys() - NOTES:
+        by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in NOTES}
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
         most = max(by_kind, key=lambda kind: len(by_kind[kind]))
@@ -130,13 +136,14 @@ def _nothing_there(path: str) -> InputError:
     missing = Path(path)
     while not os.path.exists(missing.parent):
         missing = missing.parent
-    names = [entry.name for entry in _entries(missing.parent)[:_NAMES_TO_COMPARE]]
+    names = [entry.name for entry in entries(missing.parent)[:_NAMES_TO_COMPARE]]
     close = difflib.get_close_matches(missing.name, names, n=3)
     hint = f"Close to it: {_listed(close)}" if close else f"There is no '{missing.name}' in {missing.parent}"
     return InputError("no such file or folder", path, hint)
 
 
-def _entries(folder: Path) -> list[Path]:
+def entries(folder: Path) -> list[Path]:
+    """What is in a folder, in no order. Raises InputError where it cannot be listed."""
     try:
         return list(folder.iterdir())
     except OSError as error:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..task import checkpoint
+
+T = TypeVar("T")
 
 _CHUNK = 1 << 20  # points converted at a time, so that float64 copies stay small
 _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
@@ -52,8 +56,10 @@ class PointCloud:
     colors:    (N, 4) uint8, sRGB and alpha, or None
     radii:     (N,) float32, scan units, or None
     scalars:   name -> (N,) array of any real type
-    ids:       (N,) uint32, the index in the file before anything was dropped; None: 0..N-1
+    ids:       (N,) uint32, increasing, the index in the file before anything was dropped; None: 0..N-1
     dropped:   how many points were dropped because a coordinate was NaN or infinite
+    topology:  names the faces between the points: clouds with the same one hold the same points of the
+               subject under the same ids; None where the scan does not tell
     """
 
     positions: NDArray[np.float32]
@@ -64,6 +70,8 @@ class PointCloud:
     scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     ids: NDArray[np.uint32] | None = None
     dropped: int = 0
+    topology: str | None = None
+    _facts: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def from_arrays(
@@ -131,12 +139,28 @@ class PointCloud:
         """Absolute positions, (N, 3) float64."""
         return self.positions + self.origin
 
+    def row_of(self, id: int) -> int | None:
+        """Where the arrays hold the point of this id; None where it is not there."""
+        if self.ids is None:
+            return id if 0 <= id < len(self) else None
+        row = int(np.searchsorted(self.ids, id))
+        return row if row < len(self) and self.ids[row] == id else None
+
     def bounds(self) -> Bounds:
         """The box around the body of the points, which a few far outliers do not stretch.
 
         The 2 % to 98 % quantile box, grown on every side by half of its longest edge, and
-        then shrunk to the points inside. Raises InputError where there is no point.
+        then shrunk to the points inside. Found once. Raises InputError where there is no point.
         """
+        return self.remember("bounds", self._find_bounds)
+
+    def remember(self, key: str, make: Callable[[], T]) -> T:
+        """What `make` returned the first time for this key: small facts about the points."""
+        if key not in self._facts:
+            self._facts[key] = make()
+        return self._facts[key]
+
+    def _find_bounds(self) -> Bounds:
         if not len(self):
             raise InputError("no points to fit a view to")
         low, high = _quantile_box(self.positions)
@@ -144,6 +168,7 @@ class PointCloud:
         low, high = low - margin, high + margin
         smallest, largest = np.full(3, np.inf), np.full(3, -np.inf)
         for start in range(0, len(self), _CHUNK):
+            checkpoint()
             part = self.positions[start : start + _CHUNK]
             part_low, part_high = _extremes(part)
             if (part_low < low).any() or (part_high > high).any():
@@ -213,6 +238,7 @@ def _relative(points: NDArray, origin: NDArray[np.float64]) -> NDArray[np.float3
         return np.ascontiguousarray(points)
     offsets = np.empty(points.shape, np.float32)
     for start in range(0, len(points), _CHUNK):
+        checkpoint()
         stop = start + _CHUNK
         offsets[start:stop] = points[start:stop].astype(np.float64) - origin
     return offsets

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -11,9 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..files import printable
 from . import formats
+from .points import PointCloud
 from .pose import Scanned
 from .times import TIMES_FILE, read_times_csv
+
+FACES_FILE = "mesh_topology.ply"  # beside a folder `frames`: the faces that all frames in it have
 
 
 class FrameSource(Protocol):
@@ -48,7 +54,7 @@ class FileSequence:
     """One frame a file, in the order given. paths: at least one."""
 
     def __init__(self, paths: Sequence[Path], name: str) -> None:
-        self.name = name
+        self.name = printable(name)
         self.files = tuple(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))
 
@@ -65,7 +71,7 @@ class FileSequence:
 
     def label(self, index: int) -> str:
         """The file's name; with its folder where the sequence spans several."""
-        return self.files[index].relative_to(self._folder).as_posix()
+        return printable(self.files[index].relative_to(self._folder).as_posix())
 
     def times(self) -> NDArray[np.float64] | None:
         """From a times.csv beside the frames, or beside their folder where that is called `frames`."""
@@ -83,7 +89,23 @@ class FileSequence:
             raise InputError(
                 f"holds {count} frames, where each file of a sequence holds one", path, "Open this file alone"
             )
-        return formats.read(path)
+        scanned = formats.read(path)
+        faces = self._shared_faces
+        if faces is None or not isinstance(scanned, PointCloud) or scanned.topology is not None:
+            return scanned
+        fits = len(scanned) + scanned.dropped == len(faces) + faces.dropped
+        return replace(scanned, topology=faces.topology) if fits else scanned
+
+    @cached_property
+    def _shared_faces(self) -> PointCloud | None:
+        """The mesh whose faces all frames have, None where there is none; it may as well be unreadable."""
+        file = self._folder.parent / FACES_FILE
+        if self._folder.name != "frames" or not file.is_file():
+            return None
+        try:
+            return formats.read_points(file)
+        except InputError:
+            return None
 
 
 class MultiFrameFile:
@@ -92,7 +114,7 @@ class MultiFrameFile:
     unit = None
 
     def __init__(self, path: Path, count: int) -> None:
-        self.name = path.name
+        self.name = printable(path.name)
         self.files = (path,)
         self._path = path
         self._count = count

@@ -7,7 +7,7 @@ import copy
 import operator
 import threading
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..task import Cancelled, Task
 from .cache import PoseCache, default_budget
 from .pose import Pose
 from .sources import FrameSource
@@ -44,6 +45,8 @@ class Timeline:
     unit:     the name of the scan's unit of length
     name:     the scan's name
     messages: what there is to report; it only grows, by one of a kind per frame
+    finish:   called with each pose on the thread that has read it, before anybody gets it; for what
+              would take too long where it is shown
 
     Every method may be called from any thread. One worker thread, started by the first
     `request` or `prefetch`, reads ahead; it knows no GL. Scripts use `pose`, which waits; a
@@ -61,12 +64,14 @@ class Timeline:
         self.unit = unit
         self.name = source.name
         self.messages: list[Notice] = []
+        self.finish: Callable[[Pose], object] = lambda pose: None
         self._source = source
         self._state = threading.Condition()  # guards all that follows
         self._cache = PoseCache(default_budget() if cache_bytes is None else cache_bytes)
         self._loading: dict[int, Future[Pose]] = {}
         self._broken: dict[int, InputError] = {}
         self._sizes: dict[int, int] = {}  # bytes of every pose read so far
+        self._topologies: dict[int, str | None] = {}  # of every pose read so far
         self._typical_size = 0
         self._requests: list[int] = []  # latest last
         self._playhead, self._direction = 0, 1
@@ -74,6 +79,7 @@ class Timeline:
         self._wanted: int | None = None  # what was asked of the worker last,
         self._in_use: Pose | None = None  # held here even where it exceeds the cache
         self._worker: threading.Thread | None = None
+        self._reading: Task | None = None  # what the worker does
         self._closed = False
 
     def __len__(self) -> int:
@@ -106,6 +112,30 @@ class Timeline:
         """The frames found unreadable so far, and why."""
         with self._state:
             return dict(self._broken)
+
+    @property
+    def one_topology(self) -> bool | None:
+        """Whether an id is the same point of the subject in all frames, as far as they have been read.
+
+        None while fewer than two have been: then nothing is known. The scan says so by faces between the
+        points that are the same in every frame; equal numbers of points alone say nothing.
+        """
+        with self._state:
+            known = set(self._topologies.values())
+            return None if len(self._topologies) < 2 else len(known) == 1 and None not in known
+
+    @property
+    def reading(self) -> Task | None:
+        """The work on the pose that was asked for last, while the worker is at it.
+
+        Where it is cancelled, the frame counts as broken.
+        """
+        with self._state:
+            return self._reading if self._wanted in self._loading else None
+
+    @property
+    def _is_given_up(self) -> bool:
+        return self._reading is not None and self._reading.cancelled and not self._closed
 
     def cached(self) -> list[range]:
         """The runs of poses that the cache holds, in order."""
@@ -172,6 +202,8 @@ class Timeline:
         """Stop the worker and let go of all poses; nothing is read any more."""
         with self._state:
             self._closed = True
+            if self._reading is not None:
+                self._reading.cancel()
             self._cache.clear()
             self._in_use = None
             self._state.notify_all()
@@ -216,7 +248,10 @@ class Timeline:
                     return
                 index, ahead = task
                 future = self._begin(index)
-            self._load(index, future, ahead)
+                reading = self._reading = Task(f"Reading {self._source.label(index)}")
+            with reading.current():
+                self._load(index, future, ahead)
+            self._reading = None
             del future  # it holds the pose
 
     def _next_task(self) -> tuple[int, bool] | None:
@@ -260,9 +295,12 @@ class Timeline:
         """Read a pose outside the lock and note what came of it; the future gets the pose or the error."""
         try:
             pose = self._read(index)
+            self.finish(pose)
         except BaseException as error:
             with self._state:
                 del self._loading[index]
+                if isinstance(error, Cancelled) and self._is_given_up:
+                    error = InputError("reading was cancelled", self._source.label(index), "Open it again")
                 if isinstance(error, InputError):
                     self._broken[index] = _at_rest(error)
                     self.messages.append(Notice("broken", f"frame {index} is left out: {error}", index))
@@ -275,6 +313,7 @@ class Timeline:
                 what = f"{pose.label}: {pose.cloud.dropped} points without finite coordinates are left out"
                 self.messages.append(Notice("dropped", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
+            self._topologies[index] = pose.cloud.topology
             if not self._closed:
                 distance = self._distance(index) if ahead else 0
                 self._cache.put(pose, keep=lambda other: self._distance(other) < distance)

@@ -49,6 +49,12 @@ def paced_times(labels: Sequence[str], fps: float = DEFAULT_FPS) -> NDArray[np.f
     return np.array([number - numbers[0] for number in numbers], np.float64) / fps
 
 
+def typical_rate(times: NDArray[np.float64]) -> float:
+    """Frames a second, by the median step of (T,) times in seconds; the default for one frame."""
+    steps = np.diff(times)
+    return 1 / float(np.median(steps)) if len(steps) else DEFAULT_FPS
+
+
 def read_times_csv(path: Path, labels: Sequence[str]) -> NDArray[np.float64]:
     """(T,) seconds of the frames called `labels`, as the rows of the file give them.
 

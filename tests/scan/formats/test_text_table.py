@@ -112,3 +112,20 @@ def test_guesses_without_names(values: list[float], names: str) -> None:
 def test_files_that_cannot_be_used(text: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=reason):
         read(save(tmp_path / "scan.txt", text))
+
+
+def test_tables_longer_than_what_is_parsed_at_once(tmp_path: Path) -> None:
+    """Read part by part, with the same numbers and the same words for what is wrong."""
+    rows = np.random.default_rng(0).integers(-1000, 1000, (40_000, 3))
+    text = "".join(f"{x} {y} {z}\n" for x, y, z in rows.tolist())
+    np.testing.assert_array_equal(read(save(tmp_path / "scan.xyz", text)).world(), rows)
+    lines = text.splitlines(keepends=True)
+    with pytest.raises(InputError, match=r"could not convert string 'x' to float64 at row 30000, column 1"):
+        read(save(tmp_path / "scan.xyz", "".join([*lines[:30_000], "x 1 2\n", *lines[30_001:]])))
+    with pytest.raises(InputError, match=r"at row 30001 with 2 columns"):
+        read(save(tmp_path / "scan.xyz", "".join([*lines[:30_000], "1 2\n", *lines[30_001:]])))
+    with open(tmp_path / "scan.ply", "w") as file:
+        file.write("ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\n")
+        file.write("property float z\nend_header\n" + "".join(lines[:16384]) + "1 2 3 4\n" * 23_616)
+    with pytest.raises(InputError, match=r"the number of columns changed from 3 to 4 at row 16385 of the"):
+        read(tmp_path / "scan.ply")

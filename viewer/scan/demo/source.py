@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ class DemoSource:
             rest.positions[:, skin], rest.normals[:, skin], index / self.fps
         )
         radii[skin] *= np.sqrt(np.clip(growth, 1.0, _MOST_GROWTH))
-        return PointCloud.from_arrays(
+        cloud = PointCloud.from_arrays(
             np.ascontiguousarray(positions.T),
             normals=normals.T,
             colors=rest.colors,
@@ -54,3 +55,4 @@ class DemoSource:
             scalars={"displacement": np.sqrt(np.square(positions - rest.positions).sum(axis=0))},
             origin=np.zeros(3),
         )
+        return replace(cloud, topology=self.name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
@@ -12,8 +13,10 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import DTypeLike, NDArray
 
 from ...errors import InputError
+from ...task import checkpoint
 from ..points import PointCloud
 
+_ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
 Columns = Mapping[str, NDArray]  # name -> (N,)
 
 # What the columns of a file may be called, in lower case; the first set that is complete is taken.
@@ -110,13 +113,31 @@ def parse_table(
     """
     filled = (line for line in lines if line.strip() and not line.startswith(("#", "//")))
     wanted = islice(filled, None if rows is None else min(rows, sys.maxsize))
-    first = next(wanted, None)
-    if first is None:
-        return np.empty((0, len(columns or range(3))))
+    parts: list[NDArray[np.float64]] = []
+    done = 0
+    while first := list(islice(wanted, 1)):
+        checkpoint(done / rows if rows else None)
+        part = _parse_rows(chain(first, islice(wanted, _ROWS_AT_ONCE - 1)), columns, delimiter, done)
+        if parts and part.shape[1] != parts[0].shape[1]:
+            number, before, now = done + 1, parts[0].shape[1], part.shape[1]
+            raise InputError(
+                f"not a table of numbers: the number of columns changed from {before} to {now} at row "
+                f"{number} of the points"
+            )
+        parts.append(part)
+        done += len(part)
+    return np.concatenate(parts) if parts else np.empty((0, len(columns or range(3))))
+
+
+def _parse_rows(
+    lines: Iterable[str], columns: Sequence[int] | None, delimiter: str | None, before: int
+) -> NDArray[np.float64]:
+    """At least one row of numbers, `before` rows below the first of the table."""
     try:
-        return np.loadtxt(chain([first], wanted), usecols=columns, delimiter=delimiter, ndmin=2)
+        return np.loadtxt(lines, usecols=columns, delimiter=delimiter, ndmin=2)
     except ValueError as error:
         reason = str(error).split(";")[0].rstrip(".")
+        reason = re.sub(r"(?<=row )\d+", lambda number: str(int(number[0]) + before), reason)
         raise InputError(f"not a table of numbers: {reason} of the points") from error
 
 

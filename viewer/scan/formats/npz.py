@@ -2,8 +2,9 @@
 
 `positions` (N, 3), or (T, N, 3) for a sequence; optional `normals` (…, N, 3), `colors` (…, N, 3 or 4)
 uint8 or float in 0..1, `radii` (…, N), further scalars (…, N) by their names, `origin` (3,) that is to be
-added to the positions, `times` (T,) in seconds. Attributes of a sequence may lack T: then all frames
-share them. Arrays of other shapes are left alone.
+added to the positions, `times` (T,) in seconds, `faces` (F, 3) whole numbers, which tell the topology of
+all frames. Attributes of a sequence may lack T: then all frames share them. Arrays of other shapes are
+left alone.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..points import PointCloud
+from ._faces import with_faces
 from ._packed import check_unpacked_size
 from ._stored import StoredArray
 
@@ -77,7 +79,9 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             scalars=scalars,
             origin=np.zeros(3) if "origin" in arrays else None,
         )
-        return replace(cloud, origin=_vector(arrays["origin"], 3)) if "origin" in arrays else cloud
+        if "origin" in arrays:
+            cloud = replace(cloud, origin=_vector(arrays["origin"], 3))
+        return with_faces(cloud, _faces(arrays))
 
 
 def write(path: Path, cloud: PointCloud) -> None:
@@ -115,6 +119,12 @@ def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
         found = f"has no array 'positions', only: {', '.join(arrays) or 'none'}"
         raise InputError(found, hint="Name the points 'positions', (N, 3) or (T, N, 3)")
     return arrays["positions"]
+
+
+def _faces(arrays: dict[str, StoredArray]) -> Iterator[bytes]:
+    faces = arrays.get("faces")
+    if faces and len(faces.shape) == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":
+        yield faces.read().tobytes()
 
 
 def _vector(array: StoredArray, length: int) -> NDArray[np.float64]:

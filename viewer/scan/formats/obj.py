@@ -1,4 +1,5 @@
-"""OBJ: Wavefront's mesh format; its vertices are the points, with the common colour extension.
+"""OBJ: Wavefront's mesh format; its vertices are the points, with the common colour extension, and its
+faces tell the topology.
 
 Read here and not by a library because those at hand drop vertices that no triangle uses.
 """
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..points import PointCloud
 from ._columns import parse_table
+from ._faces import with_faces
 
 TITLE = "OBJ"
 SUFFIXES = (".obj",)
@@ -24,11 +26,12 @@ _LOOK = 3000  # face corners that tell whether normals and vertices are numbered
 def read(path: Path, frame: int = 0) -> PointCloud:
     """The vertices (`v x y z [w]` or `v x y z r g b`) and their normals (`vn`). Raises InputError."""
     table = parse_table(_lines(path, "v"))
-    return PointCloud.from_arrays(
+    cloud = PointCloud.from_arrays(
         table[:, :3],
         normals=_normals(path, len(table)),
         colors=table[:, 3:6] if table.shape[1] >= 6 else None,
     )
+    return with_faces(cloud, (line.encode("latin-1") for line in _lines(path, "f")))
 
 
 def _normals(path: Path, count: int) -> NDArray[np.float64] | None:

@@ -1,4 +1,4 @@
-"""PLY: the Stanford polygon file format; its vertices are the points, its faces are skipped.
+"""PLY: the Stanford polygon file format; its vertices are the points, its faces tell the topology.
 
 Vertices of plain numbers that come first in the file, as nearly always, are read straight into
 numpy. What is rare (vertices with lists, or behind other elements) goes through plyfile.
@@ -25,11 +25,13 @@ from ._columns import (
     records,
     text_lines,
 )
+from ._faces import with_faces
 
 TITLE = "PLY"
 SUFFIXES = (".ply",)
 
 _HEADER_LIMIT = 1 << 20  # bytes looked at for the header
+_CHUNK = 1 << 20  # bytes of faces held at a time
 _ENDIAN = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -92,14 +94,19 @@ def read(path: Path, frame: int = 0) -> PointCloud:
         if not {"x", "y", "z"} <= {p.name.lower() for p in vertex.properties} and header.odd_lines:
             raise InputError(f"no x, y and z: the header line '{header.odd_lines[0]}' says nothing in PLY")
         stream.seek(header.size)
+        plain = not vertex.has_lists and not any(element.count for element in elements[:-1])
         size = path.stat().st_size - header.size
-        if vertex.has_lists or any(element.count for element in elements[:-1]):
+        if not plain:
             columns = _read_with_plyfile(stream, header.encoding, elements, size)
         elif header.encoding == "ascii":
             columns = _read_ascii(stream, vertex)
         else:
             columns = _read_binary(stream, vertex, header.encoding, size)
-    return cloud_from_columns(columns)
+        cloud = cloud_from_columns(columns)
+        has_faces = any(element.name == "face" and element.count for element in header.elements)
+        if plain and has_faces:  # all behind the vertices
+            cloud = with_faces(cloud, iter(lambda: stream.read(_CHUNK), b""))
+    return cloud
 
 
 def write(path: Path, cloud: PointCloud) -> None:

@@ -6,11 +6,11 @@ from collections import deque
 from dataclasses import replace
 from typing import Any
 
-from ..errors import InputError
-from ..scan.pose import Pose
-from ..scan.timeline import Timeline
+from ...errors import InputError
+from ...scan.pose import Pose
+from ...scan.timeline import Timeline
+from ..session import Session
 from .player import Player
-from .session import Session
 
 _RATE_SPAN = 1.0  # seconds over which shown frames are counted, longer where few are due
 _RATE_FRAMES = 4

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
-from ..params import describe
+from ...params import describe
 
 T = TypeVar("T")
 LEVELS = range(10)  # a digit each

@@ -8,22 +8,21 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...params import param
+
 SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # that the window offers
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How to play.
+    """How to play."""
 
-    speed: of the scan's time against the clock's. reverse: back in time. loop: round the end.
-    every_frame: show each frame and let time slip where that is late; else keep time and
-    leave out what is late.
-    """
-
-    speed: float = 1.0
-    reverse: bool = False
-    loop: bool = True
-    every_frame: bool = False
+    speed: float = param(1.0, "Of the scan's time against the clock's", low=SPEEDS[0], high=SPEEDS[-1])
+    reverse: bool = param(False, "Back in time")
+    loop: bool = param(True, "Round the end")
+    every_frame: bool = param(
+        False, "Show each frame and let time slip where that is late; else leave out what is late"
+    )
 
     @property
     def direction(self) -> int:

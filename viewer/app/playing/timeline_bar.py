@@ -9,11 +9,11 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 from numpy.typing import NDArray
 
-from . import theme, widgets
+from .. import theme, widgets
 from .player import SPEEDS
 
 if TYPE_CHECKING:
-    from .app import App
+    from ..app import App
 
 _SPEED_WIDTH = 4.6  # in heights of the font
 _SHORTEST_TRACK = 8.0
@@ -159,7 +159,7 @@ class _Track:
 
 def _pointed(app: App, room: float) -> str:
     """As much of what is under the mouse as there is room for."""
-    words = app.pointed_words
+    words = app.pointer.words
     while words and imgui.calc_text_size(text := _GAP.join(words)).x > room:
         words = words[:-1]
     return text if words else ""

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from ..camera import Camera
-from ..geometry import Vector
-from . import navigation, notices, theme
+from ...camera import Camera
+from ...geometry import Vector
+from .. import notices, theme
+from ..tools import measuring_view
+from . import cube, legend, navigation
 
 if TYPE_CHECKING:
-    from .app import App
+    from ..app import App
 
 _PIVOT = 0xF0C24B
 
@@ -27,41 +29,56 @@ _RED = 0xE0483E  # 0xRRGGBB
 def draw(app: App) -> None:
     """Declare the view in the current ImGui window, which it fills."""
     size = imgui.get_content_region_avail()
+    cube.take_mouse(app, size)
+    if app.steering.cube.under_mouse is not None:
+        imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
     imgui.invisible_button("view", size, _BUTTONS)
-    app.point_at(_pixel(app) if imgui.is_item_hovered() else None)
+    app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
     if app.session.camera is not None and app.playback.pose is not None:
         radius = app.picture.bounds(app.playback.pose).radius
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
-            app.set_pivot()
+            app.steering.set_pivot()
         app.session.camera = _navigate(app, app.session.camera, size, radius)
         if app.session.pivot and imgui.is_item_hovered():
             _draw_pivot(app.session.camera, app.session.pivot, size)
+        measuring_view.draw(app, size)
+    cube.draw(app, size)
+    legend.draw(app, size)
+    if app.capture.replaying is not None and imgui.is_key_pressed(imgui.Key.escape):
+        app.capture.stop_replaying()
     text = _note(app)
     if text:
         _draw_note(text, size)
+    else:
+        measuring_view.draw_banner(app, size)
     notices.draw(app, size)
-    if app.recorder is not None:
+    if app.capture.recorder is not None:
         _draw_recording_mark()
 
 
 def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
     io = imgui.get_io()
     if imgui.is_item_activated():
-        app.gesture = _gesture(io)
-    elif app.gesture:
+        app.steering.gesture = _gesture(io)
+        app.steering.turntable.stop()
+    elif app.steering.gesture == "orbit" and app.measuring.active and measuring_view.may_click():
+        pass  # so that a click does not turn the view
+    elif app.steering.gesture:
         # The move that ends with the release counts as well, that of the press does not.
         right, up = io.mouse_delta.x / size.y, -io.mouse_delta.y / size.y
-        if app.gesture == "zoom":
+        if app.steering.gesture == "zoom":
             camera = navigation.zoom(camera, up, radius)
-        elif app.gesture == "pan":
+        elif app.steering.gesture == "pan":
             camera = navigation.pan(camera, right, up)
         else:
             camera = navigation.orbit(camera, right, up, app.session.pivot)
     if not imgui.is_item_active():
-        app.gesture = None
+        app.steering.gesture = None
     if imgui.is_item_hovered() and io.mouse_wheel:
         at = imgui.get_mouse_pos() - imgui.get_item_rect_min() - size * 0.5
-        camera = navigation.wheel(camera, io.mouse_wheel, (at.x / size.y, -at.y / size.y), radius)
+        mouse = at.x / size.y, -at.y / size.y
+        seen = app.pointer.picked.place if app.pointer.picked else None
+        camera = navigation.wheel(camera, io.mouse_wheel, mouse, radius, seen)
     return camera
 
 
@@ -95,10 +112,10 @@ def _note(app: App) -> str | None:
     playback = app.playback
     if app.picture.problem:
         return str(app.picture.problem)
-    if app.opening:
-        return f"Opening {app.opening} ..."
+    if app.capture.replaying is not None:
+        return str(app.capture.replaying)
     if playback.pose is None:
-        return str(playback.problem) if playback.problem else "Loading ..."
+        return str(playback.problem) if playback.problem else None
     if playback.player.playing or playback.pose.index == app.session.index:
         return None
     if playback.problem:

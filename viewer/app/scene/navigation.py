@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..camera import Camera
-from ..geometry import Vector
-from ..scan.points import Bounds
+from ...camera import Camera
+from ...geometry import Vector
+from ...scan.points import Bounds
 
 # (azimuth, elevation) in degrees; left and right are the subject's. Just short of the poles,
 # a hundredth of a pixel, so that the scan's up axis stays the one that orbiting turns about.
-_POLE = 89.999
+POLE = 89.999
 VIEWS = {
     "front": (0.0, 0.0),
     "back": (180.0, 0.0),
     "left": (90.0, 0.0),
     "right": (-90.0, 0.0),
-    "top": (0.0, _POLE),
-    "bottom": (0.0, -_POLE),
+    "top": (0.0, POLE),
+    "bottom": (0.0, -POLE),
 }
 
 _DEGREES_PER_HEIGHT = 180.0  # a drag over the whole height turns from one pole to the other
@@ -26,12 +26,13 @@ _ZOOM_PER_NOTCH = 1.15  # factor
 _NEAREST, _FARTHEST = 1e-5, 1e3  # distances to the target, in radii of the scan
 
 
-def view_from(side: str, camera: Camera, bounds: Bounds, aspect: float, up: str) -> Camera:
-    """All of the bounds seen from a side of `VIEWS`, in the camera's projection.
+def view_from(
+    azimuth: float, elevation: float, camera: Camera, bounds: Bounds, aspect: float, up: str
+) -> Camera:
+    """All of the bounds seen from a direction, in the camera's projection.
 
-    aspect: width / height of the view. up: the scan's up axis.
+    azimuth, elevation: degrees, such as those of `VIEWS`. aspect: width / height of the view. up: the scan's.
     """
-    azimuth, elevation = VIEWS[side]
     return Camera.orbit(
         bounds, azimuth, elevation, aspect=aspect, up=up, fov_y=camera.fov_y, projection=camera.projection
     )
@@ -46,6 +47,21 @@ def place(camera: Camera, point: Vector) -> tuple[float, float] | None:
     if camera.projection == "perspective":
         height *= -back / camera.distance
     return float(right / height), float(up / height)
+
+
+def shows(camera: Camera, bounds: Bounds, aspect: float) -> bool:
+    """Whether a camera shows something of the bounds, at a distance that navigating allows.
+
+    aspect: width / height of the view.
+    """
+    radius = bounds.radius or 1.0
+    if not _NEAREST * radius <= camera.distance <= _FARTHEST * radius:
+        return False
+    right, up, back = camera.rotation() @ (bounds.center - camera.eye)
+    half = camera.view_height / 2
+    if camera.projection == "perspective":
+        half *= (max(-back, 0.0) + radius) / camera.distance
+    return bool(back < radius and abs(up) < half + radius and abs(right) < half * aspect + radius)
 
 
 def orbit(camera: Camera, right: float, up: float, pivot: Vector | None = None) -> Camera:
@@ -63,17 +79,21 @@ def zoom(camera: Camera, up: float, radius: float) -> Camera:
     return camera.zoomed(_limited(camera, _ZOOM_PER_HEIGHT**up, radius))
 
 
-def wheel(camera: Camera, notches: float, mouse: tuple[float, float], radius: float) -> Camera:
-    """Nearer for notches > 0; what is under the mouse at the target's depth stays there.
+def wheel(
+    camera: Camera, notches: float, mouse: tuple[float, float], radius: float, seen: Vector | None = None
+) -> Camera:
+    """Nearer for notches > 0; what is under the mouse stays there.
 
-    mouse: to the right of and above the view's centre. radius: as for `zoom`.
+    mouse: to the right of and above the view's centre. radius: as for `zoom`. seen: what is under the mouse,
+    scan units; None takes the target's depth.
     """
-    factor = _limited(camera, _ZOOM_PER_NOTCH**notches, radius)
-    kept = 1 - 1 / factor
-    return camera.panned(mouse[0] * kept, mouse[1] * kept).zoomed(factor)
+    if seen is None:
+        seen = camera.panned(*mouse).target
+    return camera.approached(seen, _limited(camera, _ZOOM_PER_NOTCH**notches, radius))
 
 
 def _limited(camera: Camera, factor: float, radius: float) -> float:
     """The part of a zoom that keeps the distance within its limits."""
+    radius = radius or 1.0  # of a single point
     low, high = camera.distance / (_FARTHEST * radius), camera.distance / (_NEAREST * radius)
     return min(max(factor, min(low, 1.0)), max(high, 1.0))

@@ -1,0 +1,159 @@
+"""Going from scan to scan in the window: dialog, list, drops, and all of it again at the next start."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from virtual_screen import PATIENCE, RunningApp, Screen, running_app, virtual_screen
+
+from viewer.app.settings import FILE, load
+
+SIZE = (1280, 720)
+
+
+@pytest.fixture(scope="module")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
+        yield screen
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """Two scans of a file, one of a folder, and a file that is none."""
+    study = tmp_path / "study"
+    for number, name in enumerate(("one/0.npy", "one/1.npy", "one/2.npy", "three.npy", "two.npy")):
+        path = study / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        np.save(path, np.random.default_rng(number).random((500, 3)))
+    (study / "odd.npz").write_bytes(b"none")
+    return study
+
+
+def drop(app: RunningApp, *paths: object) -> None:
+    """From another program, with a real protocol."""
+    pytest.importorskip("Xlib")
+    window = app.screen.do("search", "--name", "Scan4D").split()[-1]
+    command = [sys.executable, str(Path(__file__).with_name("drop.py")), window, *map(str, paths)]
+    subprocess.run(command, env=app.screen.env, check=True, timeout=PATIENCE)
+
+
+def ctrl(app: RunningApp, key: str) -> None:
+    """As fingers do it: one key after the other."""
+    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl")
+
+
+def close(app: RunningApp) -> None:
+    ctrl(app, "q")
+    assert app.process.wait(PATIENCE) == 0
+    assert "Traceback" not in app.log()
+
+
+def described(app: RunningApp) -> dict[str, Any]:
+    """What a screenshot says of itself."""
+    from PIL import Image
+
+    app.screen.do("key", "p")
+    with Image.open(app.expect(r"Saved (.+)")[1]) as file:
+        return json.loads(file.text["scan4d"])  # type: ignore[attr-defined]
+
+
+def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, study: Path) -> None:
+    with running_app(screen, tmp_path, study / "one") as app:
+        ctrl(app, "o")
+        app.settle()
+        screen.do("key", "Down", "sleep", 0.1, "key", "Down")  # from the open scan past odd.npz
+        app.settle()
+        screen.do("key", "Return")
+        app.expect(r"opened \S+study/three\.npy\n")
+        ctrl(app, "o")
+        app.settle()
+        screen.do("key", "Tab", "sleep", 0.2, "type", "--delay", 15, study / "two.npy")
+        app.settle()
+        screen.do("key", "Return")
+        app.expect(r"opened \S+study/two\.npy\n")
+        screen.do("key", "Prior")
+        app.expect(r"opened \S+study/three\.npy\n")
+        screen.do("key", "Next")
+        app.expect(r"opened \S+study/two\.npy\n")
+        screen.do("key", "Next")
+        app.expect(r"Cannot open: \S+study/odd\.npz")
+        screen.do("key", "Next")
+        app.expect(r"opened \S+study/one\n")
+        app.settle()
+
+        screen.do(
+            "key", "Right", "sleep", 0.2, "key", "b", "sleep", 0.2, "key", "t", "sleep", 0.2, "key", "e"
+        )
+        app.expect("every_frame=True")
+        screen.do("mousemove", 400, 300, "sleep", 0.2, "click", 4, "sleep", 0.2, "click", 4)
+        app.settle()
+        left = described(app)
+        window = screen.do("search", "--name", "Scan4D").split()[-1]
+        screen.do("windowmove", window, 40, 30, "windowsize", window, 1000, 600)
+        app.settle()
+        close(app)
+
+    settings = tmp_path / "config" / "scan4d" / FILE
+    kept = load(settings)[0]
+    assert kept.recent == tuple(str(study / name) for name in ("one", "two.npy", "three.npy"))
+    assert (kept.theme, kept.backend, kept.places[str(study / "one")].index) == ("light", "surfels", 1)
+
+    np.save(study / "three.npy", np.random.default_rng(9).random((500, 3)) * 1e4 + 1e6)
+    with running_app(screen, tmp_path, study / "one") as app:
+        assert "Place(left=40, top=30, width=1000, height=600, maximised=False)" in app.log()
+        again = described(app)
+        for name in ("pose", "camera", "backend", "params", "look"):
+            assert again[name] == left[name], name
+        screen.do("key", "Next")
+        app.expect(r"opened \S+three\.npy")
+        app.settle()
+        assert described(app)["camera"]["target"][0] > 1e6, "a camera that shows nothing is not taken up"
+        close(app)
+    settings.write_text("{")
+    with running_app(screen, tmp_path, study / "one") as app:
+        assert re.search(r"settings\.json: is damaged\. It is kept as settings\.old\.json", app.log())
+        assert described(app)["pose"] == 0
+        close(app)
+    assert settings.with_name("settings.old.json").read_text() == "{"
+    assert load(settings)[1] == []
+
+
+def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study: Path) -> None:
+    (study / "wrong.json").write_text("{}")
+    (study / "worse 1%.ply").write_bytes(b"no array")
+    with running_app(screen, tmp_path, study / "missing.npy", study) as app:
+        assert "missing.npy: no such file" in app.log(), "told, and the others are opened"
+        drop(app, study / "one")
+        app.expect(r"opened \S+study/one\n")
+        drop(app, *(study / "one" / f"{number}.npy" for number in range(3)))
+        app.expect(r"opened \S+study/one/%d\.npy\n")
+        drop(app, study / "two.npy", study / "gone.ply", study / "three.npy")
+        app.expect("gone.ply: no such file")
+        app.expect(r"opened \S+study/two\.npy\n")
+        app.settle()
+        screen.do("key", "Next")
+        app.expect(r"opened \S+study/three\.npy\n")
+        drop(app, study / "wrong.json")
+        app.expect("wrong.json: is no recording")
+        drop(app, study / "worse 1%.ply")
+        app.expect("Cannot open: .*worse 1%.ply")
+        drop(app, study / "one", study / "wrong.json")
+        app.expect(r"Left out: wrong\.json")
+        app.expect(r"opened \S+study/one\n")
+        screen.do("key", "r")
+        app.expect("Recording")
+        app.settle()
+        screen.do("key", "r")
+        recording = app.expect(r"Saved (.+\.json)")[1]
+        drop(app, recording)
+        app.expect("replays frame 0")
+        app.settle()
+        close(app)

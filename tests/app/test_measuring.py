@@ -1,0 +1,67 @@
+"""What the window says of measurements, and where it draws them."""
+
+from __future__ import annotations
+
+import pytest
+from imgui_bundle import ImVec2
+
+from viewer.app.tools.measuring import snap_words
+from viewer.app.tools.measuring_view import ViewPlace
+from viewer.camera import Camera
+from viewer.measurement import End, Measurement, Reading
+
+PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
+
+
+def end(id: int | None) -> End:
+    return End(0, 0.0, (0, 0, 0), "surface" if id is None else "point", id, None, 0)
+
+
+@pytest.mark.parametrize(
+    ("ids", "words"),
+    [
+        ((3, 12), "points 3 and 12"),
+        ((None, 12), "point 12 and surface"),
+        ((0, None), "point 0 and surface"),
+        ((None, None), "surface"),
+    ],
+)
+def test_it_says_what_the_ends_snapped_to(ids: tuple[int | None, int | None], words: str) -> None:
+    assert snap_words(Reading(Measurement(end(ids[0]), end(ids[1])), None)) == words
+
+
+@pytest.mark.parametrize(
+    ("line", "seen"),
+    [
+        ((120, 60, 380, 240), (120, 60, 380, 240)),
+        ((0, 100, 200, 100), (100, 100, 200, 100)),
+        ((200, 150, 200, 550), (200, 150, 200, 250)),
+        ((0, 0, 500, 300), (100, 60, 400, 240)),
+        ((0, 10, 500, 20), None),
+        ((90, 0, 90, 300), None),
+        ((0, 150, 80, 350), None),
+        ((150, 150, 150, 150), (150, 150, 150, 150)),
+    ],
+)
+def test_a_label_stands_at_the_part_of_its_line_that_is_in_the_view(
+    line: tuple[float, ...], seen: tuple[float, ...] | None
+) -> None:
+    for start, stop in (((0, 1), (2, 3)), ((2, 3), (0, 1))):
+        found = PLACE.clipped(*(ImVec2(*(line[i] for i in corner)) for corner in (start, stop)))
+        if seen is None:
+            assert found is None
+        else:
+            assert found is not None
+            wanted = [seen[i] for i in (*start, *stop)]
+            assert [v for place in found for v in (place.x, place.y)] == pytest.approx(wanted)
+
+
+def test_places_of_the_scan_are_where_the_picture_shows_them() -> None:
+    middle = PLACE.on_screen((0, 0, 0))
+    assert middle is not None
+    assert (middle.x, middle.y) == (250, 150)
+    above = PLACE.on_screen((0.1, 0.2, 0))
+    assert above is not None
+    assert above.x > 250
+    assert above.y < 150
+    assert PLACE.on_screen((0, 0, 5)) is None, "behind the eye"

@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.app.files.opening import Opening, find_facts
+from viewer.errors import InputError, Scan4DError
+from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.scan.timeline import Timeline
+
+
+def save(folder: Path, count: int = 3) -> Path:
+    folder.mkdir()
+    for number in range(count):
+        np.save(folder / f"{number}.npy", np.random.default_rng(number).random((100, 3)))
+    return folder
+
+
+def taken(opening: Opening) -> tuple[str, Timeline]:
+    while (taken := opening.take()) is None:
+        assert opening.scan is not None
+        time.sleep(0.001)
+    scan, opened = taken
+    assert opened.hash.done(), "nobody has to wait for it"
+    return scan, opened.timeline
+
+
+def start(opening: Opening, scan: Path, index: int = 0) -> None:
+    opening.start(str(scan), scan.name, index, lambda: open_scan(scan))
+
+
+def test_an_opened_scan_has_its_first_pose_in_memory(tmp_path: Path) -> None:
+    opening = Opening()
+    start(opening, save(tmp_path / "scan"), index=1)
+    assert opening.task is not None
+    assert opening.task.name == "Opening scan"
+    scan, timeline = taken(opening)
+    assert scan == str(tmp_path / "scan")
+    assert timeline.ready(1) is not None
+    assert opening.scan is None
+    assert opening.task is None
+    assert opening.take() is None
+    timeline.close()
+
+
+def test_a_place_beyond_the_end_is_the_end(tmp_path: Path) -> None:
+    opening = Opening()
+    start(opening, save(tmp_path / "scan"), index=9)
+    _, timeline = taken(opening)
+    assert timeline.ready(2) is not None
+    timeline.close()
+
+
+def test_what_cannot_be_opened_says_why(tmp_path: Path) -> None:
+    opening = Opening()
+    start(opening, tmp_path / "none")
+    with pytest.raises(InputError, match="no such file"):
+        taken(opening)
+    assert opening.scan is None
+    (tmp_path / "bad.ply").write_bytes(b"ply\nformat ascii 1.0\n")
+    start(opening, tmp_path / "bad.ply")
+    with pytest.raises(InputError, match=r"bad\.ply"):
+        taken(opening)
+
+
+def test_a_sequence_opens_where_its_first_frame_is_broken(tmp_path: Path) -> None:
+    scan = save(tmp_path / "scan")
+    (scan / "0.npy").write_bytes(b"nothing")
+    opening = Opening()
+    start(opening, scan)
+    _, timeline = taken(opening)
+    assert set(timeline.broken) == {0}
+    timeline.close()
+
+
+def test_whatever_goes_wrong_is_one_message(tmp_path: Path) -> None:
+    def fail() -> Timeline:
+        raise KeyError("x")
+
+    opening = Opening()
+    opening.start("scan", "scan", 0, fail)
+    with pytest.raises(Scan4DError, match=r"scan: cannot be opened \(KeyError: 'x'\)"):
+        taken(opening)
+
+
+def slow(folder: Path, gate: threading.Event, opened: Future[Timeline]) -> Callable[[], Timeline]:
+    """Opens a scan when the gate does."""
+
+    def open_it() -> Timeline:
+        gate.wait()
+        opened.set_result(open_scan(folder))
+        return opened.result()
+
+    return open_it
+
+
+def is_closed(timeline: Timeline) -> bool:
+    try:
+        timeline.pose(0)
+    except ValueError:
+        return True
+    return False
+
+
+def test_another_scan_takes_the_place_of_the_one_being_opened(tmp_path: Path) -> None:
+    gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
+    opening.start("slow", "slow", 0, slow(save(tmp_path / "slow"), gate, opened))
+    former = opening.task
+    assert former is not None
+    start(opening, save(tmp_path / "fast"))
+    assert former.cancelled
+    scan, timeline = taken(opening)
+    assert scan == str(tmp_path / "fast")
+    timeline.close()
+    gate.set()
+    left = opened.result()
+    while not is_closed(left):
+        time.sleep(0.001)
+    assert opening.take() is None
+
+
+def test_what_was_cancelled_never_comes(tmp_path: Path) -> None:
+    gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
+    opening.start("slow", "slow", 0, slow(save(tmp_path / "slow"), gate, opened))
+    opening.cancel()
+    assert opening.scan is None
+    assert opening.take() is None
+    gate.set()
+    left = opened.result()
+    while not is_closed(left):
+        time.sleep(0.001)
+    assert opening.take() is None
+    opening.cancel()
+
+
+def test_large_poses_come_with_what_drawing_asks_of_them() -> None:
+    rng = np.random.default_rng(0)
+    small, large = (PointCloud.from_arrays(rng.random((count, 3))) for count in (1000, 200_001))
+    for cloud in (small, large):
+        find_facts(Pose(0, 0.0, "x", cloud))
+    assert large.bounds() is large.bounds()
+    made: list[bool] = []
+    for cloud in (small, large):
+        made.append(cloud.remember("spacings", lambda: None) is not None)
+    assert made == [False, True]

@@ -1,0 +1,268 @@
+"""What comes back at the next start, and what damaged files do: nothing worse than the defaults."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import fields, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewer.app import settings
+from viewer.app.place import Place, reachable
+from viewer.app.playing.player import Pace
+from viewer.app.session import Bookmark, Left, Session, known_as
+from viewer.app.settings import Keeper, Settings, load, save
+from viewer.app.tools.export_plan import Choices
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.look import Look
+from viewer.marks import Marks
+
+CAMERA = Camera(eye=(1, 2, 3), target=(0.5, 0, 0), fov_y=25)
+FULL = Settings(
+    window=Place(10, 20, 800, 600, maximised=True),
+    theme="light",
+    text_scale=1.35,
+    backend="surfels",
+    params={"points": backend("points").params({"point_size": 7})},
+    look=Look(light="fixed", azimuth=12, background="#102030"),
+    pace=Pace(speed=0.5, reverse=True, loop=False),
+    marks=Marks(stamp=True),
+    cube=False,
+    turn_seconds=24.0,
+    export=Choices(what="turntable", width=640, anonymous=True),
+    export_marks=Marks(scale_bar=True),
+    recent=("/scans/b", "demo"),
+    places={
+        "/scans/a": Left(unit="mm"),
+        "/scans/b": Left(4, CAMERA, "cm", (Bookmark("nose", CAMERA),)),
+    },
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "new" / settings.FILE
+
+
+def written(file: Path, data: Any) -> Path:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(data if isinstance(data, str) else json.dumps(data))
+    return file
+
+
+def test_all_of_it_comes_back(file: Path) -> None:
+    default = Settings()
+    unlike = [of.name for of in fields(Settings) if getattr(FULL, of.name) == getattr(default, of.name)]
+    assert unlike == [], "the example says something about every field"
+    unlike = [of.name for of in fields(Left) if getattr(FULL.places["/scans/b"], of.name) == of.default]
+    assert unlike == []
+    save(FULL, file)
+    assert load(file) == (FULL, [])
+    assert [path.name for path in file.parent.iterdir()] == [settings.FILE]
+
+
+def test_without_a_file_the_defaults_hold(file: Path) -> None:
+    assert load(file) == (Settings(), [])
+    assert not file.parent.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "damaged"), ("{", "damaged"), ("[1, 2]", "another version"), ("{}", "another version"),
+        ('{"format": 99, "theme": "light"}', "another version"), ("[" * 100_000, "damaged"),
+    ],
+)  # fmt: skip
+def test_a_damaged_file_is_put_aside_and_told_once(file: Path, text: str, why: str) -> None:
+    loaded, (message,) = load(written(file, text))
+    assert loaded == Settings()
+    assert why in message
+    assert str(file) in message
+    kept = file.with_name("settings.old.json")
+    assert kept.read_text() == text
+    assert load(file) == (Settings(), []), "the next start begins anew"
+
+
+def test_a_file_that_is_not_utf_8(file: Path) -> None:
+    written(file, "").write_bytes(b'{"format": 1, "theme": "\xff"}')
+    assert "damaged" in load(file)[1][0]
+
+
+def test_a_file_that_cannot_be_read_is_told_and_stays(file: Path) -> None:
+    file.mkdir(parents=True)
+    loaded, (message,) = load(file)
+    assert loaded == Settings()
+    assert "cannot be read" in message
+    assert file.is_dir()
+
+
+def changed(change: Callable[[dict[str, Any]], object]) -> Settings:
+    data = json.loads(json.dumps(FULL.to_json()))
+    change(data)
+    return Settings.from_json(data)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda data: data.update(theme="pink", later="?"), {"theme": "dark"}),
+        (lambda data: data.update(window=[1, 2]), {"window": None}),
+        (lambda data: data["window"].update(left="x"), {"window": None}),
+        (lambda data: data["window"].update(left=10**9), {"window": None}),
+        (lambda data: data.update(text_scale=77), {"text_scale": 1.0}),
+        (lambda data: data.update(backend="gone"), {"backend": None}),
+        (lambda data: data["params"].update(gone={"x": 1}), {}),
+        (lambda data: data["params"]["points"].update(point_size="big", gone=3), {
+            "params": {"points": backend("points").params()}
+        }),
+        (lambda data: data["look"].update(azimuth=1e9, background="no colour"), {
+            "look": Look(light="fixed")
+        }),
+        (lambda data: data["look"].update(color_by="strain"), {}),
+        (lambda data: data["pace"].update(speed=0), {"pace": replace(FULL.pace, speed=1.0)}),
+        (lambda data: data.update(recent=["/a", 3]), {"recent": ()}),
+        (lambda data: data["places"]["/scans/b"].update(index=-1, camera={"eye": [0, 0, 0]}), {
+            "places": {**FULL.places, "/scans/b": replace(FULL.places["/scans/b"], index=0, camera=None)}
+        }),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_left_out_alone(
+    change: Callable[[dict[str, Any]], object], expected: dict[str, Any]
+) -> None:
+    assert changed(change) == replace(FULL, **expected)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=8,
+)
+
+
+@given(st.data())
+def test_whatever_stands_in_the_file_some_settings_come_of_it(data: st.DataObject) -> None:
+    """One value anywhere in it is replaced by any other."""
+    content = json.loads(json.dumps(FULL.to_json()))
+    inside: Any = content
+    while True:
+        keys = list(inside) if isinstance(inside, dict) else list(range(len(inside)))
+        key = data.draw(st.sampled_from(keys))
+        if not (isinstance(inside[key], dict | list) and inside[key] and data.draw(st.booleans())):
+            break
+        inside = inside[key]
+    inside[key] = data.draw(json_values)
+    usable = Settings.from_json(content)
+    assert Settings.from_json(json.loads(json.dumps(usable.to_json()))) == usable
+    session = usable.session("demo", "+y")
+    assert session.scan == "demo"
+
+
+def test_a_session_begins_where_the_last_one_ended() -> None:
+    session = FULL.session("/scans/b", "+y")
+    assert (session.index, session.camera, session.unit) == (4, CAMERA, "cm")
+    assert (session.backend, session.params["points"].point_size) == ("surfels", 7)
+    kept = Settings.of(session)
+    for name in ("backend", "params", "look", "pace", "places"):
+        assert getattr(kept, name) == getattr(FULL, name), name
+
+
+def test_the_up_axis_of_the_command_line_holds() -> None:
+    session = FULL.session("/scans/b", "+z")
+    assert session.camera is None, "it stood upright along another axis"
+    assert session.unit == "cm"
+    assert session.look.up == "+z"
+    assert changed(lambda data: data["look"].update(up="-x", low=3, high=4)).look == FULL.look
+
+
+def test_scans_are_known_by_their_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    session = Session("one.ply", index=3)
+    session.leave()
+    session = Settings.of(session).session(str(tmp_path / "one.ply"), "+y")
+    assert session.index == 3
+    assert known_as("demo") == "demo"
+
+
+def test_only_the_scans_left_last_are_kept() -> None:
+    session = Session("0")
+    for number in range(1, 300):
+        session.turn_to(str(number))
+    kept = Settings.from_json(json.loads(json.dumps(Settings.of(session).to_json()))).places
+    assert len(kept) == 200
+    assert list(kept)[-1] == known_as("299")
+
+
+def kept(file: Path) -> Settings:
+    return load(file)[0]
+
+
+def test_the_keeper_saves_what_is_at_rest(file: Path) -> None:
+    keeper = Keeper(file, Settings())
+    looks = 0
+
+    def current() -> Settings:
+        nonlocal looks
+        looks += 1
+        return states[-1]
+
+    states = [Settings()]
+    for now in (0.0, 0.1, 5.0):
+        assert keeper.look(now, current) is None
+    assert looks == 2, "now and then"
+    states.append(FULL)
+    keeper.look(10.0, current)
+    states.append(replace(FULL, theme="dark"))
+    keeper.look(15.0, current)
+    assert not file.exists(), "it is changing"
+    keeper.look(20.0, current)
+    assert keeper.close(states[-1]) is None
+    assert kept(file) == states[-1]
+
+
+def test_closing_saves_at_once_and_only_what_has_changed(file: Path) -> None:
+    assert Keeper(file, FULL).close(FULL) is None
+    assert not file.exists()
+    assert Keeper(file, Settings()).close(FULL) is None
+    assert kept(file) == FULL
+
+
+def test_what_cannot_be_kept_is_told_once(file: Path) -> None:
+    file.parent.write_text("a file where the folder should be")
+    keeper = Keeper(file, Settings())
+    looks = (keeper.look(now, lambda: FULL) for now in count(0.0, 5.0))
+    problem = next(filter(None, looks))
+    assert "not kept" in problem
+    other = replace(FULL, theme="dark")
+    assert not any(keeper.look(now, lambda: other) for now in (1e6, 2e6, 3e6))
+    assert "not kept" in str(keeper.close(FULL))
+    with pytest.raises(InputError):
+        save(FULL, file)
+
+
+SCREENS = [(0, 0, 1920, 1040), (1920, -200, 1280, 1024)]
+
+
+@pytest.mark.parametrize(
+    ("place", "expected"),
+    [
+        (Place(100, 50, 800, 600), Place(100, 50, 800, 600)),
+        (Place(2000, -150, 800, 600, True), Place(2000, -150, 800, 600, True)),
+        (Place(0, 0, 4000, 3000), Place(0, 0, 1920, 1040)),
+        (Place(-700, 30, 800, 600), Place(-700, 30, 800, 600)),
+        (Place(-790, 30, 800, 600), None),
+        (Place(100, -30, 800, 600), None),
+        (Place(100, 1030, 800, 600), None),
+        (Place(5000, 30, 800, 600), None),
+        (Place(10, 10, 3, 0), None),
+    ],
+)
+def test_a_window_comes_back_only_where_it_can_be_reached(place: Place, expected: Place | None) -> None:
+    assert reachable(place, SCREENS) == expected

@@ -1,0 +1,184 @@
+"""The tasks of docs/survey.md (Farooq 2013, 7.2.1), done in a real window, and the actions each takes."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_window import Screenshot, on_screen, shown
+from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
+
+from viewer.app.scene import navigation
+from viewer.gpu.surface import Surface
+from viewer.pick import pick
+from viewer.scan import formats
+from viewer.scan.open import open_scan
+
+pytestmark = pytest.mark.slow
+
+SIZE = (1280, 720)
+FACES = ("face_a.npz", "face_b.npz")
+NOSE, LEFT_EYE, RIGHT_EAR = (0.0, -28.5, 109.5), (31.0, 10.0, 74.0), (-84.0, 0.0, -18.0)  # of the demo, mm
+
+
+class Person:
+    """Does tasks and counts what it takes: a key, a click, a drag, a turn of the wheel is one action each."""
+
+    def __init__(self, app: RunningApp) -> None:
+        self.app = app
+        self.task = ""
+        self.actions: Counter[str] = Counter()
+
+    def press(self, *keys: str) -> None:
+        *held, key = keys
+        down = [word for name in held for word in ("keydown", name, "sleep", 0.1)]
+        up = [word for name in held for word in ("sleep", 0.1, "keyup", name)]
+        self._act(*down, "key", key, *up)
+
+    def drag(self, button: int, right: float, up: float) -> None:
+        """From the middle of the view; right, up: in heights of it."""
+        left, top, width, height = self.app.view()
+        x, y = left + width // 2, top + height // 2
+        end = x + round(right * height), y - round(up * height)
+        middle = (x + end[0]) // 2, (y + end[1]) // 2
+        self._act(
+            "mousemove", x, y, "sleep", 0.1, "mousedown", button, "sleep", 0.1, "mousemove", *middle,
+            "sleep", 0.1, "mousemove", *end, "sleep", 0.3, "mouseup", button,
+        )  # fmt: skip
+
+    def turn_wheel(self, clicks: int) -> None:
+        """Forward, or back for fewer than none."""
+        self._act("click", "--repeat", abs(clicks), "--delay", 30, 4 if clicks > 0 else 5)
+
+    def point(self, position: tuple[float, float, float]) -> None:
+        """Move the mouse there, which is no action."""
+        self.app.screen.do("mousemove", *on_screen(self.app, *self.pixel(position)))
+        self.app.settle()
+
+    def _act(self, *words: object) -> None:
+        self.app.screen.do(*words)
+        self.app.settle()
+        self.actions[self.task] += 1
+
+    # --- what it sees -----------------------------------------------------------------
+
+    def look(self) -> Screenshot:
+        shot = Screenshot(self.app)
+        self.app.screen.do("key", "Escape")  # away with the note
+        self.app.settle()
+        return shot
+
+    def pixel(self, position: tuple[float, float, float]) -> tuple[int, int]:
+        """Where a position is in the picture."""
+        _, _, width, height = self.app.view()
+        place = navigation.place(self.look().camera, position)
+        assert place is not None
+        return int(width / 2 + place[0] * height), int(height / 2 - place[1] * height)
+
+    def sees(self, position: tuple[float, float, float], within: float) -> bool:
+        """Whether the surface at its pixel is so near to it, mm: nothing is in front of it."""
+        picked = pick(self.look().surface(), *self.pixel(position))
+        return picked is not None and float(np.linalg.norm(picked.position - position)) < within
+
+
+@pytest.fixture
+def person(tmp_path: Path) -> Iterator[Person]:
+    with open_scan("demo") as demo:
+        for name, frame in zip(FACES, (0, 20), strict=True):
+            formats.write(tmp_path / name, demo.pose(frame).cloud)
+    with virtual_screen(tmp_path, SIZE) as screen, running_app(screen, tmp_path, tmp_path / FACES[0]) as app:
+        yield Person(app)
+
+
+def holes(surface: Surface) -> float:
+    """The share of the face that shows nothing: of what has something left, right, above and below it."""
+    seen = surface.level == 0
+    inside = np.ones_like(seen)
+    for turns in range(4):
+        turned = np.rot90(seen, turns)
+        inside &= np.rot90(np.logical_or.accumulate(turned, axis=0), -turns)
+    return float((inside & ~seen).sum() / inside.sum())
+
+
+def told(tasks: str) -> dict[str, int]:
+    """The actions that the survey's tables give for each task of a set."""
+    rows = re.findall(
+        rf"^\| ({tasks}\d) \|.*\| (\d+) \|$", (ROOT / "docs" / "survey.md").read_text(), re.MULTILINE
+    )
+    return {task: int(count) for task, count in rows}
+
+
+def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
+    person.press("b")  # points, which break apart
+    person.app.expect("with points")
+    for _ in FACES:
+        before = person.look()
+        person.task = "A1"
+        person.press("Next")
+        person.app.expect("drew frame 0 with points")
+        person.app.settle()
+        assert person.look().description["scan"] != before.description["scan"]
+        person.task = "A2"
+        person.drag(3, 0, 0.45)
+        broken = holes(person.look().surface())
+        assert broken > 0.3
+        person.task = "A3"
+        person.press("b")
+        assert holes(person.look().surface()) < 1e-4
+        person.press("b")
+        assert holes(person.look().surface()) == broken
+        person.task = "A4"
+        person.turn_wheel(-18)
+        assert holes(person.look().surface()) < 0.01
+        person.task = "A5"
+        without = shown(person.app).copy()
+        person.press("q")
+        assert (shown(person.app) != without).mean() > 0.1, "the list lies over the view"
+        person.app.screen.do("key", "Escape")
+        person.app.settle()
+    assert {task: person.actions[task] / len(FACES) for task in told("A")} == told("A")
+
+
+def test_set_b_turn_pan_and_find_nose_eye_and_ear(person: Person) -> None:
+    for _ in FACES:
+        person.task = "B1"
+        person.press("Next")
+        person.app.expect("drew frame 0 with surfels")
+        person.app.settle()
+        start = person.look().camera
+        person.task = "B2"
+        person.drag(1, 0.5, 0)
+        turned = person.look().camera
+        backs = [camera.rotation()[2] for camera in (start, turned)]
+        assert np.degrees(np.arccos(np.dot(*backs))) == pytest.approx(90, abs=1)
+        person.task = "B3"
+        person.drag(2, 0.2, 0.1)
+        panned = person.look().camera
+        moved = np.subtract(turned.target, panned.target) @ turned.rotation().T / turned.view_height
+        assert moved[:2] == pytest.approx([0.2, 0.1], abs=0.01)
+        person.task = "B4"
+        person.press("ctrl", "1")
+        assert person.sees(NOSE, within=3)
+        person.task = "B5"
+        person.point(LEFT_EYE)
+        person.turn_wheel(8)
+        person.press("z")
+        eye = person.look().camera
+        assert navigation.place(eye, LEFT_EYE) == pytest.approx((0, 0), abs=0.03)
+        assert eye.view_height < 0.5 * start.view_height
+        assert person.sees(LEFT_EYE, within=3)
+        person.task = "B6"
+        person.press("ctrl", "4")
+        assert person.look().camera.rotation()[2] == pytest.approx([-1, 0, 0], abs=1e-3)
+        assert person.sees(RIGHT_EAR, within=8)
+        person.task = "B7"
+        without = shown(person.app).copy()
+        person.press("q")
+        assert (shown(person.app) != without).mean() > 0.1, "the list lies over the view"
+        person.app.screen.do("key", "Escape")
+        person.app.settle()
+    assert {task: person.actions[task] / len(FACES) for task in told("B")} == told("B")

@@ -1,0 +1,245 @@
+"""Exporting from the window, with a real mouse and keyboard."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scenes import sphere
+from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
+from written import film
+
+from viewer.look import color_table
+from viewer.marks import INK
+from viewer.recording import Recording
+from viewer.scan import formats
+
+SIZE = (1280, 720)
+COUNT = 6  # frames
+LEFT = (SIZE[0] - 34 * 16) // 2  # of the dialog
+FIELD = LEFT + 390  # in the middle of a row's fields
+BEHIND = (0x2B, 0x2F, 0x36)  # the dialog's colour
+FIRST_ROW, ROW = 22, 30  # below its title
+ITEM, ITEMS = 23, 30  # of an opened list, below its row
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The working directory, with the scan jane_doe/; the look colours by height."""
+    folder = tmp_path_factory.mktemp("app")
+    config = folder / "config" / "scan4d"
+    config.mkdir(parents=True)
+    (config / "settings.json").write_text(json.dumps({"format": 1, "look": {"color_by": "height"}}))
+    (folder / "jane_doe").mkdir()
+    for index in range(COUNT):
+        formats.write(folder / "jane_doe" / f"{index}.npz", sphere(3000, radius=1 + 0.1 * index))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory, folder: Path) -> Iterator[RunningApp]:
+    with (
+        virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
+        running_app(screen, folder, "jane_doe") as app,
+    ):
+        yield app
+
+
+def press_with_ctrl(app: RunningApp, key: str) -> None:
+    """As fingers do it: one key after the other."""
+    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl", "sleep", 0.1)
+
+
+class Dialog:
+    """The export dialog, as a person uses it. Rows are counted from 0."""
+
+    def __init__(self, app: RunningApp) -> None:
+        self._app = app
+        app.screen.do("mousemove", 2, SIZE[1] - 2)
+        press_with_ctrl(app, "e")
+        app.expect("export dialog opens")
+        app.settle()
+        edge = app.screen.picture()[:, LEFT + 2 : LEFT + 8]
+        self._top = np.nonzero((edge == BEHIND).all(axis=(1, 2)))[0][0]
+
+    def _click(self, x: float, y: float, *more: object) -> None:
+        self._app.screen.do("mousemove", x, y, "sleep", 0.15, "click", *more, 1, "sleep", 0.25)
+
+    def choose(self, row: int, item: int) -> None:
+        """An item of the list in a row."""
+        y = self._top + FIRST_ROW + ROW * row
+        self._click(FIELD, y)
+        self._click(FIELD - 60, y + ITEMS + ITEM * item)
+
+    def enter(self, row: int, text: object, share: float = 0.5) -> None:
+        """A value in a row's field; share: across the fields."""
+        at = LEFT + 250 + 280 * share
+        self._click(at, self._top + FIRST_ROW + ROW * row, "--repeat", 2, "--delay", 60)
+        press_with_ctrl(self._app, "a")
+        self._app.screen.do("type", "--delay", 40, text)
+        self._app.screen.do("key", "Return", "sleep", 0.2)
+
+    def tick(self, row: int) -> None:
+        """The box of a row."""
+        self._click(LEFT + 262, self._top + FIRST_ROW + ROW * row)
+
+    def export(self, rows: float) -> None:
+        """Press the button below so many rows, a line and a line of text."""
+        self._click(LEFT + 38, self._top + FIRST_ROW + ROW * rows + 29)
+
+
+def replayed(folder: Path, *arguments: object) -> None:
+    command = [sys.executable, "-m", "viewer.cli", "render", *map(str, arguments)]
+    done = subprocess.run(command, cwd=folder, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def listed(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()} - {"jane_doe", "config", "log"}
+
+
+def corner(app: RunningApp, right: bool) -> NDArray[np.uint8]:
+    """A lower corner of the view."""
+    left, top, width, height = app.view()
+    view = app.screen.picture()[top : top + height, left : left + width]
+    return view[-60:, -110:] if right else view[-60:, :90]
+
+
+def test_marks_are_shown_and_hidden(app: RunningApp) -> None:
+    for key, right in (("s", False), ("c", True)):
+        shown = corner(app, right)
+        assert (shown == INK[:3]).all(axis=2).any(), "there is text or a line"
+        app.screen.do("key", key)
+        app.settle()
+        hidden = corner(app, right)
+        assert (hidden == hidden[0, 0]).all()
+        app.screen.do("key", key)
+        app.settle()
+        assert (corner(app, right) == shown).all()
+
+
+def test_the_colour_bar_shows_the_map(app: RunningApp) -> None:
+    stripes = corner(app, right=True).astype(int)
+    table = color_table("batlow")[:, :3].astype(int)
+    column = max(stripes.swapaxes(0, 1), key=lambda column: np.ptp(column, axis=1).sum())
+    colored = column[np.ptp(column, axis=1) > 40]
+    places = [np.abs(table - color).sum(axis=1).argmin() for color in colored]
+    assert len(places) > 30
+    assert (np.diff(places) <= 0).all(), "high is at the top"
+    assert all(np.abs(table[place] - color).max() <= 8 for place, color in zip(places, colored, strict=True))
+
+
+def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:
+    dialog = Dialog(app)
+    dialog.choose(0, 1)  # a turntable
+    dialog.enter(1, 3)
+    dialog.enter(4, 96, share=0.2)
+    dialog.enter(4, 64, share=0.8)
+    dialog.tick(5)  # the scale bar
+    dialog.enter(10, "round")
+    dialog.export(11)
+    app.expect(r"Saved 3 pictures, .*round_0000.png to round_0002.png")
+    names = [f"round_{number:04d}.png" for number in range(3)]
+    assert listed(folder) == set(names)
+    entries = [Recording.load(folder / name).entries[0] for name in names]
+    assert {(entry.scan, entry.size, entry.pose) for entry in entries} == {("jane_doe", (96, 64), 0)}
+    assert all(entry.marks.scale_bar and not entry.marks.stamp for entry in entries)
+    eyes = np.array([entry.camera.eye for entry in entries]) - entries[0].camera.target
+    assert np.allclose(eyes.sum(axis=0), 3 * np.array([0, eyes[0, 1], 0]), atol=1e-6)
+    replayed(folder, "--replay", names[1], "-o", "again.png")
+    assert (folder / "again.png").read_bytes() == (folder / names[1]).read_bytes()
+    (folder / "again.png").unlink()
+
+
+def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Path) -> None:
+    dialog = Dialog(app)
+    dialog.choose(0, 2)  # frames
+    dialog.enter(1, 2, share=0.1)
+    dialog.enter(1, 5, share=0.5)
+    dialog.choose(2, 2)  # a film
+    dialog.enter(11, "frames")
+    dialog.export(12)
+    app.expect(r"Saved .*frames.mp4")
+    images, rate = film(folder / "frames.mp4")
+    assert (len(images), rate, images[0].shape) == (4, 25, (64, 96, 3))
+    sizes = [(image > 80).sum() for image in images]
+    assert sizes == sorted(sizes), "the sphere grows"
+
+
+def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> None:
+    dialog = Dialog(app)
+    dialog.choose(2, 1)  # EXR
+    dialog.choose(0, 0)  # the current view
+    dialog.tick(7)
+    dialog.enter(9, "view")
+    dialog.export(10)
+    app.expect(r"Saved .*view.exr")
+    data = (folder / "view.exr").read_bytes()
+    assert b"jane" not in data
+    assert str(folder).encode() not in data
+    replayed(folder, "jane_doe", "--replay", "view.exr", "--anonymous", "-o", "again.exr")
+    assert (folder / "again.exr").read_bytes() == data
+    (folder / "again.exr").unlink()
+
+
+def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path) -> None:
+    before = (folder / "view.exr").stat().st_mtime_ns
+    dialog = Dialog(app)
+    dialog.enter(9, "view")
+    dialog.export(10)
+    app.settle()
+    assert (folder / "view.exr").stat().st_mtime_ns == before
+    dialog.export(10.8)  # a line of text below
+    app.expect(r"Saved .*view.exr")
+    assert (folder / "view.exr").stat().st_mtime_ns > before
+
+
+def begin_a_long_one(app: RunningApp, folder: Path) -> None:
+    dialog = Dialog(app)
+    dialog.choose(0, 1)
+    dialog.enter(1, 300)
+    dialog.choose(2, 0)  # PNG
+    dialog.choose(3, 1)  # 1920 x 1080
+    dialog.enter(10, "long")
+    dialog.export(11)
+    app.expect("exporting .*long")
+    deadline = time.monotonic() + 60
+    while not list(folder.glob(".scan4d_*/made/long*")):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+@pytest.mark.slow
+def test_a_cancelled_export_leaves_nothing_and_closing_asks(app: RunningApp, folder: Path) -> None:
+    before = listed(folder)
+    begin_a_long_one(app, folder)
+    screen = app.screen
+    screen.do("key", "Escape")  # that is for something else
+    left, top, width, _ = app.view()
+    right = left + (width + min(28 * 16, 0.9 * width)) / 2
+    screen.do("mousemove", right - 40, top + 16 + 46, "sleep", 0.3, "click", 1)
+    app.expect("Cancelled: Exporting long")
+    app.expect("the export is gone")
+    assert listed(folder) == before
+
+    begin_a_long_one(app, folder)
+    press_with_ctrl(app, "q")
+    app.expect("asks before it closes")
+    screen.do("sleep", 0.3, "key", "Escape", "sleep", 0.4)  # on second thoughts, no
+    assert app.process.poll() is None
+    press_with_ctrl(app, "q")
+    app.expect("asks before it closes")
+    screen.do("sleep", 0.5)
+    middle = SIZE[1] // 2
+    screen.do("mousemove", LEFT + 80, middle + 28, "sleep", 0.2, "click", 1)
+    assert app.process.wait(30) == 0
+    assert listed(folder) == before
+    assert not re.search("Traceback", app.log())

@@ -1,0 +1,181 @@
+"""Measuring in the window with real clicks and keys, against scans whose points are known."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from virtual_screen import RunningApp, Screen, running_app, virtual_screen
+from written import write_mesh
+
+from viewer.camera import Camera
+from viewer.gpu.view import View
+from viewer.measurement import in_words
+from viewer.scan.points import PointCloud
+
+SIZE = (1280, 720)
+FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates
+FACES = ((0, 1, 2), (1, 2, 3))
+FIELD = (0x33, 0x38, 0x3F)  # the background of input fields in the dark theme
+_READ_CLIPBOARD = """
+import glfw, sys
+glfw.init()
+glfw.window_hint(glfw.VISIBLE, False)
+sys.stdout.buffer.write(glfw.get_clipboard_string(glfw.create_window(8, 8, "", None, None)))
+"""
+
+
+def grid(scale: float) -> NDArray[np.float64]:
+    """15 x 11 points on z = 0, in steps that float32 and float64 hold exactly, (165, 3)."""
+    x, y = np.meshgrid(np.arange(15) - 7, np.arange(11) - 5)
+    return np.stack([x.ravel(), y.ravel(), np.zeros(165)], axis=1) * 8 * scale
+
+
+def pixel_of(app: RunningApp, points: NDArray[np.float64], number: int) -> tuple[int, int]:
+    """Where the screen shows a point in the view that the app starts with."""
+    left, top, width, height = app.view()
+    cloud = PointCloud.from_arrays(points)
+    camera = Camera.orbit(cloud.bounds(), aspect=width / height)
+    view = View.of(camera, (width, height), cloud.origin, cloud.bounds())
+    x, y = view.project(cloud.positions[number][None])[0][0]
+    return left + int(x), top + int(y)
+
+
+def click(app: RunningApp, place: tuple[int, int]) -> None:
+    app.screen.do("mousemove", *place, "sleep", 0.2, "click", 1)
+
+
+def ctrl(screen: Screen, key: str) -> None:
+    """As fingers do it: one key after the other."""
+    screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl")
+
+
+def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) -> tuple[float, float]:
+    """Click two points; the distance and its uncertainty as the app logs them."""
+    for number in (one, other):
+        click(app, pixel_of(app, points, number))
+        place = re.escape(", ".join(repr(float(v)) for v in points[number]))
+        app.expect(f"end at {place}: point {number}, frame 0")
+    distance, uncertainty = app.expect(r"measured (\S+), uncertainty (\S+)").groups()
+    return float(distance), float(uncertainty)
+
+
+def expect_reading(app: RunningApp, *words: str) -> None:
+    app.expect(re.escape(f"measurements: {'; '.join(words)}\n"))
+
+
+def clipboard(screen: Screen) -> str:
+    """What another program would paste."""
+    command = [sys.executable, "-c", _READ_CLIPBOARD]
+    return subprocess.run(command, env=screen.env, check=True, capture_output=True).stdout.decode()
+
+
+def name_unit(app: RunningApp, name: str) -> None:
+    """Type into the field for the unit, the lowest one in the panel while nothing is measured."""
+    app.settle()
+    x = SIZE[0] - 50
+    is_field = (app.screen.picture()[: app.view()[3], x] == FIELD).all(axis=1)
+    app.screen.do("mousemove", x, int(np.flatnonzero(is_field)[-1]) - 5, "sleep", 0.2, "click", 1)
+    app.settle()
+    app.screen.do("type", "--delay", 40, name)
+    app.expect(f"unit {name}")
+
+
+@pytest.fixture(scope="module")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
+        yield screen
+
+
+@pytest.fixture
+def keys_file(tmp_path: Path) -> None:
+    """Keys for what has none of its own."""
+    folder = tmp_path / "config" / "scan4d"
+    folder.mkdir(parents=True)
+    keys = '[keys]\nsave_measurements = "Ctrl+S"\ncopy_measurements = "Ctrl+C"\n'
+    (folder / "keys.toml").write_text(keys)
+
+
+@pytest.mark.usefixtures("keys_file")
+def test_exact_distances_that_follow_their_points_are_undone_and_saved(
+    screen: Screen, tmp_path: Path
+) -> None:
+    frames = [grid(1.0) + FAR, grid(1.25) + FAR, grid(1.5) + FAR]
+    np.savez(tmp_path / "scan.npz", positions=np.stack(frames), faces=np.array(FACES))
+    distances = [math.dist(points[34], points[128]) for points in frames]
+    with running_app(screen, tmp_path, tmp_path / "scan.npz") as app:
+        screen.do("key", "m")
+        app.expect("measuring begins")
+        name_unit(app, "cm")
+        distance, uncertainty = measure(app, frames[0], 34, 128)
+        assert distance == distances[0]
+        reading = [in_words(distance, uncertainty, "cm") + ", follows points" for distance in distances]
+        expect_reading(app, reading[0])
+
+        screen.do("key", "Right")
+        expect_reading(app, reading[1])
+        ctrl(screen, "z")
+        expect_reading(app, "none")
+        ctrl(screen, "y")
+        expect_reading(app, reading[1])
+
+        ctrl(screen, "c")
+        app.expect("Copied")
+        copied = list(csv.DictReader(io.StringIO(clipboard(screen)), delimiter="\t"))
+        ctrl(screen, "s")
+        app.settle()
+        screen.do("key", "Return")
+        file = app.expect("Saved (.*)").group(1)
+        with open(file, newline="", encoding="utf-8") as stream:
+            saved = list(csv.DictReader(stream))
+        assert saved == copied
+        for row, frame in zip(saved, (0, 1), strict=True):
+            assert (row["scan"], row["unit"], row["motion"]) == ("scan.npz", "cm", "follows points")
+            assert float(row["distance"]) == distances[frame]
+            assert (row["frame_1"], row["id_1"], row["id_2"]) == (str(frame + 1), "34", "128")
+            place = [float(row[f"{axis}_2"]) for axis in "xyz"]
+            np.testing.assert_array_equal(place, frames[frame][128])
+
+        screen.do("key", "Escape")
+        app.expect("measuring ends")
+        click(app, pixel_of(app, frames[0], 34))
+        app.settle()
+        assert app.log().count("end at") == 2, "clicks set no ends any longer"
+        assert "Traceback" not in app.log()
+
+
+def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) -> None:
+    scan = tmp_path / "scan"
+    scan.mkdir()
+    for number, faces in enumerate((FACES, FACES, FACES[::-1])):
+        write_mesh(scan / f"{number}.ply", grid(1 + number / 4), faces)
+    points = grid(1.0)
+    with running_app(screen, tmp_path, scan) as app:
+        screen.do("key", "m")
+        click(app, (app.view()[0] + 10, app.view()[1] + 10))
+        app.expect("There is nothing to measure here")
+        distance, uncertainty = measure(app, points, 34, 128)
+        words = in_words(distance, uncertainty, "units")
+        expect_reading(app, f"{words}, follows points")
+        screen.do("key", "End")
+        app.expect("Not all frames have the same points")
+        expect_reading(app, f"{words}, fixed in space")
+        screen.do("key", "Home")
+        app.expect("drew frame 0")
+
+        start = pixel_of(app, points, 34)
+        screen.do("mousemove", *start, "mousedown", 1, "sleep", 0.2, "mousemove", start[0] + 90, start[1])
+        screen.do("sleep", 0.2, "mouseup", 1)
+        app.expect("drew frame 0")
+        app.settle()
+        assert app.log().count("end at") == 2, "a drag turns the view and sets no end"
+        assert "Traceback" not in app.log()

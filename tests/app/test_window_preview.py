@@ -1,0 +1,122 @@
+"""Previews in the window: while it plays or turns, and the picture in full at rest, with real events."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import sphere
+from virtual_screen import RunningApp, running_app, virtual_screen
+from written import picture
+
+from viewer import cli
+from viewer.recording import Recording
+from viewer.scan import formats
+
+SIZE = (1280, 720)
+FRAMES, POINTS = 5, 200_000  # surfels that a software driver takes several times a frame's 40 ms for
+MIDDLE = np.s_[120:440, 300:640]  # of the view: no cube, scale bar or note there
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+    scan = tmp_path_factory.mktemp("scan")
+    for number in range(FRAMES):
+        formats.write(scan / f"{number}.npz", sphere(POINTS, radius=1 + 0.1 * number))
+    with (
+        virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
+        running_app(screen, tmp_path_factory.mktemp("app"), scan) as app,
+    ):
+        yield app
+
+
+def drawn(app: RunningApp) -> list[tuple[int, int]]:
+    """(pixels, points) of each picture so far."""
+    found = re.findall(r"drew frame \d+ with surfels, (\d+)x(\d+) pixels, (\d+) points", app.log())
+    return [(int(width) * int(height), int(points)) for width, height, points in found]
+
+
+def wait_for_preview(app: RunningApp) -> None:
+    if "Drawn in software" in app.log():  # a graphics card may need none
+        app.expect(r"drew frame \d+ with surfels, .* (?!200000)\d+ points")
+
+
+def expect_full(app: RunningApp) -> None:
+    """Wait for a picture in full, and see that it stays."""
+    _, _, width, height = app.view()
+    app.expect(rf"drew frame \d+ with surfels, {width}x{height} pixels, {POINTS} points")
+    app.settle()
+    assert drawn(app)[-1] == (width * height, POINTS)
+
+
+def saved(app: RunningApp) -> tuple[Path, np.ndarray]:
+    """A screenshot, and what is drawn again from what it tells."""
+    app.screen.do("key", "p")
+    path = Path(app.expect(r"Saved (.+\.png)")[1])
+    again = path.with_name(f"again_{path.name}")
+    assert cli.main(["render", "--replay", str(path), "-o", str(again)]) == 0
+    return path, picture(again)
+
+
+def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
+    screen = app.screen
+    screen.do("mousemove", *(v - 1 for v in SIZE), "key", "r", "key", "space")
+    wait_for_preview(app)
+    app.expect("drew frame 4")
+    path, again = saved(app)
+    np.testing.assert_array_equal(picture(path), again)
+    wait_for_preview(app)
+    screen.do("key", "space")
+    expect_full(app)
+
+    path, again = saved(app)
+    left, top, width, height = app.view()
+    shown = screen.picture()[top : top + height, left : left + width]
+    assert np.abs(shown[MIDDLE].astype(int) - again[MIDDLE][..., :3]).max() <= 1
+    np.testing.assert_array_equal(picture(path), again)
+    screen.do("key", "r")
+    recording = Recording.load(Path(app.expect(r"Saved (.+\.json)")[1]))
+    assert {entry.size for entry in recording.entries} == {(width, height)}, "recorded as asked for"
+
+
+def test_every_frame_leaves_none_out_and_real_time_does(app: RunningApp) -> None:
+    screen = app.screen
+    screen.do("key", "e")
+    app.expect("every_frame=True")
+    before = len(app.frames())
+    screen.do("key", "space")
+    while len(app.frames()) < before + 12:
+        app.expect("drew frame")
+    assert set(np.diff(app.frames()[before - 1 :]) % FRAMES) == {1}
+    screen.do("key", "e")
+    app.expect("every_frame=False")
+    for speed in ("2.0", "5.0", "10.0"):
+        screen.do("key", "bracketright")
+        app.expect(f"speed={speed}")
+    before = len(app.frames())
+    while len(app.frames()) < before + 12:
+        app.expect("drew frame")
+    assert set(np.diff(app.frames()[before:]) % FRAMES) - {1}, "250 frames a second are due"
+    screen.do("key", "space", "key", "BackSpace")
+    expect_full(app)
+
+
+def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: RunningApp) -> None:
+    screen = app.screen
+    left, top, width, height = app.view()
+    x, y = left + width // 2, top + height // 2
+    screen.do("mousemove", x, y, "mousedown", 1)
+    screen.do(*(word for i in range(15) for word in ("mousemove", x + 3 * i, y, "sleep", 0.03)))
+    wait_for_preview(app)
+    expect_full(app)  # with the button held
+    screen.do("mouseup", 1, "click", "--repeat", 8, "--delay", 40, 4)
+    wait_for_preview(app)
+    expect_full(app)
+    before = len(drawn(app))
+    screen.do("key", "f")
+    expect_full(app)
+    assert len(drawn(app)) == before + 1, "a single change is drawn in full at once"
+    assert "Traceback" not in app.log()

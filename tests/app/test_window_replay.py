@@ -1,0 +1,103 @@
+"""A recording that was made in the window is shown again in it, frame by frame."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
+
+from viewer.recording import Entry, Recording
+
+SIZE = (960, 640)
+
+
+def press(app: RunningApp, *keys: str) -> None:
+    """As fingers do it: one key after the other."""
+    *held, key = keys
+    down = [word for name in held for word in ("keydown", name, "sleep", 0.1)]
+    up = [word for name in reversed(held) for word in ("sleep", 0.1, "keyup", name)]
+    app.screen.do(*down, "key", key, *up)
+
+
+def recorded(app: RunningApp) -> tuple[Path, tuple[Entry, ...]]:
+    """Stop recording; what is in it."""
+    press(app, "r")
+    path = Path(app.expect(r"Saved (.+\.json)")[1])
+    return path, Recording.load(path).entries
+
+
+@contextmanager
+def viewed(app: RunningApp, path: Path) -> Iterator[str]:
+    """The title of another window, which `scan4d view` opens on a file."""
+    command = [sys.executable, "-m", "viewer.cli", "view", str(path)]
+    env = {**app.screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(path.parent / "other")}
+    windows = set(app.screen.do("search", "--name", "Scan4D").split())
+    with subprocess.Popen(command, env=env) as process:
+        try:
+            while not (new := set(app.screen.do("search", "--name", " - Scan4D").split()) - windows):
+                assert process.poll() is None
+                time.sleep(0.1)
+            yield app.screen.do("getwindowname", new.pop()).strip()
+        finally:
+            process.kill()
+
+
+def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) -> None:
+    for scan in "ab":
+        (tmp_path / scan).mkdir()
+        for number in range(4):
+            np.save(tmp_path / scan / f"{number}.npy", np.random.default_rng(number).random((300, 3)))
+    with (
+        virtual_screen(tmp_path, SIZE) as screen,
+        running_app(screen, tmp_path, tmp_path / "a", tmp_path / "b") as app,
+    ):
+        press(app, "r")
+        app.expect("Recording")
+        for key, line in (
+            ("Right", "frame 1"), ("b", "frame 1 with surfels"), ("o", "frame 1"), ("End", "frame 3"),
+        ):  # fmt: skip
+            press(app, key)
+            app.expect(f"drew {line}")
+            app.settle()
+        _, first = recorded(app)
+        assert [entry.pose for entry in first] == sorted(entry.pose for entry in first)
+        press(app, "Home")
+        press(app, "b")
+        app.expect("drew frame 0 with points")
+        app.settle()
+
+        press(app, "r")
+        app.expect("Recording")
+        press(app, "shift", "r")
+        app.expect("replays frame 3")
+        app.settle(1.0)
+        path, again = recorded(app)
+        assert again[1:] == first, "the first is what was shown before"
+
+        # Another scan is opened for it; without a name, it is shown on the one that is open.
+        text = path.read_text()
+        other = json.dumps(str(tmp_path / "b"))
+        for scan in (other, "null"):
+            path.write_text(text.replace(f'"scan": {json.dumps(str(tmp_path / "a"))}', f'"scan": {scan}'))
+            press(app, "shift", "r")
+            app.expect("replays frame 3")
+            app.settle()
+            press(app, "p")
+            (shown,) = Recording.load(Path(app.expect(r"Saved (.+\.png)")[1])).entries
+            assert json.dumps(shown.scan) == other
+            assert replace(shown, scan=first[-1].scan) == first[-1]
+        path.write_text(text)
+        with viewed(app, path) as title:
+            assert title == "a - Scan4D"
+        path.write_text(text[:-100])
+        press(app, "shift", "r")
+        app.expect("is not JSON")
+        assert "Traceback" not in app.log()

@@ -1,0 +1,172 @@
+"""Ways to look at a scan with real clicks and keys: cube, bookmarks, turntable, full screen, larger text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_window import Screenshot, drag, shown
+from virtual_screen import RunningApp, running_app, virtual_screen
+
+from viewer.camera import Camera
+
+SCREEN = (1280, 720)
+WINDOW = (1100, 640)
+EM = 16.0  # the font's height
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+    scan = tmp_path_factory.mktemp("scan") / "box.npy"
+    np.save(scan, np.random.default_rng(0).uniform((-1, -2, -3), (1, 2, 3), (4000, 3)))
+    with (
+        virtual_screen(tmp_path_factory.mktemp("screen"), SCREEN) as screen,
+        running_app(screen, tmp_path_factory.mktemp("app"), scan) as app,
+    ):
+        window = screen.do("search", "--name", "Scan4D").split()[-1]
+        screen.do("windowmove", window, 60, 30, "windowsize", window, *WINDOW)
+        app.expect(r"view at 0,56 .*")
+        app.settle()
+        yield app
+
+
+def test_on_a_display_of_scale_2_all_is_twice_as_large(tmp_path: Path) -> None:
+    np.save(tmp_path / "box.npy", np.random.default_rng(0).random((100, 3)))
+    views = {}
+    for scale in (1, 2):
+        folder = tmp_path / str(scale)
+        folder.mkdir()
+        with (
+            virtual_screen(folder, (800 * scale, 600 * scale), scale) as screen,
+            running_app(screen, folder, tmp_path / "box.npy") as app,
+        ):
+            views[scale] = app.view()
+    assert np.array(views[2]) == pytest.approx(2 * np.array(views[1]), abs=2)
+
+
+def chord(app: RunningApp, modifier: str, key: str) -> None:
+    """As fingers do it: one key after the other."""
+    app.screen.do("keydown", modifier, "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", modifier)
+    app.settle()
+
+
+def on_cube(app: RunningApp, right: float, up: float) -> tuple[int, int]:
+    """A place on the screen, from the cube's centre in half edges."""
+    from viewer.app.scene.cube import place
+
+    left, top, width, height = app.view()
+    x, y, half = place(width, height, EM) or pytest.fail("there is no cube")
+    return round(60 + left + x + right * half), round(30 + top + y - up * half)
+
+
+def click_cube(app: RunningApp, right: float, up: float) -> Camera:
+    app.screen.do("mousemove", *on_cube(app, right, up), "sleep", 0.2, "click", 1)
+    app.settle()
+    return Screenshot(app).camera
+
+
+def back(camera: Camera) -> list[float]:
+    """Where it looks from, as a unit vector."""
+    return camera.rotation()[2].tolist()
+
+
+def test_the_cube_is_clicked_and_dragged_and_keeps_the_mouse_from_the_view(app: RunningApp) -> None:
+    start = Screenshot(app).camera
+    corner = 3**-0.5
+    assert back(click_cube(app, 0.8, 0)) == pytest.approx([2**-0.5, 0, 2**-0.5], abs=1e-3), "its left side"
+    assert back(click_cube(app, 0.7, 0)) == pytest.approx([1, 0, 0], abs=1e-3)
+    assert back(click_cube(app, -0.8, 0.8)) == pytest.approx([corner, corner, corner], abs=1e-3)
+    assert back(click_cube(app, 0, 0.9)) == pytest.approx([0, 1, 0], abs=1e-3)
+    chord(app, "ctrl", "1")
+    place = on_cube(app, 0, 0)
+    app.screen.do("mousemove", *place, "sleep", 0.2, "click", 4, "click", 4)
+    app.settle()
+    assert Screenshot(app).camera == start, "a wheel over the cube does nothing"
+    drag(app, 1, place, (place[0] - 60, place[1]))
+    dragged = Screenshot(app).camera
+    assert dragged.target == start.target
+    assert dragged.distance == pytest.approx(start.distance)
+    assert np.degrees(np.arccos(np.dot(back(dragged), back(start)))) == pytest.approx(120, abs=15)
+    app.screen.do("mousemove", *place, "mousemove", 0, 0)
+    app.settle()
+
+
+def test_bookmarks_come_back_by_key(app: RunningApp) -> None:
+    cameras = []
+    for side in ("2", "5"):
+        chord(app, "ctrl", side)
+        chord(app, "ctrl", "b")
+        app.expect(r"Bookmark 'View \d' added")
+        cameras.append(Screenshot(app).camera)
+    chord(app, "ctrl", "1")
+    app.screen.do("key", "n")
+    app.settle()
+    assert Screenshot(app).camera == cameras[0]
+    chord(app, "shift", "n")
+    assert Screenshot(app).camera == cameras[1]
+
+
+def test_keys_typed_in_haste_are_what_was_typed(app: RunningApp) -> None:
+    """Key and modifier go down and up between two frames."""
+    app.settle()
+    before = app.log()
+    app.screen.do("key", "--delay", 8, *["ctrl+b"] * 8)
+    app.settle()
+    new = app.log()[len(before) :]
+    assert new.count("Bookmark 'View") == 8
+    assert "drew frame" not in new, "not the next renderer"
+
+
+def test_the_turntable_turns_until_a_key_or_the_mouse_stops_it(app: RunningApp) -> None:
+    chord(app, "ctrl", "1")
+    cameras = [Screenshot(app).camera]
+    for stop in (("key", "y"), ("mousemove", 300, 300, "sleep", 0.1, "click", 1)):
+        app.screen.do("key", "y")
+        for _ in range(4):
+            app.expect("drew frame 0 ")
+        app.screen.do(*stop)
+        app.settle()  # it would never settle while it turns
+        cameras.append(Screenshot(app).camera)
+    angles = [float(np.degrees(np.arctan2(back(camera)[0], back(camera)[2]))) for camera in cameras]
+    assert angles[0] == pytest.approx(0, abs=0.01)
+    assert angles[0] < angles[1] < angles[2]
+    for camera in cameras[1:]:
+        assert camera.target == pytest.approx(cameras[0].target)
+        assert camera.distance == pytest.approx(cameras[0].distance)
+
+
+def test_full_screen_is_the_view_alone_and_goes_back(app: RunningApp) -> None:
+    screen = app.screen
+    window = screen.do("search", "--name", "Scan4D").split()[-1]
+    before, place = screen.do("getwindowgeometry", window), app.view()
+    for leave in ("F11", "Escape"):
+        screen.do("key", "F11")
+        app.expect(r"view at 0,0 1280x720")
+        app.settle()
+        screen.do("key", "p")
+        app.expect("Saved")
+        screen.do("key", leave)
+        app.expect(r"view at 0,56 .*")
+        app.settle()
+        assert app.view() == place
+        assert screen.do("getwindowgeometry", window) == before
+    screen.do("key", "Tab")
+    app.expect(r"view at 0,0 1100x640")
+    screen.do("key", "Tab")
+    app.expect(r"view at 0,56 .*")
+
+
+def test_larger_text_takes_more_room(app: RunningApp) -> None:
+    usual = app.view()
+    chord(app, "ctrl", "equal")
+    app.expect("view at .*")
+    larger = app.view()
+    assert larger[1] > usual[1]
+    assert larger[2] < usual[2]
+    chord(app, "ctrl", "0")
+    app.expect("view at .*")
+    assert app.view() == usual
+    assert shown(app).size
+    assert "Traceback" not in app.log()

@@ -1,0 +1,135 @@
+"""Pictures made by a process of their own: all of them or none, the same as those of the command line."""
+
+from __future__ import annotations
+
+import json
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from scenes import sphere
+from written import film, picture
+
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.errors import InputError, Scan4DError
+from viewer.look import Look
+from viewer.marks import Marks
+from viewer.recording import Entry, Recording
+from viewer.render_job import make
+from viewer.scan import formats
+from viewer.task import Cancelled, Task
+
+COUNT = 3
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory, with the scan doe.npz and the folder out."""
+    monkeypatch.chdir(tmp_path)
+    formats.write(Path("doe.npz"), sphere(2000))
+    Path("out").mkdir()
+    return tmp_path
+
+
+def turned(count: int = COUNT, size: tuple[int, int] = (96, 64)) -> Recording:
+    camera = Camera.orbit(sphere(2000).bounds(), 30, 20, aspect=1.5)
+    first = Entry(
+        "doe.npz", None, 0, 0.0, size, camera, "points", backend("points").params({"point_size": 3}),
+        Look(color_by="height"), Marks(scale_bar=True), "mm",
+    )  # fmt: skip
+    entries = (replace(first, camera=camera.orbited(10.0 * n, 0), at=n / 10) for n in range(count))
+    return Recording(tuple(entries), count / 10)
+
+
+def listed() -> list[str]:
+    return sorted(path.name for path in Path("out").iterdir())
+
+
+def test_pictures_are_those_of_a_replay_and_replace_former_ones(run: Run) -> None:
+    Path("out/p1.png").write_bytes(b"former")
+    task = Task("export")
+    made = make(task, turned(), Path("out/p%d.png"), 25.0, anonymous=False)
+    assert made.files == tuple(Path(f"out/p{n}.png") for n in range(COUNT))
+    assert listed() == ["p0.png", "p1.png", "p2.png"]
+    assert (task.progress, made.warnings, bool(made.device)) == (1.0, (), True)
+    turned().save(Path("a.json"))
+    assert run("render", "--replay", "a.json", "-o", "again%d.png").code == 0
+    for number in range(COUNT):
+        assert Path(f"again{number}.png").read_bytes() == Path(f"out/p{number}.png").read_bytes()
+
+
+def test_a_film_has_its_pace(run: Run) -> None:
+    made = make(Task("export"), turned(), Path("out/a.mp4"), 10.0, anonymous=False)
+    frames, rate = film(made.files[0])
+    assert (len(frames), rate, frames[0].shape) == (COUNT, 10, (64, 96, 3))
+
+
+def test_an_anonymous_picture_tells_no_name_and_no_path(run: Run, folder: Path) -> None:
+    (file,) = make(Task("export"), turned(1), Path("out/a.png"), 25.0, anonymous=True).files
+    data = file.read_bytes()
+    assert b"doe" not in data
+    assert str(folder).encode() not in data
+    assert run("render", "doe.npz", "--replay", file, "-o", "again.png").code == 0
+    assert np.array_equal(picture(Path("again.png")), picture(file))
+
+
+def test_cancelled_on_the_way_nothing_is_left() -> None:
+    Path("out/p0000.png").write_bytes(b"former")
+    task = Task("export")
+    reached = threading.Event()
+
+    def report(progress: float) -> None:
+        reached.set()
+        task.cancel()
+
+    task.report = report  # type: ignore[method-assign]
+    with pytest.raises(Cancelled):
+        make(task, turned(200, (640, 480)), Path("out/p%04d.png"), 25.0, anonymous=False)
+    assert reached.is_set(), "it had begun"
+    assert listed() == ["p0000.png"]
+    assert Path("out/p0000.png").read_bytes() == b"former"
+    with pytest.raises(Cancelled):
+        make(task, turned(), Path("out/p%04d.png"), 25.0, anonymous=False)
+    assert listed() == ["p0000.png"]
+
+
+def test_what_fails_is_one_message_and_leaves_nothing() -> None:
+    gone = replace(turned().entries[0], scan="gone.ply")
+    with pytest.raises(Scan4DError) as caught:
+        make(Task("export"), Recording((gone,)), Path("out/a.png"), 25.0, anonymous=False)
+    assert "gone.ply" in str(caught.value)
+    assert "scan4d:" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert listed() == []
+    large = turned(1, (20_000, 16_000))
+    with pytest.raises(Scan4DError, match="20000x16000 pixels is too large"):
+        make(Task("export"), large, Path("out/a.png"), 25.0, anonymous=False)
+    with pytest.raises(InputError, match="cannot be written"):
+        make(Task("export"), turned(), Path("nowhere/a.png"), 25.0, anonymous=False)
+
+
+def test_broken_frames_are_told(folder: Path) -> None:
+    Path("s").mkdir()
+    formats.write(Path("s/a.npz"), sphere(2000))
+    Path("s/b.npz").write_bytes(b"broken")
+    first = replace(turned().entries[0], scan="s")
+    made = make(
+        Task("export"), Recording((first, replace(first, pose=1))), Path("out/p%d.png"), 25.0, anonymous=False
+    )
+    assert listed() == ["p0.png"]
+    assert len(made.warnings) == 1
+    assert "frame 1 is left out" in made.warnings[0]
+
+
+def test_modules_of_the_working_directory_are_not_taken_for_scan4d() -> None:
+    Path("viewer").mkdir()
+    Path("viewer/__init__.py").write_text("raise SystemExit('taken')")
+    Path("json.py").write_text("raise SystemExit('taken')")
+    (file,) = make(Task("export"), turned(1), Path("out/a.png"), 25.0, anonymous=False).files
+    from viewer.export import read_description
+
+    assert json.loads(read_description(file))["scan"] == "doe.npz"

@@ -1,0 +1,1 @@
+"""Finding and opening scans: the dialog, the lists, what is dropped onto the window."""

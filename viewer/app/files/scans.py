@@ -1,0 +1,121 @@
+"""The scans that the user can go to without a dialog."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import InputError
+from ...files import printable
+from ...scan.listing import named_scans, scans_beside
+from ...scan.open import DEMO
+from ...task import Task, in_background
+from ..session import known_as
+from ..settings import MOST_RECENT
+
+if TYPE_CHECKING:
+    from ..app import App
+    from ..commands import Item
+
+
+class Scans:
+    """Those to go through one after another, and those opened lately.
+
+    listed: what the user named together, else the scans in the folder of the open one, in natural order.
+    are_together: whether the user did. recent: the last MOST_RECENT that were opened, newest first, as
+    `known_as` has them.
+    """
+
+    def __init__(self, app: App, together: Sequence[str], recent: Sequence[str]) -> None:
+        """together: what the user named at the start, at least one."""
+        self._app = app
+        self.listed: list[str] = []
+        self.are_together = False
+        self._place = ""  # in the list: what was asked for last
+        self._together = list(dict.fromkeys(together))
+        self.recent = tuple(recent)
+        self._there: frozenset[str] = frozenset()  # of the recent ones
+        self._naming: Future[tuple[list[str], list[InputError]]] | None = None
+        self._looking: Future[tuple[list[str], frozenset[str]]] | None = None
+
+    def open(self, names: Sequence[str]) -> None:
+        """Open the first of what the user names together, and list them all; looked at beside the window."""
+        self._naming = in_background(Task("Looking for scans"), lambda: named_scans(names))
+
+    def tell(self, problems: Sequence[InputError]) -> None:
+        """Tell in one message what cannot be opened."""
+        if problems:
+            others = f" {len(problems) - 1} others cannot be opened either." if len(problems) > 1 else ""
+            self._app.note(f"Cannot open: {problems[0]}.{others}")
+
+    def opened(self, scan: str) -> None:
+        """A scan was opened: it is the latest. The list stays where it is in it, else it is named anew."""
+        name, self._place = known_as(scan), scan
+        self.recent = (name, *(other for other in self.recent if other != name))[:MOST_RECENT]
+        if len(self._together) > 1 and scan in self._together:
+            self.listed, self._together, self.are_together = self._together, [], True
+        is_listed = len(self.listed) > 1 and scan in self.listed
+        if not is_listed:
+            self.listed, self.are_together = [scan], False
+        self.look(scan, is_listed)
+
+    def look(self, scan: str, is_listed: bool = True) -> None:
+        """Find out, beside the window, what stands beside a scan and which recent ones are still there."""
+        recent, listed = self.recent, self.listed
+
+        def work() -> tuple[list[str], frozenset[str]]:
+            return listed if is_listed else scans_beside(scan), frozenset(filter(_is_there, recent))
+
+        self._looking = in_background(Task("Looking for scans"), work)
+
+    @property
+    def waits(self) -> bool:
+        """Whether something is being looked for."""
+        return self._naming is not None or self._looking is not None
+
+    def advance(self) -> bool:
+        """Take in what was found; whether there was anything."""
+        if self._naming is not None and self._naming.done():
+            (scans, problems), self._naming = self._naming.result(), None
+            self.tell(problems)
+            if scans:
+                self._together = list(dict.fromkeys(scans))
+                self._app.open(scans[0])
+        if self._looking is None or not self._looking.done():
+            return False
+        self.listed, self._there = self._looking.result()
+        self._looking = None
+        return True
+
+    def step(self, count: int) -> None:
+        """Open the scan so many places further in the list, round its end; past what cannot be opened."""
+        if len(self.listed) > 1:
+            place = self._place if self._place in self.listed else self.listed[0]
+            self._place = self.listed[(self.listed.index(place) + count) % len(self.listed)]
+            self._app.open(self._place)
+
+    @property
+    def lately(self) -> list[str]:
+        """The recent ones that are still there, without the open one."""
+        return [one for one in self.recent if one in self._there and one != known_as(self._app.session.scan)]
+
+    def items(self, scans: Iterable[str]) -> Iterator[Item]:
+        """Some of them for a menu."""
+        for scan in scans:
+            yield title(scan), partial(self._app.open, scan), scan == self._app.session.scan
+
+
+def title(scan: str) -> str:
+    """A scan's name for lists."""
+    return "Demo scan" if scan == DEMO else printable(Path(known_as(scan)).name or scan)
+
+
+def _is_there(scan: str) -> bool:
+    """Whether a scan can still be opened, as far as its name tells; of a pattern its folder must be there."""
+    is_pattern = "%" in scan or glob.has_magic(scan)
+    return scan == DEMO or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))

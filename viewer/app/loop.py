@@ -1,0 +1,121 @@
+"""The window's loop: it sleeps until something has changed, and draws only then."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import TYPE_CHECKING, Any
+
+from . import layout, tasks
+from .files import dropping
+from .turns import Turns
+
+if TYPE_CHECKING:
+    from .app import App
+
+log = logging.getLogger(__name__)
+
+_WATCH = 0.25  # seconds between looks at what workers have done while nothing is awaited
+_AWAIT = 0.015  # the same while a pose or a scan is awaited
+_RATE = 25.0  # pictures a second while the camera moves
+_FASTEST = 30.0  # the same while a scan plays that has more
+_BUSY = 0.9  # of the time between pictures that the window may take over one
+
+
+class Loop:
+    """Runs an app."""
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        self._turns = Turns()
+        self._reported: Any = None
+
+    def run(self) -> None:
+        """Go on until the window is closed."""
+        while not self._ends():
+            self._turns.add("late", 1e3 * self._app.window.wait(self._patience(time.monotonic())))
+            with self._turns.part("advance"):
+                changed = self._advance(time.monotonic())
+            if changed or self._app.window.due:
+                self._draw()
+            self._turns.end()
+
+    def _ends(self) -> bool:
+        """Whether the window is closed, and the user was asked where that cancels an export."""
+        window = self._app.window
+        if window.is_closing and self._app.exporting.keeps_open():
+            window.is_closing = False
+            window.touch()
+        return window.is_closing
+
+    def _patience(self, now: float) -> float:
+        """Seconds to wait for events before looking at what else has changed."""
+        app = self._app
+        waits = app.playback.waiting or app.tasks or app.scans.waits or app.browser.waits
+        look = _AWAIT if waits else _WATCH
+        changes = (
+            app.playback.player.until_next(now), app.notices.next_change(now),
+            app.steering.turntable.next_change(now), app.capture.until_next(now),
+        )  # fmt: skip
+        return min(look, *changes, app.picture.better_at(app.playback.player.playing) - now)
+
+    def _advance(self, now: float) -> bool:
+        """Take in what time and workers have brought; True where there is something to show."""
+        app = self._app
+        app.take_opened()
+        if app.window.dropped:
+            dropping.take(app, app.window.take_dropped())
+        listed = app.scans.advance(), app.browser.advance()
+        if problem := app.keeper.look(now, app.remembered):
+            app.note(problem)
+        app.exporting.advance()
+        app.capture.advance(now)
+        app.playback.advance(now)
+        app.pass_on_messages()
+        told = app.notices.count, len(app.notices.shown(now))
+        cached = app.playback.timeline.cached()
+        report = (app.playback.pose, app.session.index, cached, told, tasks.report(app))
+        changed, self._reported = report != self._reported, report
+        turned = app.steering.advance(now)
+        counted = app.counting.advance(app.picture, not app.moving, now)
+        better = now >= app.picture.better_at(app.playback.player.playing)
+        return changed or turned or counted or any(listed) or better
+
+    def _draw(self) -> None:
+        app, start = self._app, time.perf_counter()
+        with self._turns.part("widgets"):
+            app.window.begin()
+            app.place_view(app.window.to_pixels(*layout.draw(app)))
+        start_picture = time.perf_counter()
+        drew = self._draw_picture()
+        self._turns.add("picture" if drew else "upload", (time.perf_counter() - start_picture) * 1e3)
+        if drew and not app.moving:
+            app.window.touch(frames=1)  # for what the panel says about it
+        with self._turns.part("show"):
+            app.window.fill(app.palette.panel)
+            if app.picture.is_there:
+                app.picture.present(*app.view_corner)
+            app.window.end()
+        if drew:
+            app.picture.took((time.perf_counter() - start) * 1e3, self._goal_ms)
+        log.debug("window drawn")
+
+    def _draw_picture(self) -> bool:
+        app, pose = self._app, self._app.playback.pose
+        if pose is None:
+            return False
+        app.steering.settle(pose)
+        playing, held = app.playback.player.playing, app.steering.moves
+        drew = app.picture.draw(app.session.request(pose), app.view_size, playing=playing, held=held)
+        if drew:
+            app.capture.note_shown()
+        return drew
+
+    @property
+    def _goal_ms(self) -> float:
+        """How long the window may take over a picture: as long as the scan's frames last while it plays,
+        and as the screen needs, which `swap_buffers` may wait for."""
+        player = self._app.playback.player
+        rate = player.rate if player.playing else _RATE
+        wanted_ms = _BUSY * 1e3 / min(max(rate, _RATE if self._app.steering.moves else 0), _FASTEST)
+        return max(wanted_ms, self._app.window.refresh_ms / _BUSY)

@@ -1,0 +1,132 @@
+"""Bookmarks: cameras of a scan by name, to go back to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import count
+from typing import TYPE_CHECKING
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_4 as icons
+
+from .. import widgets
+from ..session import Bookmark, Session
+
+if TYPE_CHECKING:
+    from ..app import App
+    from ..commands import Item
+
+_LONGEST = 60  # letters of a name
+
+
+class Bookmarks:
+    """What the user does with `Session.bookmarks`. tell: takes messages.
+
+    editing: the one whose name is being typed, None while none is.
+    """
+
+    def __init__(self, session: Session, tell: Callable[[str], None]) -> None:
+        self._session, self._tell = session, tell
+        self.editing: Bookmark | None = None
+        self._is_asked = False  # for its name, but the field is not there yet
+        self._last: Bookmark | None = None  # gone to or added
+        self._text = ""
+
+    @property
+    def all(self) -> tuple[Bookmark, ...]:
+        """Those of the scan that is shown."""
+        return self._session.bookmarks
+
+    def add(self) -> None:
+        """Keep the camera under the next free name."""
+        camera = self._session.camera
+        if camera is not None:
+            names = {bookmark.name for bookmark in self.all}
+            name = next(name for n in count(1) if (name := f"View {n}") not in names)
+            self._last = Bookmark(name, camera)
+            self._session.bookmarks = *self.all, self._last
+            self._tell(f"Bookmark '{name}' added.")
+
+    def go_to(self, bookmark: Bookmark) -> None:
+        """Look from there."""
+        self._last = bookmark
+        self._session.camera, self._session.pivot = bookmark.camera, None
+
+    def step(self, direction: int) -> None:
+        """Go to the next one for 1, the previous for -1, round the end."""
+        if self.all:
+            start = self.all.index(self._last) if self._last in self.all else min(-direction, 0)
+            self.go_to(self.all[(start + direction) % len(self.all)])
+
+    def rename(self, number: int, name: str) -> None:
+        """Give one another name; an empty one changes nothing."""
+        name = " ".join(name.split())[:_LONGEST]
+        if name:
+            named = replace(self.all[number], name=name)
+            self._last = named if self._last == self.all[number] else self._last
+            self._session.bookmarks = *self.all[:number], named, *self.all[number + 1 :]
+
+    def delete(self, number: int) -> None:
+        """Forget one."""
+        self._tell(f"Bookmark '{self.all[number].name}' deleted.")
+        self._session.bookmarks = *self.all[:number], *self.all[number + 1 :]
+
+    def items(self) -> Iterator[Item]:
+        """For a menu."""
+        for bookmark in self.all:
+            yield bookmark.name, partial(self.go_to, bookmark), self.is_shown(bookmark)
+
+    def is_shown(self, bookmark: Bookmark) -> bool:
+        """Whether the view is that of a bookmark."""
+        return self._session.camera == bookmark.camera
+
+    # --- the section of the panel -----------------------------------------------------
+
+    def draw(self, app: App) -> None:
+        """Declare the list: a click on a name goes there; buttons rename and delete."""
+        deleted = None
+        for number, bookmark in enumerate(self.all):
+            imgui.push_id(number)
+            if bookmark is self.editing:
+                self._draw_editing(number)
+            else:
+                deleted = number if self._draw_row(number, bookmark) else deleted
+            imgui.pop_id()
+        if deleted is not None:
+            self.delete(deleted)
+        imgui.begin_disabled(self._session.camera is None)
+        if imgui.button(f"{icons.ICON_FA_PLUS}  Add"):
+            self.add()
+        imgui.end_disabled()
+        keys = app.keys.of["bookmark_add"]
+        imgui.set_item_tooltip("Keep this view" + (f" ({keys})" if keys else ""))
+
+    def _draw_row(self, number: int, bookmark: Bookmark) -> bool:
+        """One bookmark; True where it is to be deleted."""
+        gap, side = imgui.get_style().item_inner_spacing.x, 1.3 * imgui.get_frame_height()
+        room = imgui.get_content_region_avail().x - 2 * (side + gap)
+        name = widgets.shortened(bookmark.name, room)
+        imgui.align_text_to_frame_padding()
+        if imgui.selectable(f"{name}##go", self.is_shown(bookmark), 0, ImVec2(room, 0))[0]:
+            self.go_to(bookmark)
+        if name != bookmark.name:
+            imgui.set_item_tooltip(bookmark.name)
+        imgui.same_line(0, gap)
+        if widgets.icon_button(icons.ICON_FA_EDIT, "Rename"):
+            self.editing, self._text, self._is_asked = bookmark, bookmark.name, True
+        imgui.same_line(0, gap)
+        return widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
+
+    def _draw_editing(self, number: int) -> None:
+        """A field for the name. Enter or a click elsewhere keeps it, Escape does not."""
+        imgui.set_next_item_width(-1)
+        if self._is_asked:
+            imgui.set_keyboard_focus_here()
+            self._is_asked = False
+        _, self._text = imgui.input_text("##name", self._text, imgui.InputTextFlags_.auto_select_all)
+        if imgui.is_item_deactivated():
+            if not imgui.is_key_pressed(imgui.Key.escape):
+                self.rename(number, self._text)
+            self.editing = None

@@ -1,0 +1,67 @@
+"""What became of the points of the picture: counted when all is at rest, on a thread of its own."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+from ...gpu.counts import count_points
+from ...task import Task, in_background
+
+if TYPE_CHECKING:
+    from ..app import App
+    from .picture import Picture
+
+_REST = 0.3  # seconds after the last picture
+
+
+class Counting:
+    """counts: those of `count_points` for the picture that is shown; None until they are there."""
+
+    def __init__(self) -> None:
+        self.counts: dict[str, int] | None = None
+        self._picture = 0  # number of the one that is counted
+        self._task: Task | None = None
+        self._future: Future[dict[str, int]] | None = None
+
+    def advance(self, picture: Picture, at_rest: bool, now: float) -> bool:
+        """Begin to count, or take in what was; whether there are other counts than before."""
+        had = self.counts
+        if picture.number != self._picture:
+            self.cancel()
+            self.counts = None
+            if at_rest and picture.is_complete and now > picture.shown_at + _REST:
+                self._begin(picture)
+        if self._future is not None and self._future.done():
+            self.counts, self._future = self._future.result(), None
+        return self.counts is not had
+
+    def _begin(self, picture: Picture) -> None:
+        surface = picture.surface
+        assert surface is not None
+        cloud, view, rows, share = surface.pose.stored, surface.view, surface.row, surface.stats.share
+        self._picture, self._task = picture.number, Task("Counting points")
+        self._future = in_background(self._task, lambda: count_points(cloud, view, rows, share))
+
+    def cancel(self) -> None:
+        """Stop counting."""
+        if self._task is not None:
+            self._task.cancel()
+        self._task = self._future = None
+
+
+def words(app: App) -> list[tuple[str, str]]:
+    """(name, number), as many each time: what is drawn of the points, and why the others are not."""
+    surface, counts = app.picture.surface, app.counting.counts
+    if surface is not None and surface.stats.left_out:
+        left_out = surface.stats.left_out
+        drawn = len(surface.pose.stored) - left_out
+        pixels = math.prod(surface.size) / math.prod(app.picture.size)
+        return [
+            ("Drawn", f"{drawn:,} at most"),
+            ("Preview", f"{left_out:,} left out"),
+            ("", f"{pixels:.0%} of the pixels"),
+        ]
+    names = ("drawn", "hidden", "outside")
+    return [(name.capitalize(), "..." if counts is None else f"{counts[name]:,}") for name in names]

@@ -1,0 +1,155 @@
+"""The orientation cube at the upper right of the 3D view: it turns with the camera, and turns it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+from numpy.typing import NDArray
+
+from .. import theme
+from . import navigation, orientation
+from .orientation import Direction
+
+if TYPE_CHECKING:
+    from ..app import App
+
+_HALF = 1.55  # of an edge, in heights of the font
+_REACH = _HALF * 3**0.5  # of the corners from the centre
+_MARGIN = 0.5
+_ROOM = 14.0  # a smaller view has no cube
+_TEXT_HEIGHT = 0.57  # of a face's label, in half edges
+_READABLE = 0.3  # cosine between line of sight and face from which its label is written
+SHADE = 0.24  # how much darker a face is that is seen from the side
+
+
+class Cube:
+    """What the mouse does with it.
+
+    is_shown: by the user's choice. is_held: the button went down on it. is_dragged: the
+    camera follows the mouse.
+    """
+
+    def __init__(self, is_shown: bool) -> None:
+        self.is_shown: bool = is_shown
+        self.is_held = self.is_dragged = False
+        self.under_mouse: Direction | None = None
+
+    def is_drawn(self, app: App) -> bool:
+        """Whether it can be seen."""
+        return self.is_shown and not app.full_view.is_on and app.session.camera is not None
+
+    def toggle(self) -> None:
+        """Show it, or hide it."""
+        self.is_shown = not self.is_shown
+
+
+def place(width: float, height: float, em: float) -> tuple[float, float, float] | None:
+    """Centre from the view's upper left corner, and half an edge; None in a view that is too small.
+
+    width, height: of the view. em: the font's height.
+    """
+    if min(width, height) < _ROOM * em:
+        return None
+    inset = (_REACH + _MARGIN) * em
+    return width - inset, inset, _HALF * em
+
+
+def take_mouse(app: App, size: ImVec2) -> None:
+    """Let the mouse click and drag the cube; declare this before the view, so that it comes first."""
+    cube, camera = app.steering.cube, app.session.camera
+    where = place(size.x, size.y, imgui.get_font_size())
+    cube.under_mouse = None
+    if camera is None or where is None or not cube.is_drawn(app):
+        cube.is_held = cube.is_dragged = False
+        return
+    x, y, half = where
+    mouse = imgui.get_mouse_pos() - imgui.get_window_pos() - ImVec2(x, y)
+    under = orientation.part_at(orientation.rotation(camera, app.up), mouse.x / half, -mouse.y / half)
+    if under is None and not cube.is_held:
+        return
+    before, reach = imgui.get_cursor_pos(), half * 3**0.5
+    imgui.set_cursor_pos(ImVec2(x - reach, y - reach))
+    clicked = imgui.invisible_button("cube", ImVec2(2 * reach, 2 * reach))
+    imgui.set_cursor_pos(before)
+    cube.is_held = imgui.is_item_active()
+    if imgui.is_item_hovered() or cube.is_held:
+        cube.under_mouse = under
+    if clicked and under is not None and not cube.is_dragged:
+        app.steering.look_from(*orientation.angles(under))
+    cube.is_dragged = cube.is_held and (cube.is_dragged or imgui.is_mouse_dragging(0))
+    if cube.is_dragged:
+        app.steering.turntable.stop()
+        # The cube's surface follows the mouse.
+        delta = imgui.get_io().mouse_delta / (2 * reach)
+        app.session.camera = navigation.orbit(camera, delta.x, -delta.y, app.session.pivot)
+    elif under is not None:
+        imgui.set_item_tooltip(f"Look from {orientation.name(under)}")
+
+
+def draw(app: App, size: ImVec2) -> None:
+    """Draw it over the view in the current ImGui window. size: of the view."""
+    camera, em = app.session.camera, imgui.get_font_size()
+    where = place(size.x, size.y, em)
+    if camera is None or where is None or not app.steering.cube.is_drawn(app):
+        return
+    x, y, half = where
+    _Drawing(app, orientation.rotation(camera, app.up), imgui.get_window_pos() + ImVec2(x, y), half).draw()
+
+
+class _Drawing:
+    """One picture of the cube. center: on the screen. half: an edge's half length."""
+
+    def __init__(self, app: App, turned: NDArray[np.float64], center: ImVec2, half: float) -> None:
+        self.palette, self.marked = app.palette, app.steering.cube.under_mouse
+        self.turned, self.center, self.half = turned, center, half
+        self.draw_list = imgui.get_window_draw_list()
+
+    def on_screen(self, points: NDArray[np.float64]) -> list[Any]:
+        """Points of the cube, (N, 3), as ImGui takes them."""
+        seen = points @ self.turned[:2].T * self.half
+        return [self.center + ImVec2(right, -up) for right, up in seen]
+
+    def draw(self) -> None:
+        """The faces that are seen, with their names."""
+        for face, axis in orientation.FACES.items():
+            facing = float(self.turned[2] @ axis)
+            if facing > 0.01:
+                self.draw_face(axis, facing)
+                if facing > _READABLE:
+                    self.write(face.capitalize(), axis)
+
+    def draw_face(self, face: Direction, facing: float) -> None:
+        """One face, darker the less it faces the eye; what is under the mouse in another colour."""
+        corners = self.on_screen(orientation.square(face))
+        color = theme.mixed(self.palette.button[0], 0x000000, SHADE * (1 - facing))
+        self.draw_list.add_convex_poly_filled(corners, theme.packed(color, 0.95))
+        if self.marked and np.dot(face, self.marked) > 0:
+            marked = self.on_screen(orientation.patch(face, self.marked))
+            self.draw_list.add_convex_poly_filled(marked, theme.packed(self.palette.button[2]))
+        line = theme.packed(self.palette.faint)
+        self.draw_list.add_polyline(corners, line, self.half / 18, imgui.ImDrawFlags_.closed)
+
+    def write(self, text: str, face: Direction) -> None:
+        """Its name, lying in the face: each letter a slanted rectangle of the font's picture."""
+        right, up = orientation.writing(self.turned, face)
+        font = imgui.get_font_baked()
+        scale = _TEXT_HEIGHT / font.size
+        glyphs = [font.find_glyph(ord(letter)) for letter in text]
+        pen = -sum(glyph.advance_x for glyph in glyphs) / 2
+        middle = (font.ascent - font.descent) / 2
+        color = theme.packed(self.palette.text)
+        for glyph in glyphs:
+            left, top = pen + glyph.x0, glyph.y0 - middle
+            across, down = pen + glyph.x1, glyph.y1 - middle
+            places = np.array([(left, top), (across, top), (across, down), (left, down)]) * scale
+            corners = self.on_screen(face + places[:, :1] * right - places[:, 1:] * up)
+            self.draw_list.prim_reserve(6, 4)
+            a, b, c, d = corners
+            self.draw_list.prim_quad_uv(
+                a, b, c, d,
+                ImVec2(glyph.u0, glyph.v0), ImVec2(glyph.u1, glyph.v0),
+                ImVec2(glyph.u1, glyph.v1), ImVec2(glyph.u0, glyph.v1), color,
+            )  # fmt: skip
+            pen += glyph.advance_x

@@ -1,0 +1,82 @@
+"""The scale bar and the colour bar over the 3D view, laid out as on pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+from numpy.typing import NDArray
+
+from ... import marks
+from ...marks import Box, Color, Legend, Marks
+
+if TYPE_CHECKING:
+    from ..app import App
+
+SHOWN_FIRST = Marks(scale_bar=True, color_bar=True)  # until the user chooses
+_STEPS = 32  # of a colour bar; colours between them are blended
+
+
+def toggle(app: App, name: str) -> None:
+    """Show one of `marks.MARKS` or hide it."""
+    app.marks = replace(app.marks, **{name: not getattr(app.marks, name)})
+
+
+def draw(app: App, size: ImVec2) -> None:
+    """Draw the marks of the picture into the current ImGui window, the 3D view. size: of the view."""
+    request, surface = app.picture.request, app.picture.surface
+    if app.session.camera is None or request is None or surface is None or not app.picture.is_there:
+        return
+    pose, count = request.pose, len(app.playback.timeline)
+    told = Legend(app.marks, app.session.camera, surface.look, app.unit, pose.index, count, float(pose.time))
+    corner = imgui.get_window_pos()
+    canvas = _View(corner)
+    marks.draw(canvas, (size.x, size.y), told, surface.color_range)
+    if app.marks.scale_bar and app.steering.gesture is None and imgui.is_window_hovered():
+        left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
+        if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):
+            imgui.set_tooltip(_scale_bar_help(app.steering.is_orthographic))
+
+
+def _scale_bar_help(orthographic: bool) -> str:
+    if orthographic:
+        return "True at every depth"
+    return "True at the depth that the view turns about; what is nearer looks larger"
+
+
+class _View:
+    """A Canvas over the current ImGui window. corner: its upper left one."""
+
+    def __init__(self, corner: ImVec2) -> None:
+        self.em = imgui.get_font_size()
+        self._corner = corner
+        self._list = imgui.get_window_draw_list()
+
+    def width(self, text: str) -> float:
+        return imgui.calc_text_size(text).x
+
+    def text(self, left: float, top: float, text: str) -> None:
+        self._list.add_text(self._corner + ImVec2(round(left), round(top)), _packed(marks.INK), text)
+
+    def box(self, box: Box, color: Color) -> None:
+        self._list.add_rect_filled(*self._corners(box), _packed(color))
+
+    def gradient(self, box: Box, colors: NDArray[np.uint8]) -> None:
+        left, top, right, bottom = box
+        edges = np.linspace(bottom, top, _STEPS + 1)
+        packed = [_packed(colors[i]) for i in np.linspace(0, len(colors) - 1, _STEPS + 1).round().astype(int)]
+        for step in range(_STEPS):
+            low, high = packed[step : step + 2]
+            corners = self._corners((left, float(edges[step + 1]), right, float(edges[step])))
+            self._list.add_rect_filled_multi_color(*corners, high, high, low, low)
+
+    def _corners(self, box: Box) -> tuple[ImVec2, ImVec2]:
+        left, top, right, bottom = map(round, box)
+        return self._corner + ImVec2(left, top), self._corner + ImVec2(right, bottom)
+
+
+def _packed(color: Color | NDArray[np.uint8]) -> int:
+    red, green, blue, alpha = (int(part) for part in color)
+    return red | green << 8 | blue << 16 | alpha << 24

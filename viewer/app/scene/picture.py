@@ -1,0 +1,218 @@
+"""The picture in the window: drawn anew only where another one is asked for."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections import defaultdict, deque
+from dataclasses import replace
+from typing import Any
+
+from ...errors import Scan4DError
+from ...frame import Request, bring, fallback, is_prepared, render_frame
+from ...gpu.context import Gpu
+from ...gpu.present import Presenter
+from ...gpu.surface import Surface
+from ...pick import Picked, pick
+from ...renderer import Renderer
+from ...scan.points import Bounds
+from ...scan.pose import Pose
+from .detail import Detail, Level
+from .motion import Motion
+
+log = logging.getLogger(__name__)
+_RATE_SPAN = 1.0  # seconds over which pictures are counted
+_PREPARED_LATER = 0.1  # seconds until drawing again may find what a worker prepares
+_UPLOAD_MS = 20.0  # that one turn of the window's loop may spend on uploading a pose
+
+
+class Picture:
+    """Draws requests for the view.
+
+    request: what was drawn last, None before. problem: why it could not be drawn, None
+    where it could. size: of the view, pixels. While it moves, a picture may be a preview, of
+    fewer points and pixels, which is drawn in full at rest. surface: what the picture shows,
+    smaller than the view where it is a preview. number: of pictures drawn so far. shown_at: by
+    the clock, when the last one was there.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self.gpu = gpu
+        self.renderer = Renderer(gpu)
+        self._presenter = Presenter(gpu)
+        self.size = (1, 1)
+        self.number = 0
+        self.shown_at = -math.inf
+        self.surface: Surface | None = None
+        self._surfaces: dict[str, Surface] = {}  # one in full, one for previews
+        self._level = Level()  # that was drawn last
+        self.request: Request | None = None
+        self.problem: Scan4DError | None = None
+        self._prepared_at = math.inf  # by the clock, when what is being prepared may be there
+        self._drawn: Any = None
+        self._asked_for: Request | None = None  # the last one that was drawn as it says
+        self._motion = Motion()
+        self._details: defaultdict[str, Detail] = defaultdict(Detail)  # by the backend's name
+        self._bounded: tuple[Pose, Bounds] | None = None
+        self._times: deque[float] = deque()
+        self._picked: tuple[tuple[int, int], Picked | None] | None = None
+
+    def draw(
+        self, request: Request, size: tuple[int, int], *, playing: bool = False, held: bool = False
+    ) -> bool:
+        """Draw a request, unless the picture already shows it; whether it did.
+
+        size: pixels. playing: other poses will follow in time. held: the camera is dragged or turns.
+        """
+        wanted = (
+            request.pose, request.camera, request.backend, request.params, request.look, size,
+            self.gpu.timers.enabled,
+        )  # fmt: skip
+        now = time.monotonic()
+        if wanted != self._drawn:
+            self._motion.change(now, playing or held)
+        elif now < self.better_at(playing):
+            return False
+        elif self.renderer.preparing is not None and not self.is_preview:
+            self._prepared_at = now + _PREPARED_LATER  # the same again would be the same
+            return False
+        try:
+            if not bring(self.renderer, request, _UPLOAD_MS):
+                self._prepared_at = now  # until then the picture before stays
+                return False
+            self._drawn, self.request, self._picked = wanted, request, None
+            self.problem, self._prepared_at = None, math.inf
+            self.size = size
+            self._level = self._detail(request).level if playing or now < self._motion.ends else Level()
+            self.surface = surface = self._surface_of(self._level)
+            refinable = render_frame(self.renderer, request, surface, wait=False, share=self._level.share)
+        except Scan4DError as problem:
+            self._drawn, self.request, self.problem = wanted, request, problem
+            return True
+        self._note_drawn(request, surface, refinable)
+        return True
+
+    def _note_drawn(self, request: Request, surface: Surface, refinable: bool) -> None:
+        if surface.stats.backend == str(request.backend):
+            self._asked_for = request
+        drew, count = surface.stats.backend, len(request.pose.cloud) - surface.stats.left_out
+        now = self.shown_at = time.monotonic()
+        self.number += 1
+        self._times.append(now)
+        self._motion.show(now)
+        if refinable and not self.is_preview:
+            self._prepared_at = now + (0 if drew == request.backend else _PREPARED_LATER)
+        pixels = surface.size
+        log.debug("drew frame %d with %s, %dx%d pixels, %d points", request.pose.index, drew, *pixels, count)
+
+    def without_preparing(self, request: Request) -> Request:
+        """What to show instead, so that nothing has to be prepared: as it was before, or plain points."""
+        if self._asked_for is not None:
+            before = replace(self._asked_for, pose=request.pose, camera=request.camera)
+            if is_prepared(self.renderer, before):
+                return before
+        return fallback(request)
+
+    def finish(self) -> None:
+        """Draw the picture in full, where it is a preview."""
+        if self.is_preview and self.request is not None:
+            self._motion.end()
+            self.draw(self.request, self.size)
+
+    def rest(self) -> None:
+        """Draw the next picture in full, however soon it comes."""
+        self._motion.end()
+
+    @property
+    def is_preview(self) -> bool:
+        """Whether points or pixels were left out to be in time."""
+        surface = self.surface if self.is_there else None
+        return surface is not None and (surface.stats.left_out > 0 or surface.size != self.size)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether drawing the same again would change nothing."""
+        return self.request is not None and math.isinf(self.better_at(playing=False))
+
+    def better_at(self, playing: bool) -> float:
+        """By the clock, when drawing the same again may give a better picture; infinite where it cannot."""
+        rest = self._motion.ends if self.is_preview and not playing else math.inf
+        return min(self._prepared_at, rest)
+
+    def took(self, ms: float, goal_ms: float) -> None:
+        """Say how long the window took to show what was drawn last, and how long it may take."""
+        surface, request = self.surface, self.request
+        if self.problem is not None or surface is None or request is None:
+            return
+        if surface.stats.backend == str(request.backend):
+            self._detail(request).note(ms, self._level, goal_ms, len(request.pose.cloud))
+
+    def _detail(self, request: Request) -> Detail:
+        return self._details[str(request.backend)]
+
+    def _surface_of(self, level: Level) -> Surface:
+        """The surface for a level; one in full and one for previews are kept."""
+        width, height = (max(1, round(pixels * level.scale)) for pixels in self.size)
+        kind = "full" if level.scale == 1 else "preview"
+        surface = self._surfaces.get(kind)
+        if surface is None or surface.size != (width, height):
+            if surface is not None:
+                del self._surfaces[kind]
+                surface.release()
+            surface = self._surfaces[kind] = Surface(self.gpu, (width, height))
+        return surface
+
+    @property
+    def is_there(self) -> bool:
+        """Whether there is a picture to show."""
+        return self.surface is not None and self.request is not None and self.problem is None
+
+    def present(self, left: int, bottom: int) -> None:
+        """Copy it to the window. left, bottom: its corner, pixels from the window's lower left."""
+        if self.surface is not None:
+            self._presenter.present(self.surface, left, bottom, self.size)
+
+    def pick(self, pixel: tuple[int, int]) -> Picked | None:
+        """What a pixel shows, without its spacing; read from the GPU once for each place and picture."""
+        if self.surface is None or not self.is_there:
+            return None
+        if self._picked is None or self._picked[0] != pixel:
+            # A pixel is as good as its middle where the picture has fewer than the view.
+            across, down = (
+                math.floor((at + 0.5) * n / m)
+                for at, n, m in zip(pixel, self.surface.size, self.size, strict=True)
+            )
+            self._picked = pixel, pick(self.surface, across, down, spacing=False)
+        return self._picked[1]
+
+    def pick_in_full(self) -> Picked | None:
+        """The last `pick` once more, in the picture in full; None where that was before another picture."""
+        pixel = self._picked and self._picked[0]
+        self.finish()
+        return self.pick(pixel) if pixel else None
+
+    def clear(self) -> None:
+        """Show nothing until the next request."""
+        self._drawn = self.request = self.problem = self._bounded = self._picked = None
+        self._prepared_at = math.inf
+
+    def bounds(self, pose: Pose) -> Bounds:
+        """The robust bounds of a pose, found once; also of one that is too large to draw."""
+        if self._bounded is None or self._bounded[0] is not pose:
+            self._bounded = pose, pose.cloud.bounds()
+        return self._bounded[1]
+
+    @property
+    def rate(self) -> float:
+        """Pictures drawn in the last second."""
+        while self._times and self._times[0] < time.monotonic() - _RATE_SPAN:
+            self._times.popleft()
+        return len(self._times) / _RATE_SPAN
+
+    def release(self) -> None:
+        """Let go of everything on the GPU."""
+        for surface in self._surfaces.values():
+            surface.release()
+        self._presenter.release()
+        self.renderer.release()

@@ -1,0 +1,66 @@
+"""What the mouse points at, and how that is told."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING
+
+from ...pick import Picked
+
+if TYPE_CHECKING:
+    from ..app import App
+
+log = logging.getLogger(__name__)
+
+_DIGITS = 4  # of positions, after the leading digit of the scan's radius
+
+
+class Pointer:
+    """The place of the picture that is under the mouse.
+
+    picked: what is seen there, None where nothing is. words: the same for users.
+    """
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        self.picked: Picked | None = None
+        self.words: list[str] = []
+
+    def point_at(self, pixel: tuple[int, int] | None) -> None:
+        """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
+        app = self._app
+        picked = app.picture.pick(pixel) if pixel else None
+        if picked is self.picked:
+            return
+        self.picked, self.words = picked, []
+        if picked is not None and app.picture.request is not None:
+            pose = app.picture.request.pose
+            frame = f"frame {pose.index + 1}/{len(app.playback.timeline)}"
+            self.words = describe(picked, frame, app.unit, app.picture.bounds(pose).radius)
+        log.debug("under the mouse: %s", "; ".join(self.words))
+
+    def in_full(self) -> Picked | None:
+        """What is seen there when the picture is no preview."""
+        return self._app.picture.pick_in_full() or self.picked
+
+
+def describe(picked: Picked, frame: str, unit: str, radius: float) -> list[str]:
+    """Position, frame, point and the point's attributes: the most wanted first.
+
+    radius: of the scan, scan units; positions get the digits that matter for its size.
+    """
+    decimals = min(max(_DIGITS - math.floor(math.log10(radius or 1.0)), 0), 9)
+    words = [f"{', '.join(f'{v:.{decimals}f}' for v in picked.position)} {unit}", frame]
+    seen = "measured" if picked.measured else f"filled from level {picked.level}"
+    words.append(seen if picked.id is None else f"point {picked.id}, {seen}")
+    words += [f"{name} {_number(value)}" for name, value in picked.scalars.items()]
+    if picked.color is not None:
+        words.append("colour #" + "".join(f"{channel:02x}" for channel in picked.color[:3]))
+    if picked.normal is not None:
+        words.append(f"normal {', '.join(f'{v:.2f}' for v in picked.normal)}")
+    return words
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,63 @@
+"""Which backend draws, and its pyramid levels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...backends import backends
+from . import levels
+
+if TYPE_CHECKING:
+    from ..app import App
+
+
+class Rendering:
+    """Changes `session.backend` and `session.params`."""
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+
+    @property
+    def backend(self) -> str | None:
+        """The name of the backend that draws; None before the first pose."""
+        pose = self._app.playback.pose
+        return None if pose is None else self._app.session.chosen(pose)[0]
+
+    def choose(self, name: str) -> None:
+        """Draw with a backend."""
+        self._app.session.backend = name
+
+    def choose_next(self) -> None:
+        """Draw with the next backend."""
+        if self.backend is not None:
+            names = list(backends())
+            self.choose(names[(names.index(self.backend) + 1) % len(names)])
+
+    @property
+    def _params(self) -> Any:
+        """The backend's parameters; None before the first pose."""
+        pose = self._app.playback.pose
+        return None if pose is None else self._app.session.chosen(pose)[1]
+
+    @_params.setter
+    def _params(self, params: Any) -> None:
+        if self.backend is not None:
+            self._app.session.params[self.backend] = params
+
+    @property
+    def levels(self) -> dict[int, bool]:
+        """The backend's pyramid levels and whether they are on; empty where it has none."""
+        return {} if self._params is None else levels.levels(self._params)
+
+    def toggle_level(self, number: int) -> None:
+        """Switch one of the backend's pyramid levels on or off."""
+        self._params = levels.toggled(self._params, number)
+
+    @property
+    def is_filling(self) -> bool:
+        """Whether all levels that fill holes are on."""
+        return self._params is not None and levels.is_filling(self._params)
+
+    def toggle_filling(self) -> None:
+        """Switch all levels that fill holes on or off."""
+        self._params = levels.with_filling(self._params, not self.is_filling)

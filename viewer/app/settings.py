@@ -1,0 +1,306 @@
+"""What comes back at the next start: one JSON file of the user's."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..backends import backend
+from ..camera import Camera
+from ..errors import InputError
+from ..files import whole_file
+from ..geometry import up_vector
+from ..look import COLOR_BY, Look
+from ..marks import Marks
+from ..params import describe
+from . import theme
+from .place import Place
+from .playing.player import Pace
+from .scene import legend, turntable
+from .session import Bookmark, Left, Session
+from .tools.export_plan import Choices
+
+T = TypeVar("T")
+FORMAT = 1
+FILE = "settings.json"
+MOST_RECENT = 15
+_MOST_PLACES = 200
+_UPRIGHT = 0.999  # cosine between a camera's up and the scan's
+_LOOK_EVERY = 3.0  # seconds between looks at what has changed
+_OF_ONE_SCAN = ("up", "low", "high")  # of a look: no use for the next scan
+_WRONG = (InputError, TypeError, ValueError, KeyError, AttributeError, ArithmeticError)  # by odd JSON
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The choices that outlive the window.
+
+    window: None until it was open once. backend: None for the scan's own default. params: backend ->
+    its `Params`. marks: over the view. cube: whether the orientation cube is shown. turn_seconds: of the
+    turntable. export, export_marks: of the export dialog. recent: the scans opened last, newest first.
+    places: scan, as `known_as` has it -> how it was left, the last one at the end.
+    """
+
+    window: Place | None = None
+    theme: str = theme.DEFAULT
+    text_scale: float = 1.0
+    backend: str | None = None
+    params: Mapping[str, Any] = field(default_factory=dict)
+    look: Look = field(default_factory=Look)
+    pace: Pace = field(default_factory=Pace)
+    marks: Marks = legend.SHOWN_FIRST
+    cube: bool = True
+    turn_seconds: float = turntable.USUAL
+    export: Choices = field(default_factory=Choices)
+    export_marks: Marks = field(default_factory=Marks)
+    recent: tuple[str, ...] = ()
+    places: Mapping[str, Left] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, session: Session, **others: Any) -> Settings:
+        """What a session holds, and other fields by name."""
+        session.leave()
+        return cls(
+            backend=session.backend, params=dict(session.params), look=session.look, pace=session.pace,
+            places=dict(session.places), **others,
+        )  # fmt: skip
+
+    def session(self, scan: str, up: str) -> Session:
+        """A session that begins with a scan, as it was left. up: the up axis; other cameras are forgotten."""
+        places = {name: _under(left, up) for name, left in self.places.items()}
+        session = Session(
+            scan, backend=self.backend, params=dict(self.params), look=replace(self.look, up=up),
+            pace=self.pace, places=places,
+        )  # fmt: skip
+        session.find_again()
+        return session
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        data = {"format": FORMAT} | asdict(self)
+        data["places"] = dict(list(data["places"].items())[-_MOST_PLACES:])
+        data["params"] = {name: _chosen(values) for name, values in self.params.items()}
+        data["look"] = {k: value for k, value in _chosen(self.look).items() if k not in _OF_ONE_SCAN}
+        return data
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Settings:
+        """What can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
+        return cls(**_usable(data, _READERS))
+
+
+def load(path: Path) -> tuple[Settings, list[str]]:
+    """The settings of a file, the defaults where there is none, and what the user should know.
+
+    A file that is damaged or of another version is put aside, and all starts anew.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return Settings(), []
+    except OSError as error:
+        return Settings(), [str(InputError(f"cannot be read ({error.strerror})", path, "All starts anew"))]
+    except (ValueError, RecursionError):  # of encoding as well
+        return Settings(), [_put_aside(path, "is damaged")]
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        return Settings(), [_put_aside(path, "is of another version of Scan4D")]
+    return Settings.from_json(data), []
+
+
+def save(settings: Settings, path: Path) -> None:
+    """Write the file, and its folder. Raises InputError where it cannot be written."""
+    text = json.dumps(settings.to_json(), indent=1)
+    with whole_file(path) as temporary:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+class Keeper:
+    """Keeps the file up to date on a thread of its own, so that a crash loses little.
+
+    path: of the file. saved: what is in it.
+    """
+
+    def __init__(self, path: Path, saved: Settings) -> None:
+        self._path = path
+        self._saved: Settings | None = saved
+        self._seen = saved
+        self._next_look = 0.0
+        self._writing: Future[None] | None = None
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="settings")
+
+    def look(self, now: float, current: Callable[[], Settings]) -> str | None:
+        """Save what has changed and is at rest; now and then only. now: by the clock, seconds.
+
+        Returns what went wrong, once: from then on only closing tries again.
+        """
+        if now < self._next_look:
+            return None
+        self._next_look = now + _LOOK_EVERY
+        settings = current()
+        if settings == self._seen and settings != self._saved and not self._is_writing:
+            self._saved = settings
+            self._writing = self._worker.submit(save, settings, self._path)
+            return None
+        self._seen = settings
+        return self._take_problem()
+
+    def close(self, current: Settings) -> str | None:
+        """Save, and wait for it. Returns what went wrong."""
+        if current != self._saved or self._is_writing:
+            self._writing = self._worker.submit(save, current, self._path)
+        self._worker.shutdown()
+        return self._take_problem()
+
+    @property
+    def _is_writing(self) -> bool:
+        return self._writing is not None and not self._writing.done()
+
+    def _take_problem(self) -> str | None:
+        if self._writing is None or self._is_writing:
+            return None
+        error, self._writing = self._writing.exception(), None
+        if error is not None:
+            self._next_look, self._saved = math.inf, None
+        return None if error is None else f"Settings are not kept: {error}"
+
+
+def _chosen(values: Any) -> dict[str, Any]:
+    """The values of a declaration that are not its defaults, which a later version may change."""
+    read = {parameter.name: getattr(values, parameter.name) for parameter in describe(type(values))}
+    return {name: value for name, value in read.items() if value != getattr(type(values)(), name)}
+
+
+def _put_aside(path: Path, what: str) -> str:
+    kept = path.with_name(f"{path.stem}.old{path.suffix}")
+    try:
+        os.replace(path, kept)
+    except OSError as error:
+        return str(InputError(f"{what}, and cannot be moved ({error.strerror})", path, "All starts anew"))
+    return str(InputError(what, path, f"It is kept as {kept.name}; all starts anew"))
+
+
+# --- reading what may be wrong ----------------------------------------------------------------
+
+
+def _usable(data: Mapping[str, Any], readers: Mapping[str, Callable[[Any], Any]]) -> dict[str, Any]:
+    """The values that their readers take, by name; what is wrong or has no reader is left out."""
+    values = {}
+    for name, read in readers.items():
+        with suppress(*_WRONG):
+            values[name] = read(data[name])
+    return values
+
+
+def _declared(cls: type[T], data: Mapping[str, Any], default: T | None = None) -> T:
+    """An instance of a declaration (see viewer/params.py) with those values that it takes."""
+    values: Any = cls() if default is None else default
+    for parameter in describe(cls):
+        with suppress(*_WRONG):
+            values = replace(values, **{parameter.name: parameter.parse(data[parameter.name])})
+    return values
+
+
+def _look(data: Mapping[str, Any]) -> Look:
+    look = _declared(Look, {name: value for name, value in data.items() if name not in _OF_ONE_SCAN})
+    return look if look.color_by in COLOR_BY else replace(look, color_by="auto")  # a scalar of one scan
+
+
+def _params(data: Mapping[str, Any]) -> dict[str, Any]:
+    read = {}
+    for name, values in data.items():
+        with suppress(*_WRONG):
+            read[name] = _declared(backend(name).module.Params, values)
+    return read
+
+
+def _under(left: Left, up: str) -> Left:
+    """How a scan was left, where its camera stands upright."""
+    if left.camera is None:
+        return left
+    above = np.array(left.camera.up)
+    is_upright = above @ up_vector(up) >= _UPRIGHT * np.linalg.norm(above)
+    return left if is_upright else replace(left, camera=None)
+
+
+def _theme(data: Any) -> str:
+    if data not in theme.PALETTES:
+        raise InputError("there is no such theme")
+    return str(data)
+
+
+def _window(data: Any) -> Place:
+    numbers = [data[name] for name in ("left", "top", "width", "height")]
+    if not all(type(number) is int and abs(number) < 2**15 for number in numbers):
+        raise InputError("is no place of a window")
+    left, top, width, height = numbers
+    return Place(left, top, width, height, data.get("maximised") is True)
+
+
+def _text_scale(data: Any) -> float:
+    if data not in theme.TEXT_SCALES:
+        raise InputError("there is no such size of text")
+    return float(data)
+
+
+def _turn_seconds(data: Any) -> float:
+    if data not in turntable.SECONDS:
+        raise InputError("there is no such time for a turn")
+    return float(data)
+
+
+def _text(data: Any) -> str:
+    if not isinstance(data, str) or not data or "\0" in data:
+        raise InputError("is no text")
+    return data
+
+
+def _index(data: Any) -> int:
+    if type(data) is not int or not 0 <= data < 2**31:
+        raise InputError("is no frame")
+    return data
+
+
+def _recent(data: Any) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_text(name) for name in data))[:MOST_RECENT]
+
+
+def _left(data: Any) -> Left:
+    return Left(**_usable(data, _OF_A_SCAN))
+
+
+def _places(data: Any) -> dict[str, Left]:
+    return {name: _left(left) for name, left in data.items() if "\0" not in name}
+
+
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "window": _window,
+    "theme": _theme,
+    "text_scale": _text_scale,
+    "backend": lambda data: backend(data).name,
+    "params": _params,
+    "look": _look,
+    "pace": lambda data: _declared(Pace, data),
+    "marks": lambda data: _declared(Marks, data, legend.SHOWN_FIRST),
+    "cube": lambda data: data is not False,
+    "turn_seconds": _turn_seconds,
+    "export": lambda data: _declared(Choices, data),
+    "export_marks": lambda data: _declared(Marks, data),
+    "recent": _recent,
+    "places": _places,
+}
+_OF_A_SCAN: dict[str, Callable[[Any], Any]] = {
+    "index": _index,
+    "camera": Camera.from_json,
+    "unit": _text,
+    "bookmarks": lambda data: tuple(Bookmark.from_json(bookmark) for bookmark in data),
+}

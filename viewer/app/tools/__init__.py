@@ -1,0 +1,1 @@
+"""What is done with a picture: measuring, saving, recording, replaying, exporting."""

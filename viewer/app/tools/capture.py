@@ -1,0 +1,134 @@
+"""Pictures and recordings of what is shown, and replaying them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from functools import partial
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from ...errors import InputError
+from ...export import write_png
+from ...files import free_file
+from ...recording import Entry, Recorder
+from ...task import Task, in_background
+from .replaying import Replaying
+
+if TYPE_CHECKING:
+    from ..app import App
+
+_LOOK = 0.02  # seconds between looks at whether a picture has been written
+
+
+class Capture:
+    """Saves what is shown in the working directory.
+
+    recorder: takes down what is shown, None while nothing is recorded. replaying: a recording that is
+    shown again, None while none is. last: the recording saved last.
+    """
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        self.recorder: Recorder | None = None
+        self.replaying: Replaying | None = None
+        self.last: Path | None = None
+        self._saving: list[Future[tuple[Path | None, str]]] = []  # pictures, in the order of their names
+        self._naming = Lock()  # one free name at a time
+
+    def shown(self) -> Entry | None:
+        """What the picture shows, None where there is none."""
+        app = self._app
+        request = app.picture.request
+        if not app.picture.is_there or request is None:
+            return None
+        return Entry.of(request, app.session.scan, app.hash, app.picture.size, app.unit)
+
+    def screenshot(self) -> None:
+        """Save the picture as it is shown, in full and without panels."""
+        self._app.picture.finish()
+        surface, entry = self._app.picture.surface, self.shown()
+        if surface is None or entry is None:
+            self._app.note("There is no picture to save.")
+            return
+        image, text = surface.image(), entry.description()
+        work = partial(self._saved, ".png", lambda path: write_png(image, path, text))
+        self._saving.append(in_background(Task("Saving"), work))
+
+    # --- recording --------------------------------------------------------------------
+
+    def toggle_recording(self) -> None:
+        """Take down what is shown from now on; or stop, and save it."""
+        now = time.monotonic()
+        if self.recorder is None:
+            self.recorder = Recorder(now)
+            self.note_shown()
+            self._app.note("Recording what is shown, until you stop it.")
+            return
+        recorder, self.recorder = self.recorder, None
+        if len(recorder):
+            path, words = self._saved(".json", recorder.finish(now).save)
+            self.last = path or self.last
+            self._app.note(words)
+        else:
+            self._app.note("Nothing was shown while recording.")
+
+    def note_shown(self) -> None:
+        """Take down what is shown where that is being recorded."""
+        if self.recorder is not None and (entry := self.shown()) is not None:
+            self.recorder.note(entry, time.monotonic())
+
+    def _saved(self, suffix: str, write: Callable[[Path], None]) -> tuple[Path | None, str]:
+        """Write a file under the next free name; returns it, None where that fails, and what to tell."""
+        with self._naming:
+            path = free_file(Path.cwd(), suffix)
+            try:
+                write(path)
+            except InputError as error:
+                return None, str(error)
+        return path, f"Saved {path}"
+
+    def _tell_saved(self) -> None:
+        """Tell of the pictures that have been written."""
+        while self._saving and self._saving[0].done():
+            _, words = self._saving.pop(0).result()
+            self._app.note(words)
+
+    # --- replaying --------------------------------------------------------------------
+
+    def replay(self, path: Path) -> None:
+        """Show a recording again, or what a picture tells of itself."""
+        try:
+            self.replaying = Replaying(path)
+        except InputError as error:
+            self._app.note(str(error))
+
+    def replay_last(self) -> None:
+        """Show the recording saved last again."""
+        if self.last is not None:
+            self.replay(self.last)
+
+    def stop_replaying(self) -> None:
+        """Stay at what is shown."""
+        self.replaying = None
+
+    def until_next(self, now: float) -> float:
+        """Seconds until the there is something to do; infinite where there is nothing."""
+        soon = _LOOK if self._saving else math.inf
+        return soon if self.replaying is None else min(soon, self.replaying.until_next(now))
+
+    def advance(self, now: float) -> None:
+        """Let the replay go on. The user's own moves end it."""
+        self._tell_saved()
+        if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
+            self.stop_replaying()
+
+    def close(self) -> None:
+        """Save what is being recorded, and wait for pictures that are being written."""
+        wait(self._saving)
+        self._tell_saved()
+        if self.recorder is not None:
+            self.toggle_recording()

@@ -1,0 +1,173 @@
+"""Measuring in the window: clicks set the ends, and what was measured is kept with its scan."""
+
+from __future__ import annotations
+
+import logging
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from ...errors import InputError
+from ...files import free_file
+from ...measurement import End, Measurements, Reading, in_words, read, save, table, to_text
+from ...pick import is_seen, pick
+
+if TYPE_CHECKING:
+    from ...scan.timeline import Timeline
+    from ..app import App
+
+log = logging.getLogger(__name__)
+_LONGEST_UNIT = 16  # letters
+_SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is before what it hides
+
+
+class Measuring:
+    """What was measured, by scan, and the tool that does it.
+
+    active: whether clicks in the view set ends. filled: whether they may set them where holes are filled.
+    to_show: whether the panel has yet to show the list. saving: the file name in the dialog that saves, None
+    while it is closed; problem: why it could not be saved under that name.
+    """
+
+    def __init__(self, app: App) -> None:
+        self.app = app
+        self.active = False
+        self.filled = False
+        self.to_show = False
+        self.saving: str | None = None
+        self.problem = ""
+        self._of: defaultdict[str, Measurements] = defaultdict(Measurements)
+        self._seen: tuple[object, dict[End, bool]] = None, {}
+        self._told: list[str] = []
+        self._followed = ""  # the scan that was found to have one topology, last
+
+    @property
+    def here(self) -> Measurements:
+        """Those of the scan that is open."""
+        return self._of[self.app.session.scan]
+
+    def toggle(self) -> None:
+        """Take up the tool or put it away; a measurement that was begun goes with it."""
+        self.active = self.to_show = not self.active
+        self.here.begun = None
+        log.debug("measuring %s", "begins" if self.active else "ends")
+
+    def click(self, pixel: tuple[int, int]) -> None:
+        """Set an end at what a pixel of the view shows, or say why it cannot be."""
+        self.app.picture.finish()
+        surface, request = self.app.picture.surface, self.app.picture.request
+        if surface is None or request is None or not self.app.picture.is_there:
+            return
+        picked = pick(surface, *pixel)
+        if picked is None:
+            self.app.note("There is nothing to measure here.")
+            return
+        try:
+            end = End.of(picked, request.pose, filled=self.filled)
+        except InputError as error:
+            self.app.note(str(error))
+            return
+        log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
+        if made := self.here.set_end(end):
+            self.to_show = True
+            log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
+        _learn_topology(self.app.playback.timeline, request.pose.index)
+
+    def readings(self) -> list[Reading]:
+        """Them as they stand in the frame that is shown, in order; none before the first frame."""
+        pose, one_topology = self.app.playback.pose, self.app.playback.timeline.one_topology
+        if pose is None:
+            return []
+        return [read(measurement, pose, one_topology) for measurement in self.here.all]
+
+    def watch(self, readings: Sequence[Reading]) -> None:
+        """Tell when measurements that followed their points no longer can; note in the log what they read."""
+        scan, one_topology = self.app.session.scan, self.app.playback.timeline.one_topology
+        if one_topology:
+            self._followed = scan
+        elif self._followed == scan and one_topology is False:
+            self._followed = ""
+            if readings:
+                self.app.note("Not all frames have the same points: measurements stay fixed in space.")
+        told = [f"{distance_words(reading, self.app.unit)}, {reading.motion}" for reading in readings]
+        if told != self._told:
+            self._told = told
+            log.debug("measurements: %s", "; ".join(told) or "none")
+
+    def is_seen(self, end: End) -> bool:
+        """Whether an end is in the picture and not behind what that shows; found once a picture."""
+        surface, shown = self.app.picture.surface, self.app.picture.request
+        if surface is None or shown is None or not self.app.picture.is_there:
+            return True
+        if self._seen[0] is not shown:
+            self._seen = shown, {}
+        known = self._seen[1]
+        if end not in known:
+            spacings, share = _SLACK
+            slack = spacings * (end.spacing or 0) + share * self.app.picture.bounds(shown.pose).radius
+            known[end] = is_seen(surface, end.position, slack)
+        return known[end]
+
+    def name_unit(self, text: str) -> None:
+        """Call the scan's unit of length so; an empty text leaves it unknown."""
+        name = "".join(letter for letter in text if letter.isprintable())[:_LONGEST_UNIT]
+        self.app.session.unit = name.strip() or None
+        log.debug("unit %s", self.app.unit)
+
+    # --- out of the window ------------------------------------------------------------
+
+    def copy(self) -> None:
+        """Put a table of all into the clipboard, for spreadsheets."""
+        imgui.set_clipboard_text(to_text(self._table(), "\t"))
+        self.app.note(f"Copied {len(self.here.all)} measurements as a table.")
+
+    def ask_to_save(self) -> None:
+        """Open the dialog that saves, with a name that is free."""
+        self.saving, self.problem = str(free_file(Path.cwd(), ".csv")), ""
+
+    def save(self) -> None:
+        """Write them as the CSV file of the dialog and close that, or say why it cannot be written."""
+        assert self.saving is not None
+        try:
+            save(Path(self.saving), self._table())
+        except InputError as error:
+            self.problem = str(error)
+        else:
+            self.app.note(f"Saved {self.saving}")
+            self.saving = None
+
+    def _table(self) -> list[list[object]]:
+        """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
+        rows: list[tuple[int, Reading]] = []
+        for number, (made, reading) in enumerate(zip(self.here.all, self.readings(), strict=True), 1):
+            rows.append((number, Reading(made, reading.fixed)))
+            if reading.measurement != made:
+                rows.append((number, reading))
+        return table(rows, self.app.playback.timeline.name, self.app.unit)
+
+
+def distance_words(reading: Reading, unit: str) -> str:
+    """The distance and its uncertainty."""
+    return in_words(reading.measurement.distance, reading.measurement.uncertainty, unit)
+
+
+def snap_words(reading: Reading) -> str:
+    """What the ends snapped to, such as "points 12 and 345"."""
+    ids = [end.id for end in reading.measurement.ends if end.id is not None]
+    if len(ids) == 2:
+        return f"points {ids[0]} and {ids[1]}"
+    return f"point {ids[0]} and surface" if ids else "surface"
+
+
+def _place_words(end: End) -> tuple[str, str]:
+    return ", ".join(map(repr, end.position)), "surface" if end.id is None else f"point {end.id}"
+
+
+def _learn_topology(timeline: Timeline, index: int) -> None:
+    """Have a second frame read where only one is known, since that tells whether points can be followed."""
+    if timeline.one_topology is None and len(timeline) > 1:
+        timeline.request((index + 1) % len(timeline))
+        timeline.request(index)

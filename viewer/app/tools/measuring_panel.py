@@ -1,0 +1,124 @@
+"""Measurements in the panel: their list, the unit of length, and the dialog that saves them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_4 as icons
+
+from ...measurement import End, Reading
+from .. import widgets
+from .measuring import distance_words, snap_words
+
+if TYPE_CHECKING:
+    from ..app import App
+
+_UNKNOWN = "units"  # what a timeline calls a unit that nobody knows
+_DIALOG = "Save measurements"
+
+
+def draw(app: App) -> None:
+    """Declare the section of the panel."""
+    measuring, here = app.measuring, app.measuring.here
+    half = ImVec2((imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2, 0)
+    if imgui.button("Stop measuring" if measuring.active else "Measure", half):
+        measuring.toggle()
+    keys = app.keys.of["measure"]
+    imgui.set_item_tooltip("Click two places in the view for their distance" + (f" ({keys})" if keys else ""))
+    imgui.same_line()
+    measuring.filled = imgui.checkbox("Allow filled", measuring.filled)[1]
+    imgui.set_item_tooltip("Also take places where the renderer has filled a hole, and no point was measured")
+    _draw_unit(app)
+    for number, reading in enumerate(measuring.readings()):
+        imgui.push_id(number)
+        if _draw_row(app, number, reading):
+            here.delete(number)
+        imgui.pop_id()
+    if here.all:
+        _draw_outlets(app)
+    if measuring.to_show:
+        measuring.to_show = False
+        imgui.set_scroll_here_y(1.0)
+
+
+def _draw_unit(app: App) -> None:
+    widgets.label("Unit", "Of length. Where the scan does not tell, say it once; it stays with the scan")
+    if app.playback.timeline.unit != _UNKNOWN:
+        imgui.text(app.unit)
+        return
+    changed, text = imgui.input_text_with_hint("##unit", _UNKNOWN, app.session.unit or "")
+    if changed:
+        app.measuring.name_unit(text)
+
+
+def _draw_row(app: App, number: int, reading: Reading) -> bool:
+    """Number and distance, what the ends snapped to below; whether it is to be deleted."""
+    right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
+    imgui.align_text_to_frame_padding()
+    imgui.text(f"{number + 1}:  {distance_words(reading, app.unit)}")
+    imgui.set_item_tooltip(_details(reading, app.unit))
+    imgui.same_line(right - 1.3 * imgui.get_frame_height())
+    is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
+    words = snap_words(reading)
+    if len(app.playback.timeline) > 1:
+        words += f", {reading.motion}"
+    imgui.text_disabled(widgets.shortened(words, imgui.get_content_region_avail().x))
+    if reading.fixed and len(app.playback.timeline) > 1:
+        imgui.set_item_tooltip(f"Fixed in space: {reading.fixed}")
+    return is_deleted
+
+
+def _details(reading: Reading, unit: str) -> str:
+    """Both ends in full."""
+    uncertain = "sampling alone: what the spacing of the points around the ends leaves open"
+    return "\n".join([*(_end_words(end, unit) for end in reading.measurement.ends), f"± is of {uncertain}"])
+
+
+def _end_words(end: End, unit: str) -> str:
+    what = "surface" if end.id is None else f"point {end.id}"
+    place = ", ".join(f"{v:.9g}" for v in end.position)
+    spacing = "unknown" if end.spacing is None else f"{end.spacing:.3g} {unit}"
+    seen = f", filled from level {end.level}" if end.level else ""
+    return f"{what}, frame {end.frame + 1}: {place} {unit}, spacing {spacing}{seen}"
+
+
+def _draw_outlets(app: App) -> None:
+    gap = imgui.get_style().item_spacing.x
+    third = ImVec2((imgui.get_content_region_avail().x - 2 * gap) / 3, 0)
+    if imgui.button("Copy", third):
+        app.measuring.copy()
+    imgui.set_item_tooltip("As a table, into the clipboard")
+    imgui.same_line()
+    if imgui.button("Save CSV...", third):
+        app.measuring.ask_to_save()
+    imgui.same_line()
+    if imgui.button("Clear", third):
+        app.measuring.here.clear()
+    imgui.set_item_tooltip("Delete all; undo brings them back")
+
+
+def draw_dialog(app: App) -> None:
+    """Declare the dialog that saves, while it is open."""
+    measuring = app.measuring
+    with widgets.modal(_DIALOG, measuring.saving is not None) as is_drawn:
+        if not is_drawn or measuring.saving is None:
+            return
+        imgui.text("All measurements, as a table of comma separated values")
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
+        imgui.set_next_item_width(-1)
+        changed, measuring.saving = imgui.input_text("##path", measuring.saving)
+        if changed:
+            measuring.problem = ""
+        is_entered = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+        exists = Path(measuring.saving).exists()
+        imgui.text_wrapped(measuring.problem or ("This file is there already." if exists else ""))
+        if imgui.button("Replace" if exists else "Save") or (is_entered and not exists):
+            measuring.save()
+        imgui.same_line()
+        if imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
+            measuring.saving = None
+        if measuring.saving is None:
+            imgui.close_current_popup()

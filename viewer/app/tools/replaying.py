@@ -1,0 +1,80 @@
+"""Replaying in the window: a recording is shown again, picture by picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...recording import Entry, Recording, place_of, places_of
+
+if TYPE_CHECKING:
+    from ..app import App
+
+
+class Replaying:
+    """Shows the entries of a recording, each in full for as long as it was shown.
+
+    None is left out: where reading or drawing takes longer than then, time slips. Raises InputError for what
+    is wrong in the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.recording = Recording.load(path)
+        self._next = 0
+        self._since: float | None = None  # by the clock, when the last one was there in full
+        self._asked: str | None = None  # the scan that was to be opened
+        self._compared: str | None = None  # the scan whose hash was
+
+    def __str__(self) -> str:
+        return f"Replaying {self.path.name}: {self._next} of {len(self.recording.entries)}. Esc stops it."
+
+    def until_next(self, now: float) -> float:
+        """Seconds until another picture is due; 0 while one is awaited."""
+        if self._since is None:
+            return 0.0
+        entries = self.recording.entries
+        until = entries[self._next].at if self._next < len(entries) else self.recording.seconds
+        return self._since + until - entries[self._next - 1].at - now
+
+    def advance(self, app: App, now: float) -> bool:
+        """Show the next picture if it is due and all that it needs is there; whether it goes on."""
+        if self._next and self._since is None:
+            if not app.picture.is_complete:
+                return True
+            self._since = now
+        if self._next and self.until_next(now) > 0:
+            return True
+        if self._next == len(self.recording.entries):
+            return False
+        entry = self.recording.entries[self._next]
+        if not self._has_opened(app, entry):
+            return app.opening is not None
+        timeline = app.playback.timeline
+        if entry.pose in timeline.broken or entry.pose >= len(timeline):
+            app.note(f"Frame {entry.pose} cannot be shown; it is left out.")
+            self._next += 1
+        elif timeline.ready(entry.pose) is None:
+            timeline.request(entry.pose)
+        else:
+            app.show(entry)
+            self._next, self._since = self._next + 1, None
+        return True
+
+    def _has_opened(self, app: App, entry: Entry) -> bool:
+        """Whether the scan of an entry is open; it is being opened where it is not."""
+        if app.opening is not None:
+            return False
+        scan = app.session.scan
+        places = [scan] if entry.scan is None else places_of(entry.scan, self.path)
+        if scan not in places:
+            place = scan if entry.scan is None else place_of(entry.scan, self.path)
+            if self._asked != place:  # else it could not be opened, and that was told
+                self._asked = place
+                app.open(place)
+            return False
+        if self._compared != scan:
+            self._compared = scan
+            if None not in (entry.hash, app.hash) and entry.hash != app.hash:
+                app.note(f"{scan} is not as it was when {self.path.name} was made; pictures may differ.")
+        return True

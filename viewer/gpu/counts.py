@@ -1,0 +1,45 @@
+"""What became of the points of a picture. Plain numpy, on any thread."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan.points import PointCloud
+from ..task import checkpoint
+from .sample import is_sampled
+from .view import View
+
+NOTHING = 0xFFFFFFFF
+_CHUNK = 1 << 20  # points counted at a time
+
+
+def count_points(cloud: PointCloud, view: View, rows: NDArray[np.uint32], share: float) -> dict[str, int]:
+    """What became of the points of the file: "in", and of these "drawn" (they have a pixel),
+    "dropped" (not finite), "preview" (not in the share that was drawn from; only where that is not
+    all), "outside" (the centre is not in the picture or not between near and far) and "hidden"
+    (the rest).
+
+    rows: (H, W), which point each pixel shows, 0xFFFFFFFF where none.
+    """
+    shown = np.zeros(len(cloud), bool)
+    shown[rows[rows != NOTHING]] = True
+    hidden = left_out = 0
+    for start in range(0, len(cloud), _CHUNK):
+        checkpoint(start / len(cloud))
+        part = slice(start, start + _CHUNK)
+        others = ~shown[part]
+        if share < 1:
+            sampled = is_sampled(np.arange(start, start + len(others), dtype=np.uint32), share)
+            left_out += int(np.count_nonzero(~sampled))
+            others &= sampled
+        hidden += int(np.count_nonzero(view.contains(cloud.positions[part]) & others))
+    drawn = int(np.count_nonzero(shown))
+    return {
+        "in": len(cloud) + cloud.dropped,
+        "drawn": drawn,
+        "dropped": cloud.dropped,
+        **({"preview": left_out} if share < 1 else {}),
+        "outside": len(cloud) - drawn - hidden - left_out,
+        "hidden": hidden,
+    }

@@ -1,0 +1,163 @@
+"""A process beside this one for heavy work on points.
+
+Native libraries hold the interpreter's lock while they work (open3d for seconds), which would stop
+the window whatever thread they run on; and what runs in a process can be ended at any moment.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import IO, Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from .errors import Scan4DError
+from .task import Task
+
+P = ParamSpec("P")
+R = TypeVar("R")
+_NICE = 10  # the window's own work goes first
+
+
+class Helper:
+    """Starts its process at the first call and keeps it for the next ones."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+
+    def call(self, task: Task, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """What the function returns for these arguments, computed in the process; this waits for it.
+
+        One call at a time. function: a public one of a module. Raises Cancelled as soon as the task
+        is cancelled, which ends the process; Scan4DError where the function or the process fails.
+        """
+        with self._lock, task.stopped_by(self._kill):
+            process = self._process = self._process or _start()
+            answer = _ask(process, (function, args, kwargs), task)
+            if answer is None:
+                self._process = None
+                _end(process)
+                task.check()
+                raise Scan4DError(f"{task.name} failed: its process ended with code {process.returncode}")
+        result, error = answer
+        if error is not None:
+            raise error
+        return result
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+
+    def close(self) -> None:
+        """End the process. Cancel the task of a call before, and it waits for that."""
+        with self._lock:
+            if self._process is not None:
+                _end(self._process)
+            self._process = None
+
+
+def _start() -> subprocess.Popen[bytes]:
+    # The same modules as here, whatever lies in the working directory.
+    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
+    try:
+        return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    except OSError as error:
+        raise Scan4DError(f"no process can be started ({error.strerror})") from error
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            with suppress(OSError):  # what was not read any more
+                stream.close()
+
+
+def _ask(process: subprocess.Popen[bytes], question: Any, task: Task) -> Any:
+    """The answer to a question, None where the process has ended."""
+    assert process.stdin is not None and process.stdout is not None
+    try:
+        _send(process.stdin, question)
+    except OSError:
+        return None
+    while isinstance(answer := _receive(process.stdout), float):
+        task.report(answer)
+    return answer
+
+
+def serve() -> None:
+    """Answer calls until nobody is left to ask: what the process does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window ends this process
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print must not get between the answers
+    while (question := _receive(questions)) is not None:
+        _send(answers, _answer(question, answers))
+
+
+def _answer(question: Any, answers: IO[bytes]) -> tuple[Any, Scan4DError | None]:
+    """The result of a call, or why it failed."""
+    function, args, kwargs = question
+    try:
+        with _Told(answers).current():
+            return function(*args, **kwargs), None
+    except Scan4DError as error:
+        return None, error
+    except MemoryError:
+        return None, Scan4DError("not enough memory", hint="Close other programs")
+    except Exception as error:
+        return None, Scan4DError(f"{function.__name__} failed ({type(error).__name__}: {error})")
+
+
+class _Told(Task):
+    """A task whose progress goes to the process that asked."""
+
+    def __init__(self, answers: IO[bytes]) -> None:
+        self._answers = answers
+        super().__init__("")
+
+    def report(self, progress: float) -> None:
+        _send(self._answers, progress)
+
+
+def _send(stream: IO[bytes], message: Any) -> None:
+    """Write a message, its arrays as they lie in memory, so that no lock is held while they are copied."""
+    buffers: list[pickle.PickleBuffer] = []
+    head = pickle.dumps(message, protocol=5, buffer_callback=buffers.append)
+    parts = [memoryview(head), *(buffer.raw() for buffer in buffers)]
+    stream.write(np.array([len(parts), *(part.nbytes for part in parts)], np.uint64).tobytes())
+    for part in parts:
+        stream.write(part)
+    stream.flush()
+
+
+def _receive(stream: IO[bytes]) -> Any:
+    """The next message, None where the stream has ended."""
+    try:
+        (count,) = _read(stream, 8).view(np.uint64).tolist()
+        sizes = _read(stream, 8 * count).view(np.uint64).tolist()
+        head, *buffers = (_read(stream, size) for size in sizes)
+    except EOFError:
+        return None
+    return pickle.loads(head.data, buffers=buffers)
+
+
+def _read(stream: IO[bytes], size: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    data = np.empty(size, np.uint8)
+    view, done = data.data, 0
+    while done < size:
+        count = stream.readinto(view[done:])  # type: ignore[attr-defined]
+        if not count:
+            raise EOFError
+        done += count
+    return data

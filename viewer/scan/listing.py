@@ -1,0 +1,174 @@
+"""The scans of a folder, found by the names in it: no frame is read."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from ..errors import InputError
+from . import formats
+from .open import DEMO, NOTES, entries, find_source, folder_frames, matches
+from .times import TIMES_FILE, frame_numbers, natural_key
+
+_NUMBERED = re.compile(r"(.*?)([0-9]+)([^0-9]*)")
+
+
+@dataclass(frozen=True)
+class Listed:
+    """Something in a folder.
+
+    path: as `open_scan` takes it. title: its name for people. kind: "whole" is the folder itself.
+    frames: files that it plays; 1 for a file, which may hold several, and 0 for a folder that is no scan.
+    """
+
+    path: str
+    title: str
+    kind: Literal["whole", "folder", "sequence", "file"]
+    frames: int
+
+
+def list_folder(folder: Path | str) -> list[Listed]:
+    """What a folder offers: itself as one scan, folders, numbered sequences and files, each in natural order.
+
+    Raises InputError where it cannot be listed.
+    """
+    folder = Path(folder)
+    inside = sorted(entries(folder), key=lambda entry: natural_key(entry.name))
+    folders = [entry for entry in inside if os.path.isdir(entry) and not entry.name.startswith(".")]
+    files = _scan_files(inside)
+    whole = [
+        Listed(str(folder), f"All of {folder.resolve().name or folder}", "whole", count)
+        for count in [_frame_count(folder)]
+        if count > 1
+    ]
+    sequences = [
+        Listed(pattern, _with_range(members), "sequence", len(members))
+        for pattern, members in _sequences(files).items()
+        if not (whole and len(members) == len(files))
+    ]
+    return [
+        *whole,
+        *(Listed(str(entry), entry.name, "folder", _frame_count(entry)) for entry in folders),
+        *sequences,
+        *(Listed(str(file), file.name, "file", 1) for file in files),
+    ]
+
+
+def scans_beside(scan: str) -> list[str]:
+    """The scans in the folder of a scan, itself among them: files and folders, or sequences for a pattern.
+
+    The scan alone where its folder cannot be listed.
+    """
+    path = Path(os.path.abspath(scan))
+    if scan == DEMO or str(path) == path.anchor:
+        return [scan]
+    kinds = ("file", "folder") if os.path.exists(path) else ("sequence",)
+    found: dict[str, str] = {}
+    with suppress(InputError):
+        listed = [one for one in list_folder(path.parent) if one.kind in kinds and one.frames]
+        found = {one.path: one.path for one in listed}
+    found[str(path)] = scan
+    return [found[name] for name in sorted(found, key=natural_key)]
+
+
+def named_scans(names: Iterable[str]) -> tuple[list[str], list[InputError]]:
+    """Of the names of a user those that can be opened, and what is wrong with the others.
+
+    A folder that is no scan itself stands for the scans in it.
+    """
+    scans: list[str] = []
+    problems: list[InputError] = []
+    for name in names:
+        try:
+            find_source(name)
+            scans.append(name)
+        except InputError as problem:
+            inner, wrong = named_scans(_inside(Path(name)))
+            scans += inner
+            problems += wrong if inner else [problem]
+    return scans, problems
+
+
+def as_one_scan(files: Sequence[str]) -> str | None:
+    """The pattern of files that are all frames of one numbered sequence; None where they are not."""
+    (folder, *others) = {os.path.dirname(os.path.abspath(file)) for file in files}
+    if others or len(files) < 2:
+        return None
+    members = {Path(folder, os.path.basename(file)) for file in files}
+    for pattern, found in _sequences(_scan_files(sorted(members))).items():
+        if members == set(found) == set(matches(pattern)):
+            return pattern
+    return None
+
+
+def _inside(folder: Path) -> list[str]:
+    """The scans in a folder; none where it is no folder, or cannot be listed."""
+    if not os.path.isdir(folder):
+        return []
+    with suppress(InputError):
+        return [one.path for one in list_folder(folder) if one.kind in ("file", "folder") and one.frames]
+    return []
+
+
+def _scan_files(paths: Sequence[Path]) -> list[Path]:
+    """The files that scans may be in; TXT and CSV only where there is nothing else."""
+    known = set(formats.known_suffixes())
+    files = [
+        path
+        for path in paths
+        if path.suffix.lower() in known
+        and not path.name.startswith(".")
+        and path.name != TIMES_FILE
+        and os.path.isfile(path)
+    ]
+    scans = [file for file in files if file.suffix.lower() not in NOTES]
+    return scans or files
+
+
+def _frame_count(folder: Path) -> int:
+    """How many files a folder plays as one scan; 0 where it is none."""
+    try:
+        return len(folder_frames(folder))
+    except InputError:
+        return 0
+
+
+def _sequences(files: Sequence[Path]) -> dict[str, list[Path]]:
+    """Pattern -> its files in order, for names that differ in their last number alone, as frames do."""
+    groups: dict[tuple[str, str, int], list[Path]] = {}
+    for file in files:
+        if match := _NUMBERED.fullmatch(file.name):
+            before, number, after = match.groups()
+            width = len(number) if number.startswith("0") and number != "0" else 0
+            groups.setdefault((before, after, width), []).append(file)
+    _join_padded(groups)
+    return {
+        str(members[0].with_name(f"{before}%0{width}d{after}" if width else f"{before}%d{after}")): members
+        for (before, after, width), members in groups.items()
+        if len(members) > 1 and _is_plain(members[0]) and frame_numbers([file.name for file in members])
+    }
+
+
+def _join_padded(groups: dict[tuple[str, str, int], list[Path]]) -> None:
+    """Numbers without zeros in front are of the padded group of their width, where there is one: 099, 100."""
+    for (before, after, width), members in list(groups.items()):
+        unpadded = groups.get((before, after, 0))
+        if width and unpadded:
+            digits = len(before) + width + len(after)
+            members += [file for file in unpadded if len(file.name) >= digits]
+            members.sort(key=lambda file: natural_key(file.name))
+            unpadded[:] = [file for file in unpadded if len(file.name) < digits]
+
+
+def _is_plain(file: Path) -> bool:
+    """Whether a pattern can be made of its name."""
+    return "%" not in str(file)
+
+
+def _with_range(files: Sequence[Path]) -> str:
+    return f"{files[0].name} to {files[-1].name}"
