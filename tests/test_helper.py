@@ -4,10 +4,12 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
+import viewer.helper as helper_module
 from viewer.errors import InputError, Scan4DError
 from viewer.helper import Helper
 from viewer.task import Cancelled, Task, checkpoint, in_background
@@ -21,6 +23,11 @@ def doubled(values: np.ndarray, times: int = 1) -> dict[str, np.ndarray]:
 
 def process() -> int:
     return os.getpid()
+
+
+def report_an_integer() -> str:
+    checkpoint(1)
+    return "done"
 
 
 def wait_for_ever() -> None:
@@ -70,6 +77,28 @@ def test_cancelling_ends_the_work_at_once_and_the_next_call_works(helper: Helper
     task.cancel()
     with pytest.raises(Cancelled):
         future.result()
+    assert helper.call(Task("Asking"), process) != os.getpid()
+
+
+def test_progress_is_no_answer_whatever_number_it_is(helper: Helper) -> None:
+    task = Task("Reporting")
+    assert helper.call(task, report_an_integer) == "done"
+    assert task.progress == 1
+
+
+def test_a_cancel_while_the_process_starts_is_not_lost(
+    helper: Helper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task, start = Task("Asking"), helper_module.start_python
+
+    def start_and_cancel(*args: Any, **kwargs: Any) -> Any:
+        started = start(*args, **kwargs)
+        task.cancel()
+        return started
+
+    monkeypatch.setattr(helper_module, "start_python", start_and_cancel)
+    with pytest.raises(Cancelled):
+        helper.call(task, process)
     assert helper.call(Task("Asking"), process) != os.getpid()
 
 

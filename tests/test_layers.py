@@ -28,7 +28,7 @@ LAYERS = (
     {"gpu"},
     {"backends"},
     {"renderer", "frame", "timing", "export", "pick", "measurement"},
-    {"recording", "render_job", "__init__"},
+    {"recording", "recording_json", "render_job", "__init__"},
     {"app", "bench"},
     {"cli", "commands"},
 )

@@ -11,7 +11,7 @@ from scenes import looking_down_z, plane, sphere, sphere_hits
 from viewer.camera import Camera
 from viewer.gpu.surface import EMPTY, NOTHING, Surface, Texel
 from viewer.gpu.view import View
-from viewer.pick import is_seen, pick
+from viewer.pick import before_gap, is_seen, pick
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]
@@ -111,6 +111,39 @@ def test_a_texel_is_what_the_whole_pictures_hold(draw: Draw) -> None:
     assert 0 < np.count_nonzero(level == EMPTY) < level.size
     for y, x in np.ndindex(*depth.shape):
         assert surface.texel(x, y) == (depth[y, x], row[y, x], level[y, x])
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_what_a_gap_between_points_shows_is_not_meant_but_what_is_round_it(
+    draw: Draw, projection: str
+) -> None:
+    front = plane(6, depth=3.0, spacing=0.15)  # 3 pixels or more between points of one pixel
+    behind = plane(160, depth=4.0, spacing=0.02)
+    cloud = PointCloud.from_arrays(np.concatenate([front.world(), behind.world()]))
+    surface = draw(cloud, CAMERAS[projection], SIZE)
+    for y, x in np.ndindex(5, 5):
+        meant = before_gap(surface, 28 + x, 18 + y)
+        assert surface.depth[meant[1], meant[0]] == pytest.approx(3.0)
+        assert np.hypot(meant[0] - 28 - x, meant[1] - 18 - y) < 4, "the nearest point of the front"
+    across, down = np.flatnonzero((surface.depth < 3.5).any(axis=0)), 20
+    for x in (*range(across[0]), *range(across[-1] + 1, SIZE[0])):
+        assert before_gap(surface, int(x), down) == (x, down), "beside an edge nothing is seen through"
+    for place in [(0, 0), (SIZE[0] - 1, SIZE[1] - 1), (-1, 3), (SIZE[0], 3)]:
+        assert before_gap(surface, *place) == place
+
+
+def test_on_a_slope_every_pixel_is_meant(draw: Draw) -> None:
+    cloud = sphere(20_000)
+    surface = draw(cloud, Camera.orbit(cloud.bounds()), SIZE, "surfels")
+    for y, x in np.argwhere(surface.level == 0):
+        assert before_gap(surface, int(x), int(y)) == (x, y)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (5, 39), (59, 20), (30, 20)])
+def test_depths_round_a_pixel_are_those_of_the_picture(draw: Draw, place: tuple[int, int]) -> None:
+    surface = draw(sphere(3000), Camera.orbit(sphere(3000).bounds()), SIZE)
+    around = np.pad(surface.depth, 3, constant_values=np.inf)[place[1] :, place[0] :][:7, :7]
+    np.testing.assert_array_equal(surface.depth_around(*place, 3), around)
 
 
 def test_a_filled_pixel_has_a_place_and_no_point(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:

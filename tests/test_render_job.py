@@ -62,6 +62,13 @@ def test_pictures_are_those_of_a_replay_and_replace_former_ones(run: Run) -> Non
         assert Path(f"again{number}.png").read_bytes() == Path(f"out/p{number}.png").read_bytes()
 
 
+def test_files_bear_the_numbers_that_are_wanted() -> None:
+    out = Path("out/p%02d.png")
+    made = make(Task("export"), turned(), out, 25.0, anonymous=False, numbers=(1, 5, 9))
+    assert made.files == tuple(Path("out", name) for name in ("p01.png", "p05.png", "p09.png"))
+    assert listed() == ["p01.png", "p05.png", "p09.png"]
+
+
 def test_a_film_has_its_pace(run: Run) -> None:
     made = make(Task("export"), turned(), Path("out/a.mp4"), 10.0, anonymous=False)
     frames, rate = film(made.files[0])

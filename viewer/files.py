@@ -40,7 +40,21 @@ def user_folder() -> Path:
 
 def free_file(folder: Path, suffix: str) -> Path:
     """scan4d_0001 with this suffix, or the next number that no file in the folder has."""
-    return next(path for n in count(1) if not (path := folder / f"scan4d_{n:04d}{suffix}").exists())
+    paths = (folder / f"scan4d_{n:04d}{suffix}" for n in count(1))
+    return next(path for path in paths if not os.path.exists(path))
+
+
+def working_folder() -> Path:
+    """The working directory, or the user's own folder where that is gone."""
+    try:
+        return Path.cwd()
+    except OSError:
+        return Path(os.path.expanduser("~"))
+
+
+def absolute(path: Path | str) -> str:
+    """A path from the root, as `os.path.abspath` gives it, also where the working directory is gone."""
+    return os.path.normpath(os.path.join(working_folder(), path))
 
 
 def printable(name: str) -> str:

@@ -14,7 +14,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import IO, Any, ParamSpec, TypeVar
+from typing import IO, Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,27 @@ from .task import Task
 P = ParamSpec("P")
 R = TypeVar("R")
 _NICE = 10  # the window's own work goes first
+_NO_CONSOLE = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows it would open a window of its own
+
+
+def start_python(code: str, *arguments: str, nice: int, **streams: Any) -> subprocess.Popen[bytes]:
+    """Run code in a process of its own, whose standard output is a pipe; it finds the modules found here.
+
+    nice: how much it steps back for others, where the system knows that. streams: `stdin`, `stderr`.
+    Raises OSError.
+    """
+    # The same modules as here, whatever lies in the working directory.
+    begin = f"import os, sys; sys.path[:] = {sys.path!r}; hasattr(os, 'nice') and os.nice({nice})"
+    return subprocess.Popen(
+        [sys.executable, "-c", f"{begin}\n{code}", *arguments],
+        stdout=subprocess.PIPE, creationflags=_NO_CONSOLE, **streams,
+    )  # fmt: skip
+
+
+class _Progress(NamedTuple):
+    """What the process sends while it works: how far it is, 0..1."""
+
+    share: float
 
 
 class Helper:
@@ -39,10 +60,11 @@ class Helper:
         One call at a time. function: a public one of a module. Raises Cancelled as soon as the task
         is cancelled, which ends the process; Scan4DError where the function or the process fails.
         """
-        with self._lock, task.stopped_by(self._kill):
+        with self._lock:
             process = self._process = self._process or _start()
-            answer = _ask(process, (function, args, kwargs), task)
-            if answer is None:
+            with task.stopped_by(process.kill):
+                answer = _ask(process, (function, args, kwargs), task)
+            if answer is None or task.cancelled:
                 self._process = None
                 _end(process)
                 task.check()
@@ -51,10 +73,6 @@ class Helper:
         if error is not None:
             raise error
         return result
-
-    def _kill(self) -> None:
-        if self._process is not None:
-            self._process.kill()
 
     def close(self) -> None:
         """End the process. Cancel the task of a call before, and it waits for that."""
@@ -65,10 +83,8 @@ class Helper:
 
 
 def _start() -> subprocess.Popen[bytes]:
-    # The same modules as here, whatever lies in the working directory.
-    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
     try:
-        return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        return start_python(f"from {__name__} import serve; serve()", nice=_NICE, stdin=subprocess.PIPE)
     except OSError as error:
         raise Scan4DError(f"no process can be started ({error.strerror})") from error
 
@@ -89,16 +105,14 @@ def _ask(process: subprocess.Popen[bytes], question: Any, task: Task) -> Any:
         _send(process.stdin, question)
     except OSError:
         return None
-    while isinstance(answer := _receive(process.stdout), float):
-        task.report(answer)
+    while isinstance(answer := _receive(process.stdout), _Progress):
+        task.report(answer.share)
     return answer
 
 
 def serve() -> None:
     """Answer calls until nobody is left to ask: what the process does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window ends this process
-    if hasattr(os, "nice"):
-        os.nice(_NICE)
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
     while (question := _receive(questions)) is not None:
@@ -127,7 +141,7 @@ class _Told(Task):
         super().__init__("")
 
     def report(self, progress: float) -> None:
-        _send(self._answers, progress)
+        _send(self._answers, _Progress(progress))
 
 
 def _send(stream: IO[bytes], message: Any) -> None:

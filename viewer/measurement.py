@@ -23,7 +23,7 @@ from .geometry import Vector
 from .pick import Picked
 from .scan.points import PointCloud
 from .scan.pose import Pose
-from .scan.spacing import spacing_at
+from .scan.spacing import nearest_row, spacing_at
 
 _DECIMALS = (-6, 12)  # that a number is written out with
 
@@ -250,7 +250,6 @@ def _row(number: int, reading: Reading, scan: str, unit: str) -> list[object]:
 
 def _spacing_near(cloud: PointCloud, position: np.ndarray) -> float | None:
     """The spacing at the point nearest to a place, or the distance to that point where it is more."""
-    offsets = cloud.positions - (position - cloud.origin).astype(np.float32)
-    row = int(np.einsum("ij,ij->i", offsets, offsets).argmin())
-    spacing, gap = spacing_at(cloud, row), float(np.linalg.norm(offsets[row]))
+    row, gap = nearest_row(cloud, position)
+    spacing = spacing_at(cloud, row)
     return None if spacing is None else max(spacing, gap)

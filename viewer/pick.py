@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from .geometry import Vector
 from .gpu.surface import EMPTY, NOTHING, Surface
-from .scan.spacing import spacing_at
+from .scan.spacing import spacing_at, typical_spacing
+
+_REACH = 4  # pixels round one that are looked at: gaps that are wider are seen as such
+_BEHIND = 4.0, 4.0 * _REACH  # spacings and pixels that what is seen through a gap is behind it, at least
+_WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +59,7 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
     Reads one pixel from the GPU. spacing: whether to find the spacing too, which looks at
     every point of the cloud (see `spacing_at`).
     """
-    if not (0 <= x < surface.size[0] and 0 <= y < surface.size[1]):
+    if not _has(surface, x, y):
         return None
     depth, row, level = surface.texel(x, y)
     if level == EMPTY:
@@ -76,6 +80,38 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
         scalars={name: values[row].item() for name, values in cloud.scalars.items()},
         spacing=spacing_at(cloud, row) if spacing else None,
     )
+
+
+def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
+    """The pixel that is meant by (x, y): itself; or the nearest one of the front, where (x, y) is seen
+    through a gap between the points of that.
+
+    Such a pixel is far behind others that lie all round it. At an edge they lie on one side.
+    """
+    if not _has(surface, x, y) or (texel := surface.texel(x, y)).level == EMPTY:
+        return x, y
+    depths = surface.depth_around(x, y, _REACH)
+    ends = surface.view.unproject(np.array([[x, y], [x + 1, y]]), np.full(2, texel.depth))
+    spacings, pixels = _BEHIND
+    limit = texel.depth - pixels * np.linalg.norm(ends[1] - ends[0])
+    front = depths < limit
+    if front.any():
+        front &= depths < limit - spacings * typical_spacing(surface.pose.stored)
+    down, across = np.argwhere(front).T - _REACH
+    if not _lie_all_round(down, across):
+        return x, y
+    nearest = np.argmin(down**2 + across**2)
+    return x + int(across[nearest]), y + int(down[nearest])
+
+
+def _has(surface: Surface, x: int, y: int) -> bool:
+    return 0 <= x < surface.size[0] and 0 <= y < surface.size[1]
+
+
+def _lie_all_round(down: NDArray[np.intp], across: NDArray[np.intp]) -> bool:
+    """Whether places lie round the origin in all directions; not so on one side of a line."""
+    angles = np.sort(np.arctan2(down, across))
+    return len(angles) > 0 and bool(np.diff(angles, append=angles[0] + 2 * np.pi).max() < _WIDEST)
 
 
 def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:

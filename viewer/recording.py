@@ -20,7 +20,7 @@ import json
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -35,17 +35,15 @@ from .frame import Request
 from .look import Look
 from .marks import Legend, Marks
 from .params import parse
+from .recording_json import DAMAGED, checked, placed, read_json
 from .scan.open import DEMO
 from .scan.pose import Pose
 from .scan.timeline import Timeline
 
 FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
-_MOST_BYTES = 256 * 2**20  # of a recording
-_MOST_SECONDS = 86_400.0
 _TICK = 0.001  # seconds that time stamps are rounded to
 _LATER: dict[str, Any] = {"at": 0.0, "marks": {}, "unit": None}  # what earlier files lack, and pictures
-_DAMAGED = "It is damaged, or no recording of Scan4D; record it again"
 
 
 @dataclass(frozen=True)
@@ -113,8 +111,8 @@ class Entry:
                 raise unknown_name("field", name, known)
         for name in known:
             if name not in data:
-                raise InputError(f"has no '{name}'", hint=_DAMAGED)
-        read = {name: _checked(name, data[name]) for name in known}
+                raise InputError(f"has no '{name}'", hint=DAMAGED)
+        read = {name: checked(name, data[name]) for name in known}
         backend = find_backend(read["backend"])
         read["size"] = tuple(read["size"])
         read["camera"] = Camera.from_json(read["camera"])
@@ -154,7 +152,7 @@ class Recording:
 
         Raises InputError, which names the file and the entry, for whatever is wrong in it.
         """
-        data = _read_json(path)
+        data = read_json(path)
         if not isinstance(data, dict) or "format" not in data:
             raise InputError("is no recording", path, "Use a JSON that the window has recorded, or a picture")
         if data["format"] != FORMAT:
@@ -165,9 +163,9 @@ class Recording:
             complete = {name: value for name, value in data.items() if name not in _head()}
             return cls((_parsed(complete, path),))
         if not isinstance(entries, list) or not entries:
-            raise InputError("has no entries", path, _DAMAGED)
+            raise InputError("has no entries", path, DAMAGED)
         read = _read_changes(entries, path)
-        seconds = _placed(lambda: _checked("seconds", data.get("seconds", 0.0)), path)
+        seconds = placed(lambda: checked("seconds", data.get("seconds", 0.0)), path)
         return cls(read, max(seconds, read[-1].at))
 
     def paced(self, fps: float) -> list[Entry]:
@@ -243,22 +241,6 @@ def place_of(scan: str, recording: Path) -> str:
 # --- reading --------------------------------------------------------------------------------
 
 
-def _read_json(path: Path) -> Any:
-    """The JSON of a file, or of the description in a picture."""
-    try:
-        if path.suffix.lower() in (".png", ".exr"):
-            text = read_description(path)
-        elif path.stat().st_size > _MOST_BYTES:
-            raise InputError("is too large for a recording", path)
-        else:
-            text = path.read_text(encoding="utf-8")
-        return json.loads(text)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", path, "Check its name") from error
-    except (ValueError, RecursionError) as error:  # of the text's encoding as well
-        raise InputError(f"is not JSON ({error})", path, _DAMAGED) from error
-
-
 def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
     """The entries, each with what the one before tells and it does not."""
     entries: list[Entry] = []
@@ -266,7 +248,7 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
     for number, change in enumerate(changes):
         where = f"{path}, entry {number}"
         if not isinstance(change, dict):
-            raise InputError("is no JSON object", where, _DAMAGED)
+            raise InputError("is no JSON object", where, DAMAGED)
         complete |= change
         entries.append(_parsed(complete, where))
         if number and entries[-1].at < entries[-2].at:
@@ -275,62 +257,7 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
 
 
 def _parsed(complete: Mapping[str, Any], where: object) -> Entry:
-    return _placed(lambda: Entry.from_json(complete), where)
-
-
-def _placed(read: Callable[[], Any], where: object) -> Any:
-    """What a function reads; its InputError says where."""
-    try:
-        return read()
-    except InputError as error:
-        inner = "" if error.where is None else f"{error.where}: "
-        raise InputError(inner + error.what, where, error.hint) from error
-    except OverflowError as error:  # a number of hundreds of digits
-        raise InputError(f"holds a number that is too large ({error})", where, _DAMAGED) from error
-
-
-def _whole(value: Any) -> bool:
-    return type(value) is int and 0 <= value < 2**31
-
-
-def _finite(value: Any) -> bool:
-    return type(value) in (int, float) and math.isfinite(value)
-
-
-def _stamp(value: Any) -> bool:
-    return _finite(value) and 0 <= value <= _MOST_SECONDS
-
-
-def _object(value: Any) -> bool:
-    return isinstance(value, dict)
-
-
-def _word(value: Any) -> bool:
-    return isinstance(value, str) and value != "" and "\0" not in value
-
-
-_KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "scan": (lambda value: value is None or _word(value), "the name of a scan"),
-    "hash": (lambda value: value is None or _word(value), "a hash"),
-    "pose": (_whole, "the number of a pose"),
-    "time": (_finite, "a time in seconds"),
-    "size": (lambda v: isinstance(v, list) and len(v) == 2 and all(map(_whole, v)), "width and height"),
-    "camera": (_object, "a camera"),
-    "backend": (_word, "the name of a renderer"),
-    "params": (_object, "parameters by name"),
-    "look": (_object, "a look"),
-    "marks": (_object, "marks by name"),
-    "unit": (lambda value: value is None or _word(value), "a unit"),
-    "at": (_stamp, "a time within a day, in seconds"),
-    "seconds": (_stamp, "a time within a day, in seconds"),
-}
-
-
-def _checked(name: str, value: Any) -> Any:
-    fits, kind = _KINDS[name]
-    if not fits(value):
-        raise InputError(f"'{name}' is not {kind} but {value!r:.40}", hint=_DAMAGED)
-    return value
+    return placed(lambda: Entry.from_json(complete), where)
 
 
 # --- writing --------------------------------------------------------------------------------

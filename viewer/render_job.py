@@ -8,20 +8,20 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from .errors import InputError, Scan4DError
+from .export import numbered
+from .helper import start_python
 from .recording import Recording
 from .task import Task
 
 _SAID = "scan4d: "  # before each line of warnings and errors
 _NICE = 5  # what waits for a person goes first
-_NO_CONSOLE = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows it would open a window of its own
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,18 @@ class Made:
     warnings: tuple[str, ...]
 
 
-def make(task: Task, recording: Recording, out: Path, fps: float, anonymous: bool) -> Made:
+def make(
+    task: Task,
+    recording: Recording,
+    out: Path,
+    fps: float,
+    anonymous: bool,
+    numbers: Sequence[int] | None = None,
+) -> Made:
     """Make the pictures or the film of a recording; this waits for it.
 
     out: as `scan4d render -o` has it. fps: of a film. anonymous: without the names and paths of scans.
+    numbers: that the entries' files bear, each its own; from 0 where they are not given.
     Files take their names when all are complete, and replace those that have them. Raises
     Cancelled, InputError where they cannot be written, Scan4DError with what the process said.
     """
@@ -52,10 +60,17 @@ def make(task: Task, recording: Recording, out: Path, fps: float, anonymous: boo
         if code:
             what = f"its process ended with code {code}"
             raise Scan4DError(lines[-1] if code > 0 and lines else what)
-        names = sorted(path.name for path in made.iterdir())
-        for name in names:
-            os.replace(made / name, out.parent / name)
-    return Made(tuple(out.parent / name for name in names), device, lines)
+        files = tuple(_moved(made, out, range(len(recording.entries)) if numbers is None else numbers))
+    return Made(files, device, lines)
+
+
+def _moved(made: Path, out: Path, numbers: Iterable[int]) -> Iterator[Path]:
+    """Move the files out of the folder `made` and give them their names, in the order of their numbers."""
+    for drawn_as, number in enumerate(numbers):
+        drawn, file = numbered(made / out.name, drawn_as), numbered(out, number)
+        if drawn.exists():  # a broken frame has none, and all pictures of a film have one
+            os.replace(drawn, file)
+            yield file
 
 
 @contextmanager
@@ -75,29 +90,22 @@ def _run(task: Task, arguments: list[str], said: Path) -> tuple[str, int, str]:
     said: a file for what it says on standard error. Returns the device that drew, the exit code, and what
     was said. Raises Cancelled.
     """
-    # The same modules as here, whatever lies in the working directory.
-    code = (
-        f"import os, sys; sys.path[:] = {sys.path!r}; hasattr(os, 'nice') and os.nice({_NICE})\n"
-        "from viewer.cli import main; sys.exit(main(sys.argv[1:]))"
-    )
+    code = "import sys; from viewer.cli import main; sys.exit(main(sys.argv[1:]))"
     with (
         open(said, "wb") as stream,
-        subprocess.Popen(
-            [sys.executable, "-c", code, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=stream, text=True, encoding="utf-8", creationflags=_NO_CONSOLE,
-        ) as process,
-    ):  # fmt: skip
+        start_python(code, *arguments, nice=_NICE, stdin=subprocess.DEVNULL, stderr=stream) as process,
+    ):
         device = _follow(task, process)
     return device, process.returncode, said.read_text("utf-8", errors="replace")
 
 
-def _follow(task: Task, process: subprocess.Popen[str]) -> str:
+def _follow(task: Task, process: subprocess.Popen[bytes]) -> str:
     """Report the progress of the process until it ends; the device that it names. Raises Cancelled."""
     device = ""
     try:
         with task.stopped_by(process.kill):
             for line in process.stdout or ():
-                step = json.loads(line) if line.startswith("{") else {}
+                step = json.loads(line) if line.startswith(b"{") else {}
                 device = step.get("device", device)
                 if "drawn" in step:
                     task.report(step["drawn"] / step["of"])

@@ -25,7 +25,7 @@ _KEYS = (
     *(f"F{n}" for n in range(1, 13)),
 )  # fmt: skip
 _MODIFIERS = ("ctrl", "shift", "alt", "ctrl+shift")
-_TEXTS = ("/nowhere", "1e9", "-1", "nan", "0", "../..", "%d%d", "a b.csv", "")
+_TEXTS = ("/nowhere", "1e9", "-1", "nan", "0", "../..", "%d%d", "a b.csv", "f" * 300, "")
 _TROUBLE = re.compile(r"Traceback|\bERROR\b|\bWARNING\b|[A-Z]\w+Error\b|assert", re.IGNORECASE)
 
 

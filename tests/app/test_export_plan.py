@@ -82,9 +82,16 @@ def test_without_a_last_frame_it_goes_to_the_end() -> None:
         ({"format": "mp4"}, "format", "turntable"),
         ({"what": "turntable", "format": "mp4", "fps": 0.0}, "fps", "1.0 to 240.0"),
         ({"folder": "nowhere"}, "folder", "no such folder"),
+        ({"folder": "f" * 300}, "folder", "no such folder"),
         ({"name": " "}, "name", "name"),
         ({"name": "a/b"}, "name", "/"),
         ({"name": "a%d"}, "name", "%"),
+        ({"name": "."}, "name", "dot"),
+        ({"name": ".."}, "name", "dot"),
+        ({"name": "a "}, "name", "space"),
+        ({"name": "con"}, "name", "device"),
+        ({"name": "LPT1.old"}, "name", "device"),
+        ({"name": "ü" * 150}, "name", "200 bytes"),
     ],
 )
 def test_a_wrong_value_is_said_at_its_field(changes: dict[str, object], field: str, words: str) -> None:
@@ -101,10 +108,15 @@ def test_good_choices_have_no_problems() -> None:
 def test_files_that_are_there_are_found(tmp_path: Path) -> None:
     choices = replace(VIEW, folder=str(tmp_path), what="frames")
     assert present(choices, 10) == []
-    for name in ("a_0003.png", "a_0010.png", "a.png"):
+    for name in ("a_0000.png", "a_0003.png", "a_0010.png", "a.png"):
         (tmp_path / name).touch()
-    assert present(choices, 10) == [tmp_path / "a_0003.png"]
+    assert present(choices, 10) == [tmp_path / "a_0003.png", tmp_path / "a_0010.png"]
     assert present(replace(choices, what="view"), 10) == [tmp_path / "a.png"]
+
+
+def test_files_are_numbered_as_the_window_counts() -> None:
+    assert list(replace(VIEW, what="frames", first=3, last=9, step=3).numbers(10)) == [3, 6, 9]
+    assert list(replace(VIEW, what="turntable", pictures=3).numbers(10)) == [1, 2, 3]
 
 
 def test_a_free_name_is_suggested(tmp_path: Path) -> None:
@@ -114,6 +126,7 @@ def test_a_free_name_is_suggested(tmp_path: Path) -> None:
     assert free_name(tmp_path) == "scan4d_0002"
     (tmp_path / "scan4d_0002.exr").touch()
     assert free_name(tmp_path) == "scan4d_0004"
+    assert free_name(tmp_path / ("f" * 300)) == "scan4d_0001"
 
 
 def test_wrong_values_break_nothing_while_they_are_edited() -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from imgui_bundle import ImVec2
 
-from viewer.app.tools.measuring import snap_words
+from viewer.app.tools.measuring import csv_file, snap_words
 from viewer.app.tools.measuring_view import ViewPlace
 from viewer.camera import Camera
+from viewer.errors import InputError
 from viewer.measurement import End, Measurement, Reading
 
 PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
@@ -47,7 +50,7 @@ def test_a_label_stands_at_the_part_of_its_line_that_is_in_the_view(
     line: tuple[float, ...], seen: tuple[float, ...] | None
 ) -> None:
     for start, stop in (((0, 1), (2, 3)), ((2, 3), (0, 1))):
-        found = PLACE.clipped(*(ImVec2(*(line[i] for i in corner)) for corner in (start, stop)))
+        found = PLACE.box.clipped(*(ImVec2(*(line[i] for i in corner)) for corner in (start, stop)))
         if seen is None:
             assert found is None
         else:
@@ -65,3 +68,16 @@ def test_places_of_the_scan_are_where_the_picture_shows_them() -> None:
     assert above.x > 250
     assert above.y < 150
     assert PLACE.on_screen((0, 0, 5)) is None, "behind the eye"
+
+
+def test_the_file_of_a_table_is_what_the_user_means(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert csv_file(" a.csv ") == csv_file("~/a") == tmp_path / "a.csv"
+    assert csv_file("a.b") == tmp_path / "a.b.csv"
+    for wrong in ("", str(tmp_path), "~"):
+        with pytest.raises(InputError, match="is a folder"):
+            csv_file(wrong)
+    for wrong in ("nowhere/a.csv", "f" * 300 + "/a.csv"):
+        with pytest.raises(InputError, match="no such folder"):
+            csv_file(wrong)

@@ -141,6 +141,19 @@ def test_what_was_cancelled_never_comes(tmp_path: Path) -> None:
     opening.cancel()
 
 
+def test_what_was_ready_and_never_taken_is_closed(tmp_path: Path) -> None:
+    gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
+    gate.set()
+    opening.start("slow", "slow", 0, slow(save(tmp_path / "slow"), gate, opened))
+    left = opened.result()
+    threads = [thread for thread in threading.enumerate() if thread.name == "Opening slow"]
+    for thread in threads:
+        thread.join()
+    assert not is_closed(left)
+    opening.cancel()
+    assert is_closed(left)
+
+
 def test_large_poses_come_with_what_drawing_asks_of_them() -> None:
     rng = np.random.default_rng(0)
     small, large = (PointCloud.from_arrays(rng.random((count, 3))) for count in (1000, 200_001))

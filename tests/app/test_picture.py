@@ -49,7 +49,7 @@ def test_a_pixel_is_read_once_until_mouse_or_picture_move(
     picture.draw(REQUEST, SIZE)
     assert picture.pick((30, 20)) is first
     assert picture.pick((0, 0)) is picture.pick((0, 0)) is None
-    assert reads == [(30, 20), (0, 0)]
+    assert len(reads) == 2
     other = replace(REQUEST, camera=REQUEST.camera.orbited(40, 0))
     picture.pick((30, 20))
     picture.draw(other, SIZE)
@@ -70,6 +70,7 @@ def test_nothing_is_picked_where_there_is_no_picture(picture: Picture) -> None:
     assert picture.pick((30, 20)) is not None
     picture.clear()
     assert picture.pick((30, 20)) is None
+    assert picture.is_visible, "until another one is drawn"
 
 
 def test_a_preview_is_drawn_in_full_at_rest_and_on_demand(picture: Picture) -> None:

@@ -75,9 +75,12 @@ class Dialog:
 
     def choose(self, row: int, item: int) -> None:
         """An item of the list in a row."""
-        y = self._top + FIRST_ROW + ROW * row
-        self._click(FIELD, y)
-        self._click(FIELD - 60, y + ITEMS + ITEM * item)
+        self.open_list(row)
+        self._click(FIELD - 60, self._top + FIRST_ROW + ROW * row + ITEMS + ITEM * item)
+
+    def open_list(self, row: int) -> None:
+        """Without choosing."""
+        self._click(FIELD, self._top + FIRST_ROW + ROW * row)
 
     def enter(self, row: int, text: object, share: float = 0.5) -> None:
         """A value in a row's field; share: across the fields."""
@@ -146,8 +149,8 @@ def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path)
     dialog.tick(5)  # the scale bar
     dialog.enter(10, "round")
     dialog.export(11)
-    app.expect(r"Saved 3 pictures, .*round_0000.png to round_0002.png")
-    names = [f"round_{number:04d}.png" for number in range(3)]
+    app.expect(r"Saved 3 pictures, .*round_0001.png to round_0003.png")
+    names = [f"round_{number:04d}.png" for number in (1, 2, 3)]
     assert listed(folder) == set(names)
     entries = [Recording.load(folder / name).entries[0] for name in names]
     assert {(entry.scan, entry.size, entry.pose) for entry in entries} == {("jane_doe", (96, 64), 0)}
@@ -193,6 +196,8 @@ def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> No
 def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path) -> None:
     before = (folder / "view.exr").stat().st_mtime_ns
     dialog = Dialog(app)
+    dialog.open_list(0)
+    app.screen.do("key", "Escape", "sleep", 0.3)  # closes the list alone
     dialog.enter(9, "view")
     dialog.export(10)
     app.settle()

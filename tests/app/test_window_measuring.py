@@ -50,8 +50,8 @@ def pixel_of(app: RunningApp, points: NDArray[np.float64], number: int) -> tuple
     return left + int(x), top + int(y)
 
 
-def click(app: RunningApp, place: tuple[int, int]) -> None:
-    app.screen.do("mousemove", *place, "sleep", 0.2, "click", 1)
+def click(app: RunningApp, place: tuple[int, int], times: int = 1) -> None:
+    app.screen.do("mousemove", *place, "sleep", 0.2, "click", "--repeat", times, "--delay", 60, 1)
 
 
 def ctrl(screen: Screen, key: str) -> None:
@@ -60,9 +60,9 @@ def ctrl(screen: Screen, key: str) -> None:
 
 
 def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) -> tuple[float, float]:
-    """Click two points; the distance and its uncertainty as the app logs them."""
-    for number in (one, other):
-        click(app, pixel_of(app, points, number))
+    """Click two points, the second one twice by habit; distance and uncertainty as the app logs them."""
+    for times, number in enumerate((one, other), 1):
+        click(app, pixel_of(app, points, number), times)
         place = re.escape(", ".join(repr(float(v)) for v in points[number]))
         app.expect(f"end at {place}: point {number}, frame 0")
     distance, uncertainty = app.expect(r"measured (\S+), uncertainty (\S+)").groups()
@@ -112,7 +112,7 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
     frames = [grid(1.0) + FAR, grid(1.25) + FAR, grid(1.5) + FAR]
     np.savez(tmp_path / "scan.npz", positions=np.stack(frames), faces=np.array(FACES))
     distances = [math.dist(points[34], points[128]) for points in frames]
-    with running_app(screen, tmp_path, tmp_path / "scan.npz") as app:
+    with running_app(screen, tmp_path, "scan.npz") as app:
         screen.do("key", "m")
         app.expect("measuring begins")
         name_unit(app, "cm")
@@ -133,8 +133,19 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         copied = list(csv.DictReader(io.StringIO(clipboard(screen)), delimiter="\t"))
         ctrl(screen, "s")
         app.settle()
+        screen.do("key", "Escape")
+        app.settle()
+        assert "measuring ends" not in app.log(), "Escape closes the dialog alone"
+        ctrl(screen, "s")
+        app.settle()
+        screen.do("type", "--delay", 40, "nowhere/table")
+        screen.do("key", "Return")
+        app.settle()
+        ctrl(screen, "a")  # the field has kept the keyboard
+        screen.do("type", "--delay", 40, "table")
         screen.do("key", "Return")
         file = app.expect("Saved (.*)").group(1)
+        assert file == str(tmp_path / "table.csv")
         with open(file, newline="", encoding="utf-8") as stream:
             saved = list(csv.DictReader(stream))
         assert saved == copied
@@ -144,6 +155,14 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
             assert (row["frame_1"], row["id_1"], row["id_2"]) == (str(frame + 1), "34", "128")
             place = [float(row[f"{axis}_2"]) for axis in "xyz"]
             np.testing.assert_array_equal(place, frames[frame][128])
+
+        ctrl(screen, "o")
+        app.settle()
+        screen.do("key", "Return")
+        app.expect(f"opened {re.escape(str(tmp_path / 'scan.npz'))}")
+        app.settle()
+        told = re.findall(r"measurements: (.*)", app.log())[-1]
+        assert told == reading[1], "it is the same scan by another name"
 
         screen.do("key", "Escape")
         app.expect("measuring ends")

@@ -87,6 +87,8 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         other = json.dumps(str(tmp_path / "b"))
         for scan in (other, "null"):
             path.write_text(text.replace(f'"scan": {json.dumps(str(tmp_path / "a"))}', f'"scan": {scan}'))
+            press(app, "space")  # a scan that plays is stopped for it,
+            press(app, "y")  # and the turntable
             press(app, "shift", "r")
             app.expect("replays frame 3")
             app.settle()

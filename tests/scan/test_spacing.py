@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from viewer.scan.points import PointCloud
-from viewer.scan.spacing import typical_spacing
+from viewer.scan.spacing import nearest_row, typical_spacing
 
 
 def grid(edge: int, step: float) -> np.ndarray:
@@ -28,3 +28,11 @@ def test_degenerate_clouds_have_a_spacing(points: np.ndarray) -> None:
 
 def test_two_points() -> None:
     assert 0 < typical_spacing(PointCloud.from_arrays([[0.0, 0, 0], [3, 0, 0]])) < 10
+
+
+def test_the_nearest_point_is_found_in_any_part_of_the_file() -> None:
+    points = np.random.default_rng(3).random((50_000, 3)) + np.array([1e6, 0, -1e6])
+    cloud = PointCloud.from_arrays(points)
+    for row in (0, 16383, 16384, 49_999):
+        place = points[row] + 1e-5
+        assert nearest_row(cloud, place) == (row, pytest.approx(3**0.5 * 1e-5, rel=0.02))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -171,7 +172,7 @@ class App:
     def write_keys(self) -> None:
         """Write the file of keys where there is none yet, and tell where it is."""
         try:
-            if not self._keys_file.exists():
+            if not os.path.exists(self._keys_file):
                 keys.write_template(self._keys_file)
             self.note(f"The keys are in {self._keys_file}; edit it and start Scan4D again.")
         except InputError as error:

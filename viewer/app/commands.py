@@ -137,7 +137,7 @@ _FILE = Menu("File", (
         Command("scans", "Back to the list of scans", lambda app: app.browser.show(), "Q"),
     ),
     (
-        Command("screenshot", "Save picture", lambda app: app.capture.screenshot(), "P", short="Screenshot"),
+        Command("screenshot", "Screenshot", lambda app: app.capture.screenshot(), "P", short="Screenshot"),
         Command(
             "record", "Record", lambda app: app.capture.toggle_recording(), "R",
             is_on=lambda app: app.capture.recorder is not None, short="Record",

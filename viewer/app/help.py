@@ -18,19 +18,25 @@ _KEY_COLUMN = 15.0
 
 
 class Help:
-    """Which of the pages are open."""
+    """open: the pages that are. focused: the one of them that has the focus, None where none has."""
 
     def __init__(self) -> None:
         self.open: set[str] = set()
+        self.focused: str | None = None
 
     def toggle(self, page: str) -> None:
         """Open or close one of the pages."""
         assert page in _PAGES
         self.open ^= {page}
 
+    def close_focused(self) -> None:
+        """Close the page that has the focus, if one has."""
+        self.open.discard(self.focused or "")
+
 
 def draw(app: App) -> None:
     """Declare the windows of the open pages."""
+    app.help.focused = None
     for page, draw_page in zip(_PAGES, (_draw_keys, _draw_messages, _draw_about), strict=True):
         if page not in app.help.open:
             continue
@@ -40,10 +46,11 @@ def draw(app: App) -> None:
         imgui.set_next_window_pos((display - size) * 0.5, imgui.Cond_.appearing)
         flags = imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
         _, stays = imgui.begin(page, True, flags)
-        is_left = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
+        if imgui.is_window_focused():
+            app.help.focused = page
         draw_page(app)
         imgui.end()
-        if not stays or is_left:
+        if not stays:
             app.help.toggle(page)
 
 
@@ -90,4 +97,4 @@ def _draw_about(app: App) -> None:
     imgui.text_wrapped(f"Scan4D {__version__}: a viewer for 4D scans.")
     imgui.spacing()
     imgui.text_wrapped(f"OpenGL {gpu.driver} on {gpu.device}" + (", in software" if gpu.software else ""))
-    imgui.text_wrapped(f"{len(COMMANDS)} commands; F1 shows their keys.")
+    imgui.text_wrapped(f"{len(COMMANDS)} commands. {app.keys.hint('keys')}: all their keys.")

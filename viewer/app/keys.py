@@ -61,6 +61,11 @@ class Keys:
         self.of = {name: command.key for name, command in COMMANDS.items()} | dict(changes or {})
         self._chords = [(COMMANDS[name], chord(text)) for name, text in self.of.items() if text]
 
+    def hint(self, name: str) -> str:
+        """A command's title, and its keys where it has some."""
+        keys, title = self.of[name], COMMANDS[name].title
+        return f"{title} ({keys})" if keys else title
+
     def handle(self, app: App) -> None:
         """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there."""
         if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):

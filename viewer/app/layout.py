@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import help, menu, panel, tasks
+from . import escape, help, menu, panel, tasks
 from .playing import timeline_bar
 from .scene import view
 from .tools import export_dialog, measuring_panel
@@ -14,6 +14,7 @@ from .tools import export_dialog, measuring_panel
 if TYPE_CHECKING:
     from .app import App
 
+Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
 _PANEL_WIDTH = 21.0  # in heights of the font
 _BAR_HEIGHT = 4.8
 # No background: the window is filled with the panels' colour before.
@@ -25,11 +26,12 @@ _STILL = (
 )  # fmt: skip
 
 
-def draw(app: App) -> tuple[float, float, float, float]:
-    """Declare all widgets; returns the 3D view: left, top, width, height in ImGui's coordinates."""
+def draw(app: App) -> Place:
+    """Declare all widgets; returns where the 3D view is."""
     app.keys.handle(app)
-    place = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
-    tasks.draw(app, place)
+    escape.handle(app)
+    place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
+    tasks.draw(app, place, head)
     help.draw(app)
     app.browser.draw()
     export_dialog.draw(app)
@@ -37,16 +39,12 @@ def draw(app: App) -> tuple[float, float, float, float]:
     return place
 
 
-def _draw_view_alone(app: App) -> tuple[float, float, float, float]:
+def _draw_view_alone(app: App) -> tuple[Place, float]:
     whole = imgui.get_io().display_size
-    no_popup = not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
-    in_use = app.help.open or app.measuring.active
-    if imgui.is_key_pressed(imgui.Key.escape) and no_popup and not in_use:
-        app.full_view.leave()
     return _draw_view(app, 0, int(whole.x), int(whole.y))
 
 
-def _draw_parts(app: App) -> tuple[float, float, float, float]:
+def _draw_parts(app: App) -> tuple[Place, float]:
     whole = imgui.get_io().display_size
     top = _draw_head(app, whole.x)
     em = imgui.get_font_size()
@@ -54,23 +52,24 @@ def _draw_parts(app: App) -> tuple[float, float, float, float]:
     width = max(1, int(whole.x - min(_PANEL_WIDTH * em, 0.5 * whole.x)))
     bottom = int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y))
     height = max(1, bottom - top)
-    place = _draw_view(app, top, width, height)
+    view_and_head = _draw_view(app, top, width, height)
     _place("panel", width, top, whole.x - width, height)
     panel.draw(app)
     imgui.end()
     _place("timeline", 0, bottom, whole.x, whole.y - bottom)
     timeline_bar.draw(app)
     imgui.end()
-    return place
+    return view_and_head
 
 
-def _draw_view(app: App, top: int, width: int, height: int) -> tuple[float, float, float, float]:
+def _draw_view(app: App, top: int, width: int, height: int) -> tuple[Place, float]:
+    """Declare the view; returns where it is, and how much of its top notes take."""
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     _place("view", 0, top, width, height)
     imgui.pop_style_var()
-    view.draw(app)
+    head = view.draw(app)
     imgui.end()
-    return 0, top, width, height
+    return (0, top, width, height), head
 
 
 def _draw_head(app: App, width: float) -> int:

@@ -93,7 +93,7 @@ class Loop:
             app.window.touch(frames=1)  # for what the panel says about it
         with self._turns.part("show"):
             app.window.fill(app.palette.panel)
-            if app.picture.is_there:
+            if app.picture.is_visible and (app.picture.is_there or app.playback.problem is None):
                 app.picture.present(*app.view_corner)
             app.window.end()
         if drew:

@@ -59,8 +59,7 @@ def _draw_button(app: App, command: Command) -> None:
     if is_on:
         imgui.pop_style_color()
     imgui.end_disabled()
-    keys = app.keys.of[command.name]
-    imgui.set_item_tooltip(f"{command.title} ({keys})" if keys else command.title)
+    imgui.set_item_tooltip(app.keys.hint(command.name))
 
 
 def _draw(app: App, entry: Command | Listing | Menu) -> None:
@@ -73,8 +72,6 @@ def _draw(app: App, entry: Command | Listing | Menu) -> None:
             _draw_items(app, entry)
         else:
             _draw_groups(app, entry)
-        if imgui.is_key_pressed(imgui.Key.escape):
-            imgui.close_current_popup()
         imgui.end_menu()
 
 

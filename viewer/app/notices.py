@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
 _MOST_SHOWN = 3
 _MOST_KEPT = 1000
-_WIDTH = 34.0  # in heights of the font
+_WIDTH, _FOOT = 34.0, 4.5  # in heights of the font; the foot is where the scale bar is
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,10 @@ class Notices:
 
 def draw(app: App, size: ImVec2) -> None:
     """Declare the notes in the current ImGui window, the 3D view. size: of the view."""
-    if imgui.is_key_pressed(imgui.Key.escape):
-        app.notices.dismiss()
     em = imgui.get_font_size()
     wrap = min(_WIDTH * em, 0.8 * size.x)
     pad = ImVec2(0.8 * em, 0.5 * em)
-    bottom = size.y - 2.5 * em
+    bottom = size.y - _FOOT * em
     for notice in reversed(app.notices.shown(time.monotonic())):
         extent = imgui.calc_text_size(notice.text, wrap_width=wrap)
         corner = ImVec2((size.x - extent.x) / 2, bottom - extent.y)

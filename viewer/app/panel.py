@@ -106,7 +106,7 @@ def _draw_statistics(app: App) -> None:
     timers = app.picture.gpu.timers
     width = imgui.get_item_rect_size().x + imgui.get_style().item_spacing.x
     imgui.same_line(max(imgui.get_content_region_avail().x - 8 * imgui.get_font_size(), width))
-    timers.enabled = imgui.checkbox("time passes", timers.enabled)[1]
+    timers.enabled = imgui.checkbox("Time each pass", timers.enabled)[1]
     imgui.set_item_tooltip("Measure each pass of a picture; this makes it a little slower")
     if surface is None or pose is None or app.picture.request is None:
         return

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 from ..camera import Camera
 from ..errors import InputError
+from ..files import absolute
 from ..frame import Request, choose
 from ..geometry import Vector
 from ..look import Look
@@ -47,7 +47,7 @@ class Left:
 
 def known_as(scan: str) -> str:
     """The name that a scan is remembered by: its path from the root, wherever Scan4D was started."""
-    return scan if scan == DEMO else os.path.abspath(scan)
+    return scan if scan == DEMO else absolute(scan)
 
 
 @dataclass

@@ -31,29 +31,29 @@ def report(app: App) -> list[tuple[str, int]]:
     return [(task.name, int(task.seconds / _TICK)) for task in shown(app)]
 
 
-def draw(app: App, place: tuple[float, float, float, float]) -> None:
-    """Declare the work over the top of the 3D view. place: of the view: left, top, width, height."""
+def draw(app: App, place: tuple[float, float, float, float], head: float) -> None:
+    """Declare the work over the top of the 3D view.
+
+    place: of the view: left, top, width, height. head: how much of its top is taken by notes.
+    """
     tasks = shown(app)
     if not tasks:
         return
     left, top, width, _ = place
     em = imgui.get_font_size()
     own_width = min(_WIDTH * em, 0.9 * width)
-    imgui.set_next_window_pos(ImVec2(left + (width - own_width) / 2, top + em))
+    imgui.set_next_window_pos(ImVec2(left + (width - own_width) / 2, top + head + em))
     imgui.set_next_window_size_constraints(ImVec2(own_width, 0), ImVec2(own_width, 1e4))
     imgui.begin("tasks", flags=_FLAGS)
     for task in tasks:
         _draw_task(app, task)
     imgui.end()
-    lightly = [task for task in tasks if _ends_by_escape(app, task)]
-    no_popup = not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
-    if lightly and no_popup and imgui.is_key_pressed(imgui.Key.escape):
-        app.cancel(lightly[-1])
 
 
-def _ends_by_escape(app: App, task: Task) -> bool:
-    """Not what may have taken long: Escape is pressed for other reasons too."""
-    return task is not app.exporting.task
+def end_by_escape(app: App) -> list[Task]:
+    """The work shown that Escape cancels: not what may have taken long, since it is pressed for other reasons
+    too."""
+    return [task for task in shown(app) if task is not app.exporting.task]
 
 
 def _draw_task(app: App, task: Task) -> None:
@@ -70,4 +70,4 @@ def _draw_task(app: App, task: Task) -> None:
     imgui.same_line()
     if imgui.button(f"Cancel##{id(task)}"):
         app.cancel(task)
-    imgui.set_item_tooltip("Cancel (Esc)" if _ends_by_escape(app, task) else "Cancel")
+    imgui.set_item_tooltip("Cancel (Esc)" if task in end_by_escape(app) else "Cancel")

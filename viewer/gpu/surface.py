@@ -236,6 +236,18 @@ class Surface:
         row = np.frombuffer(self.rows.buffer.read(4, offset=place), np.uint32)[0]
         return Texel(float(depth), int(row), int(_levels(row)))
 
+    def depth_around(self, x: int, y: int, reach: int) -> NDArray[np.float32]:
+        """(2 reach + 1, 2 reach + 1) float32: `depth` round pixel (x, y); +inf outside the picture."""
+        self.gpu.activate()
+        width, height = self.size
+        top, bottom = max(y - reach, 0), min(y + reach + 1, height)
+        lines = self.depths.buffer.read(4 * width * (bottom - top), offset=4 * width * top)
+        left, right = max(x - reach, 0), min(x + reach + 1, width)
+        around = np.full((2 * reach + 1, 2 * reach + 1), np.inf, np.float32)
+        rows, columns = slice(top - y + reach, bottom - y + reach), slice(left - x + reach, right - x + reach)
+        around[rows, columns] = np.frombuffer(lines, np.float32).reshape(-1, width)[:, left:right]
+        return around
+
     @property
     def value(self) -> NDArray[np.float32]:
         """(H, W) float32, the number that the look colours by; NaN where there is none."""

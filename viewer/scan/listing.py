@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..errors import InputError
+from ..files import absolute
 from . import formats
 from .open import DEMO, NOTES, entries, find_source, folder_frames, matches
 from .times import TIMES_FILE, frame_numbers, natural_key
@@ -64,7 +65,7 @@ def scans_beside(scan: str) -> list[str]:
 
     The scan alone where its folder cannot be listed.
     """
-    path = Path(os.path.abspath(scan))
+    path = Path(absolute(scan))
     if scan == DEMO or str(path) == path.anchor:
         return [scan]
     kinds = ("file", "folder") if os.path.exists(path) else ("sequence",)
@@ -96,7 +97,7 @@ def named_scans(names: Iterable[str]) -> tuple[list[str], list[InputError]]:
 
 def as_one_scan(files: Sequence[str]) -> str | None:
     """The pattern of files that are all frames of one numbered sequence; None where they are not."""
-    (folder, *others) = {os.path.dirname(os.path.abspath(file)) for file in files}
+    (folder, *others) = {os.path.dirname(absolute(file)) for file in files}
     if others or len(files) < 2:
         return None
     members = {Path(folder, os.path.basename(file)) for file in files}

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import formats
+from .points import UNKNOWN_UNIT
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import Notice, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
@@ -41,7 +42,7 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     if recorded is None or (fps is not None and not measured):
         labels = [source.label(index) for index in range(len(source))]
         recorded = paced_times(labels, DEFAULT_FPS if fps is None else fps)
-    timeline = Timeline(source, recorded, unit or source.unit or "units")
+    timeline = Timeline(source, recorded, unit or source.unit or UNKNOWN_UNIT)
     if measured and fps is not None:
         timeline.messages.append(Notice("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used"))
     return timeline

@@ -18,6 +18,8 @@ _CHUNK = 1 << 20  # points converted at a time, so that float64 copies stay smal
 _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
+UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
+
 
 @dataclass(frozen=True)
 class Bounds:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .colors import srgb8_from_linear
-from .points import PointCloud
+from .points import UNKNOWN_UNIT, PointCloud
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
@@ -41,7 +41,7 @@ class RangeView:
     cy: float
     world_to_camera: NDArray[np.float64]
     name: str = ""
-    unit: str = "units"
+    unit: str = UNKNOWN_UNIT
 
     def __post_init__(self) -> None:
         shape = np.shape(self.depth)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..task import Cancelled, Task
 from .cache import PoseCache, default_budget
+from .points import UNKNOWN_UNIT
 from .pose import Pose
 from .sources import FrameSource
 
@@ -54,7 +55,7 @@ class Timeline:
     """
 
     def __init__(
-        self, source: FrameSource, times: ArrayLike, unit: str = "units", cache_bytes: int | None = None
+        self, source: FrameSource, times: ArrayLike, unit: str = UNKNOWN_UNIT, cache_bytes: int | None = None
     ) -> None:
         """times: (T,) seconds. cache_bytes: what poses may take; None: `default_budget()`.
 

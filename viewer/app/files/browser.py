@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
-from ...files import printable
+from ...files import absolute, printable, working_folder
 from ...recording import is_recording
 from ...scan.listing import Listed, list_folder
 from ...scan.open import DEMO
@@ -40,7 +40,7 @@ class Browser:
 
     def __init__(self, app: App) -> None:
         self._app = app
-        self._folder = Path.cwd()
+        self._folder = working_folder()
         self._asked = False  # to be opened
         self._rows: list[Listed] = []
         self._problem: str | None = None
@@ -107,7 +107,7 @@ class Browser:
 
     def _enter_text(self) -> None:
         """Go to the folder that was typed, or open the scan."""
-        path = os.path.abspath(os.path.expanduser(self._text.strip()))
+        path = absolute(os.path.expanduser(self._text.strip()))
         if os.path.isdir(path):
             self._go(Path(path))
         elif self._text.strip():
@@ -166,7 +166,7 @@ class Browser:
         imgui.push_id(head)
         for number, scan in enumerate(scans):
             name = widgets.shortened(title(scan), imgui.get_content_region_avail().x)
-            is_open = scan == self._app.session.scan
+            is_open = known_as(scan) == known_as(self._app.session.scan)
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
                 self._app.open(scan)
                 imgui.close_current_popup()

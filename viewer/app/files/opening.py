@@ -54,12 +54,12 @@ class Opening:
         self.cancel()
         self.scan, self.task = scan, Task(f"Opening {title}")
         self._future = in_background(self.task, lambda: _opened(open_it, index))
-        self._future.add_done_callback(_Unclaimed(self.task))
 
     def cancel(self) -> None:
         """Give up what is being opened."""
-        if self.task is not None:
+        if self.task is not None and self._future is not None:
             self.task.cancel()
+            self._future.add_done_callback(_close_unclaimed)  # at once where it is ready
         self.scan = self.task = self._future = None
 
     def take(self) -> tuple[str, Opened] | None:
@@ -77,15 +77,10 @@ class Opening:
             raise InputError(f"cannot be opened ({type(error).__name__}: {error})", scan) from error
 
 
-class _Unclaimed:
-    """Closes a scan that was opened in spite of being cancelled."""
-
-    def __init__(self, task: Task) -> None:
-        self._task = task
-
-    def __call__(self, future: Future[Opened]) -> None:
-        if self._task.cancelled and future.exception() is None:
-            future.result().timeline.close()
+def _close_unclaimed(future: Future[Opened]) -> None:
+    """Close a scan that was opened in spite of being cancelled."""
+    if future.exception() is None:
+        future.result().timeline.close()
 
 
 def _opened(open_it: Callable[[], Timeline], index: int) -> Opened:

@@ -106,8 +106,9 @@ class Scans:
 
     def items(self, scans: Iterable[str]) -> Iterator[Item]:
         """Some of them for a menu."""
+        shown = known_as(self._app.session.scan)
         for scan in scans:
-            yield title(scan), partial(self._app.open, scan), scan == self._app.session.scan
+            yield title(scan), partial(self._app.open, scan), known_as(scan) == shown
 
 
 def title(scan: str) -> str:

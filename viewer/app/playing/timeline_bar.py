@@ -10,6 +10,7 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from numpy.typing import NDArray
 
 from .. import theme, widgets
+from ..commands import COMMANDS
 from .player import SPEEDS
 
 if TYPE_CHECKING:
@@ -47,36 +48,36 @@ def draw(app: App) -> None:
 def _draw_steps(app: App) -> None:
     """Buttons that go somewhere or start to."""
     playing = app.playback.player.playing
-    for icon, tooltip, act in (
-        (icons.ICON_FA_FAST_BACKWARD, "First frame (Home)", lambda: app.seek(0)),
-        (icons.ICON_FA_STEP_BACKWARD, "Previous frame (Left)", lambda: app.step(-1)),
-        (icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY, "Play or pause (Space)", app.toggle_play),
-        (icons.ICON_FA_STEP_FORWARD, "Next frame (Right)", lambda: app.step(1)),
+    for icon, name in (
+        (icons.ICON_FA_FAST_BACKWARD, "first"),
+        (icons.ICON_FA_STEP_BACKWARD, "back"),
+        (icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY, "play"),
+        (icons.ICON_FA_STEP_FORWARD, "next"),
     ):
-        if widgets.icon_button(icon, tooltip):
-            act()
-        imgui.same_line()
+        _draw_button(app, icon, name)
+
+
+def _draw_button(app: App, icon: str, name: str, color: int | None = None, about: str = "") -> None:
+    """The button of a command. about: what more its tooltip says."""
+    if widgets.icon_button(icon, app.keys.hint(name) + about, color):
+        COMMANDS[name].act(app)
+    imgui.same_line()
 
 
 def _draw_pace(app: App) -> None:
     """How it plays."""
     pace, accent = app.session.pace, app.palette.accent
-    for icon, tooltip, field in (
-        (icons.ICON_FA_REDO, "Play round the end (L)", "loop"),
-        (icons.ICON_FA_BACKWARD, "Play backward (Shift+Space)", "reverse"),
-        (
-            icons.ICON_FA_FILM,
-            "Show every frame, however long it takes, rather than keep time (E)",
-            "every_frame",
-        ),
+    for icon, name, about in (
+        (icons.ICON_FA_REDO, "loop", ": play round the end"),
+        (icons.ICON_FA_BACKWARD, "reverse", ""),
+        (icons.ICON_FA_FILM, "every_frame", ", however long it takes, rather than keep time"),
     ):
-        if widgets.icon_button(icon, tooltip, accent if getattr(pace, field) else None):
-            app.toggle_pace(field)
-        imgui.same_line()
+        _draw_button(app, icon, name, accent if getattr(pace, name) else None, about)
     imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())
     titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
     chosen = float(widgets.choose("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
-    imgui.set_item_tooltip("Speed: slower ([), faster (]), 1x (Backspace)")
+    hints = (app.keys.hint(name) for name in ("slower", "faster", "speed_1"))
+    imgui.set_item_tooltip("Speed of playing. " + ", ".join(hints))
     if chosen != pace.speed:
         app.change_pace(speed=chosen)
     imgui.same_line()
@@ -124,7 +125,8 @@ def _draw_track(app: App, width: float) -> None:
         track.bar(run.start, run.stop, palette.cached)
     for index in playback.timeline.broken:
         track.bar(index, index + 1, palette.broken)
-    track.head(app.session.index, palette.text if playback.problem is None else palette.broken)
+    if len(playback.timeline) > 1:
+        track.head(app.session.index, palette.text if playback.problem is None else palette.broken)
 
 
 class _Track:

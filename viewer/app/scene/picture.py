@@ -14,7 +14,7 @@ from ...frame import Request, bring, fallback, is_prepared, render_frame
 from ...gpu.context import Gpu
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
-from ...pick import Picked, pick
+from ...pick import Picked, before_gap, pick
 from ...renderer import Renderer
 from ...scan.points import Bounds
 from ...scan.pose import Pose
@@ -168,13 +168,21 @@ class Picture:
         """Whether there is a picture to show."""
         return self.surface is not None and self.request is not None and self.problem is None
 
+    @property
+    def is_visible(self) -> bool:
+        """Whether there is an image to show: after `clear` the one before, until the next is drawn."""
+        return self.surface is not None and self.problem is None
+
     def present(self, left: int, bottom: int) -> None:
         """Copy it to the window. left, bottom: its corner, pixels from the window's lower left."""
         if self.surface is not None:
             self._presenter.present(self.surface, left, bottom, self.size)
 
     def pick(self, pixel: tuple[int, int]) -> Picked | None:
-        """What a pixel shows, without its spacing; read from the GPU once for each place and picture."""
+        """What a pixel shows, without its spacing, never through a gap (`before_gap`).
+
+        Read from the GPU once for each place and picture.
+        """
         if self.surface is None or not self.is_there:
             return None
         if self._picked is None or self._picked[0] != pixel:
@@ -183,7 +191,7 @@ class Picture:
                 math.floor((at + 0.5) * n / m)
                 for at, n, m in zip(pixel, self.surface.size, self.size, strict=True)
             )
-            self._picked = pixel, pick(self.surface, across, down, spacing=False)
+            self._picked = pixel, pick(self.surface, *before_gap(self.surface, across, down), spacing=False)
         return self._picked[1]
 
     def pick_in_full(self) -> Picked | None:
@@ -193,7 +201,9 @@ class Picture:
         return self.pick(pixel) if pixel else None
 
     def clear(self) -> None:
-        """Show nothing until the next request."""
+        """Forget what is shown, whose image stays until the next request is drawn."""
+        if self.problem is not None:
+            self.surface = None
         self._drawn = self.request = self.problem = self._bounded = self._picked = None
         self._prepared_at = math.inf
 

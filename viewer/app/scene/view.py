@@ -26,8 +26,8 @@ _BUTTONS = (
 _RED = 0xE0483E  # 0xRRGGBB
 
 
-def draw(app: App) -> None:
-    """Declare the view in the current ImGui window, which it fills."""
+def draw(app: App) -> float:
+    """Declare the view in the current ImGui window, which it fills; returns where notes at its top end."""
     size = imgui.get_content_region_avail()
     cube.take_mouse(app, size)
     if app.steering.cube.under_mouse is not None:
@@ -36,7 +36,8 @@ def draw(app: App) -> None:
     app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
     if app.session.camera is not None and app.playback.pose is not None:
         radius = app.picture.bounds(app.playback.pose).radius
-        if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
+        sets_pivot = imgui.is_mouse_double_clicked(0) and not app.measuring.active
+        if imgui.is_item_hovered() and sets_pivot:
             app.steering.set_pivot()
         app.session.camera = _navigate(app, app.session.camera, size, radius)
         if app.session.pivot and imgui.is_item_hovered():
@@ -44,16 +45,11 @@ def draw(app: App) -> None:
         measuring_view.draw(app, size)
     cube.draw(app, size)
     legend.draw(app, size)
-    if app.capture.replaying is not None and imgui.is_key_pressed(imgui.Key.escape):
-        app.capture.stop_replaying()
-    text = _note(app)
-    if text:
-        _draw_note(text, size)
-    else:
-        measuring_view.draw_banner(app, size)
+    head = _draw_note(text, size) if (text := _note(app)) else measuring_view.draw_banner(app, size)
     notices.draw(app, size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
+    return head
 
 
 def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
@@ -123,12 +119,14 @@ def _note(app: App) -> str | None:
     return f"Loading {playback.timeline.label(app.session.index)} ..."
 
 
-def _draw_note(text: str, size: ImVec2) -> None:
+def _draw_note(text: str, size: ImVec2) -> float:
+    """Say something at the top of the view; returns where it ends."""
     em = imgui.get_font_size()
     wrap = max(10 * em, min(0.7 * size.x, 40 * em))
     extent = imgui.calc_text_size(text, wrap_width=wrap)
     corner = ImVec2((size.x - extent.x) / 2, 2 * em)
     notices.draw_text(text, corner, extent, wrap, ImVec2(em, 0.6 * em))
+    return corner.y + extent.y + 0.6 * em
 
 
 def _draw_recording_mark() -> None:

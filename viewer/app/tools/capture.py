@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import InputError
 from ...export import write_png
-from ...files import free_file
+from ...files import free_file, working_folder
 from ...recording import Entry, Recorder
 from ...task import Task, in_background
 from .replaying import Replaying
@@ -84,10 +84,10 @@ class Capture:
     def _saved(self, suffix: str, write: Callable[[Path], None]) -> tuple[Path | None, str]:
         """Write a file under the next free name; returns it, None where that fails, and what to tell."""
         with self._naming:
-            path = free_file(Path.cwd(), suffix)
+            path = free_file(working_folder(), suffix)
             try:
                 write(path)
-            except InputError as error:
+            except (InputError, OSError) as error:
                 return None, str(error)
         return path, f"Saved {path}"
 
@@ -105,6 +105,9 @@ class Capture:
             self.replaying = Replaying(path)
         except InputError as error:
             self._app.note(str(error))
+            return
+        self._app.playback.player.pause()
+        self._app.steering.turntable.stop()
 
     def replay_last(self) -> None:
         """Show the recording saved last again."""
@@ -116,7 +119,7 @@ class Capture:
         self.replaying = None
 
     def until_next(self, now: float) -> float:
-        """Seconds until the there is something to do; infinite where there is nothing."""
+        """Seconds until there is something to do; infinite where there is nothing."""
         soon = _LOOK if self._saving else math.inf
         return soon if self.replaying is None else min(soon, self.replaying.until_next(now))
 

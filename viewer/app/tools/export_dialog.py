@@ -154,12 +154,12 @@ def _warn(text: str) -> None:
 def _draw_end(app: App, can: bool) -> None:
     """What will be written, and the buttons."""
     exporting = app.exporting
-    choices, number = exporting.choices, exporting.choices.number(exporting.count)
+    choices, numbers = exporting.choices, exporting.choices.numbers(exporting.count)
     out = choices.out()
     imgui.separator()
     if can:
-        names = dict.fromkeys(numbered(out, n).name for n in (0, number - 1))
-        imgui.text_wrapped(f"{number} picture{'s' * (number > 1)}: {' to '.join(names)}")
+        names = dict.fromkeys(numbered(out, n).name for n in (numbers[0], numbers[-1]))
+        imgui.text_wrapped(f"{len(numbers)} picture{'s' * (len(numbers) > 1)}: {' to '.join(names)}")
     if exporting.replaced:
         _warn(_there_already([path.name for path in exporting.replaced]))
     imgui.begin_disabled(not can)
@@ -167,8 +167,7 @@ def _draw_end(app: App, can: bool) -> None:
         exporting.start()
     imgui.end_disabled()
     imgui.same_line()
-    escapes = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)  # not from an open list
-    if imgui.button("Cancel") or escapes:
+    if imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
         exporting.is_open = False
     if not exporting.is_open:
         imgui.close_current_popup()

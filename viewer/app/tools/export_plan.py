@@ -22,6 +22,8 @@ VIEW, TURNTABLE, FRAMES = "view", "turntable", "frames"
 PNG, EXR, MP4 = "png", "exr", "mp4"
 _MOST_PIXELS = 16_384  # a side
 _MOST_PICTURES = 3600  # of a turn
+_LONGEST_NAME = 200  # bytes; file systems take 255, of which numbers and temporary files need some
+_DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{name}{n}" for name in ("COM", "LPT") for n in range(10))}
 
 
 @dataclass(frozen=True)
@@ -54,9 +56,12 @@ class Choices:
         last = count if self.last is None else min(self.last, count)
         return range(max(self.first, 1) - 1, last, max(self.step, 1))
 
-    def number(self, count: int) -> int:
-        """How many pictures it makes of a scan with so many frames."""
-        return {VIEW: 1, TURNTABLE: self.pictures, FRAMES: len(self.indices(count))}[self.what]
+    def numbers(self, count: int) -> range:
+        """What its pictures of a scan with so many frames are numbered by: the frame, else from 1."""
+        if self.what == FRAMES:
+            indices = self.indices(count)
+            return range(indices.start + 1, indices.stop + 1, indices.step)
+        return range(1, (self.pictures if self.what == TURNTABLE else 1) + 1)
 
     def rate(self, times: NDArray[np.float64]) -> float:
         """Pictures a second of a film. times: (T,) of the scan's frames, seconds."""
@@ -91,11 +96,24 @@ def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
             found["last"] = f"The last frame is one of {choices.first} to {count}"
     if choices.format == MP4 and choices.what == VIEW:
         found["format"] = "A film shows a turntable or frames"
-    if not _folder(choices.folder).is_dir():
+    if not os.path.isdir(_folder(choices.folder)):
         found["folder"] = "There is no such folder"
-    if not choices.name.strip() or set(choices.name) & set('/\\%:*?"<>|\0'):
-        found["name"] = 'Give a name without / \\ % : * ? " < > |'
+    if problem := _problem_of_name(choices.name):
+        found["name"] = problem
     return found
+
+
+def _problem_of_name(name: str) -> str:
+    """Why a file cannot have this name on every system; empty where it can."""
+    if not name.strip() or set(name) & set('/\\%:*?"<>|\0'):
+        return 'Give a name without / \\ % : * ? " < > |'
+    if name[-1] in " .":
+        return "A name does not end with a space or a dot"
+    if name.partition(".")[0].rstrip().upper() in _DEVICES:
+        return "Windows keeps this name for a device"
+    if len(os.fsencode(name)) > _LONGEST_NAME:
+        return f"The name is longer than {_LONGEST_NAME} bytes"
+    return ""
 
 
 def present(choices: Choices, count: int) -> list[Path]:
@@ -103,8 +121,8 @@ def present(choices: Choices, count: int) -> list[Path]:
     out = choices.out()
     return [
         path
-        for path in dict.fromkeys(numbered(out, n) for n in range(choices.number(count)))
-        if path.exists()
+        for path in dict.fromkeys(numbered(out, n) for n in choices.numbers(count))
+        if os.path.exists(path)
     ]
 
 
@@ -140,7 +158,6 @@ def _folder(text: str) -> Path:
 
 def free_name(folder: Path) -> str:
     """scan4d_0001, or the next number that no file in the folder begins with."""
-    taken = (
-        {path.name[:11] for path in folder.glob("scan4d_[0-9][0-9][0-9][0-9]*")} if folder.is_dir() else set()
-    )
+    paths = folder.glob("scan4d_[0-9][0-9][0-9][0-9]*") if os.path.isdir(folder) else ()
+    taken = {path.name[:11] for path in paths}
     return next(name for n in range(1, len(taken) + 2) if (name := f"scan4d_{n:04d}") not in taken)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...files import working_folder
 from ...marks import Marks
 from ...render_job import Made, make
 from ...task import Cancelled, Task, in_background
@@ -65,7 +66,7 @@ class Exporting:
             self._scan = self._app.session.scan
             choices = replace(choices, first=1, last=None)
         if not choices.folder or "folder" in self.problems():
-            choices = replace(choices, folder=str(Path.cwd()))
+            choices = replace(choices, folder=str(working_folder()))
         if choices.name in ("", self._suggested):
             self._suggested = free_name(choices.out().parent)
             choices = replace(choices, name=self._suggested)
@@ -93,8 +94,9 @@ class Exporting:
         times = app.playback.timeline.times
         recording = export_plan.recording(choices, shown, self.marks, times, app.session.pivot)
         out, rate, anonymous = choices.out(), choices.rate(times), choices.anonymous
+        numbers = choices.numbers(self.count)
         task = self.task = Task(f"Exporting {choices.name}")
-        self._work = in_background(task, lambda: make(task, recording, out, rate, anonymous))
+        self._work = in_background(task, lambda: make(task, recording, out, rate, anonymous, numbers))
         log.debug("exporting %s", out)
 
     def advance(self) -> None:

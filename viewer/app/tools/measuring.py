@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,9 +12,10 @@ from typing import TYPE_CHECKING
 from imgui_bundle import imgui
 
 from ...errors import InputError
-from ...files import free_file
+from ...files import absolute, free_file, working_folder
 from ...measurement import End, Measurements, Reading, in_words, read, save, table, to_text
-from ...pick import is_seen, pick
+from ...pick import before_gap, is_seen, pick
+from ..session import known_as
 
 if TYPE_CHECKING:
     from ...scan.timeline import Timeline
@@ -29,7 +31,8 @@ class Measuring:
 
     active: whether clicks in the view set ends. filled: whether they may set them where holes are filled.
     to_show: whether the panel has yet to show the list. saving: the file name in the dialog that saves, None
-    while it is closed; problem: why it could not be saved under that name.
+    while it is closed; problem: why it could not be saved under that name; to_type: whether its field has yet
+    to take the keyboard.
     """
 
     def __init__(self, app: App) -> None:
@@ -39,15 +42,17 @@ class Measuring:
         self.to_show = False
         self.saving: str | None = None
         self.problem = ""
+        self.to_type = False
         self._of: defaultdict[str, Measurements] = defaultdict(Measurements)
         self._seen: tuple[object, dict[End, bool]] = None, {}
         self._told: list[str] = []
+        self._learned: Timeline | None = None  # the last that was asked whether points can be followed
         self._followed = ""  # the scan that was found to have one topology, last
 
     @property
     def here(self) -> Measurements:
         """Those of the scan that is open."""
-        return self._of[self.app.session.scan]
+        return self._of[known_as(self.app.session.scan)]
 
     def toggle(self) -> None:
         """Take up the tool or put it away; a measurement that was begun goes with it."""
@@ -61,7 +66,8 @@ class Measuring:
         surface, request = self.app.picture.surface, self.app.picture.request
         if surface is None or request is None or not self.app.picture.is_there:
             return
-        picked = pick(surface, *pixel)
+        meant = before_gap(surface, *pixel)
+        picked = pick(surface, *meant)
         if picked is None:
             self.app.note("There is nothing to measure here.")
             return
@@ -70,6 +76,8 @@ class Measuring:
         except InputError as error:
             self.app.note(str(error))
             return
+        if meant != pixel:
+            self.app.note("That was seen through a gap: the end is at the point before it.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
         if made := self.here.set_end(end):
             self.to_show = True
@@ -85,7 +93,11 @@ class Measuring:
 
     def watch(self, readings: Sequence[Reading]) -> None:
         """Tell when measurements that followed their points no longer can; note in the log what they read."""
-        scan, one_topology = self.app.session.scan, self.app.playback.timeline.one_topology
+        scan, timeline = self.app.session.scan, self.app.playback.timeline
+        one_topology = timeline.one_topology
+        if readings and self._learned is not timeline:  # opened again, with measurements of before
+            self._learned = timeline
+            _learn_topology(timeline, self.app.session.index)
         if one_topology:
             self._followed = scan
         elif self._followed == scan and one_topology is False:
@@ -126,17 +138,26 @@ class Measuring:
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self.saving, self.problem = str(free_file(Path.cwd(), ".csv")), ""
+        self.saving, self.problem, self.to_type = str(free_file(working_folder(), ".csv")), "", True
+
+    @property
+    def replaces(self) -> bool:
+        """Whether the file of the dialog is there already."""
+        try:
+            return self.saving is not None and os.path.exists(csv_file(self.saving))
+        except InputError:
+            return False
 
     def save(self) -> None:
         """Write them as the CSV file of the dialog and close that, or say why it cannot be written."""
         assert self.saving is not None
         try:
-            save(Path(self.saving), self._table())
+            file = csv_file(self.saving)
+            save(file, self._table())
         except InputError as error:
-            self.problem = str(error)
+            self.problem, self.to_type = str(error), True
         else:
-            self.app.note(f"Saved {self.saving}")
+            self.app.note(f"Saved {file}")
             self.saving = None
 
     def _table(self) -> list[list[object]]:
@@ -147,6 +168,20 @@ class Measuring:
             if reading.measurement != made:
                 rows.append((number, reading))
         return table(rows, self.app.playback.timeline.name, self.app.unit)
+
+
+def csv_file(text: str) -> Path:
+    """The file that a user's text names: ~ is the user's folder, and .csv is added where it is missing.
+
+    Raises InputError where there is no folder for it, or no name.
+    """
+    typed = os.path.expanduser(text.strip())
+    path = Path(absolute(typed))
+    if not typed or os.path.isdir(path):
+        raise InputError("is a folder", path, "Name a file in it")
+    if not os.path.isdir(path.parent):
+        raise InputError("there is no such folder", path.parent, "Create it first, or name another")
+    return path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv")
 
 
 def distance_words(reading: Reading, unit: str) -> str:

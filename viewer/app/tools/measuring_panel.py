@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
 from ...measurement import End, Reading
+from ...scan.points import UNKNOWN_UNIT
 from .. import widgets
 from .measuring import distance_words, snap_words
 
 if TYPE_CHECKING:
     from ..app import App
 
-_UNKNOWN = "units"  # what a timeline calls a unit that nobody knows
 _DIALOG = "Save measurements"
 
 
@@ -45,10 +44,10 @@ def draw(app: App) -> None:
 
 def _draw_unit(app: App) -> None:
     widgets.label("Unit", "Of length. Where the scan does not tell, say it once; it stays with the scan")
-    if app.playback.timeline.unit != _UNKNOWN:
+    if app.playback.timeline.unit != UNKNOWN_UNIT:
         imgui.text(app.unit)
         return
-    changed, text = imgui.input_text_with_hint("##unit", _UNKNOWN, app.session.unit or "")
+    changed, text = imgui.input_text_with_hint("##unit", UNKNOWN_UNIT, app.session.unit or "")
     if changed:
         app.measuring.name_unit(text)
 
@@ -106,14 +105,15 @@ def draw_dialog(app: App) -> None:
         if not is_drawn or measuring.saving is None:
             return
         imgui.text("All measurements, as a table of comma separated values")
-        if imgui.is_window_appearing():
+        if measuring.to_type:
             imgui.set_keyboard_focus_here()
+            measuring.to_type = False
         imgui.set_next_item_width(-1)
         changed, measuring.saving = imgui.input_text("##path", measuring.saving)
         if changed:
             measuring.problem = ""
         is_entered = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
-        exists = Path(measuring.saving).exists()
+        exists = measuring.replaces
         imgui.text_wrapped(measuring.problem or ("This file is there already." if exists else ""))
         if imgui.button("Replace" if exists else "Save") or (is_entered and not exists):
             measuring.save()

@@ -13,6 +13,7 @@ from ...geometry import Vector
 from ...measurement import End, Reading
 from .. import notices, theme
 from ..scene import navigation
+from .labels import Box, Line, free_place, usual_place
 from .measuring import distance_words
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 _LINE, _OUTLINE = 0x58D6F0, 0x000000  # light on dark, so that it is seen on any surface
 _DIM = 0.35  # opacity where an end is not seen
 _END, _THICK = 0.28, 0.11  # radius, thickness; in heights of the font
+_GAP = 0.5  # between a line and its label
 _HEAD = 2.6  # of the view's head, where the banner is
 
 
@@ -40,21 +42,19 @@ def draw(app: App, size: ImVec2) -> None:
     labels = [
         box for number, reading in enumerate(readings, 1) if (box := _draw_one(app, view, number, reading))
     ]
-    _draw_labels(labels, view)
+    _draw_labels(labels, view, _boxes_of_ends(view, readings))
     if begun := measuring.here.begun:
         _draw_begun(app, view, begun)
 
 
 def _take_mouse(app: App) -> None:
     """A click sets an end; a drag turns the view, as ever."""
-    elsewhere = imgui.is_popup_open("", imgui.PopupFlags_.any_popup) or imgui.is_any_item_active()
-    if imgui.is_key_pressed(imgui.Key.escape) and not elsewhere:
-        app.measuring.toggle()
-        return
     if imgui.is_item_hovered():
         imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
     is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
-    if is_released and may_click() and imgui.is_item_hovered() and not imgui.get_io().key_shift:
+    is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click
+    may_set = is_first and may_click() and not imgui.get_io().key_shift
+    if is_released and may_set and imgui.is_item_hovered():
         at = (imgui.get_mouse_pos() - imgui.get_item_rect_min()) * app.window.pixel_ratio
         app.measuring.click((math.floor(at.x), math.floor(at.y)))
 
@@ -66,25 +66,11 @@ def may_click() -> bool:
 
 
 class ViewPlace:
-    """Where places of the scan are on the screen. corner: of the view, upper left."""
+    """Where places of the scan are on the screen. corner: of the view, upper left. box: the view."""
 
     def __init__(self, camera: Camera, corner: ImVec2, size: ImVec2) -> None:
         self.camera, self.corner, self.size = camera, corner, size
-
-    def clipped(self, start: ImVec2, stop: ImVec2) -> tuple[ImVec2, ImVec2] | None:
-        """The part of a line on the screen that is in the view, None where none is."""
-        begin, end, along = 0.0, 1.0, stop - start
-        far = self.corner + self.size
-        for place, step, low, high in (
-            (start.x, along.x, self.corner.x, far.x),
-            (start.y, along.y, self.corner.y, far.y),
-        ):
-            if step:
-                enter, leave = sorted(((low - place) / step, (high - place) / step))
-                begin, end = max(begin, enter), min(end, leave)
-            elif not low <= place <= high:
-                return None
-        return (start + along * begin, start + along * end) if begin <= end else None
+        self.box = Box(corner, corner + size)
 
     def on_screen(self, position: Vector) -> ImVec2 | None:
         """None behind the eye."""
@@ -95,49 +81,30 @@ class ViewPlace:
 
 
 class _Label:
-    """Lines of text on a plate, beside a line on the screen. faint: whether it is dimmed."""
+    """Lines of text on a plate. line: beside which, on the screen. faint: whether it is dimmed."""
 
-    def __init__(self, lines: Sequence[str], start: ImVec2, stop: ImVec2, faint: bool) -> None:
-        self.lines, self.faint = lines, faint
+    def __init__(self, texts: Sequence[str], line: Line, faint: bool) -> None:
+        self.texts, self.line, self.faint = texts, line, faint
         em = imgui.get_font_size()
-        self.pad = ImVec2(0.4 * em, 0.2 * em)
-        extents = [imgui.calc_text_size(line) for line in lines]
-        self.extent = ImVec2(max(e.x for e in extents), sum(e.y for e in extents))
-        # Upward at a right angle to the line, so far that the plate does not cover it.
-        along = stop - start
-        length = math.hypot(along.x, along.y)
-        across = ImVec2(along.y, -along.x) / length if length else ImVec2(0, -1)
-        if across.y > 0:
-            across = across * -1
-        plate = self.extent + self.pad * 2
-        away = (abs(across.x) * plate.x + abs(across.y) * plate.y) / 2 + 2 * _END * em
-        self.corner = (start + stop) * 0.5 + across * away - self.extent * 0.5
+        self._pad = ImVec2(0.4 * em, 0.2 * em)
+        extents = [imgui.calc_text_size(text) for text in texts]
+        self.size = ImVec2(max(e.x for e in extents), sum(e.y for e in extents)) + self._pad * 2
 
-    def keep_within(self, corner: ImVec2, size: ImVec2) -> None:
-        """Move it so that all of it is in a rectangle."""
-        low, high = corner + self.pad, corner + size - self.pad - self.extent
-        self.corner = ImVec2(max(low.x, min(self.corner.x, high.x)), max(low.y, min(self.corner.y, high.y)))
+    def in_short(self) -> _Label:
+        """Its number alone."""
+        return _Label([self.texts[0].partition(":")[0]], self.line, self.faint)
 
-    def overlaps(self, other: _Label) -> bool:
-        """Whether the plates do."""
-        gap = self.pad + other.pad
-        ends, other_ends = self.corner + self.extent + gap, other.corner + other.extent + gap
-        return (
-            self.corner.x < other_ends.x and other.corner.x < ends.x
-            and self.corner.y < other_ends.y and other.corner.y < ends.y
-        )  # fmt: skip
-
-    def draw(self) -> None:
+    def draw(self, box: Box) -> None:
         """Text in the theme's colours on a plate of the theme, which is read on any picture."""
         draw_list = imgui.get_window_draw_list()
-        plate = imgui.get_color_u32(imgui.Col_.window_bg, 0.92)
-        ends = self.corner + self.extent
-        draw_list.add_rect_filled(self.corner - self.pad, ends + self.pad, plate, self.pad.x)
-        at = ImVec2(self.corner.x, self.corner.y)
-        for number, line in enumerate(self.lines):
+        draw_list.add_rect_filled(
+            box.low, box.high, imgui.get_color_u32(imgui.Col_.window_bg, 0.92), self._pad.x
+        )
+        at = box.low + self._pad
+        for number, text in enumerate(self.texts):
             color = imgui.Col_.text_disabled if number or self.faint else imgui.Col_.text
-            draw_list.add_text(at, imgui.get_color_u32(color), line)
-            at.y += imgui.calc_text_size(line).y
+            draw_list.add_text(at, imgui.get_color_u32(color), text)
+            at.y += imgui.calc_text_size(text).y
 
 
 def _draw_one(app: App, view: ViewPlace, number: int, reading: Reading) -> _Label | None:
@@ -151,26 +118,38 @@ def _draw_one(app: App, view: ViewPlace, number: int, reading: Reading) -> _Labe
     for end, place in zip(ends, places, strict=True):
         if place is not None:
             _draw_end(end, place, alpha)
-    seen = view.clipped(there[0], there[-1]) if there else None
+    seen = view.box.clipped(there[0], there[-1]) if there else None
     if seen is None:
         return None
     lines = [f"{number}:  {distance_words(reading, app.unit)}"]
     if len(app.playback.timeline) > 1:
         lines.append(reading.motion)
-    return _Label(lines, *seen, alpha < 1)
+    return _Label(lines, seen, alpha < 1)
 
 
-def _draw_labels(labels: Sequence[_Label], view: ViewPlace) -> None:
-    """Draw them in the view, below the banner, each below those before it that it would overlap."""
-    placed: list[_Label] = []
-    head = ImVec2(0, _HEAD * imgui.get_font_size())
+def _draw_labels(labels: Sequence[_Label], view: ViewPlace, taken: list[Box]) -> None:
+    """Draw them in the view, below the banner, off each other and what is taken; in short where there is no
+    room, and then in full under the mouse."""
+    em = imgui.get_font_size()
+    lines = [label.line for label in labels]
+    area = Box(view.box.low + ImVec2(0, _HEAD * em), view.box.high)
     for label in labels:
-        label.keep_within(view.corner + head, view.size - head)
-        while in_way := [other for other in placed if label.overlaps(other)]:
-            lowest = max(other.corner.y + other.extent.y + other.pad.y for other in in_way)
-            label.corner.y = lowest + label.pad.y + 1
-        label.draw()
-        placed.append(label)
+        short, gap = label.in_short(), _GAP * em
+        if (box := free_place(label.size, label.line, gap, area, taken, lines)) is not None:
+            label.draw(box)
+        else:
+            box = free_place(short.size, label.line, gap, area, taken, lines)
+            box = box or usual_place(short.size, label.line, gap, area)
+            short.draw(box)
+            if imgui.is_item_hovered() and imgui.is_mouse_hovering_rect(box.low, box.high):
+                imgui.set_tooltip("\n".join(label.texts))
+        taken.append(box)
+
+
+def _boxes_of_ends(view: ViewPlace, readings: Sequence[Reading]) -> list[Box]:
+    side = 2 * _END * imgui.get_font_size() + 2
+    places = [view.on_screen(end.position) for reading in readings for end in reading.measurement.ends]
+    return [Box.around(place, ImVec2(side, side)) for place in places if place is not None]
 
 
 def _draw_begun(app: App, view: ViewPlace, begun: End) -> None:
@@ -200,12 +179,13 @@ def _draw_end(end: End, place: ImVec2, alpha: float) -> None:
         draw_list.add_circle(place, _END * em, theme.packed(_LINE, alpha), thickness=_THICK * em)
 
 
-def draw_banner(app: App, size: ImVec2) -> None:
-    """Say what a click does while it measures. size: of the view."""
+def draw_banner(app: App, size: ImVec2) -> float:
+    """Say what a click does while it measures; returns where that ends, 0 without. size: of the view."""
     if not app.measuring.active:
-        return
+        return 0.0
     which = "second" if app.measuring.here.begun else "first"
     text = f"Measuring: click the {which} place.  Esc ends."
     em, extent = imgui.get_font_size(), imgui.calc_text_size(text)
     corner = ImVec2((size.x - extent.x) / 2, 0.9 * em)
     notices.draw_text(text, corner, extent, extent.x + em, ImVec2(0.8 * em, 0.4 * em))
+    return corner.y + extent.y + 0.4 * em

@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...recording import Entry, Recording, place_of, places_of
+from ..session import known_as
 
 if TYPE_CHECKING:
     from ..app import App
+
+_LOOK = 0.015  # seconds between looks at whether what is awaited has come
 
 
 class Replaying:
@@ -30,21 +33,24 @@ class Replaying:
         return f"Replaying {self.path.name}: {self._next} of {len(self.recording.entries)}. Esc stops it."
 
     def until_next(self, now: float) -> float:
-        """Seconds until another picture is due; 0 while one is awaited."""
-        if self._since is None:
-            return 0.0
+        """Seconds until another picture is due, or is to be looked for while one is awaited."""
+        left = 0.0 if self._since is None else self._left(self._since, now)
+        return left if left > 0 else _LOOK
+
+    def _left(self, since: float, now: float) -> float:
+        """Seconds for which what has been there since then is still shown; not above 0 once it is over."""
         entries = self.recording.entries
         until = entries[self._next].at if self._next < len(entries) else self.recording.seconds
-        return self._since + until - entries[self._next - 1].at - now
+        return since + until - entries[self._next - 1].at - now
 
     def advance(self, app: App, now: float) -> bool:
         """Show the next picture if it is due and all that it needs is there; whether it goes on."""
-        if self._next and self._since is None:
-            if not app.picture.is_complete:
+        if self._next:
+            if self._since is None and not app.picture.is_complete:
                 return True
-            self._since = now
-        if self._next and self.until_next(now) > 0:
-            return True
+            self._since = now if self._since is None else self._since
+            if self._left(self._since, now) > 0:
+                return True
         if self._next == len(self.recording.entries):
             return False
         entry = self.recording.entries[self._next]
@@ -52,7 +58,7 @@ class Replaying:
             return app.opening is not None
         timeline = app.playback.timeline
         if entry.pose in timeline.broken or entry.pose >= len(timeline):
-            app.note(f"Frame {entry.pose} cannot be shown; it is left out.")
+            app.note(f"Frame {entry.pose + 1} cannot be shown; it is left out.")
             self._next += 1
         elif timeline.ready(entry.pose) is None:
             timeline.request(entry.pose)
@@ -66,15 +72,15 @@ class Replaying:
         if app.opening is not None:
             return False
         scan = app.session.scan
-        places = [scan] if entry.scan is None else places_of(entry.scan, self.path)
-        if scan not in places:
-            place = scan if entry.scan is None else place_of(entry.scan, self.path)
+        here = known_as(scan)
+        if entry.scan is not None and here not in map(known_as, places_of(entry.scan, self.path)):
+            place = place_of(entry.scan, self.path)
             if self._asked != place:  # else it could not be opened, and that was told
                 self._asked = place
                 app.open(place)
             return False
-        if self._compared != scan:
-            self._compared = scan
+        if self._compared != here:
+            self._compared = here
             if None not in (entry.hash, app.hash) and entry.hash != app.hash:
                 app.note(f"{scan} is not as it was when {self.path.name} was made; pictures may differ.")
         return True

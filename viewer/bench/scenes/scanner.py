@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...camera import Camera
 from ...errors import InputError
-from ...scan.points import Bounds
+from ...scan.points import UNKNOWN_UNIT, Bounds
 from ...scan.range_view import RangeView
 from ..truth.reference import Reference, trace
 from ..truth.scene import Scene
@@ -106,7 +106,7 @@ def capture(
     *,
     seed: int = 0,
     frame: int = 0,
-    unit: str = "units",
+    unit: str = UNKNOWN_UNIT,
 ) -> tuple[RangeView, ...]:
     """What each pod measures of one frame. size: (width, height), pixels. faults: one a pod.
 

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView
 from ._packed import check_unpacked_size
 
@@ -131,7 +132,7 @@ def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> Rang
         cy=cy - top,
         world_to_camera=_turned(np.asarray(to_camera, np.float64).reshape(4, 4).T),
         name=name,
-        unit=_unit(header) or "units",
+        unit=_unit(header) or UNKNOWN_UNIT,
     )
 
 
