@@ -67,7 +67,9 @@ def renderer() -> Renderer:
 
 @pytest.fixture
 def draw(renderer: Renderer) -> Callable[..., Surface]:
-    """draw(cloud, camera, size, backend, look, params): one finished Surface."""
+    """draw(cloud, camera, size, backend or variant, look, params): one finished Surface."""
+    from scenes import of_variant
+
     from viewer.backends import backend
     from viewer.frame import Request, render_frame
     from viewer.gpu.surface import Surface
@@ -80,11 +82,12 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
         look: Look | None = None,
         params: dict[str, object] | None = None,
     ) -> Surface:
+        name, setting = of_variant(name)
         request = Request(
             Pose(0, 0.0, "test", cloud),
             camera,
             name,
-            backend(name).params(params),
+            backend(name).params({**setting, **(params or {})}),
             look or Look(light="flat"),
         )
         surface = Surface(renderer.gpu, size)

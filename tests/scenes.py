@@ -5,12 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.backends import backends
 from viewer.bench.truth.mesh import Mesh
 from viewer.camera import Camera
 from viewer.gpu.view import View
 from viewer.scan.points import PointCloud
 
 NOTHING = 0xFFFFFFFF
+
+
+def variants() -> list[str]:
+    """All backends by name, and each again with every word that changes its shaders but not its picture:
+    "surfels instancing=gs"."""
+    return [
+        *backends(),
+        *(
+            f"{one.name} {parameter.name}={word}"
+            for one in backends().values()
+            for parameter in one.parameters
+            if parameter.affects == "shader"
+            for word in parameter.choices
+            if word != parameter.default
+        ),
+    ]
+
+
+def of_variant(name: str) -> tuple[str, dict[str, object]]:
+    """The backend of a variant and its parameters."""
+    name, _, setting = name.partition(" ")
+    return name, dict([setting.split("=")]) if setting else {}
 
 
 def sphere(count: int, radius: float = 1.0, center: tuple[float, float, float] = (0, 0, 0)) -> PointCloud:

@@ -83,6 +83,22 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
     assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_the_feeds_are_timed_and_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
+    """Without the sequences the demo alone."""
+    (tmp_path / "data").mkdir()
+    small = ("--quick", "--size", "96x64", "--views", 1, "--data", tmp_path / "data")
+    done = run("bench", "--suite", "slomp", *small, "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert "crane is left out" in done.err
+    assert done.out.splitlines()[-1] == str(tmp_path / "out" / "table-two.md")
+    rows = read_rows(tmp_path / "out")
+    assert {row["scene"] for row in rows} == {"demo"}
+    assert {row["params"].get("instancing") for row in rows} > {"gs", "ubo", "tbo", "vbo"}
+    assert all(row["errors"] == {} and row["busy_ms"]["median"] > 0 for row in rows)
+    text = (tmp_path / "out" / "table-two.md").read_text(encoding="utf-8")
+    assert f"| `demo` | {rows[0]['n']:,} |".replace(",", "\N{NARROW NO-BREAK SPACE}") in text
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -96,6 +112,8 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
         (["--suite", "speed"], ["speed", "numerics"]),
         (["--seed", "-1"], ["-1"]),
         (["--suite", "numerics", "--compare", "."], ["--compare"]),
+        (["--suite", "slomp", "--scene", "sphere"], ["slomp", "--scene"]),
+        (["--suite", "slomp", "--backend", "points"], ["slomp", "--backend"]),
         (["--scene", "sphere", "--size", "20000x20000"], ["20000x20000", "too large"]),
     ],
 )

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from viewer.backends import backends
+from viewer.bench.report import table_two
 from viewer.look import Look
 from viewer.params import Parameter, describe
 
@@ -54,6 +55,16 @@ def test_the_page_of_backends_is_up_to_date(bless: bool) -> None:
     if bless:
         page.write_text(backends_page(), encoding="utf-8")
     assert page.read_text(encoding="utf-8") == backends_page()
+
+
+def test_the_page_of_table_two_is_up_to_date(bless: bool) -> None:
+    page = ROOT / "docs" / "table-two.md"
+    files = sorted((ROOT / "docs" / "data").glob("table-two*.json"))
+    assert files
+    made = table_two.page([table_two.read_measurement(file) for file in files])
+    if bless:
+        page.write_text(made, encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == made
 
 
 def commands(text: str) -> list[str]:

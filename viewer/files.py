@@ -38,6 +38,13 @@ def user_folder() -> Path:
     return platformdirs.user_config_path("scan4d", appauthor=False)
 
 
+def cache_folder() -> Path:
+    """Where what was found out about this machine is kept for this user; it need not be there yet."""
+    import platformdirs
+
+    return platformdirs.user_cache_path("scan4d", appauthor=False)
+
+
 def free_file(folder: Path, suffix: str) -> Path:
     """scan4d_0001 with this suffix, or the next number that no file in the folder has."""
     paths = (folder / f"scan4d_{n:04d}{suffix}" for n in count(1))

@@ -2,7 +2,7 @@
 #include "amplify/point.glsl"
 #include "common/view.glsl"
 
-// CORNERS, bool begin_shape(Point) and Corner corner(int).
+// bool begin_shape(Point) and Corner corner(int).
 #include <shape>
 
 layout(points) in;

@@ -1,16 +1,8 @@
 // Geometry-shader feed: the vertex shader only forwards (Slomp 2014, IV-A).
-#include "amplify/point.glsl"
-
-layout(location = 0) in vec3 in_position;
-layout(location = 1) in vec3 in_normal;
-#if HAS_RADIUS
-layout(location = 2) in float in_radius;
-#else
-const float in_radius = 0.0;
-#endif
+#include "amplify/attributes.glsl"
 
 out Forwarded { Point point; } forwarded;
 
 void main() {
-    forwarded.point = Point(in_position, in_normal, in_radius, uint(gl_VertexID));
+    forwarded.point = attribute_point(gl_VertexID);
 }

@@ -55,3 +55,8 @@ vec4 to_clip(vec3 view) {
 float linear_depth(float stored) {
     return view_perspective ? view_near / stored : view_reach - stored * (view_reach - view_near);
 }
+
+// The reversed depth-buffer value of a depth.
+float stored_depth(float depth) {
+    return view_perspective ? view_near / depth : (view_reach - depth) / (view_reach - view_near);
+}

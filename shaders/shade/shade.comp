@@ -1,6 +1,7 @@
 // From a Surface to a picture: colour, light, eye-dome lighting, background.
 // COLOR_BY 0 plain, 1 own, 2 normal, 3 value, 4 id. LIGHT 0 flat, 1 head, 2 fixed.
-// OWN_COLORS, OWN_NORMALS: the backend wrote them for each pixel; else each row has them.
+// OWN_COLORS, OWN_NORMALS: the backend wrote them for each pixel; else each row has them. With its colours
+// comes how much of the pixel is covered; the rest is background.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -15,9 +16,13 @@ layout(binding = 4) uniform samplerBuffer values;
 layout(binding = 5) uniform samplerBuffer color_map;
 layout(binding = 6) uniform samplerBuffer positions;
 layout(binding = 7) uniform usamplerBuffer ids;
+#if OWN_COLORS
+layout(binding = 8) uniform samplerBuffer own_colors;
+#endif
 layout(std430, binding = 0) writeonly buffer Picture { uint picture[]; };
 
 uniform vec3 plain;          // sRGB
+uniform vec4 background;     // sRGB and alpha
 uniform vec2 value_range;    // relative to the zero that values are stored from
 uniform vec3 height_axis;
 uniform vec3 light;          // to the light, view space
@@ -118,7 +123,21 @@ vec3 shade(int index) {
     return color;
 }
 
+#if OWN_COLORS
+// sRGB, as pictures are put on a page.
+vec4 over_background(vec4 color, float coverage) {
+    float alpha = mix(background.a, 1.0, coverage);
+    vec3 mixed = mix(background.rgb * background.a, color.rgb, coverage);
+    return vec4(mixed / max(alpha, 1e-6), alpha);
+}
+#endif
+
 void main() {
     uint i = item();
-    if (i < list_count) picture[list[i]] = packUnorm4x8(vec4(shade(int(list[i])), 1.0));
+    if (i >= list_count) return;
+    vec4 color = vec4(shade(int(list[i])), 1.0);
+#if OWN_COLORS
+    color = over_background(color, texelFetch(own_colors, int(list[i])).a);
+#endif
+    picture[list[i]] = packUnorm4x8(color);
 }

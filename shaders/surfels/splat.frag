@@ -1,6 +1,11 @@
 // The round Gaussian mask of a splat, cut off (Slomp 2014, V-B), opaque.
 #include "common/view.glsl"
 
+#ifndef BEHIND
+#define BEHIND 1.0  // what the depth buffer's values were divided by
+#define SIGN 1.0    // of the depth written
+#endif
+
 uniform float mask_limit;  // squared distance from the centre at which the mask is cut off
 
 flat in uint row;
@@ -10,8 +15,8 @@ layout(location = 0) out uint out_row;
 layout(location = 1) out float out_depth;
 
 void main() {
-    float depth = linear_depth(gl_FragCoord.z);
+    float depth = linear_depth(gl_FragCoord.z * BEHIND);
     if (dot(local, local) > mask_limit || depth > view_far) discard;
     out_row = row;
-    out_depth = depth;
+    out_depth = SIGN * depth;
 }

@@ -1,26 +1,15 @@
 // A surfel's template quad, T(p) S(r, r, 1) R(u, v, n) (Slomp 2014, V-A).
-#define CORNERS 4
+#include "surfels/splat.glsl"
 
-uniform float radius_scale;
-uniform float uniform_radius;  // scan units, for points without one of their own
-uniform bool cull_back;
-
-Point surfel;
 vec3 surfel_u, surfel_v;  // half edges, view space
 vec3 surfel_center;
 
 bool begin_shape(Point point) {
-    surfel = point;
     surfel_center = to_view(point.position);
     float depth = -surfel_center.z;
-    float radius = point.radius > 0.0 && point.radius < 3e38 ? point.radius : uniform_radius;
-    // Below this a splat can fall between pixel centres, and a far scan would flicker away.
-    radius = max(radius * radius_scale * enlarged, 0.7072 / scale_at(max(depth, view_near)));
-
-    vec3 to_eye = view_perspective ? -surfel_center : vec3(0.0, 0.0, 1.0);
-    float len = length(point.normal);
-    // A missing normal faces the eye.
-    vec3 n = len > 0.0 && len < 3e38 ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
+    float radius = splat_radius(point, depth);
+    vec3 to_eye = towards_eye(surfel_center);
+    vec3 n = splat_normal(point, to_eye);
     if (cull_back && dot(mat3(world_to_view) * n, to_eye) <= 0.0) return false;
 
     // Out of view: not even the sphere around the splat's corners reaches the picture.

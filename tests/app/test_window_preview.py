@@ -73,6 +73,8 @@ def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     expect_full(app)
 
     path, again = saved(app)
+    screen.do("key", "Escape")  # away with the notes
+    app.settle()
     left, top, width, height = app.view()
     shown = screen.picture()[top : top + height, left : left + width]
     assert np.abs(shown[MIDDLE].astype(int) - again[MIDDLE][..., :3]).max() <= 1

@@ -8,9 +8,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scenes import NOTHING, sphere, sphere_hits
+from scenes import NOTHING, of_variant, sphere, sphere_hits, variants
 
-from viewer.backends import backend, backends
+from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.sample import is_sampled
@@ -20,7 +20,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 SIZE = (320, 240)
-every_backend = pytest.mark.parametrize("name", list(backends()))
+every_backend = pytest.mark.parametrize("name", variants())
 Preview = Callable[..., Surface]
 
 
@@ -31,7 +31,8 @@ def preview(renderer: Renderer) -> Preview:
     def preview(cloud: PointCloud, name: str, share: float, camera: Camera | None = None) -> Surface:
         surface = Surface(renderer.gpu, SIZE)
         camera = camera or Camera.orbit(cloud.bounds(), 20, 10, aspect=SIZE[0] / SIZE[1])
-        params = backend(name).params({"point_size": 0} if name == "points" else {})
+        name, setting = of_variant(name)
+        params = backend(name).params({"point_size": 0} if name == "points" else setting)
         request = Request(Pose(0, 0.0, "test", cloud), camera, name, params)
         assert render_frame(renderer, request, surface, share=share) == (surface.stats.left_out > 0)
         return surface

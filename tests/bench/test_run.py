@@ -134,6 +134,17 @@ def test_measuring_ticks_as_often_as_it_said(renderer: Renderer) -> None:
     assert len(ticks) == bench.steps(TORUS)
 
 
+def test_what_is_not_judged_is_timed_alone(renderer: Renderer, tmp_path: Path) -> None:
+    ticks: list[None] = []
+    bench = Bench(renderer, replace(SETTINGS, judged=False), tmp_path)
+    bench.tick = lambda: ticks.append(None)
+    rows = bench.measure(TORUS)
+    assert len(ticks) == bench.steps(TORUS) == len(DEFAULTS) * SETTINGS.views
+    assert all(row["errors"] == row["errors_by_view"] == {} for row in rows)
+    assert all(len(times) == SETTINGS.views for row in rows for times in row["times_by_view"].values())
+    assert not list(tmp_path.iterdir())
+
+
 def test_pictures_compare_with_the_truth(renderer: Renderer, tmp_path: Path) -> None:
     from PIL import Image
 

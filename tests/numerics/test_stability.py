@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import of_variant, variants
 
-from viewer.backends import Backend, backends
+from viewer.backends import backends
 from viewer.bench.numerics import Difference, Picture, Row, difference, picture, rows
 from viewer.renderer import Renderer
 
@@ -13,10 +14,12 @@ ROWS = list(rows())
 NOTHING = np.inf
 
 
-@pytest.mark.parametrize("backend", backends().values(), ids=backends())
+@pytest.mark.parametrize("variant", variants())
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_the_picture_stays_the_same(renderer: Renderer, row: Row, backend: Backend) -> None:
-    found, limit = row.compare(renderer, backend), row.limit_of(backend)
+def test_the_picture_stays_the_same(renderer: Renderer, row: Row, variant: str) -> None:
+    name, setting = of_variant(variant)
+    backend = backends()[name]
+    found, limit = row.compare(renderer, backend, backend.params(setting)), row.limit_of(backend)
     held = row.tolerance.holds(found)
     if limit and not held:
         pytest.xfail(f"a limit in principle: {limit} ({found})")

@@ -27,7 +27,8 @@ _STATISTICS_SHARE = 0.4  # of the panel's height at most
 
 def draw(app: App) -> None:
     """Declare the panel in the current ImGui window."""
-    passes = len(app.picture.surface.stats.passes) if app.picture.surface else 0
+    stats = app.picture.surface.stats if app.picture.surface else None
+    passes = len(stats.passes) + len(stats.chosen) if stats else 0
     rows = imgui.get_text_line_height_with_spacing() * (_STATISTICS_ROWS + passes)
     head = imgui.get_frame_height_with_spacing() + 2 * imgui.get_style().item_spacing.y
     height = min(head + rows, _STATISTICS_SHARE * imgui.get_content_region_avail().y)
@@ -119,6 +120,8 @@ def _draw_statistics(app: App) -> None:
         _row(name, number)
     _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.unit}")
     _row("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
+    for name, choice in surface.stats.chosen.items():
+        _row(name.capitalize(), choice)
     _row("Time", _times(surface.stats) + (f", {app.picture.rate:.0f} fps" if app.moving else ""))
     for name, milliseconds in surface.stats.passes:
         _row(f"  {name}", f"{milliseconds:.2f} ms")

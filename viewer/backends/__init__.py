@@ -51,7 +51,7 @@ class FrameView:
 
     share: of the points that need to be drawn, less than 1 while the picture moves and all would
     take too long. A backend that leaves some out says that a later call would refine the picture,
-    and counts them (`amplify` does); one that is fast enough may draw all.
+    and counts them (`Points.of` does); one that is fast enough may draw all.
     """
 
     view: View

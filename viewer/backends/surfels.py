@@ -7,13 +7,20 @@ that is cut off, in a single pass.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from ..gpu.amplify import FEEDS, amplify
+from ..gpu import passes
+from ..gpu.amplify import FEEDS, Points, Shape, amplify
+from ..gpu.context import Gpu
+from ..gpu.fastest import fastest, trial
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
+from ..gpu.tiles import FALLBACK, splat
 from ..params import param
 from ..scan.points import PointCloud
 from ..scan.spacing import typical_spacing
@@ -21,10 +28,11 @@ from . import FrameView
 
 TITLE = "Surfels"
 
+SURFEL = Shape("surfels/surfel.glsl", corners=4)
+_INSTANCING = ("auto", "tiles", *FEEDS)
+_TWO = ("two", "two_large")  # values of `passes`
 # A uniform radius of 1.5 times the spacing closes the surface.
 _RADIUS_PER_SPACING = 1.5
-# The mask is exp(-falloff d^2), 2 % at the quad's edge (d = 1).
-_MASK_FALLOFF = 4.0
 _LARGEST_RADIUS = np.float32(3e38)  # beyond it the shader takes a radius as unknown
 
 
@@ -32,13 +40,36 @@ _LARGEST_RADIUS = np.float32(3e38)  # beyond it the shader takes a radius as unk
 class Params:
     """Parameters of the surfels backend."""
 
-    instancing: str = param("gs", "How points become quads", choices=FEEDS, affects="shader")
+    instancing: str = param(
+        "auto",
+        "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
+        "the others: quads from a geometry shader, uniform blocks, buffer textures, vertex attributes or "
+        "pulled vertices",
+        choices=_INSTANCING,
+        affects="shader",
+    )
+    passes: str = param(
+        "one",
+        "How splats that overlap become one surface. one: the nearest is seen; two: those close behind it "
+        "are blended with it. The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); "
+        "one_no_depth (b); visibility, the first of two alone (c); two_large, the first enlarged as well "
+        "(e); sorted, each over those behind it",
+        choices=("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
+        sweep=("one", "two"),
+    )
+    enlarge: float = param(2.0, "Factor on splats in the second pass (f); 1: none (d)", low=1.0, high=8.0)
+    epsilon: float = param(
+        1.0, "How far behind the nearest splat others are blended with it, in its radii", low=0.0, high=100.0
+    )
     radius: str = param(
         "auto",
         "auto: the scan's own, else uniform; own: estimated where the scan has none; uniform: one for all",
         choices=("auto", "own", "uniform"),
     )
     radius_scale: float = param(1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0))
+    mask_falloff: float = param(
+        4.0, "How fast the mask fades, exp(-falloff d^2), d = 1 at the radius", low=0.1, high=100.0
+    )
     mask_cutoff: float = param(
         0.0183, "Value of the Gaussian mask where the splat ends", low=0.0183, high=0.99
     )
@@ -51,24 +82,99 @@ def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Splat in one pass; complete where all points shall be drawn."""
+    """Splat in as many passes as are asked for; complete where all points shall be drawn."""
     params: Params = frame.params
+    if not len(pose.cloud):
+        surface.clear()
+        return False
     own = {"auto": pose.stored.radii is not None, "own": True, "uniform": False}[params.radius]
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.remember("radii suffice", lambda: _radii_suffice(pose))
-    return amplify(
-        pose,
-        surface,
-        params.instancing,
-        "surfels/surfel.glsl",
-        "surfels/splat.frag",
-        use_radii=own,
-        share=frame.share,
-        radius_scale=params.radius_scale,
-        uniform_radius=0.0 if suffices else _uniform_radius(pose),
-        cull_back=params.cull_back,
-        mask_limit=min(1.0, -math.log(params.mask_cutoff) / _MASK_FALLOFF),
-    )
+    points = Points.of(pose, surface, frame.share, use_radii=own)
+    instancing = _instancing(params, surface)
+    surface.stats.faces_away = params.cull_back
+    _splat(points, surface, params, instancing, uniform_radius=0.0 if suffices else _uniform_radius(pose))
+    return points.rows is not None
+
+
+def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
+    uniforms = {
+        "radius_scale": params.radius_scale,
+        "uniform_radius": uniform_radius,
+        "cull_back": params.cull_back,
+        "mask_limit": min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff),
+    }
+    if params.passes in _TWO:
+        _draw_two(points, surface, params, instancing, uniforms)
+    else:
+        _draw_one(points, surface, params, instancing, uniforms)
+
+
+def _draw_nearest(points: Points, surface: Surface, instancing: str, uniforms: dict[str, Any]) -> None:
+    """The nearest splat of each pixel."""
+    if instancing == "tiles":
+        splat(points, surface, SURFEL, "surfels/splat.frag", **uniforms)
+    else:
+        amplify(points, surface, instancing, SURFEL, "surfels/splat.frag", **uniforms)
+
+
+def _draw_one(
+    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
+) -> None:
+    """The nearest splats, and what is made of them beyond that."""
+    _draw_nearest(points, surface, instancing, uniforms)
+    if params.passes == "visibility":
+        passes.show_visibility(points, surface, params.epsilon, **uniforms)
+    elif params.passes != "one":
+        feed = FALLBACK if instancing == "tiles" else instancing
+        falloff = params.mask_falloff * uniforms["mask_limit"]
+        if params.passes == "sorted":
+            passes.splat_sorted(points, surface, feed, SURFEL, falloff, **uniforms)
+        else:
+            tested = params.passes == "one_blended"
+            passes.splat_over(points, surface, feed, SURFEL, falloff, tested, **uniforms)
+
+
+def _draw_two(
+    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
+) -> None:
+    """Visibility, then blending."""
+    enlarge = params.enlarge
+    if params.passes == "two_large":
+        points, enlarge = replace(points, enlarged=points.enlarged * enlarge), 1.0
+    second = passes.Second(enlarge, params.epsilon, params.mask_falloff * uniforms["mask_limit"])
+    if second.enlarge == 1 and second.epsilon == 0:
+        surface.stats.skipped["second pass"] = "nothing is enlarged or blended"
+        _draw_nearest(points, surface, instancing, uniforms)
+    elif instancing == "tiles":
+        passes.tiled_two_passes(points, surface, SURFEL, second, **uniforms)
+    else:
+        passes.two_passes(points, surface, instancing, SURFEL, second, **uniforms)
+
+
+def _instancing(params: Params, surface: Surface) -> str:
+    """How points become splats. Where that is left open: tiles on software drivers, and what was the
+    fastest on others when it was measured there; in one pass and in two this need not be the same."""
+    if params.instancing != "auto":
+        return params.instancing
+    gpu, chosen = surface.gpu, "tiles"
+    if not gpu.software:
+        like = Params(passes="two" if params.passes in _TWO else "one")
+        chosen = gpu.keep(("instancing", like.passes), lambda: _fastest(gpu, like))
+        surface.bind_view()  # in place of the trial's
+    surface.stats.chosen["instancing"] = chosen
+    return chosen
+
+
+def _fastest(gpu: Gpu, params: Params) -> str:
+    names = tuple(name for name in _INSTANCING if name != "auto")
+
+    def ways() -> dict[str, Callable[[], None]]:
+        pose, surface = trial(gpu)
+        points = Points.of(pose, surface, 1.0, use_radii=True)
+        return {name: partial(_splat, points, surface, params, name, 0.0) for name in names}
+
+    return fastest(gpu, f"surfels, passes {params.passes}", names, ways)
 
 
 def _radii_suffice(pose: GpuPose) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -108,10 +109,10 @@ class Picture:
     color: NDArray[np.int_]
 
 
-def picture(renderer: Renderer, backend: Backend, shot: Shot) -> Picture:
-    """Draw a shot with a backend's defaults; raises InputError as `render_frame` does."""
+def picture(renderer: Renderer, backend: Backend, shot: Shot, params: Any = None) -> Picture:
+    """Draw a shot. params: of the backend; None: its defaults. Raises InputError as `render_frame` does."""
     pose = Pose(0, 0.0, "numerics", shot.cloud())
-    request = Request(pose, shot.camera, backend.name, look=shot.look)
+    request = Request(pose, shot.camera, backend.name, params, shot.look)
     surface = Surface(renderer.gpu, shot.size)
     while render_frame(renderer, request, surface):
         pass
@@ -203,10 +204,10 @@ class Row:
         """Why this backend cannot hold it in principle; empty where it must."""
         return self.limit or getattr(backend.module, "LIMITS", {}).get(self.name, "")
 
-    def compare(self, renderer: Renderer, backend: Backend) -> Difference:
-        """Draw both and compare them."""
+    def compare(self, renderer: Renderer, backend: Backend, params: Any = None) -> Difference:
+        """Draw both and compare them. params: of the backend; None: its defaults."""
         shot = self.shot()
-        return difference(*(picture(renderer, backend, s) for s in (shot, self.variant(shot))))
+        return difference(*(picture(renderer, backend, s, params) for s in (shot, self.variant(shot))))
 
 
 # --- the rows -------------------------------------------------------------------------

@@ -35,7 +35,7 @@ class Group:
     """A scene and the contenders that take turns on it.
 
     count, noise: None for the scene's own. sweep: "n" or "noise" where the group is a step of such a
-    sweep, else empty.
+    sweep, or the parameter that all its contenders vary; else empty.
     """
 
     scene: str

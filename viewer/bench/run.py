@@ -6,9 +6,12 @@ Times come from draws that are already warm; judging is outside of them.
 from __future__ import annotations
 
 import gc
+import os
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from datetime import date
 from functools import lru_cache
 from itertools import pairwise, product
 from math import nan
@@ -41,6 +44,7 @@ LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the 
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
 # What takes longer is not repeated as often: it stands out of the noise.
 _SLOW = 250.0  # ms
+_TIMES = ("gpu_ms", "cpu_ms", "busy_ms")  # of each view
 PREPARED = 5  # views that prepare a pose anew in any case
 
 Kind = Literal["orbit", "pose"]
@@ -52,14 +56,15 @@ class Settings:
     """How it is measured.
 
     size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of,
-    where they are faster than 250 ms. frames: of a walk, for flicker. seed: of viewpoints, samples and
-    noise. data: the folder of real scans.
+    where they are faster than 250 ms. frames: of a walk, for flicker. judged: whether errors are found, which
+    takes longer than drawing. seed: of viewpoints, samples and noise. data: the folder of real scans.
     """
 
     size: tuple[int, int] = (1920, 1280)
     views: int = 20
     repeat: int = 3
     frames: int = 6
+    judged: bool = True
     seed: int = 0
     data: Path | None = None
 
@@ -74,11 +79,13 @@ class _Tally:
 
     gpu_ms: list[float] = field(default_factory=list)
     cpu_ms: list[float] = field(default_factory=list)
+    busy_ms: list[float] = field(default_factory=list)
     derive_ms: list[float] = field(default_factory=list)
     upload_ms: list[float] = field(default_factory=list)
     passes: list[dict[str, float]] = field(default_factory=list)
     bytes_gpu: list[int] = field(default_factory=list)
     peak_rss: list[int | None] = field(default_factory=list)
+    covered: list[float] = field(default_factory=list)  # percent of the picture
     errors: list[Errors] = field(default_factory=list)
     flicker: Errors = field(default_factory=dict)
 
@@ -90,9 +97,9 @@ class _Tally:
 
     def numbers(self, views: int) -> Row:
         """What a row holds of the first views."""
-        passes = {
-            name: spread([run.get(name, 0.0) for run in self.passes[:views]]) for name in self.passes[0]
-        }
+        runs = self.passes[:views]
+        names = dict.fromkeys(name for run in runs for name in run)  # a view may need others than the first
+        passes = {name: spread([run.get(name, 0.0) for run in runs]) for name in names}
         by_view = {name: [errors[name] for errors in self.errors[:views]] for name in self.errors[0]}
         memory = [peak for peak in self.peak_rss[:views] if peak is not None]
         return {
@@ -102,7 +109,8 @@ class _Tally:
             "peak_rss": max(memory, default=None),
             "errors": aggregate(by_view) | self.flicker,
             "errors_by_view": by_view,
-            "times_by_view": {name: getattr(self, name)[:views] for name in ("gpu_ms", "cpu_ms")},
+            "covered_by_view": self.covered[:views],
+            "times_by_view": {name: getattr(self, name)[:views] for name in _TIMES},
         }
 
 
@@ -149,6 +157,8 @@ class Bench:
 
     def walks(self, group: Group) -> int:
         """How many walks of frames a group has at most."""
+        if not self.settings.judged:
+            return 0
         return 2 if self._subject(group).moments > 1 else 1
 
     def note(self, text: str) -> None:
@@ -185,7 +195,14 @@ class Bench:
 
     def _where(self) -> Row:
         gpu = self.renderer.gpu
-        return {"timer": gpu.timers.kind, "device": gpu.device, "driver": gpu.driver, "version": __version__}
+        return {
+            "timer": gpu.timers.kind,
+            "device": gpu.device,
+            "driver": gpu.driver,
+            "processors": os.cpu_count(),
+            "version": __version__,
+            "date": date.today().isoformat(),
+        }
 
     # --- one view ---------------------------------------------------------------------
 
@@ -193,7 +210,7 @@ class Bench:
         """Let all contenders draw a view, time them and judge them. pictured: save how they compare."""
         moment = subject.moment(view * subject.moments // self.settings.views)
         camera = self._cameras(subject, moment)[view]
-        judge = self._judge(subject, moment, camera)
+        judge = self._judge(subject, moment, camera) if self.settings.judged else None
         turn = view % max(1, len(tallies))  # who is first changes, so that drift hits all alike
         for contender in (*list(tallies)[turn:], *list(tallies)[:turn]):
             surface, tally = Surface(self.renderer.gpu, self.settings.size), tallies[contender]
@@ -206,8 +223,9 @@ class Bench:
                 self.note(f"{subject.name}: {contender.backend} is left out: {error}")
                 del tallies[contender]
                 continue
-            tally.errors.append(judge.errors(surface))
-            if self.folder and pictured and view == 0 and not contender.sweep:
+            tally.covered.append(100 * float((surface.coverage > 0).mean()))
+            tally.errors.append(judge.errors(surface) if judge else {})
+            if self.folder and judge and pictured and view == 0 and not contender.sweep:
                 _save_comparison(picture_path(self.folder, subject.name, contender.backend), judge, surface)
             surface.release()
             self.tick()
@@ -227,7 +245,9 @@ class Bench:
                 tally.bytes_gpu.append(self.renderer.bytes_of(request.pose) + surface.nbytes)
             (warm,) = call_ms(self.renderer, request, surface, 1)
             repeat = self.settings.repeat if warm < _SLOW else 1
+            start = time.process_time()
             calls = call_ms(self.renderer, request, surface, repeat)
+            tally.busy_ms.append((time.process_time() - start) * 1e3 / repeat)
             runs = pass_ms(self.renderer, request, surface, repeat)
         tally.cpu_ms.append(spread(calls)["median"])
         tally.gpu_ms.append(spread([run.total() for run in runs])["median"])
@@ -248,7 +268,12 @@ class Bench:
     # --- from frame to frame ----------------------------------------------------------
 
     def _walks(self, subject: Subject) -> Iterator[tuple[Kind, list[Frame], Walk]]:
-        """An orbit about the first moment; some moments of a sequence whose points are known in all."""
+        """An orbit about the first moment; some moments of a sequence whose points are known in all.
+
+        None where nothing is judged.
+        """
+        if not self.settings.judged:
+            return
         first, frames = subject.moment(0), self.settings.frames
         start = self._cameras(subject, first)[0]
         orbit = [(first, start.orbited(_ORBIT_STEP * frame, 0)) for frame in range(frames)]

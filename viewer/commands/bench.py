@@ -10,18 +10,19 @@ from __future__ import annotations
 import os
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 
 from ..backends import backend, backends
-from ..bench import numerics
+from ..bench import numerics, slomp
 from ..bench.forecast import forecast
 from ..bench.plan import Group, plan
 from ..bench.report.page import write_report
 from ..bench.report.results import NOTES, NUMERICS, RESULTS, Row, compare, read_rows, write_row
+from ..bench.report.table_two import write_table_two
 from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
 from ..errors import InputError
@@ -29,7 +30,7 @@ from ..files import whole_file
 from . import arguments, drawing
 from .console import progress, warn
 
-_SUITES = ("scenes", "numerics")
+_SUITES = ("scenes", "numerics", "slomp")
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -60,7 +61,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="NAME|FILE",
         help="scenes by name, or meshes (PLY, OBJ); default: all there are",
     )
-    parser.add_argument("--suite", choices=_SUITES, help="only this part; default: both")
+    parser.add_argument("--suite", choices=_SUITES, help="only this part; default: scenes and numerics")
     parser.add_argument(
         "--quick", action="store_true", help="few scenes, few views, small pictures: two minutes"
     )
@@ -85,13 +86,17 @@ def run(args: Namespace) -> int:
     _check_libraries()
     if args.compare and args.suite == "numerics":
         raise InputError("--compare is for the scenes", "--suite numerics")
+    if args.suite == "slomp" and (args.backend or args.scene):
+        raise InputError(
+            "has its own scenes and renderer", "--suite slomp", "Leave out --scene and --backend"
+        )
     old = read_rows(args.compare) if args.compare else None
     names = list(dict.fromkeys(args.backend or backends()))
     for name in names:
         backend(name)  # wrong names are told before anything is drawn
     settings = _settings(args)
-    groups, missing = _groups(args, settings, names) if args.suite != "numerics" else ([], [])
-    tested = names if args.suite != "scenes" else []
+    groups, missing = _groups(args, settings, names)
+    tested = names if args.suite in (None, "numerics") else []
     bench = Bench(drawing.renderer(args.device), settings, args.out)
     _make_folder(args.out)
     for name in missing:
@@ -109,6 +114,8 @@ def run(args: Namespace) -> int:
     stopped = ["Stopped before the end."] if bench.stopped else []
     _write_notes(args.out, [*missing, *bench.notes, *stopped])
     print(write_report(args.out))
+    if args.suite == "slomp":
+        print(write_table_two(args.out))
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
     return int(bench.stopped)
@@ -176,12 +183,20 @@ def _settings(args: Namespace) -> Settings:
             f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
+    if args.suite == "slomp":
+        told["judged"] = False  # how right surfels are, the scenes tell
     return replace(_QUICK if args.quick else Settings(), **{k: v for k, v in told.items() if v is not None})
 
 
 def _groups(args: Namespace, settings: Settings, names: Sequence[str]) -> tuple[list[Group], list[str]]:
     """What to measure, and what of all scenes cannot be had. Raises InputError for those that were named."""
+    if args.suite == "numerics":
+        return [], []
     missing = {name: reason for name, reason in catalog.names(settings.data).items() if reason}
+    if args.suite == "slomp":
+        groups = slomp.groups()
+        lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
+        return [group for group in groups if group.scene not in lacking], _left_out(lacking)
     known = _QUICK_SCENES if args.quick else catalog.names(settings.data)
     scenes = list(dict.fromkeys(args.scene or [name for name in known if name not in missing]))
     if args.quick:
@@ -191,8 +206,12 @@ def _groups(args: Namespace, settings: Settings, names: Sequence[str]) -> tuple[
     called = Counter(settings.subject(group).name for group in groups if not group.sweep)
     if twice := [name for name, count in called.items() if count > 1]:
         raise InputError(f"two scenes are called {twice[0]}", "--scene", "Rename one of the files")
-    left_out = [] if args.scene else [f"{name} is left out: {reason}" for name, reason in missing.items()]
-    return groups, left_out
+    return groups, [] if args.scene else _left_out(missing)
+
+
+def _left_out(missing: Mapping[str, str]) -> list[str]:
+    """What to say of scenes that cannot be had, by name with the reason."""
+    return [f"{name} is left out: {reason}" for name, reason in missing.items()]
 
 
 def _make_folder(out: Path) -> None:

@@ -3,52 +3,174 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
+from . import gl
 from .pose import GpuPose
 from .surface import Surface
 
-# Feed -> the stages that bring points to a shape; the fragment stage is the shape's own.
-_STAGES = {"gs": ("amplify/gs.vert", "amplify/gs.geom")}
-FEEDS = tuple(_STAGES)
+_STAGES = ("amplify/corner.vert",)
+# Feed -> the stages that bring points to a shape, and the part of them that fetches points.
+_FEEDS: dict[str, tuple[tuple[str, ...], dict[str, str]]] = {
+    "gs": (("amplify/gs.vert", "amplify/gs.geom"), {}),
+    "ubo": (_STAGES, {"feed": "amplify/feeds/ubo.glsl"}),
+    "tbo": (_STAGES, {"feed": "amplify/feeds/tbo.glsl"}),
+    "vbo": (_STAGES, {"feed": "amplify/feeds/vbo.glsl"}),
+    "pull": (_STAGES, {"feed": "amplify/feeds/pull.glsl"}),
+}
+FEEDS = tuple(_FEEDS)
+_WHOLE = ("ubo", "vbo")  # feeds that bring a pose's points one after the other, without choice
+_BLOCK_BYTES = 1 << 16  # of a uniform block; some drivers allow less or more
+_BLOCK_POINTS = 64  # ranges begin at multiples of 256 bytes, whatever a point takes
+# What a point has: name of the pose's array, of the vertex attribute, floats. Radii only where points
+# bring their own.
+_ATTRIBUTES = (("positions", "in_position", 3), ("normals", "in_normal", 3), ("radii", "in_radius", 1))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What points become. file: shader with `begin_shape` and `corner`. corners: of its triangle strip."""
+
+    file: str
+    corners: int
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The points of a pose that are drawn.
+
+    use_radii: whether they bring their own radius. count: how many. rows: which, ascending; None: all.
+    enlarged: the factor on their size with which they together cover what all do.
+    """
+
+    pose: GpuPose
+    use_radii: bool
+    count: int
+    rows: gl.BufferTexture | None = None
+    enlarged: float = 1.0
+
+    @classmethod
+    def of(cls, pose: GpuPose, surface: Surface, share: float, use_radii: bool) -> Points:
+        """A share of the points, as `Surface.take_sample` chooses them; 1: all."""
+        rows, count = surface.take_sample(share)
+        return cls(pose, use_radii, count, rows, math.sqrt(len(pose.cloud) / count) if count else 1.0)
+
+    @property
+    def attributes(self) -> tuple[tuple[str, str, int], ...]:
+        """What is read of each: (name of the pose's array, of the vertex attribute, floats)."""
+        return _ATTRIBUTES if self.use_radii else _ATTRIBUTES[:2]
+
+    @property
+    def stride(self) -> int:
+        """Floats of a point."""
+        return sum(floats for _, _, floats in self.attributes)
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """For shaders that include amplify/attributes.glsl or amplify/texels.glsl."""
+        return {"HAS_RADIUS": int(self.use_radii), "SAMPLED": int(self.rows is not None)}
+
+    def bind(self) -> None:
+        """Bind what amplify/texels.glsl reads: texture units 0 to 3."""
+        for unit, (name, _, _) in enumerate(self.attributes):
+            self.pose.array(name).bind(unit)
+        if self.rows is not None:
+            self.rows.bind(3)
 
 
 def amplify(
-    pose: GpuPose,
-    surface: Surface,
-    feed: str,
-    shape: str,
-    fragment: str,
-    use_radii: bool,
-    share: float = 1.0,
-    **uniforms: Any,
-) -> bool:
-    """Draw the points of a pose as shapes, in id order with a strict depth test.
+    points: Points, surface: Surface, feed: str, shape: Shape, fragment: str, **uniforms: Any
+) -> None:
+    """Draw points as shapes, in id order with a strict depth test.
 
-    feed: one of FEEDS. shape: the shader file with `begin_shape` and `corner`. fragment:
-    the shape's fragment shader, which writes a row and a depth. use_radii: whether points
-    bring their own radius. share: of the points that are drawn, enlarged (the shape multiplies
-    by the uniform `enlarged`) so that together they cover what all do; 1: all. uniforms: of
-    both. Returns whether points were left out.
+    feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth.
+    uniforms: of both.
     """
-    gpu, count = pose.gpu, len(pose.cloud)
-    target = surface.raster()
-    rows, drawn = surface.take_sample(share)
-    program = gpu.program((*_STAGES[feed], fragment), {"HAS_RADIUS": int(use_radii)}, {"shape": shape})
-    gpu.set(program, enlarged=math.sqrt(count / drawn) if drawn else 1.0, **uniforms)
+    gpu = surface.gpu
     with gpu.timers.measure("splat"):
-        target.clear()
+        surface.raster().clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        if drawn:
-            attributes = [("positions", "3f", "in_position"), ("normals", "3f", "in_normal")]
-            attributes += [("radii", "1f", "in_radius")] if use_radii else []
-            content = [(pose.array(name).buffer, form, attribute) for name, form, attribute in attributes]
-            vertices = gpu.ctx.vertex_array(program, content, index_buffer=rows and rows.buffer)
-            vertices.render(moderngl.POINTS, vertices=drawn)
-            vertices.release()
+        draw_shapes(points, feed, shape, fragment, **uniforms)
     with gpu.timers.measure("copy"):
         surface.take_raster()
-    return drawn < count
+
+
+def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, **uniforms: Any) -> None:
+    """Draw points as shapes into the bound framebuffer, with the depth test and blending that are set.
+
+    Where only some are drawn, `ubo` and `vbo` are replaced by `tbo`, which gives the same picture.
+    """
+    gpu = points.pose.gpu
+    if points.rows is not None and feed in _WHOLE:
+        feed = "tbo"
+    stages, parts = _FEEDS[feed]
+    defines = {**points.defines, "CORNERS": shape.corners}
+    if feed == "ubo":
+        defines |= {"STRIDE": points.stride, "POINTS": _block_points(points)}
+    program = gpu.program((*stages, fragment), defines, {**parts, "shape": shape.file})
+    gpu.set(program, enlarged=points.enlarged, **uniforms)
+    if not points.count:
+        return
+    if feed == "ubo":
+        _draw_blocks(program, points, shape)
+        return
+    content = _attributes(program, points, "/i" if feed == "vbo" else "") if feed in ("gs", "vbo") else []
+    if not content:
+        points.bind()
+    index = points.rows.buffer if feed == "gs" and points.rows is not None else None
+    vertices = gpu.ctx.vertex_array(program, content, index_buffer=index)
+    if feed == "gs":
+        vertices.render(moderngl.POINTS, vertices=points.count)
+    elif feed == "pull":
+        vertices.render(moderngl.TRIANGLES, vertices=3 * (shape.corners - 2) * points.count)
+    else:
+        vertices.render(moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=points.count)
+    vertices.release()
+
+
+def _attributes(
+    program: moderngl.Program, points: Points, advance: str
+) -> list[tuple[moderngl.Buffer, str, str]]:
+    """What a vertex array is made of. advance: "/i" for the next value with each instance."""
+    return [
+        (points.pose.array(name).buffer, f"{floats}f{advance}", attribute)
+        for name, attribute, floats in points.attributes
+        if attribute in program
+    ]
+
+
+def _draw_blocks(program: moderngl.Program, points: Points, shape: Shape) -> None:
+    """Range after range of one buffer as a uniform block, a draw call each."""
+    gpu, size = points.pose.gpu, _block_points(points)
+    point_bytes = 4 * points.stride
+    packed = points.pose.packed(f"block of {points.stride}", lambda: _pack(points)).buffer
+    vertices = gpu.ctx.vertex_array(program, [])
+    for first in range(0, points.count, size):
+        packed.bind_to_uniform_block(1, offset=first * point_bytes, size=size * point_bytes)
+        gpu.set(program, first=first)
+        vertices.render(
+            moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=min(size, points.count - first)
+        )
+    vertices.release()
+
+
+def _block_points(points: Points) -> int:
+    """Points of a uniform block."""
+    block_bytes = min(_BLOCK_BYTES, gl.max_uniform_block_bytes())
+    fitting = block_bytes // (4 * points.stride)
+    return fitting - fitting % _BLOCK_POINTS
+
+
+def _pack(points: Points) -> NDArray[np.float32]:
+    """The attributes of each point one after the other, (ranges x points of a block, floats)."""
+    cloud, size = points.pose.cloud, _block_points(points)
+    packed = np.zeros((-(-len(cloud) // size) * size, points.stride), np.float32)
+    arrays = [getattr(cloud, name).reshape(len(cloud), -1) for name, _, _ in points.attributes]
+    packed[: len(cloud)] = np.concatenate(arrays, axis=1)
+    return packed

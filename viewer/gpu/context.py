@@ -65,7 +65,8 @@ class Gpu:
         self.driver: str = ctx.info["GL_VERSION"]
         self.software = any(word in self.device.lower() for word in _SOFTWARE)
         self.timers = Timers(ctx, self.software)
-        self.max_pixels = gl.max_storage_block_bytes() // 4  # a word a pixel
+        self.max_storage_bytes = gl.max_storage_block_bytes()
+        self.max_pixels = self.max_storage_bytes // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
         self._kept: dict[object, Any] = {}
         self._discarded: deque[Resource] = deque()

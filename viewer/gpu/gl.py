@@ -35,8 +35,10 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
 )
 from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
 
+RG32UI = 0x823C
 RGB32F = 0x8815
 R32F = 0x822E
+RGBA32F = 0x8814
 RGBA8 = 0x8058
 R32UI = 0x8236
 _RED_INTEGER = 0x8D94
@@ -53,6 +55,7 @@ _DEPTH_ATTACHMENT = 0x8D00
 _DEPTH_COMPONENT32F = 0x8CAC
 _MAX_TEXTURE_BUFFER_SIZE = 0x8C2B
 _MAX_SHADER_STORAGE_BLOCK_SIZE = 0x90DE
+_MAX_UNIFORM_BLOCK_SIZE = 0x8A30
 _READ_FRAMEBUFFER = 0x8CA8
 _SCRATCH_UNIT = 15
 
@@ -74,6 +77,11 @@ def max_storage_block_bytes() -> int:
     return integer(_MAX_SHADER_STORAGE_BLOCK_SIZE)
 
 
+def max_uniform_block_bytes() -> int:
+    """How many bytes of a buffer a shader may see as a uniform block."""
+    return integer(_MAX_UNIFORM_BLOCK_SIZE)
+
+
 def reverse_depth() -> None:
     """Clip space as the project uses it: depth 0..1, row 0 of a picture at its top."""
     _clip.glClipControl(_clip.GL_UPPER_LEFT, _clip.GL_ZERO_TO_ONE)
@@ -82,6 +90,16 @@ def reverse_depth() -> None:
 def default_clip_space() -> None:
     """OpenGL's own clip space, which other libraries expect."""
     _clip.glClipControl(_clip.GL_LOWER_LEFT, _clip.GL_NEGATIVE_ONE_TO_ONE)
+
+
+def write_depth(on: bool) -> None:
+    """Whether what is drawn from now on changes the depth buffer."""
+    GL_1_0.glDepthMask(on)
+
+
+def divide_depth(divisor: float) -> None:
+    """Divide what reaches the depth buffer from now on; 1: as it is."""
+    GL_1_0.glDepthRange(0.0, 1.0 / divisor)
 
 
 def clear_words(buffer: moderngl.Buffer, word: int) -> None:
@@ -115,23 +133,24 @@ class BufferTexture:
         self.buffer.release()
 
 
-class Raster:
-    """A framebuffer with a 32-bit float depth buffer and two 32-bit images: row and depth.
+class Target:
+    """A framebuffer of two images with a 32-bit float depth buffer.
 
     moderngl's own depth textures are 24-bit integers.
     """
 
-    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, size: tuple[int, int], images: tuple[moderngl.Texture, moderngl.Texture]
+    ) -> None:
         self.size = size
-        self.rows = ctx.texture(size, 1, dtype="u4")
-        self.depth = ctx.texture(size, 1, dtype="f4")
+        self.images = images
         renderbuffer, framebuffer = ctypes.c_uint(0), ctypes.c_uint(0)
         GL_3_0.glGenRenderbuffers(1, ctypes.byref(renderbuffer))
         GL_3_0.glBindRenderbuffer(_RENDERBUFFER, renderbuffer.value)
         GL_3_0.glRenderbufferStorage(_RENDERBUFFER, _DEPTH_COMPONENT32F, *size)
         GL_3_0.glGenFramebuffers(1, ctypes.byref(framebuffer))
         GL_3_0.glBindFramebuffer(_FRAMEBUFFER, framebuffer.value)
-        for index, texture in enumerate((self.rows, self.depth)):
+        for index, texture in enumerate(images):
             GL_3_0.glFramebufferTexture2D(
                 _FRAMEBUFFER, _COLOR_ATTACHMENT0 + index, GL_1_1.GL_TEXTURE_2D, texture.glo, 0
             )
@@ -140,6 +159,29 @@ class Raster:
         GL_2_0.glDrawBuffers(2, buffers)
         self._renderbuffer, self._framebuffer = renderbuffer, framebuffer
         self.target = ctx.detect_framebuffer(framebuffer.value)
+
+    def depth_is_float32(self) -> bool:
+        """Whether the driver really stores 32-bit float depth."""
+        GL_3_0.glBindRenderbuffer(_RENDERBUFFER, self._renderbuffer.value)
+        value = ctypes.c_int(0)
+        GL_3_0.glGetRenderbufferParameteriv(
+            _RENDERBUFFER, GL_3_0.GL_RENDERBUFFER_INTERNAL_FORMAT, ctypes.byref(value)
+        )
+        return value.value == _DEPTH_COMPONENT32F
+
+    def release(self) -> None:
+        """Delete everything."""
+        GL_3_0.glDeleteFramebuffers(1, ctypes.byref(self._framebuffer))
+        GL_3_0.glDeleteRenderbuffers(1, ctypes.byref(self._renderbuffer))
+        for image in self.images:
+            image.release()
+
+
+class Raster(Target):
+    """Two 32-bit images: row and depth."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+        super().__init__(ctx, size, (ctx.texture(size, 1, dtype="u4"), ctx.texture(size, 1, dtype="f4")))
 
     def clear(self) -> None:
         """Bind it and clear: no row anywhere, depth +inf, the depth buffer at its far end."""
@@ -163,18 +205,21 @@ class Raster:
             GL_1_0.glReadPixels(0, 0, *self.size, form, kind, ctypes.c_void_p(0))
         GL_1_5.glBindBuffer(_PIXEL_PACK_BUFFER, 0)
 
-    def depth_is_float32(self) -> bool:
-        """Whether the driver really stores 32-bit float depth."""
-        GL_3_0.glBindRenderbuffer(_RENDERBUFFER, self._renderbuffer.value)
-        value = ctypes.c_int(0)
-        GL_3_0.glGetRenderbufferParameteriv(
-            _RENDERBUFFER, GL_3_0.GL_RENDERBUFFER_INTERNAL_FORMAT, ctypes.byref(value)
-        )
-        return value.value == _DEPTH_COMPONENT32F
 
-    def release(self) -> None:
-        """Delete everything."""
-        GL_3_0.glDeleteFramebuffers(1, ctypes.byref(self._framebuffer))
-        GL_3_0.glDeleteRenderbuffers(1, ctypes.byref(self._renderbuffer))
-        self.rows.release()
-        self.depth.release()
+class Sums(Target):
+    """Two images of four floats, to which what is drawn is added or blended."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+        super().__init__(ctx, size, (ctx.texture(size, 4, dtype="f4"), ctx.texture(size, 4, dtype="f4")))
+        self.nbytes = (16 + 16 + 4) * size[0] * size[1]
+
+    def clear(self) -> None:
+        """Set both images to zero; it is bound. The depth buffer stays."""
+        zero = (ctypes.c_float * 4)(*[0.0] * 4)
+        for index in range(2):
+            GL_3_0.glClearBufferfv(GL_1_1.GL_COLOR, index, zero)
+
+    def clear_depth(self) -> None:
+        """Set the depth buffer to its far end; it is bound."""
+        GL_1_0.glDepthMask(True)
+        GL_3_0.glClearBufferfv(GL_1_1.GL_DEPTH, 0, (ctypes.c_float * 1)(0.0))

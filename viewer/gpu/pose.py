@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, TypeVar
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,16 +72,31 @@ class GpuPose:
             end = time.perf_counter() + budget_ms / 1e3
             return all(self._upload(name, end) for name in missing)
 
+    def packed(self, name: str, pack: Callable[[], NDArray], texel_format: int = gl.R32F) -> gl.BufferTexture:
+        """The pose's arrays arranged in another way, which `pack` does at the first call for this name.
+
+        Counted, kept and deleted with the arrays.
+        """
+        key = f"packed:{name}"
+        if key not in self._arrays:
+            with self.preparing("upload"):
+                upload = _Upload(self.gpu, pack())
+                upload.go_on(np.inf)
+                self._keep(key, upload.buffer, texel_format)
+        return self._arrays[key]
+
     def _upload(self, name: str, end: float) -> bool:
         """Go on with an array until that time of the performance counter; whether it is there."""
         if name not in self._uploads:
             self._uploads[name] = _Upload(self.gpu, self._values(name))
         if not self._uploads[name].go_on(end):
             return False
-        buffer = self._uploads.pop(name).buffer
-        self._arrays[name] = gl.BufferTexture(buffer, FORMATS.get(name, gl.R32F))
-        self.uploaded_bytes += buffer.size
+        self._keep(name, self._uploads.pop(name).buffer, FORMATS.get(name, gl.R32F))
         return True
+
+    def _keep(self, name: str, buffer: moderngl.Buffer, texel_format: int) -> None:
+        self._arrays[name] = gl.BufferTexture(buffer, texel_format)
+        self.uploaded_bytes += buffer.size
 
     def _values(self, name: str) -> NDArray:
         if name.startswith("scalar:"):

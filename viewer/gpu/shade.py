@@ -52,6 +52,8 @@ def shade(surface: Surface, look: Look) -> None:
             _attribute(surface, "colors").bind(2)
         if light != "flat" or color == "normal":
             _attribute(surface, "normals").bind(3)
+        if surface.is_own("colors"):
+            surface.own("colors").bind(8)
         if value == "scalar":
             pose.array(f"scalar:{source}").bind(4)
         if value == "height":
@@ -63,6 +65,7 @@ def shade(surface: Surface, look: Look) -> None:
         gpu.set(
             program,
             plain=tuple(c / 255 for c in rgba(look.plain)[:3]),
+            background=tuple(c / 255 for c in rgba(look.background)),
             value_range=(low - zero, high - zero),
             height_axis=up_vector(look.up),
             light=_direction(look.azimuth, look.elevation),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 import moderngl
 import numpy as np
@@ -21,6 +22,7 @@ from .pose import FORMATS, GpuPose
 from .sample import sample_of
 from .view import View
 
+_NO_DEPTH = 0x7F800000  # +inf as float bits
 EMPTY = 255  # the level of a pixel that shows nothing
 _FEW = 1000  # points of which none is left out: it would gain nothing, and they would be missed
 _OWN_BYTES = {"normals": 12, "colors": 4}  # a pixel
@@ -32,8 +34,10 @@ class Stats:
 
     backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose,
     estimates included. passes: (name, gpu_ms), empty while timers are off.
-    skipped: what was not computed -> why. share: of the points that needed to be drawn, by the
-    order of gpu/sample.py, less than 1 in a preview. left_out: the points that are not in that share.
+    skipped: what was not computed -> why. chosen: parameter -> what "auto" stood for. faces_away:
+    whether points that face away from the eye were left out. share: of the points that needed to be
+    drawn, by the order of gpu/sample.py, less than 1 in a preview. left_out: the points that are not in
+    that share.
     """
 
     backend: str = ""
@@ -43,8 +47,21 @@ class Stats:
     derive_ms: float = 0.0
     passes: list[tuple[str, float]] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    chosen: dict[str, str] = field(default_factory=dict)
+    faces_away: bool = False
     share: float = 1.0
     left_out: int = 0
+
+
+class Workspace(Resource, Protocol):
+    """What a backend keeps with a surface."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+
+
+W = TypeVar("W", bound=Workspace)
 
 
 class Texel(NamedTuple):
@@ -68,6 +85,7 @@ class Surface:
         self.gpu = gpu
         self._resources: tuple[Resource, ...] = ()
         self._own: dict[str, gl.BufferTexture] = {}
+        self._kept: dict[str, Workspace] = {}
         self._raster: gl.Raster | None = None
         width, height = size
         if width < 1 or height < 1:
@@ -132,6 +150,11 @@ class Surface:
         self.stats.share, self.stats.left_out = share, count - drawn
         return rows, drawn
 
+    def clear(self) -> None:
+        """Nothing anywhere."""
+        gl.clear_words(self.depths.buffer, _NO_DEPTH)
+        gl.clear_words(self.rows.buffer, NOTHING)
+
     def raster(self) -> gl.Raster:
         """The framebuffer of backends that rasterise; `take_raster` makes it the Surface."""
         if self._raster is None:
@@ -142,9 +165,17 @@ class Surface:
         """Copy what was rasterised into the Surface."""
         self.raster().copy_to(self.rows.buffer, self.depths.buffer)
 
+    def keep(self, name: str, make: Callable[[], W]) -> W:
+        """What `make` returned the first time for this name: what a backend works with from picture to
+        picture and does not want to make anew. Counted and deleted with the surface."""
+        if name not in self._kept:
+            self._kept[name] = make()
+        return self._kept[name]  # type: ignore[return-value]
+
     def own(self, name: str) -> gl.BufferTexture:
         """A texel a pixel, for a backend that writes `normals` or `colors` itself in this frame:
-        they are shown in place of the row's. In the pose's formats; where nothing is, unread."""
+        they are shown in place of the row's. In the pose's formats, the alpha of a colour being what it
+        covers of the pixel; where nothing is, unread."""
         if name not in self._own:
             buffer = self.gpu.ctx.buffer(reserve=_OWN_BYTES[name] * self.size[0] * self.size[1])
             self._own[name] = gl.BufferTexture(buffer, FORMATS[name])
@@ -159,7 +190,8 @@ class Surface:
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         words = 3 + (3 if self._raster else 0) + sum(_OWN_BYTES[name] for name in self._own) // 4
-        return 4 * self.size[0] * self.size[1] * words + self.covered.nbytes
+        kept = sum(workspace.nbytes for workspace in self._kept.values())
+        return 4 * self.size[0] * self.size[1] * words + self.covered.nbytes + kept
 
     @property
     def pose(self) -> GpuPose:
@@ -194,7 +226,7 @@ class Surface:
         """(H, W, 3) float32, linear; the look's plain colour where the scan has none; 0 where nothing is."""
         colors = self._cloud.colors
         if self.is_own("colors"):
-            bytes_ = self._read(self._own["colors"].buffer, np.uint8).reshape(*self.size[::-1], 4)
+            bytes_ = self._read_texels("colors", np.uint8)
             rgb = np.where((self.row != NOTHING)[..., None], bytes_[..., :3], np.uint8(0))
         elif colors is None:
             plain = np.array(rgba(self.look.plain)[:3], np.uint8)
@@ -208,7 +240,7 @@ class Surface:
         """(H, W, 3) float32, world space, unit length; 0 where unknown."""
         normals = self._cloud.normals
         if self.is_own("normals"):
-            written = self._read(self._own["normals"].buffer, np.float32).reshape(*self.size[::-1], 3)
+            written = self._read_texels("normals", np.float32)
             fetched = np.where((self.row != NOTHING)[..., None], written, np.float32(0))
         elif normals is None:
             return np.zeros((*self.size[::-1], 3), np.float32)
@@ -220,8 +252,11 @@ class Surface:
 
     @property
     def coverage(self) -> NDArray[np.float32]:
-        """(H, W) float32, 0..1 of the pixel."""
-        return (self.row != NOTHING).astype(np.float32)
+        """(H, W) float32, 0..1 of the pixel: the alpha of the backend's own colours where it wrote them."""
+        covered = (self.row != NOTHING).astype(np.float32)
+        if self.is_own("colors"):
+            covered *= self._read_texels("colors", np.uint8)[..., 3] / np.float32(255)
+        return covered
 
     @property
     def level(self) -> NDArray[np.uint8]:
@@ -275,12 +310,12 @@ class Surface:
 
     def point_counts(self) -> dict[str, int]:
         """What became of the points of the file; see `count_points`."""
-        return count_points(self._cloud, self.view, self.row, self.stats.share)
+        return count_points(self._cloud, self.view, self.row, self.stats.share, self.stats.faces_away)
 
     def release(self) -> None:
         """Give up what it holds on the GPU now; otherwise that goes with the object."""
-        self.gpu.discard(*self._resources, *self._own.values(), self._raster)
-        self._resources, self._own, self._raster = (), {}, None
+        self.gpu.discard(*self._resources, *self._own.values(), *self._kept.values(), self._raster)
+        self._resources, self._own, self._kept, self._raster = (), {}, {}, None
 
     def __del__(self) -> None:
         self.release()
@@ -301,6 +336,10 @@ class Surface:
         out = np.empty(buffer.size, np.uint8)
         buffer.read_into(out)
         return out.view(dtype).reshape(self.size[1], -1)
+
+    def _read_texels(self, name: str, dtype: type) -> NDArray:
+        """What the backend wrote for each pixel, (H, W, channels)."""
+        return self._read(self._own[name].buffer, dtype).reshape(*self.size[::-1], -1)
 
     def _fetch(self, values: NDArray, nothing: float) -> NDArray:
         rows = self.row

@@ -29,6 +29,15 @@ class Timers:
         self._passes = []
 
     @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Time nothing that runs inside."""
+        enabled, self.enabled = self.enabled, False
+        try:
+            yield
+        finally:
+            self.enabled = enabled
+
+    @contextmanager
     def measure(self, name: str) -> Iterator[None]:
         """Time what runs inside; passes do not nest."""
         if not self.enabled:

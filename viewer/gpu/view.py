@@ -95,3 +95,12 @@ class View:
             pixels, depth = self.project(positions)
         in_picture = ((pixels >= 0) & (pixels < self.size)).all(axis=1)
         return in_picture & (depth >= self.near) & (depth <= self.far)
+
+    def faces_away(self, positions: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which points (N, 3), relative to the origin, have a normal (N, 3) away from the eye; those that
+        have none do not."""
+        with np.errstate(invalid="ignore"):  # NaN is none
+            if not self.perspective:
+                return normals @ self.rotation[2] < 0
+            eye = -self.translation @ self.rotation
+            return np.einsum("ij,ij->i", normals, eye - positions) < 0

@@ -40,9 +40,11 @@ class Counting:
     def _begin(self, picture: Picture) -> None:
         surface = picture.surface
         assert surface is not None
-        cloud, view, rows, share = surface.pose.stored, surface.view, surface.row, surface.stats.share
+        cloud, view, rows, stats = surface.pose.stored, surface.view, surface.row, surface.stats
         self._picture, self._task = picture.number, Task("Counting points")
-        self._future = in_background(self._task, lambda: count_points(cloud, view, rows, share))
+        self._future = in_background(
+            self._task, lambda: count_points(cloud, view, rows, stats.share, stats.faces_away)
+        )
 
     def cancel(self) -> None:
         """Stop counting."""
@@ -63,5 +65,5 @@ def words(app: App) -> list[tuple[str, str]]:
             ("Preview", f"{left_out:,} left out"),
             ("", f"{pixels:.0%} of the pixels"),
         ]
-    names = ("drawn", "hidden", "outside")
+    names = ("drawn", "hidden", "outside", *(("away",) if surface and surface.stats.faces_away else ()))
     return [(name.capitalize(), "..." if counts is None else f"{counts[name]:,}") for name in names]

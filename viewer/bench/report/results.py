@@ -17,7 +17,7 @@ from ..baselines import CEILING, FLOOR
 Row = dict[str, Any]
 
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
-SPREADS = ("gpu_ms", "cpu_ms", "derive_ms", "upload_ms")
+SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
 _IDENTITY = ("backend", "scene", _SCENE, "n", "noise", "params", "size", "seed", "views")
@@ -61,6 +61,7 @@ class Metric:
 COSTS = [
     Metric("gpu_ms", "ms", "time of one picture on the GPU, median over the views"),
     Metric("cpu_ms", "ms", "time of the call that draws one picture, median over the views"),
+    Metric("busy_ms", "ms", "processor time of all threads for that call, median over the views"),
     Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
     Metric("derive_ms", "ms", "data derived from a pose on the CPU"),
     Metric("upload_ms", "ms", "a pose and its derived data brought to the GPU"),

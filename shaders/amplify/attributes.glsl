@@ -1,0 +1,14 @@
+// A point from vertex attributes.
+#include "amplify/point.glsl"
+
+layout(location = 0) in vec3 in_position;
+layout(location = 1) in vec3 in_normal;
+#if HAS_RADIUS
+layout(location = 2) in float in_radius;
+#else
+const float in_radius = 0.0;
+#endif
+
+Point attribute_point(int i) {
+    return Point(in_position, in_normal, in_radius, uint(i));
+}

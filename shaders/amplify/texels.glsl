@@ -1,0 +1,29 @@
+// Points from buffer textures. SAMPLED: only the listed rows are drawn.
+#include "amplify/point.glsl"
+
+layout(binding = 0) uniform samplerBuffer positions;
+layout(binding = 1) uniform samplerBuffer normals;
+#if HAS_RADIUS
+layout(binding = 2) uniform samplerBuffer radii;
+#endif
+#if SAMPLED
+layout(binding = 3) uniform usamplerBuffer drawn_rows;
+#endif
+
+// The row of the i-th point that is drawn.
+int drawn_row(int i) {
+#if SAMPLED
+    return int(texelFetch(drawn_rows, i).r);
+#else
+    return i;
+#endif
+}
+
+Point texel_point(int at) {
+#if HAS_RADIUS
+    float radius = texelFetch(radii, at).r;
+#else
+    const float radius = 0.0;
+#endif
+    return Point(texelFetch(positions, at).xyz, texelFetch(normals, at).xyz, radius, uint(at));
+}

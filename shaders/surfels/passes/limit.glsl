@@ -1,0 +1,22 @@
+// How far behind the visible splat others still count (Slomp 2014, V-B): visibility, pushed away from the eye.
+#include "surfels/splat.glsl"
+
+#if HAS_RADIUS
+layout(binding = 4) uniform samplerBuffer visible_radii;
+#endif
+uniform float epsilon;  // of the visible splat's radius
+
+// Of the splat that a pixel shows at this depth, scan units.
+float visible_radius(float depth, uint row) {
+#if HAS_RADIUS
+    float radius = texelFetch(visible_radii, int(row)).r;
+#else
+    const float radius = 0.0;
+#endif
+    return splat_radius(Point(vec3(0.0), vec3(0.0), radius, row), depth);
+}
+
+// The reversed depth-buffer value that splats must reach to count there.
+float limit_behind(float depth, uint row) {
+    return stored_depth(depth + epsilon * visible_radius(depth, row));
+}

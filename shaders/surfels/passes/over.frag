@@ -1,0 +1,22 @@
+// A splat over what was drawn before it: colour and normal, transparent as its mask says.
+#include "common/view.glsl"
+#include "surfels/passes/visible.glsl"
+
+uniform float mask_limit;  // squared distance from the centre at which the mask is cut off
+
+flat in uint row;
+in vec2 local;
+
+layout(location = 0) out vec4 out_color;   // times its opacity, and that
+layout(location = 1) out vec4 out_normal;
+
+void main() {
+    float t = dot(local, local) / mask_limit;
+    float depth = linear_depth(gl_FragCoord.z);
+    if (depth > view_far) discard;
+    float opacity = t > 1.0 ? 0.0 : weight_at(0.25 * falloff * t) / FULL;
+    uvec2 look = texelFetch(looks, int(row)).xy;
+    vec3 normal = normal_of(look);
+    out_color = opacity * vec4(color_of(look), 1.0);
+    out_normal = vec4(turned(opacity, normal, visible_normal()) * normal, opacity);
+}

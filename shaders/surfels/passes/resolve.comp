@@ -1,0 +1,24 @@
+// What the splats gave, divided by how much they counted. OVER: they were drawn over one another.
+// Pixels that were filled are listed for surfels/passes/close.comp.
+#include "common/view.glsl"
+#include "common/item.glsl"
+#include "surfels/passes/look.glsl"
+#include "surfels/passes/store.glsl"
+#include "common/list.glsl"
+
+layout(binding = 0) uniform sampler2D color_sums;
+layout(binding = 1) uniform sampler2D normal_sums;
+layout(binding = 6) uniform usamplerBuffer depths;
+layout(binding = 7) uniform usamplerBuffer rows;
+
+void main() {
+    int index = int(item());
+    if (index >= view_size.x * view_size.y) return;
+    uint row = texelFetch(rows, index).r;
+    if (row == NONE) return;
+    ivec2 pixel = ivec2(index % view_size.x, index / view_size.x);
+    vec4 color = texelFetch(color_sums, pixel, 0);
+    vec3 normal = texelFetch(normal_sums, pixel, 0).xyz;
+    store_mean(index, color.rgb, normal, color.a, OVER != 0 ? color.a : 1.0, row);
+    if (uintBitsToFloat(texelFetch(depths, index).r) < 0.0) list[reserve(1u)] = uint(index);
+}

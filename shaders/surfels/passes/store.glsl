@@ -1,0 +1,22 @@
+// The blended colour and normal of a pixel, for Surface.own.
+#if HAS_COLORS
+layout(std430, binding = 4) writeonly buffer Colors { uint own_colors[]; };
+#endif
+layout(std430, binding = 5) writeonly buffer Normals { float own_normals[]; };
+
+// color, normal: sums of what `look.glsl` gives, times weights that add up to `total`; row: what is
+// shown, where those are nothing. coverage: of the pixel.
+void store_mean(int index, vec3 color, vec3 normal, float total, float coverage, uint row) {
+    if (total == 0.0) {
+        uvec2 look = texelFetch(looks, int(row)).xy;
+        color = color_of(look);
+        normal = normal_of(look);
+        total = 1.0;
+    }
+#if HAS_COLORS
+    own_colors[index] = packUnorm4x8(vec4(color / (255.0 * total), coverage));
+#endif
+    own_normals[3 * index] = normal.x;
+    own_normals[3 * index + 1] = normal.y;
+    own_normals[3 * index + 2] = normal.z;
+}

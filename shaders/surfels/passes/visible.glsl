@@ -1,0 +1,10 @@
+// What a fragment's pixel shows.
+#include "surfels/passes/look.glsl"
+
+layout(binding = 7) uniform usamplerBuffer rows;
+
+vec3 visible_normal() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    uint visible = texelFetch(rows, pixel.y * view_size.x + pixel.x).r;
+    return visible == NONE ? vec3(0.0) : normal_of(texelFetch(looks, int(visible)).xy);
+}

@@ -1,0 +1,103 @@
+// Which discs reach each tile of TILE x TILE pixels. PASS 0 counts them, PASS 1 lists them.
+// Large discs, and those that cross the near plane, are listed to be rasterised.
+// SIDE 0: all discs; 1: those that face the eye; 2: the others, where `farthest` does not hide them;
+// 3: all that it does not hide.
+#include "common/item.glsl"
+#include "amplify/texels.glsl"
+#include "surfels/disc.glsl"
+
+uniform uint item_count;
+uniform ivec2 tiles;
+
+layout(std430, binding = 0) buffer Slots { uint slots[]; };
+#if PASS == 0
+layout(std430, binding = 1) writeonly buffer Places { vec4 places[]; };
+layout(std430, binding = 2) writeonly buffer Forms { vec4 forms[]; };
+layout(std430, binding = 3) writeonly buffer Reach { uint reach[]; };
+layout(std430, binding = 4) buffer Large { uint large_count, list_length, away, longest, large[]; };
+#if SIDE >= 2
+layout(binding = 4) uniform usamplerBuffer farthest;  // depth shown in each tile, float bits
+#endif
+#else
+layout(binding = 4) uniform usamplerBuffer known_reach;
+layout(std430, binding = 1) writeonly buffer List { uint list[]; };
+uniform uint capacity;
+#endif
+
+// First tile 11 + 11 bits, width and height 5 + 5: pictures up to 2048 tiles, discs up to 31.
+const int SPAN = 31;
+
+void visit(uint word, uint row) {
+    ivec2 first = ivec2(word & 0x7FFu, word >> 11 & 0x7FFu), span = ivec2(word >> 22 & 31u, word >> 27);
+    for (int y = first.y; y < first.y + span.y; ++y)
+        for (int x = first.x; x < first.x + span.x; ++x) {
+            uint at = atomicAdd(slots[y * tiles.x + x], 1u);
+#if PASS == 1
+            if (at < capacity) list[at] = row;
+#endif
+        }
+}
+
+#if PASS == 0
+// Tiles whose pixel centres the box reaches: first, and the one after the last.
+ivec4 tiles_in(vec4 box) {
+    ivec4 pixels = ivec4(clamp(ceil(box - 0.5), vec4(0.0), vec2(view_size).xyxy));
+    if (any(greaterThanEqual(pixels.xy, pixels.zw))) return ivec4(0);
+    return ivec4(pixels.xy / TILE, (pixels.zw + TILE - 1) / TILE);
+}
+
+#if SIDE >= 2
+// Whether all pixels of these tiles show something nearer.
+bool is_hidden(ivec4 t, float nearest) {
+    for (int y = t.y; y < t.w; ++y)
+        for (int x = t.x; x < t.z; ++x)
+            if (uintBitsToFloat(texelFetch(farthest, y * tiles.x + x).r) >= nearest) return false;
+    return true;
+}
+#endif
+
+// The tiles that a disc reaches, as a word; its key and form are written down.
+uint tiles_of(Point point) {
+    if (!begin_disc(point)) return 0u;
+    bool faces = dot(disc_normal, towards_eye(disc_center)) > 0.0;
+#if SIDE == 2
+    if (faces) return 0u;
+#endif
+    vec2 depths = disc_range();
+    if (depths.y < view_near || depths.x > view_far) return 0u;
+    bool crosses = depths.x < view_near;
+    ivec4 t = crosses ? ivec4(0) : tiles_in(disc_box());
+    if (crosses || any(greaterThan(t.zw - t.xy, ivec2(SPAN)))) {
+#if SIDE != 2
+        large[atomicAdd(large_count, 1u)] = point.row;
+#endif
+        return 0u;
+    }
+    if (t.x >= t.z) return 0u;
+#if SIDE == 1
+    if (!faces) {
+        away = 1u;
+        return 0u;
+    }
+#elif SIDE >= 2
+    if (is_hidden(t, depths.x * (1.0 - 1e-6))) return 0u;
+#endif
+    vec3 form, key = disc_key(form);
+    places[point.row] = vec4(to_pixel(disc_center), key.xy);
+    forms[point.row] = vec4(key.z, form);
+    return uint(t.x | t.y << 11 | (t.z - t.x) << 22) | uint(t.w - t.y) << 27;
+}
+#endif
+
+void main() {
+    uint i = item();
+    if (i >= item_count) return;
+    int row = drawn_row(int(i));
+#if PASS == 0
+    uint word = tiles_of(texel_point(row));
+    reach[i] = word;
+#else
+    uint word = texelFetch(known_reach, int(i)).r;
+#endif
+    visit(word, uint(row));
+}

@@ -1,0 +1,109 @@
+// The invocations of listed tiles: each keeps ROWS pixels, one below another, and looks at the tile's discs.
+// No atomics: the best depth and the lowest row at that depth stay in registers.
+#include "common/view.glsl"
+
+layout(local_size_x = TILE, local_size_y = COLUMNS, local_size_z = TILES) in;
+
+layout(binding = 0) uniform samplerBuffer places;  // centre, pixels; key there; its step right
+layout(binding = 1) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
+layout(binding = 2) uniform usamplerBuffer ends;   // of each tile's part of the list
+layout(binding = 3) uniform usamplerBuffer listed;
+layout(binding = 8) uniform usamplerBuffer work;  // tiles that discs reach, after a dispatch and their number
+layout(std430, binding = 0) buffer Depths { uint depths[]; };
+layout(std430, binding = 1) buffer Rows { uint rows[]; };
+
+uniform ivec2 tiles;
+
+float best[ROWS];  // reversed depth-buffer values
+uint shown[ROWS];
+ivec2 pixel;       // the first of this invocation's
+
+// -1: none, at the end of the last work group.
+int this_tile() {
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint at = group * TILES + gl_LocalInvocationID.z;
+    int tile = at < texelFetch(work, 3).r ? int(texelFetch(work, int(at) + 4).r) : -1;
+    pixel = ivec2(tile % tiles.x, tile / tiles.x) * TILE;
+    pixel += ivec2(gl_LocalInvocationID.x, gl_LocalInvocationID.y * ROWS);
+    return tile;
+}
+
+// A tile's part of the list: first, and the one after the last.
+ivec2 part_of(int tile) {
+    if (tile < 0) return ivec2(0);
+    return ivec2(tile == 0 ? 0 : int(texelFetch(ends, tile - 1).r), int(texelFetch(ends, tile).r));
+}
+
+struct Column { float center_y, key, key_step, form, skew, curve; };
+
+// What a disc is along this invocation's column of pixels.
+Column column_of(uint row) {
+    vec4 a = texelFetch(places, int(row)), b = texelFetch(forms, int(row));
+    precise float x = float(pixel.x) + 0.5 - a.x;
+    precise float key = a.z + a.w * x;
+    precise float form = b.y * x * x;
+    return Column(a.y, key, b.x, form, 2.0 * b.z * x, b.w);
+}
+
+// From the disc's centre to a pixel of the column.
+float down_at(Column c, int k) {
+    precise float y = (float(pixel.y) + (0.5 + float(k))) - c.center_y;
+    return y;
+}
+
+// A disc's key and form at a pixel are the same numbers however pixels are shared out: `precise`.
+float key_at(Column c, float y) {
+    precise float key = c.key + c.key_step * y;
+    return key;
+}
+
+float form_at(Column c, float y) {
+    precise float form = c.form + y * (c.skew + c.curve * y);
+    return form;
+}
+
+// holes: only for pixels that show nothing yet.
+void take_nearest(ivec2 part, const bool holes) {
+    bool hole[ROWS];
+    for (int k = 0; k < ROWS; ++k) hole[k] = shown[k] == NONE;
+    for (int i = part.x; i < part.y; ++i) {
+        uint row = texelFetch(listed, i).r;
+        Column c = column_of(row);
+        for (int k = 0; k < ROWS; ++k) {
+            float y = down_at(c, k), here = key_at(c, y);
+            bool inside = form_at(c, y) <= (PERSPECTIVE != 0 ? here * here : 1.0);
+            bool better = inside && (here > best[k] || (here == best[k] && row < shown[k]));
+            if (holes) better = better && hole[k];
+            best[k] = better ? here : best[k];
+            shown[k] = better ? row : shown[k];
+        }
+    }
+}
+
+bool in_picture(int k) { return pixel.x < view_size.x && pixel.y + k < view_size.y; }
+
+int index_of(int k) { return (pixel.y + k) * view_size.x + pixel.x; }
+
+// FOUND: the Surface holds something already.
+void begin_pixels() {
+    for (int k = 0; k < ROWS; ++k) {
+        best[k] = view_perspective ? view_near / view_far : 0.0;
+        shown[k] = NONE;
+#if FOUND
+        if (in_picture(k) && rows[index_of(k)] != NONE) {
+            shown[k] = rows[index_of(k)];
+            best[k] = stored_depth(uintBitsToFloat(depths[index_of(k)]));
+        }
+#endif
+    }
+}
+
+// Of the depth that is shown; +inf where nothing is.
+uint depth_bits(int k) {
+    return shown[k] == NONE ? 0x7F800000u : floatBitsToUint(linear_depth(best[k]));
+}
+
+void store_pixel(int k) {
+    depths[index_of(k)] = depth_bits(k);
+    rows[index_of(k)] = shown[k];
+}

@@ -1,0 +1,343 @@
+"""Surfels in one pass and in two: what is blended, what stays exact, what enlarging closes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scenes import NOTHING, looking_down_z, plane, sphere
+
+from viewer.backends import backend
+from viewer.bench import metrics
+from viewer.bench.judge import Judge, Walk
+from viewer.bench.scenes.scanner import Faults, around, capture, rig
+from viewer.bench.truth import tessellation
+from viewer.bench.truth.reference import Reference, footprint, trace, visible
+from viewer.bench.truth.scene import Scene
+from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.camera import Camera
+from viewer.frame import Request, render_frame
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+Draw = Callable[..., Surface]
+SIZE = (240, 180)
+INSTANCING = ("tiles", "gs", "tbo")
+RED, GREEN = (255, 0, 0), (0, 255, 0)
+every_feed = pytest.mark.parametrize("instancing", INSTANCING)
+
+
+def surfels(draw: Draw, cloud: PointCloud, camera: Camera, size=SIZE, look=None, **params: object) -> Surface:
+    return draw(cloud, camera, size, "surfels", look, params)
+
+
+def discs(depths: list[float], colors: list[tuple[int, int, int]], radius: float = 1.0) -> PointCloud:
+    """Discs before the eye of `looking_down_z`, one behind another."""
+    return PointCloud.from_arrays(
+        [[0.0, 0.0, -depth] for depth in depths],
+        normals=[[0, 0, 1]] * len(depths),
+        colors=np.array(colors, np.uint8),
+        radii=[radius] * len(depths),
+    )
+
+
+def shown(surface: Surface, x: int, y: int) -> list[int]:
+    return [int(channel) for channel in surface.image()[y, x, :3]]
+
+
+@every_feed
+@pytest.mark.parametrize("passes", ["two", "two_large"])
+@pytest.mark.parametrize("enlarge", [1.0, 2.0])
+def test_a_sphere_of_one_colour_is_one_colour(
+    draw: Draw, instancing: str, passes: str, enlarge: float
+) -> None:
+    exact = sphere(8000)
+    cloud = PointCloud.from_arrays(
+        exact.positions, normals=exact.normals, radii=exact.radii, colors=np.full((8000, 3), 0.6)
+    )
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
+    surface = surfels(draw, cloud, camera, instancing=instancing, passes=passes, enlarge=enlarge)
+    inside = surface.image()[surface.row != NOTHING][:, :3]
+    assert len(inside) > 5000
+    assert inside.std(axis=0).max() < 1, "of 255"
+
+
+@every_feed
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None:
+    """Zero holes; depth within 5 % of a pixel and the discs' sagitta; shading within 40 dB."""
+    cloud, look = sphere(20_000), Look(light="head", color_by="plain")
+    camera = Camera.orbit(cloud.bounds(), 40, 25, aspect=4 / 3, projection=projection)
+    truth = trace(Shapes((Sphere(),)), camera, SIZE)
+    inside = truth.covered
+    for passes, enlarge in (("one", 1.0), ("two", 1.0), ("two", 2.0)):
+        surface = surfels(
+            draw, cloud, camera, look=look, instancing=instancing, passes=passes, enlarge=enlarge
+        )
+        drawn = surface.row != NOTHING
+        assert not (inside & ~drawn).any(), "a hole"
+        # Along the normal, in which discs are off by their sagitta.
+        error = (surface.depth[inside] - truth.depth[inside]) * truth.incidence()[inside]
+        pixel = float(np.median(footprint(truth.view, truth.depth[inside])))
+        sagitta = 1 - np.sqrt(1 - float(cloud.radii[0]) ** 2)
+        assert np.sqrt((error**2).mean()) < 0.05 * pixel + sagitta
+        reference = truth.surface(surface.gpu, look).image()
+        assert metrics.color(surface.image(), reference, inside)["psnr"] >= 40
+
+
+def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
+    """Of what two pods with noise saw: at most half as many holes; outline and spill within a pixel."""
+    mesh, size = tessellation.torus(), (480, 320)
+    pods = rig(mesh.bounds, around(2), aspect=4 / 3, up="+y")
+    noise = Faults(noise=0.5 / 190 * mesh.bounds.radius)  # 0.5 mm of a head
+    pose = Pose.of(0, 0.0, "", capture(mesh, pods, (640, 480), [noise] * 2, seed=0, frame=0))
+    camera = Camera.orbit(mesh.bounds, 20, 30, aspect=1.5)
+    truth = trace(mesh, camera, size)
+    scanned = seen_by(mesh, truth, pods)
+    outline = np.count_nonzero(metrics._outline(truth.covered))
+    holes, spill, boundary = [], [], []
+    for enlarge in (1.0, 2.0):
+        surface = surfels(draw, pose.cloud, camera, size, passes="two", enlarge=enlarge)
+        drawn = surface.row != NOTHING
+        holes.append(np.count_nonzero(scanned & ~drawn))
+        spill.append(np.count_nonzero(drawn & ~truth.covered) / outline)
+        boundary.append(metrics.coverage(drawn, truth.covered)["boundary_mean"])
+    assert holes[0] > 100, "no gaps to close"
+    assert holes[1] <= holes[0] / 2
+    assert spill[1] < spill[0] + 1
+    assert boundary[1] < boundary[0] + 1
+
+
+def seen_by(scene: Scene, picture: Reference, pods: list[Camera]) -> NDArray[np.bool_]:
+    """Which pixels (H, W) show what a pod sees as well."""
+    points = picture.positions() + (picture.origin - scene.origin)
+    seen = np.zeros(picture.covered.shape, bool)
+    seen[picture.covered] = np.any([visible(scene, points, pod, None) for pod in pods], axis=0)
+    return seen
+
+
+@every_feed
+def test_a_slit_is_closed_but_the_outline_stays(draw: Draw, instancing: str) -> None:
+    whole = plane(40, 3.0)
+    x = whole.positions[:, 0] + whole.origin[0]
+    kept = np.abs(x) > 0.1  # four columns of points are gone
+    cloud = PointCloud.from_arrays(
+        (whole.positions + whole.origin)[kept], normals=whole.normals[kept], radii=whole.radii[kept]
+    )
+    camera, size = looking_down_z(fov_y=50), (200, 200)
+    plain, large = (
+        surfels(draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=e).row != NOTHING
+        for e in (1.0, 2.0)
+    )
+    assert not plain[60:140, 97:103].any()
+    assert large[60:140, 90:110].all()
+    grown = large & ~plain
+    grown[60:140, 90:110] = False
+    across = np.count_nonzero(metrics._outline(plain))
+    assert np.count_nonzero(grown) < across, "less than a pixel"
+
+
+@every_feed
+@pytest.mark.parametrize("epsilon", [0.5, 1.0, 2.0])
+def test_splats_are_blended_within_epsilon_of_the_nearest(
+    draw: Draw, instancing: str, epsilon: float
+) -> None:
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=4.0), (41, 41)
+    for behind, blended in ((0.95, True), (1.05, False)):
+        cloud = discs([5.0 + 0.5 * epsilon * behind, 5.0], [RED, GREEN], radius=0.5)
+        surface = surfels(
+            draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=1, epsilon=epsilon
+        )
+        assert shown(surface, 20, 20) == ([128, 128, 0] if blended else [0, 255, 0])
+        assert surface.row[20, 20] == 1
+        assert surface.depth[20, 20] == pytest.approx(5.0, rel=1e-6)
+
+
+@every_feed
+def test_visibility_alone_is_pushed_away_by_epsilon(draw: Draw, instancing: str) -> None:
+    cloud = sphere(3000)
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
+    one = surfels(draw, cloud, camera, instancing=instancing)
+    pushed = surfels(draw, cloud, camera, instancing=instancing, passes="visibility", epsilon=0.5)
+    np.testing.assert_array_equal(one.row, pushed.row)
+    covered = one.row != NOTHING
+    moved = pushed.depth[covered] - one.depth[covered]
+    np.testing.assert_allclose(moved, 0.5 * cloud.radii[0], rtol=1e-3)
+    assert np.ptp(pushed.image()[covered][:, :3], axis=1).max() == 0, "grey"
+
+
+@every_feed
+def test_what_is_seen_where_splats_are_drawn_over_one_another(draw: Draw, instancing: str) -> None:
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=4.0), (41, 41)
+    near_first = discs([4.0, 6.0], [RED, GREEN])
+    near_last = discs([6.0, 4.0], [GREEN, RED])
+
+    def middle(cloud: PointCloud, passes: str) -> list[int]:
+        return shown(surfels(draw, cloud, camera, size, instancing=instancing, passes=passes), 20, 20)
+
+    for passes in ("one", "two", "one_blended", "sorted"):
+        assert middle(near_first, passes) == middle(near_last, passes) == [255, 0, 0]
+    assert middle(near_last, "one_no_depth") == [255, 0, 0]
+    assert middle(near_first, "one_no_depth") == [0, 255, 0], "what is behind shines through"
+
+
+@every_feed
+def test_sorted_blending_is_that_of_the_masks(draw: Draw, instancing: str) -> None:
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=4.0), (41, 41)
+    cloud = discs([5.0, 4.0], [GREEN, RED])
+    look = Look(light="flat", background="#000000")
+    surface = surfels(draw, cloud, camera, size, look, instancing=instancing, passes="sorted")
+    x = 25  # 5 pixels of 4 / 41 off the middle
+    mask = np.exp(-4 * (5 * 4 / 41) ** 2)
+    red, green = 255 * mask, 255 * mask * (1 - mask)
+    np.testing.assert_allclose(shown(surface, x, 20), [red, green, 0], atol=2)
+    assert surface.coverage[20, x] == pytest.approx(1 - (1 - mask) ** 2, abs=0.01)
+
+
+@pytest.mark.parametrize("passes", ["two", "one_blended", "one_no_depth", "sorted"])
+def test_feeds_blend_alike(draw: Draw, passes: str) -> None:
+    cloud = sphere(8000)
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
+    pictures = {
+        feed: surfels(draw, cloud, camera, look=Look(light="head"), instancing=feed, passes=passes)
+        for feed in ("gs", "tbo", "vbo", "ubo", "pull", "tiles")
+    }
+    buffers = [pictures[feed].arrays() for feed in ("tbo", "vbo", "ubo", "pull")]
+    for other in buffers[1:]:
+        for channel in ("color", "normal", "depth", "id"):
+            np.testing.assert_array_equal(buffers[0][channel], other[channel], channel)
+    reference = pictures["gs"].image().astype(int)
+    for feed in ("tbo", "tiles"):
+        away = np.abs(pictures[feed].image() - reference).max(axis=2)
+        # Borders of splats, and with them of the outline, are a rounding apart.
+        assert (away > 1).mean() < 1e-3, feed
+
+
+@every_feed
+def test_normals_need_not_agree_in_sign(draw: Draw, instancing: str) -> None:
+    exact = sphere(8000)
+    flip = np.random.default_rng(0).choice([-1, 1], (8000, 1))
+    mixed = PointCloud.from_arrays(
+        exact.positions, normals=exact.normals * flip, radii=exact.radii, colors=exact.colors
+    )
+    camera = Camera.orbit(exact.bounds(), 30, 20, aspect=4 / 3)
+    one, other = (
+        surfels(draw, cloud, camera, look=Look(light="head"), instancing=instancing, passes="two").image()
+        for cloud in (exact, mixed)
+    )
+    assert np.abs(one.astype(int) - other).max() <= 1
+
+
+@every_feed
+def test_the_same_picture_twice(draw: Draw, instancing: str) -> None:
+    cloud = sphere(30_000)
+    camera = Camera.orbit(cloud.bounds(), 10, 10, aspect=4 / 3)
+    first, second = (
+        surfels(draw, cloud, camera, look=Look(light="head"), instancing=instancing, passes="two").arrays()
+        for _ in range(2)
+    )
+    for channel, values in first.items():
+        np.testing.assert_array_equal(values, second[channel], channel)
+
+
+def test_very_many_splats_in_one_pixel_stay_in_range(draw: Draw) -> None:
+    count = 100_000  # more than a tile's list takes
+    cloud = PointCloud.from_arrays(
+        np.tile([[0.0, 0.0, -5.0]], (count, 1)), normals=np.tile([[0, 0, 1.0]], (count, 1)),
+        radii=np.full(count, 0.5), colors=np.tile(np.array([[200, 100, 50]], np.uint8), (count, 1)),
+    )  # fmt: skip
+    surface = surfels(draw, cloud, looking_down_z(fov_y=60), (33, 33), instancing="tiles", passes="two")
+    covered = surface.row != NOTHING
+    assert covered.any()
+    assert np.abs(surface.image()[covered][:, :3] - [200.0, 100.0, 50.0]).max() <= 1
+    np.testing.assert_allclose(surface.normal[covered], [[0, 0, 1]] * covered.sum(), atol=0.01)
+
+
+def test_large_splats_are_blended_by_the_rasteriser(draw: Draw) -> None:
+    cloud = sphere(300)
+    camera, size = Camera(eye=(0.3, 0.5, 1.5), fov_y=60), (480, 360)
+    tiles, quads = (
+        surfels(draw, cloud, camera, size, instancing=name, passes="two") for name in ("tiles", "gs")
+    )
+    assert "rasterised" in tiles.stats.skipped["tiles"]
+    for channel, values in tiles.arrays().items():
+        np.testing.assert_array_equal(values, quads.arrays()[channel], channel)
+
+
+def test_a_scan_without_colours_keeps_the_looks_colour(draw: Draw) -> None:
+    exact = sphere(3000)
+    cloud = PointCloud.from_arrays(exact.positions, normals=exact.normals)
+    camera = Camera.orbit(cloud.bounds())
+    surface = surfels(draw, cloud, camera, look=Look(light="flat", plain="#204060"), passes="two")
+    assert (surface.image()[surface.row != NOTHING][:, :3] == [0x20, 0x40, 0x60]).all()
+    assert surface.is_own("normals")
+    assert not surface.is_own("colors")
+
+
+@pytest.mark.parametrize("passes", ["two", "sorted", "one_blended", "visibility"])
+@every_feed
+def test_empty_poses_and_previews(renderer: Renderer, draw: Draw, instancing: str, passes: str) -> None:
+    empty = PointCloud.from_arrays(np.zeros((0, 3)), normals=np.zeros((0, 3)))
+    nothing = surfels(draw, empty, Camera(eye=(0, 0, 5)), instancing=instancing, passes=passes)
+    assert (nothing.row == NOTHING).all()
+    cloud = sphere(8000)
+    surface = Surface(renderer.gpu, SIZE)
+    params = backend("surfels").params({"instancing": instancing, "passes": passes})
+    camera = Camera.orbit(cloud.bounds(), aspect=4 / 3)
+    request = Request(Pose(0, 0.0, "", cloud), camera, "surfels", params, Look(light="flat"))
+    assert render_frame(renderer, request, surface, share=0.25), "a preview would be refined"
+    preview = (surface.row != NOTHING).sum()
+    assert not render_frame(renderer, request, surface)
+    assert preview == pytest.approx((surface.row != NOTHING).sum(), rel=0.05)
+
+
+def test_splats_under_a_pixel_do_not_flicker_where_they_are_blended(draw: Draw) -> None:
+    cloud, truth, size = sphere(20_000), Shapes((Sphere(),)), (100, 75)
+    look = Look(light="head", color_by="plain")
+    cameras = [Camera.orbit(cloud.bounds(), 10 + 2 * step, 10, aspect=4 / 3) for step in range(3)]
+    gpu = surfels(draw, cloud, cameras[0]).gpu
+    walk = Walk([Judge.of(gpu, truth, camera, size, look, cloud, None) for camera in cameras], [None] * 2)
+    flicker = [
+        walk.flicker((surfels(draw, cloud, camera, size, look, passes=passes) for camera in cameras), "orbit")
+        for passes in ("one", "two")
+    ]
+    assert flicker[0]["flicker_orbit_normal"] > 0.5, "degrees: nothing to improve"
+    for name in ("flicker_orbit_color", "flicker_orbit_normal"):
+        assert abs(flicker[1][name]) < flicker[0][name] / 4
+
+
+@pytest.mark.parametrize("cull_back", [False, True])
+def test_splats_left_out_of_the_second_pass_would_not_have_shown(draw: Draw, cull_back: bool) -> None:
+    """Balls in one another: most discs are hidden, and the rasteriser draws them all."""
+    balls = [sphere(4000, radius=radius) for radius in (1.0, 0.9, 0.5)]
+    cloud = PointCloud.from_arrays(
+        np.concatenate([ball.positions for ball in balls]),
+        normals=np.concatenate([ball.normals for ball in balls]),
+        colors=np.concatenate([ball.colors for ball in balls]),
+        radii=np.concatenate([ball.radii for ball in balls]),
+    )
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
+    tiles, quads = (
+        surfels(
+            draw, cloud, camera, look=Look(light="head"), instancing=name, passes="two", cull_back=cull_back
+        )
+        for name in ("tiles", "gs")
+    )
+    away = np.abs(tiles.image().astype(int) - quads.image()).max(axis=2)
+    assert (away > 1).mean() < 1e-3
+
+
+@every_feed
+def test_a_second_pass_that_would_change_nothing_is_not_drawn(draw: Draw, instancing: str) -> None:
+    cloud = sphere(3000)
+    camera = Camera.orbit(cloud.bounds())
+    one = surfels(draw, cloud, camera, instancing=instancing)
+    two = surfels(draw, cloud, camera, instancing=instancing, passes="two", enlarge=1, epsilon=0)
+    assert "second pass" in two.stats.skipped
+    assert not two.is_own("normals")
+    np.testing.assert_array_equal(one.image(), two.image())
