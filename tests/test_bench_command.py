@@ -181,6 +181,7 @@ def test_a_missing_library_is_told(refused: Refused, tmp_path: Path, monkeypatch
     assert "scan4d[bench]" in message
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_was_measured(mesh: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "viewer.cli", "bench", "--scene", str(mesh), "--suite", "scenes",
                "--quick", "--size", "96x64", "--views", "400", "-o", str(tmp_path / "out")]  # fmt: skip

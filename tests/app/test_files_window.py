@@ -65,6 +65,7 @@ def described(app: RunningApp) -> dict[str, Any]:
         return json.loads(file.text["scan4d"])  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, study: Path) -> None:
     with running_app(screen, tmp_path, study / "one") as app:
         ctrl(app, "o")

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 
 from viewer.recording import Entry, Recording
@@ -50,6 +51,7 @@ def viewed(app: RunningApp, path: Path) -> Iterator[str]:
             process.kill()
 
 
+@pytest.mark.slow
 def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) -> None:
     for scan in "ab":
         (tmp_path / scan).mkdir()

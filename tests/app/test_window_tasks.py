@@ -80,10 +80,10 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     app.expect(r"opened \S+2_bare.npz")
     app.expect("drew frame 0 with points")
     app.settle()
-    app.screen.do("mousemove", *(v - 1 for v in SIZE))
+    app.screen.do("mousemove", *(v - 1 for v in SIZE), "key", "Escape")  # away with the notes
     app.settle(1.0)
     left, top, width, height = app.view()
-    part = np.s_[top + 200 : top + height - 100, left : left + width]  # without marks and notes
+    part = np.s_[top + 200 : top + height - 100, left : left + width]  # without marks
     before = app.screen.picture()[part]
     app.screen.do("key", "b")
     app.expect("drew frame 0 with points")  # meanwhile
