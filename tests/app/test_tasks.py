@@ -54,6 +54,14 @@ class Person:
         """Forward, or back for fewer than none."""
         self._act("click", "--repeat", abs(clicks), "--delay", 30, 4 if clicks > 0 else 5)
 
+    def go_to_the_list(self) -> None:
+        """See the list, and leave it again for what comes next, which is no action."""
+        without = shown(self.app).copy()
+        self.press("q")
+        assert (shown(self.app) != without).mean() > 0.1, "the list lies over the view"
+        self.app.screen.do("key", "Escape")
+        self.app.settle()
+
     def point(self, position: tuple[float, float, float]) -> None:
         """Move the mouse there, which is no action."""
         self.app.screen.do("mousemove", *on_screen(self.app, *self.pixel(position)))
@@ -135,11 +143,7 @@ def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
         person.turn_wheel(-18)
         assert holes(person.look().surface()) < 0.01
         person.task = "A5"
-        without = shown(person.app).copy()
-        person.press("q")
-        assert (shown(person.app) != without).mean() > 0.1, "the list lies over the view"
-        person.app.screen.do("key", "Escape")
-        person.app.settle()
+        person.go_to_the_list()
     assert {task: person.actions[task] / len(FACES) for task in told("A")} == told("A")
 
 
@@ -176,9 +180,5 @@ def test_set_b_turn_pan_and_find_nose_eye_and_ear(person: Person) -> None:
         assert person.look().camera.rotation()[2] == pytest.approx([-1, 0, 0], abs=1e-3)
         assert person.sees(RIGHT_EAR, within=8)
         person.task = "B7"
-        without = shown(person.app).copy()
-        person.press("q")
-        assert (shown(person.app) != without).mean() > 0.1, "the list lies over the view"
-        person.app.screen.do("key", "Escape")
-        person.app.settle()
+        person.go_to_the_list()
     assert {task: person.actions[task] / len(FACES) for task in told("B")} == told("B")
