@@ -269,6 +269,33 @@ def test_large_splats_are_blended_by_the_rasteriser(draw: Draw) -> None:
         np.testing.assert_array_equal(values, quads.arrays()[channel], channel)
 
 
+@pytest.mark.parametrize(("enlarge", "cull_back"), [(1.0, True), (1.0, False), (2.0, True)])
+def test_large_splats_among_many_are_blended_with_them(draw: Draw, enlarge: float, cull_back: bool) -> None:
+    """A ball full of gaps before a few discs as large as the picture, and one of its own before the eye."""
+    ball = sphere(8000)
+    walls, facing = [[0, 0, -3.0], [0.2, 0, -3.1], [0, 0.1, -3.2], [-0.4, -0.3, 2.7]], [[0.1, 0, 1.0]] * 4
+    cloud = PointCloud.from_arrays(
+        np.concatenate([ball.positions, walls]),
+        normals=np.concatenate([ball.normals, facing]),  # type: ignore[list-item]
+        colors=np.concatenate([ball.colors, np.full((4, 4), [90, 200, 40, 255])]),  # type: ignore[list-item]
+        radii=np.concatenate([0.6 * ball.radii, [4.0, 4.0, 4.0, 0.4]]),  # type: ignore[operator]
+    )
+    camera = Camera((0.0, 0.0, 3.0), (0, 0, 0), fov_y=50)
+    tiles, quads = (
+        surfels(
+            draw, cloud, camera, (480, 360), Look(light="head"),
+            instancing=name, passes="two", enlarge=enlarge, cull_back=cull_back,
+        )
+        for name in ("tiles", "tbo")
+    )  # fmt: skip
+    assert "tiles" not in tiles.stats.skipped
+    assert "rasterised" in tiles.stats.skipped["large splats in tiles"]
+    np.testing.assert_array_equal(tiles.row == NOTHING, quads.row == NOTHING)
+    away = np.abs(tiles.image().astype(int) - quads.image()).max(axis=2)
+    assert (away > 1).mean() < 1e-3
+    assert {8000, 8003} <= set(tiles.row.ravel())
+
+
 def test_a_scan_without_colours_keeps_the_looks_colour(draw: Draw) -> None:
     exact = sphere(3000)
     cloud = PointCloud.from_arrays(exact.positions, normals=exact.normals)

@@ -19,10 +19,11 @@ from . import gl
 from .amplify import Points, Shape, draw_shapes
 from .pose import robust_range
 from .surface import Surface
-from .tiles import FALLBACK, NOT_HIDDEN, TILE, TileLists, run, show, splat, tile_lists
+from .tiles import FALLBACK, NOT_HIDDEN, TILE, TileLists, run, show_all, splat, tile_lists
 
 _BEHIND = 2.0**64  # as surfels/passes/fill.frag has it
 _CHUNK = 1 << 20  # points packed at a time
+_FIRST = "surfels/splat.frag"  # of the first pass
 
 
 @dataclass(frozen=True)
@@ -55,13 +56,30 @@ def two_passes(
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        draw_shapes(points, feed, shape, "surfels/splat.frag", **uniforms)
+        draw_shapes(points, feed, shape, _FIRST, **uniforms)
         if second.enlarge > 1:
-            gl.divide_depth(_BEHIND)
-            draw_shapes(second.larger(points), feed, shape, "surfels/passes/fill.frag", **uniforms)
-            gl.divide_depth(1)
+            _draw_fill(second.larger(points), feed, shape, **uniforms)
     with gpu.timers.measure("copy"):
         surface.take_raster()
+    _add(points, second.larger(points), surface, feed, shape, second, **uniforms)
+    _resolve(points, surface, over=False)
+    if second.enlarge > 1:
+        _close(points, surface, second, **uniforms)
+
+
+def _draw_fill(larger: Points, feed: str, shape: Shape, **uniforms: Any) -> None:
+    """Enlarged splats behind all that the first pass found."""
+    gl.divide_depth(_BEHIND)
+    draw_shapes(larger, feed, shape, "surfels/passes/fill.frag", **uniforms)
+    gl.divide_depth(1)
+
+
+def _add(
+    points: Points, larger: Points, surface: Surface, feed: str, shape: Shape, second: Second, **uniforms: Any
+) -> gl.Sums:
+    """Add up what enlarged splats give that are not too far behind what is visible. points: all that were
+    drawn in the first pass; larger: those to add."""
+    gpu = surface.gpu
     with _sums(points, surface) as sums:
         with gpu.timers.measure("limit"):
             _limit(points, surface, second, **uniforms)
@@ -71,12 +89,9 @@ def two_passes(
             gpu.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
             gpu.ctx.depth_func = ">="
             gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE
-            larger = second.larger(points)
             draw_shapes(larger, feed, shape, "surfels/passes/add.frag", falloff=second.falloff, **uniforms)
             gl.write_depth(True)
-    _resolve(points, surface, over=False)
-    if second.enlarge > 1:
-        _close(points, surface, second, **uniforms)
+    return sums
 
 
 def splat_sorted(
@@ -138,29 +153,56 @@ def show_visibility(points: Points, surface: Surface, epsilon: float, **uniforms
 
 
 def tiled_two_passes(points: Points, surface: Surface, shape: Shape, second: Second, **uniforms: Any) -> None:
-    """What `two_passes` draws, by tiles; by the rasteriser where some splats are too large for these."""
-    if second.enlarge == 1 and uniforms["cull_back"]:  # both passes have the same lists
-        lists = tile_lists(points, surface, **uniforms)
-        if lists is not None:
-            show(surface, lists)
-    else:
-        splat(points, surface, shape, "surfels/splat.frag", **uniforms)
-        lists = _lists_not_hidden(points, surface, second, **uniforms)
-    if lists is not None and lists.large:
-        surface.stats.skipped["tiles"] = f"{lists.large:,} large splats: all rasterised"
-    if lists is None or lists.large:
+    """What `two_passes` draws, by tiles; splats that are too large for these are rasterised."""
+    lists = _first_by_tiles(points, surface, shape, second, **uniforms)
+    if lists is None:
         two_passes(points, surface, FALLBACK, shape, second, **uniforms)
         return
+    large = lists.large_points(second.larger(points)) if lists.large else None
+    if second.enlarge > 1:
+        _fill_by_tiles(surface, lists, shape, large, **uniforms)
+    sums: tuple[moderngl.Texture, ...] = ()
+    if large is not None:
+        sums = _add(points, large, surface, FALLBACK, shape, second, **uniforms).images
     _bind_visible_radii(points)
-    defines = {"FOUND": 1, "ENLARGED": int(second.enlarge > 1), **points.defines}
+    defines = {"FOUND": 1, "FILL": 0, "LARGE": int(lists.large > 0), **points.defines}
     defines |= _bind_looks(points, surface)
     blocks = (surface.depths.buffer, surface.rows.buffer)
     passes = {"epsilon": second.epsilon, "falloff": second.falloff, "enlarged": points.enlarged}
-    surface.covered.clear()
-    surface.covered.bind()
-    run("blend", surface, lists, defines, blocks, **passes, **uniforms)
+    run("blend", surface, lists, defines, blocks, sums, **passes, **uniforms)
     if second.enlarge > 1:
         _close(points, surface, second, **uniforms)
+
+
+def _first_by_tiles(
+    points: Points, surface: Surface, shape: Shape, second: Second, **uniforms: Any
+) -> TileLists | None:
+    """Draw the first pass; the lists of the second. None where the rasteriser has to do it all."""
+    if second.enlarge > 1 or not uniforms["cull_back"]:
+        splat(points, surface, shape, _FIRST, **uniforms)
+        return _lists_not_hidden(points, surface, second, **uniforms)
+    lists = tile_lists(points, surface, **uniforms)  # both passes have the same
+    if lists is not None:
+        show_all(points, surface, lists, shape, _FIRST, **uniforms)
+    return lists
+
+
+def _fill_by_tiles(
+    surface: Surface, lists: TileLists, shape: Shape, large: Points | None, **uniforms: Any
+) -> None:
+    """The nearest of the enlarged splats where the first pass found nothing. large: those not in lists."""
+    blocks = (surface.depths.buffer, surface.rows.buffer)
+    images: tuple[moderngl.Texture, ...] = ()
+    if large is not None:
+        surface.raster().clear()
+        images = surface.raster().images
+        surface.gpu.ctx.enable_only(moderngl.DEPTH_TEST)
+        surface.gpu.ctx.depth_func = ">"
+        _draw_fill(large, FALLBACK, shape, **uniforms)
+    surface.covered.clear()
+    surface.covered.bind()
+    defines = {"FOUND": 1, "FARTHEST": 0, "FILL": 1, "LARGE": int(large is not None)}
+    run("show", surface, lists, defines, blocks, images)
 
 
 def _lists_not_hidden(points: Points, surface: Surface, second: Second, **uniforms: Any) -> TileLists | None:

@@ -161,11 +161,8 @@ def splat(points: Points, surface: Surface, shape: Shape, fragment: str, **unifo
     if lists is None:
         amplify(points, surface, FALLBACK, shape, fragment, **uniforms)
         return
-    found = lists.large > 0
-    if found:
-        amplify(lists.large_points(points), surface, FALLBACK, shape, fragment, **uniforms)
     away = lists.away
-    show(surface, lists, found, farthest=away)
+    show_all(points, surface, lists, shape, fragment, farthest=away, **uniforms)
     if not away:
         surface.stats.skipped["second lists"] = "no splat that is drawn faces away"
     elif lists.fill(points, AWAY, **uniforms):
@@ -194,6 +191,21 @@ def tile_lists(points: Points, surface: Surface, side: int = ALL, **uniforms: An
     return lists
 
 
+def show_all(
+    points: Points,
+    surface: Surface,
+    lists: TileLists,
+    shape: Shape,
+    fragment: str,
+    farthest: bool = False,
+    **uniforms: Any,
+) -> None:
+    """The nearest disc at each pixel of those listed and of the large ones. farthest: as in `show`."""
+    if lists.large:
+        amplify(lists.large_points(points), surface, FALLBACK, shape, fragment, **uniforms)
+    show(surface, lists, found=lists.large > 0, farthest=farthest)
+
+
 def show(surface: Surface, lists: TileLists, found: bool = False, farthest: bool = False) -> None:
     """The nearest listed disc at each pixel.
 
@@ -202,7 +214,8 @@ def show(surface: Surface, lists: TileLists, found: bool = False, farthest: bool
     if not found:
         surface.clear()
     blocks = [surface.depths.buffer, surface.rows.buffer, *([lists.farthest] if farthest else [])]
-    run("show", surface, lists, {"FOUND": int(found), "FARTHEST": int(farthest)}, blocks)
+    defines = {"FOUND": int(found), "FARTHEST": int(farthest), "FILL": 0, "LARGE": 0}
+    run("show", surface, lists, defines, blocks)
 
 
 def run(
@@ -211,9 +224,11 @@ def run(
     lists: TileLists,
     defines: dict[str, object],
     blocks: Sequence[moderngl.Buffer],
+    rastered: Sequence[moderngl.Texture] = (),
     **uniforms: Any,
 ) -> None:
-    """Run surfels/tiles/NAME.comp on the tiles that have lists. blocks: its storage blocks, from 0 on."""
+    """Run surfels/tiles/NAME.comp on the tiles that have lists. blocks: its storage blocks, from 0 on.
+    rastered: two images of what the large discs gave (LARGE)."""
     gpu = surface.gpu
     rows, tiles = _mapping(gpu)
     perspective = int(surface.view.perspective)
@@ -223,6 +238,8 @@ def run(
         gpu.set(program, **uniforms)
         for number, block in enumerate(blocks):
             block.bind_to_storage_buffer(number)
+        for unit, image in enumerate(rastered, start=9):
+            image.use(unit)
         lists.run(program)
 
 

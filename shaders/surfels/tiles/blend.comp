@@ -1,15 +1,19 @@
 // The second of two passes (Slomp 2014, V-B): of the listed discs, enlarged, those that pass at most
-// so far behind what the first pass found at a pixel, weighted by their masks. Where that found nothing,
-// the nearest listed disc fills the pixel, which is listed for surfels/passes/close.comp.
+// so far behind what is visible at a pixel, weighted by their masks. LARGE: on top of what the rasteriser
+// has added up of others.
 #include "surfels/tiles/nearest.glsl"
 #include "surfels/passes/limit.glsl"
 #include "surfels/passes/look.glsl"
 #include "surfels/passes/store.glsl"
-#include "common/list.glsl"
 
 // A float holds the sums of so many discs exactly, an integer those of a whole list: the order of a
 // tile's list, which changes from frame to frame, does not show.
 const int BLOCK = 256;
+
+#if LARGE
+layout(binding = 9) uniform sampler2D color_sums;  // and weight
+layout(binding = 10) uniform sampler2D normal_sums;
+#endif
 
 float limit[ROWS];
 int total[ROWS];
@@ -47,33 +51,28 @@ void blend(int first, int last) {
 
 void main() {
     int tile = this_tile();
-    begin_pixels();
     ivec2 part = part_of(tile);
-#if ENLARGED
-    bool hole[ROWS], holes = false;
     for (int k = 0; k < ROWS; ++k) {
-        hole[k] = shown[k] == NONE;
-        holes = holes || hole[k];
-    }
-    take_nearest(holes ? part : ivec2(0), true);
-#endif
-    for (int k = 0; k < ROWS; ++k) {
-        limit[k] = shown[k] == NONE ? 1.0 : limit_behind(linear_depth(best[k]), shown[k]);
-        visible[k] = shown[k] == NONE ? vec3(0.0) : normal_of(texelFetch(looks, int(shown[k])).xy);
+        limit[k] = 1.0;
+        visible[k] = vec3(0.0);
         total[k] = 0;
         color[k] = normal[k] = ivec3(0);
+        shown[k] = in_picture(k) ? rows[index_of(k)] : NONE;
+        if (shown[k] != NONE) {
+            limit[k] = limit_behind(abs(uintBitsToFloat(depths[index_of(k)])), shown[k]);
+            visible[k] = normal_of(texelFetch(looks, int(shown[k])).xy);
+        }
+#if LARGE
+        vec4 rgb = texelFetch(color_sums, pixel + ivec2(0, k), 0);
+        total[k] = int(rgb.a);
+        color[k] = ivec3(rgb.rgb);
+        normal[k] = ivec3(texelFetch(normal_sums, pixel + ivec2(0, k), 0).xyz);
+#endif
     }
     for (int first = part.x; first < part.y; first += BLOCK) blend(first, min(first + BLOCK, part.y));
     if (tile < 0) return;
     for (int k = 0; k < ROWS; ++k)
-        if (in_picture(k) && shown[k] != NONE) {
-            int index = index_of(k);
-            store_mean(index, vec3(color[k]), vec3(normal[k]), float(total[k]), 1.0, shown[k]);
-#if ENLARGED
-            if (!hole[k]) continue;
-            depths[index] = floatBitsToUint(-linear_depth(best[k]));
-            rows[index] = shown[k];
-            list[reserve(1u)] = uint(index);
-#endif
+        if (shown[k] != NONE) {
+            store_mean(index_of(k), vec3(color[k]), vec3(normal[k]), float(total[k]), 1.0, shown[k]);
         }
 }

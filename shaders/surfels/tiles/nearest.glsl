@@ -16,6 +16,7 @@ uniform ivec2 tiles;
 
 float best[ROWS];  // reversed depth-buffer values
 uint shown[ROWS];
+bool closed[ROWS];  // FILL: pixels that stay as they are
 ivec2 pixel;       // the first of this invocation's
 
 // -1: none, at the end of the last work group.
@@ -62,10 +63,7 @@ float form_at(Column c, float y) {
     return form;
 }
 
-// holes: only for pixels that show nothing yet.
-void take_nearest(ivec2 part, const bool holes) {
-    bool hole[ROWS];
-    for (int k = 0; k < ROWS; ++k) hole[k] = shown[k] == NONE;
+void take_nearest(ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
         uint row = texelFetch(listed, i).r;
         Column c = column_of(row);
@@ -73,7 +71,9 @@ void take_nearest(ivec2 part, const bool holes) {
             float y = down_at(c, k), here = key_at(c, y);
             bool inside = form_at(c, y) <= (PERSPECTIVE != 0 ? here * here : 1.0);
             bool better = inside && (here > best[k] || (here == best[k] && row < shown[k]));
-            if (holes) better = better && hole[k];
+#if FILL
+            better = better && !closed[k];
+#endif
             best[k] = better ? here : best[k];
             shown[k] = better ? row : shown[k];
         }
@@ -84,15 +84,30 @@ bool in_picture(int k) { return pixel.x < view_size.x && pixel.y + k < view_size
 
 int index_of(int k) { return (pixel.y + k) * view_size.x + pixel.x; }
 
-// FOUND: the Surface holds something already.
+#if LARGE
+layout(binding = 9) uniform usampler2D large_rows;
+layout(binding = 10) uniform sampler2D large_depths;  // negative, as surfels/passes/fill.frag has it
+#endif
+
+// FOUND: the Surface holds something already. FILL: only where it does not, this is to change; LARGE: the
+// rasteriser filled some of that.
 void begin_pixels() {
     for (int k = 0; k < ROWS; ++k) {
         best[k] = view_perspective ? view_near / view_far : 0.0;
         shown[k] = NONE;
+        closed[k] = !in_picture(k);
 #if FOUND
         if (in_picture(k) && rows[index_of(k)] != NONE) {
             shown[k] = rows[index_of(k)];
             best[k] = stored_depth(uintBitsToFloat(depths[index_of(k)]));
+            closed[k] = true;
+        }
+#endif
+#if LARGE
+        ivec2 at = pixel + ivec2(0, k);
+        if (!closed[k] && texelFetch(large_rows, at, 0).r != NONE) {
+            shown[k] = texelFetch(large_rows, at, 0).r;
+            best[k] = stored_depth(-texelFetch(large_depths, at, 0).r);
         }
 #endif
     }

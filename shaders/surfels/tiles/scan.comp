@@ -1,5 +1,6 @@
 // Counts become where each tile's part of the list starts; lists the tiles that have one, with a
-// dispatch of TILES in a work group. One work group.
+// dispatch of TILES in a work group: all tiles where large discs, which reach anywhere, are rasterised.
+// One work group.
 layout(local_size_x = 256) in;
 
 layout(std430, binding = 0) buffer Slots { uint slots[]; };
@@ -8,6 +9,8 @@ layout(std430, binding = 2) writeonly buffer Work { uint groups_x, groups_y, gro
 layout(std430, binding = 3) writeonly buffer Farthest { uint farthest[]; };
 
 uniform uint slot_count;
+
+uint is_worked(uint entries) { return entries > 0u || large_count > 0u ? 1u : 0u; }
 
 shared uvec2 sums[256];  // entries, tiles
 
@@ -18,7 +21,7 @@ void main() {
     uvec2 sum = uvec2(0u);
     uint most = 0u;
     for (uint i = first; i < last; ++i) {
-        sum += uvec2(slots[i], min(slots[i], 1u));
+        sum += uvec2(slots[i], is_worked(slots[i]));
         most = max(most, slots[i]);
     }
     atomicMax(longest, most);
@@ -34,9 +37,9 @@ void main() {
     for (uint i = first; i < last; ++i) {
         uint count = slots[i];
         slots[i] = start.x;
-        if (count > 0u) work[start.y] = i;
+        if (is_worked(count) > 0u) work[start.y] = i;
         farthest[i] = count > 0u ? 0u : 0x7F800000u;  // +inf: through such a tile everything is seen
-        start += uvec2(count, min(count, 1u));
+        start += uvec2(count, is_worked(count));
     }
     if (me != 255u) return;
     list_length = start.x;

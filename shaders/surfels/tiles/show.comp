@@ -1,17 +1,36 @@
 // The nearest disc at each pixel of a tile. FARTHEST: also the farthest depth that the tile then shows.
+// FILL: only where nothing was shown; such pixels are listed for surfels/passes/close.comp, and
+// their depth is negative until then.
 #include "surfels/tiles/nearest.glsl"
 
 #if FARTHEST
 layout(std430, binding = 2) buffer Farthest { uint farthest[]; };
+#elif FILL
+#include "common/list.glsl"
 #endif
 
 void main() {
     int tile = this_tile();
     begin_pixels();
-    take_nearest(part_of(tile), false);
+    ivec2 part = part_of(tile);
+#if FILL
+    bool all_closed = true;
+    for (int k = 0; k < ROWS; ++k) all_closed = all_closed && closed[k];
+    if (all_closed) part = ivec2(0);
+#endif
+    take_nearest(part);
     if (tile < 0) return;
+#if FILL
+    for (int k = 0; k < ROWS; ++k)
+        if (!closed[k] && shown[k] != NONE) {
+            depths[index_of(k)] = floatBitsToUint(-linear_depth(best[k]));
+            rows[index_of(k)] = shown[k];
+            list[reserve(1u)] = uint(index_of(k));
+        }
+#else
     for (int k = 0; k < ROWS; ++k)
         if (in_picture(k)) store_pixel(k);
+#endif
 #if FARTHEST
     uint most = 0u;
     for (int k = 0; k < ROWS; ++k)
