@@ -8,12 +8,12 @@ uniform uint item_count;
 #if PASS == 0
 layout(std430, binding = 0) buffer Keys { uint keys[]; };
 #else
-layout(binding = 0) uniform usamplerBuffer keys;
+layout(binding = 10) uniform usamplerBuffer keys;
 #endif
 #if PASS == 1
 layout(std430, binding = 1) buffer Best { uint best[]; };
 #elif PASS == 2
-layout(binding = 1) uniform usamplerBuffer best;
+layout(binding = 11) uniform usamplerBuffer best;
 #include "common/list.glsl"
 #endif
 

@@ -1,8 +1,8 @@
 """How long each way from points to splats takes, in one run. Prints a table.
 
-    python tests/speed/splats.py [--counts 100000 1000000] [--size 1920x1280] [--rounds 5] [--set key=value]
+    python tests/speed/splats.py [--counts 100000 1000000] [--size 1920x1280] [--rounds 5] [--away 1] [--set key=value]
 
-A sphere that fills half of the picture with radii of 1.5 times the spacing, in random order and in that
+A sphere that fills half of the picture (--away 1) with radii of 1.5 times the spacing, in random order and in that
 of a scanner; ways take turns, so that a change of the machine's speed hits all alike. Least wall time, and
 least processor time of the process (all threads) over 2: what two free cores would take if the work splits
 evenly, whoever else uses the machine. Drawing alone, without shading and reading back.
@@ -24,7 +24,7 @@ from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 
 SURFELS = backend("surfels")
-WAYS = next(p.choices for p in SURFELS.parameters if p.name == "instancing")[1:]
+WAYS = next(p.choices for p in SURFELS.parameters if p.name == "instancing")
 ORDERS = ("random", "scan")
 
 
@@ -63,6 +63,7 @@ def main() -> None:
     arguments.add_argument("--counts", type=int, nargs="+", default=[100_000, 1_000_000])
     arguments.add_argument("--size", default="1920x1280")
     arguments.add_argument("--rounds", type=int, default=5)
+    arguments.add_argument("--away", type=float, default=1.0, help="factor on the camera's distance")
     arguments.add_argument("--set", action="append", default=[], metavar="key=value")
     options = arguments.parse_args()
     width, height = (int(n) for n in options.size.split("x"))
@@ -75,7 +76,8 @@ def main() -> None:
     for count in options.counts:
         for order in ORDERS:
             pose = GpuPose(gpu, sphere(count, order))
-            camera = Camera(eye=(0.3, 0.5, 2.6), target=(0, 0, 0), fov_y=46)
+            eye = options.away * np.array([0.3, 0.5, 2.6])
+            camera = Camera(eye=tuple(eye), target=(0, 0, 0), fov_y=46)
             surface.start(pose, View.of(camera, surface.size, pose.cloud.origin, pose.bounds))
             result = turns(pose, surface, settings, options.rounds)
             cells = (f"{wall:9.0f} ({cpu:4.0f})" for wall, cpu in result.values())

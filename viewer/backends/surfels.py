@@ -19,6 +19,7 @@ from ..gpu.amplify import FEEDS, Points, Shape, amplify
 from ..gpu.context import Gpu
 from ..gpu.fastest import fastest, trial
 from ..gpu.pose import GpuPose
+from ..gpu.subpixel import average, is_subpixel, splat_subpixel
 from ..gpu.surface import Surface
 from ..gpu.tiles import FALLBACK, splat
 from ..params import param
@@ -50,7 +51,8 @@ class Params:
     )
     passes: str = param(
         "one",
-        "How splats that overlap become one surface. one: the nearest is seen; two: those close behind it "
+        "How splats that overlap become one surface. one: the nearest is seen, and where all are under a "
+        "pixel, the mean of those close behind it; two: those close behind it "
         "are blended with it. The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); "
         "one_no_depth (b); visibility, the first of two alone (c); two_large, the first enlarged as well "
         "(e); sorted, each over those behind it",
@@ -104,7 +106,12 @@ def _splat(points: Points, surface: Surface, params: Params, instancing: str, un
         "cull_back": params.cull_back,
         "mask_limit": min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff),
     }
-    if params.passes in _TWO:
+    larger = params.enlarge if params.passes in _TWO else 1.0
+    enlarged = replace(points, enlarged=points.enlarged * larger)
+    may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
+    if may_average and is_subpixel(enlarged, surface, params.radius_scale, uniform_radius):
+        _draw_subpixel(points, surface, params, instancing, uniforms)
+    elif params.passes in _TWO:
         _draw_two(points, surface, params, instancing, uniforms)
     else:
         _draw_one(points, surface, params, instancing, uniforms)
@@ -116,6 +123,22 @@ def _draw_nearest(points: Points, surface: Surface, instancing: str, uniforms: d
         splat(points, surface, SURFEL, "surfels/splat.frag", **uniforms)
     else:
         amplify(points, surface, instancing, SURFEL, "surfels/splat.frag", **uniforms)
+
+
+def _draw_subpixel(
+    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
+) -> None:
+    """Splats of about a pixel: those of a pixel are averaged, in place of any second pass."""
+    if params.passes in _TWO:
+        surface.stats.skipped["second pass"] = "splats are under a pixel: they are averaged"
+    if params.instancing == "auto":
+        surface.stats.chosen["instancing"] = "scatter"
+        surface.stats.skipped["tiles"] = "splats are under a pixel: they are sent there one by one"
+        splat_subpixel(points, surface, **uniforms)
+    else:
+        _draw_nearest(points, surface, instancing, uniforms)
+    if params.epsilon > 0:
+        average(points, surface, params.epsilon, **uniforms)
 
 
 def _draw_one(

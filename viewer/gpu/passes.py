@@ -146,7 +146,7 @@ def show_visibility(points: Points, surface: Surface, epsilon: float, **uniforms
     gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, depth_range=depths, **uniforms)
     blocks = (surface.depths, surface.rows, surface.own("colors"), surface.own("normals"))
     with gpu.timers.measure("grey"):
-        _bind_visible_radii(points)
+        bind_visible_radii(points)
         for number, block in enumerate(blocks):
             block.buffer.bind_to_storage_buffer(number)
         gpu.dispatch(program, surface.size[0] * surface.size[1])
@@ -164,9 +164,9 @@ def tiled_two_passes(points: Points, surface: Surface, shape: Shape, second: Sec
     sums: tuple[moderngl.Texture, ...] = ()
     if large is not None:
         sums = _add(points, large, surface, FALLBACK, shape, second, **uniforms).images
-    _bind_visible_radii(points)
+    bind_visible_radii(points)
     defines = {"FOUND": 1, "FILL": 0, "LARGE": int(lists.large > 0), **points.defines}
-    defines |= _bind_looks(points, surface)
+    defines |= bind_looks(points, surface)
     blocks = (surface.depths.buffer, surface.rows.buffer)
     passes = {"epsilon": second.epsilon, "falloff": second.falloff, "enlarged": points.enlarged}
     run("blend", surface, lists, defines, blocks, sums, **passes, **uniforms)
@@ -214,7 +214,7 @@ def _lists_not_hidden(points: Points, surface: Surface, second: Second, **unifor
     with gpu.timers.measure("limits"):
         gl.clear_words(lists.farthest, 0)
         lists.farthest.bind_to_storage_buffer(0)
-        _bind_visible_radii(points)
+        bind_visible_radii(points)
         surface.depths.bind(6)
         surface.rows.bind(7)
         gpu.dispatch(program, surface.size[0] * lists.tiles[1])
@@ -227,7 +227,7 @@ def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
     gpu = surface.gpu
     sums = surface.keep("sums", lambda: gl.Sums(gpu.ctx, surface.size))
     sums.target.use()
-    _bind_looks(points, surface)
+    bind_looks(points, surface)
     surface.rows.bind(7)
     yield sums
     gpu.ctx.disable(moderngl.BLEND)
@@ -238,7 +238,7 @@ def _limit(points: Points, surface: Surface, second: Second, **uniforms: Any) ->
     gpu = surface.gpu
     program = gpu.program(("present/present.vert", "surfels/passes/limit.frag"), points.defines)
     gpu.set(program, epsilon=second.epsilon, enlarged=points.enlarged, **uniforms)
-    _bind_visible_radii(points)
+    bind_visible_radii(points)
     surface.depths.bind(6)
     gpu.ctx.enable_only(moderngl.DEPTH_TEST)
     gpu.ctx.depth_func = "1"
@@ -252,7 +252,7 @@ def _resolve(points: Points, surface: Surface, over: bool) -> None:
     gpu = surface.gpu
     sums = surface.keep("sums", lambda: gl.Sums(gpu.ctx, surface.size))
     with gpu.timers.measure("resolve"):
-        defines = _bind_looks(points, surface)
+        defines = bind_looks(points, surface)
         program = gpu.compute("surfels/passes/resolve.comp", {**defines, "OVER": int(over)})
         for unit, image in enumerate(sums.images):
             image.use(unit)
@@ -267,7 +267,7 @@ def _close(points: Points, surface: Surface, second: Second, **uniforms: Any) ->
     """Take back what the second pass filled beyond the outline; `covered` lists what it filled."""
     gpu = surface.gpu
     with gpu.timers.measure("close"):
-        _bind_visible_radii(points)
+        bind_visible_radii(points)
         for number, texels in enumerate((surface.depths, surface.rows)):
             texels.buffer.bind_to_storage_buffer(number)
         for step in range(2):
@@ -277,13 +277,13 @@ def _close(points: Points, surface: Surface, second: Second, **uniforms: Any) ->
             gpu.ctx.memory_barrier()
 
 
-def _bind_visible_radii(points: Points) -> None:
+def bind_visible_radii(points: Points) -> None:
     """Bind what surfels/passes/limit.glsl reads: texture unit 4."""
     if points.use_radii:
         points.pose.array("radii").bind(4)
 
 
-def _bind_looks(points: Points, surface: Surface) -> dict[str, object]:
+def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     """Bind what surfels/passes/look.glsl reads and store.glsl writes; the defines that say so."""
     cloud = points.pose.cloud
     points.pose.packed("looks", lambda: _pack_looks(cloud), gl.RG32UI).bind(5)

@@ -28,7 +28,7 @@ def scatter(
 
     cells: the shader file that names an item's cells and key (it calls `visit`). keys,
     best: one R32UI texel a cell; cells that nothing hit hold +inf bits and 0xFFFFFFFF.
-    bind: sets what `cells` reads. listed: filled with the cells that were hit.
+    bind: sets what `cells` reads, from texture units 0 to 9. listed: filled with the cells that were hit.
     """
     gl.clear_words(keys.buffer, _NO_KEY)
     gl.clear_words(best.buffer, _NO_ITEM)
@@ -38,9 +38,9 @@ def scatter(
         program = gpu.compute("scatter/scatter.comp", {"PASS": number, **(defines or {})}, {"cells": cells})
         with gpu.timers.measure(name):
             keys.buffer.bind_to_storage_buffer(0)
-            keys.bind(0)
+            keys.bind(10)
             best.buffer.bind_to_storage_buffer(1)
-            best.bind(1)
+            best.bind(11)
             if listed is not None:
                 listed.bind()
             gpu.set(program, item_count=count)

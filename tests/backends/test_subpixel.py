@@ -1,0 +1,134 @@
+"""Splats of about a pixel: sent to their pixels one by one, and averaged there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scenes import NOTHING, looking_down_z, sphere
+from test_instancing import assert_agree
+
+from viewer.bench.judge import Judge, Walk
+from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.camera import Camera
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.scan.points import PointCloud
+
+Draw = Callable[..., Surface]
+SIZE = (200, 150)
+CLOUD = sphere(300_000)
+PROJECTIONS = ("perspective", "orthographic")
+
+
+def camera(projection: str = "perspective", azimuth: float = 30) -> Camera:
+    return Camera.orbit(CLOUD.bounds(), azimuth, 20, aspect=4 / 3, projection=projection)
+
+
+def surfels(draw: Draw, cloud: PointCloud, camera: Camera, **params: object) -> Surface:
+    return draw(cloud, camera, SIZE, "surfels", Look(light="flat"), params)
+
+
+def in_one_pixel(depths: list[float], colors: list[list[int]], normals: list[list[float]]) -> PointCloud:
+    """Discs of a hundredth of a pixel in the middle of a picture of 9 x 9, at the eye's z axis."""
+    positions = [[0.0, 0.0, -depth] for depth in depths]
+    return PointCloud.from_arrays(
+        positions, normals=normals, colors=np.array(colors, np.uint8), radii=[1e-3] * len(depths)
+    )
+
+
+@pytest.mark.parametrize("cull_back", [False, True])
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_scattered_splats_are_those_of_tiles_and_quads(draw: Draw, projection: str, cull_back: bool) -> None:
+    ways = {
+        way: surfels(draw, CLOUD, camera(projection), instancing=way, cull_back=cull_back)
+        for way in ("auto", "tiles", "gs")
+    }
+    assert ways["auto"].stats.chosen["instancing"] == "scatter"
+    assert "tiles" in ways["auto"].stats.skipped
+    for way in ("tiles", "gs"):
+        np.testing.assert_array_equal(ways["auto"].row == NOTHING, ways[way].row == NOTHING)
+        assert_agree(ways["auto"], ways[way], others=0.2)  # a pixel holds some twenty, many at one depth
+
+
+@pytest.mark.parametrize("passes", ["one", "two"])
+def test_those_of_a_pixel_are_averaged_within_epsilon_of_the_nearest(draw: Draw, passes: str) -> None:
+    view, size = looking_down_z(), (9, 9)
+    near, far = 1.0, 1.0 + 1e-3
+    cloud = in_one_pixel(
+        [near, near, near, far, 1.5],
+        [[200, 0, 0], [0, 100, 0], [10, 20, 30], [50, 80, 30], [0, 0, 255]],
+        [[0, 0, 1], [0, 0, -1], [0.6, 0, 0.8], [0, 0.6, 0.8], [0, 0, 1]],
+    )
+    surface = draw(cloud, view, size, "surfels", Look(light="flat"), {"passes": passes})
+    ((y,), (x,)) = np.nonzero(surface.row != NOTHING)
+    assert surface.row[y, x] == 0
+    assert surface.depth[y, x] == pytest.approx(near, rel=1e-6)
+    np.testing.assert_allclose(surface.image()[y, x, :3], [65, 50, 15], atol=1)
+    mean = np.array([0.6, 0.6, 3.6]) / np.linalg.norm([0.6, 0.6, 3.6])  # signs need not agree
+    np.testing.assert_allclose(surface.normal[y, x], mean, atol=2e-3)
+
+
+def test_without_epsilon_the_nearest_is_alone(draw: Draw) -> None:
+    nearest = surfels(draw, CLOUD, camera(), epsilon=0)
+    assert nearest.stats.chosen["instancing"] == "scatter"
+    assert not nearest.is_own("normals")
+    assert_agree(nearest, surfels(draw, CLOUD, camera(), epsilon=0, instancing="gs"), others=0.2)
+
+
+def test_very_many_in_one_pixel(draw: Draw) -> None:
+    count = 200_000
+    view, size = looking_down_z(), (9, 9)
+    cloud = in_one_pixel([1.0] * count, [[250, 120, 7]] * count, [[0, 0.6, 0.8]] * count)
+    surface = draw(cloud, view, size, "surfels", Look(light="flat"))
+    ((y,), (x,)) = np.nonzero(surface.row != NOTHING)
+    assert surface.row[y, x] == 0
+    np.testing.assert_array_equal(surface.image()[y, x, :3], [250, 120, 7])
+    np.testing.assert_allclose(surface.normal[y, x], [0, 0.6, 0.8], atol=2e-3)
+
+
+def test_the_same_picture_twice(draw: Draw) -> None:
+    first, second = (surfels(draw, CLOUD, camera()).arrays() for _ in range(2))
+    for channel, values in first.items():
+        np.testing.assert_array_equal(values, second[channel], channel)
+
+
+def test_they_do_not_flicker(draw: Draw) -> None:
+    look = Look(light="head", color_by="plain")
+    cameras = [camera(azimuth=10 + 2 * step) for step in range(3)]
+    gpu = surfels(draw, CLOUD, cameras[0]).gpu
+    truth = Shapes((Sphere(),))
+    walk = Walk([Judge.of(gpu, truth, one, SIZE, look, CLOUD, None) for one in cameras], [None] * 2)
+    nearest, mean = (
+        walk.flicker(
+            (draw(CLOUD, one, SIZE, "surfels", look, {"epsilon": epsilon}) for one in cameras), "orbit"
+        )
+        for epsilon in (0.0, 1.0)
+    )
+    assert nearest["flicker_orbit_normal"] > 0.5, "degrees: nothing to improve"
+    for name in ("flicker_orbit_color", "flicker_orbit_normal"):
+        assert abs(mean[name]) < nearest[name] / 2
+
+
+def test_larger_splats_are_neither_scattered_nor_averaged(draw: Draw) -> None:
+    """A few large ones among them count, and those that come close to the eye."""
+    close = surfels(draw, CLOUD, Camera((0, 0, 1.2), (0, 0, 0)))
+    radii = CLOUD.radii.copy()  # type: ignore[union-attr]
+    radii[7] = 2.0
+    one_large = PointCloud.from_arrays(CLOUD.positions, normals=CLOUD.normals, radii=radii)
+    for surface in (close, surfels(draw, one_large, camera())):
+        assert surface.stats.chosen["instancing"] == "tiles"
+        assert not surface.is_own("normals")
+    assert surface.row.min() >= 0
+
+
+def test_no_colours_and_no_radii_of_their_own(draw: Draw) -> None:
+    bare = PointCloud.from_arrays(CLOUD.positions, normals=CLOUD.normals)
+    surface = surfels(draw, bare, camera())
+    assert surface.stats.chosen["instancing"] == "scatter"
+    assert surface.is_own("normals")
+    assert not surface.is_own("colors")
+    covered = surface.row != NOTHING
+    away = np.linalg.norm(surface.normal[covered], axis=1)
+    np.testing.assert_allclose(away, 1, atol=1e-5)

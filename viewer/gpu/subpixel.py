@@ -1,0 +1,114 @@
+"""Splats of about a pixel: sent to their pixels one by one, and averaged there.
+
+Many of them share a pixel, so that lists and quads cost more than they give, and the nearest alone, another
+one with each small motion, would flicker.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan.points import PointCloud
+from .amplify import Points
+from .context import Gpu
+from .passes import bind_looks, bind_visible_radii
+from .scatter import scatter
+from .surface import Surface
+
+_LEAST_RADIUS = 0.7072  # pixels: surfels/splat.glsl draws none smaller
+_LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
+_SAMPLE = 1 << 13
+
+
+class _Sums:
+    """Four words a pixel."""
+
+    def __init__(self, gpu: Gpu, pixels: int) -> None:
+        self._gpu = gpu
+        self.buffer = gpu.ctx.buffer(reserve=16 * pixels)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.buffer.size
+
+    def release(self) -> None:
+        """Delete it."""
+        self.buffer.release()
+
+
+def is_subpixel(points: Points, surface: Surface, radius_scale: float, uniform_radius: float) -> bool:
+    """Whether nearly all discs are as small as any is drawn, and none much larger."""
+    pose, view = points.pose, surface.view
+    nearest = float(view.depths(pose.remember("box", lambda: _box(pose.cloud))).min())
+    if view.perspective and nearest <= view.near:
+        return False
+    usual = largest = uniform_radius
+    if points.use_radii:
+        own = pose.remember("radii up to", lambda: _radii_up_to(pose.cloud))
+        usual, largest = max(usual, own[0]), max(largest, own[1])
+    pixels = radius_scale * points.enlarged * view.scale / (nearest if view.perspective else 1.0)
+    return usual * pixels < _LEAST_RADIUS and largest * pixels < _LARGEST_RADIUS
+
+
+def _box(cloud: PointCloud) -> NDArray[np.float32]:
+    """The corners of the box around all points, (8, 3), relative to the origin."""
+    low, high = (np.array([f(column) for column in cloud.positions.T]) for f in (np.min, np.max))
+    return np.where([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], high, low)
+
+
+def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
+    """What nine of ten radii do not exceed, going by a sample, and what none does; unknown ones aside."""
+    radii = cloud.radii
+    assert radii is not None
+    sample = radii[:: max(1, len(radii) // _SAMPLE)]
+    known = sample[(sample > 0) & np.isfinite(sample)]
+    largest = float(radii.max(where=np.isfinite(radii), initial=0.0))
+    return float(np.quantile(known, 0.9)) if known.size else 0.0, largest
+
+
+def splat_subpixel(points: Points, surface: Surface, **uniforms: Any) -> None:
+    """The nearest disc at each pixel, by scatter: what `tiles.splat` draws, up to rounding."""
+
+    def bind(program: moderngl.ComputeShader) -> None:
+        points.bind()
+        surface.gpu.set(program, enlarged=points.enlarged, **uniforms)
+
+    scatter(
+        surface.gpu,
+        "surfels/scatter.glsl",
+        points.count,
+        surface.depths,
+        surface.rows,
+        bind,
+        defines=points.defines,
+    )
+
+
+def average(points: Points, surface: Surface, epsilon: float, **uniforms: Any) -> None:
+    """Colours and normals of each pixel: the mean of the discs that lie at most epsilon radii behind
+    what it shows."""
+    gpu = surface.gpu
+    covered = surface.list_covered()
+    sums = surface.keep("mean", lambda: _Sums(gpu, surface.size[0] * surface.size[1]))
+    bound = bind_looks(points, surface)
+    with gpu.timers.measure("mean"):
+        sums.buffer.bind_to_storage_buffer(0)
+        bind_visible_radii(points)
+        surface.depths.bind(6)
+        surface.rows.bind(7)
+        for step in range(3):
+            defines = {"STEP": step, **bound, **points.defines}
+            program = gpu.compute("surfels/passes/mean.comp", defines)
+            gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, item_count=points.count, **uniforms)
+            if step == 1:
+                points.bind()
+                gpu.dispatch(program, points.count)
+            else:
+                covered.bind()
+                covered.run(program)
+                gpu.ctx.memory_barrier()
