@@ -8,7 +8,12 @@ layout(location = 2) in float in_radius;
 #else
 const float in_radius = 0.0;
 #endif
+#if HAS_AXES
+layout(location = 3) in vec4 in_axes;
+#else
+const vec4 in_axes = vec4(0.0);
+#endif
 
 Point attribute_point(int i) {
-    return Point(in_position, in_normal, in_radius, uint(i));
+    return Point(in_position, in_normal, in_radius, in_axes, uint(i));
 }

@@ -3,6 +3,7 @@ struct Point {
     vec3 position;  // relative to the pose's origin
     vec3 normal;    // as stored
     float radius;   // as stored, 0 where the scan has none
+    vec4 axes;      // one half-axis, and the length of the other; 0 where the splat is round
     uint row;
 };
 

@@ -6,6 +6,9 @@ layout(binding = 1) uniform samplerBuffer normals;
 #if HAS_RADIUS
 layout(binding = 2) uniform samplerBuffer radii;
 #endif
+#if HAS_AXES
+layout(binding = 9) uniform samplerBuffer axes;
+#endif
 #if SAMPLED
 layout(binding = 3) uniform usamplerBuffer drawn_rows;
 #endif
@@ -25,5 +28,10 @@ Point texel_point(int at) {
 #else
     const float radius = 0.0;
 #endif
-    return Point(texelFetch(positions, at).xyz, texelFetch(normals, at).xyz, radius, uint(at));
+#if HAS_AXES
+    vec4 half_axes = texelFetch(axes, at);
+#else
+    const vec4 half_axes = vec4(0.0);
+#endif
+    return Point(texelFetch(positions, at).xyz, texelFetch(normals, at).xyz, radius, half_axes, uint(at));
 }

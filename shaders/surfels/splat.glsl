@@ -7,8 +7,8 @@ uniform float uniform_radius;  // scan units, for points without one of their ow
 uniform bool cull_back;
 
 // Scan units. Below the least one a splat can fall between pixel centres, and a far scan would flicker away.
-float splat_radius(Point point, float depth) {
-    float radius = point.radius > 0.0 && point.radius < 3e38 ? point.radius : uniform_radius;
+float splat_radius(float stored, float depth) {
+    float radius = stored > 0.0 && stored < 3e38 ? stored : uniform_radius;
     return max(radius * radius_scale * enlarged, 0.7072 / scale_at(max(depth, view_near)));
 }
 
@@ -21,4 +21,33 @@ vec3 towards_eye(vec3 center) {
 vec3 splat_normal(Point point, vec3 to_eye) {
     float len = length(point.normal);
     return len > 0.0 && len < 3e38 ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
+}
+
+// The longer of its half-axes, scan units.
+float splat_reach(Point point, float depth) {
+#if HAS_AXES
+    float longer = max(length(point.axes.xyz), point.axes.w);
+    if (longer > 0.0) return splat_radius(longer, depth);
+#endif
+    return splat_radius(point.radius, depth);
+}
+
+// The directions of its half-axes, unit vectors perpendicular to the normal n, from the origin's axes; returns
+// their lengths, scan units. A tangent that is missing, or parallel to the normal, makes it round.
+vec2 splat_axes(Point point, vec3 n, float depth, out vec3 u, out vec3 v) {
+    vec2 lengths = vec2(splat_radius(point.radius, depth));
+    u = cross(vec3(0.0, 1.0, 0.0), n);
+    if (dot(u, u) < 1e-8) u = cross(vec3(0.0, 0.0, -1.0), n);  // n is parallel to (0, 1, 0)
+#if HAS_AXES
+    float first = length(point.axes.xyz);
+    vec3 tangent = first > 0.0 ? point.axes.xyz / first : n;
+    tangent -= dot(tangent, n) * n;
+    if (dot(tangent, tangent) > 1e-6) {
+        u = tangent;
+        lengths = vec2(splat_radius(first, depth), splat_radius(point.axes.w, depth));
+    }
+#endif
+    u = normalize(u);
+    v = cross(n, u);  // the paper prints n x a, which is -u
+    return lengths;
 }

@@ -59,7 +59,7 @@ def describe(timeline: Timeline, pose: Pose) -> dict[str, Any]:
 
 
 def _attributes(cloud: PointCloud) -> dict[str, NDArray]:
-    named = {"normals": cloud.normals, "colors": cloud.colors, "radii": cloud.radii}
+    named = {name: getattr(cloud, name) for name in ("normals", "colors", "radii", "axes")}
     return {name: values for name, values in named.items() if values is not None} | dict(cloud.scalars)
 
 

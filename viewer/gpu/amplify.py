@@ -27,9 +27,16 @@ FEEDS = tuple(_FEEDS)
 _WHOLE = ("ubo", "vbo")  # feeds that bring a pose's points one after the other, without choice
 _BLOCK_BYTES = 1 << 16  # of a uniform block; some drivers allow less or more
 _BLOCK_POINTS = 64  # ranges begin at multiples of 256 bytes, whatever a point takes
-# What a point has: name of the pose's array, of the vertex attribute, floats. Radii only where points
-# bring their own.
-_ATTRIBUTES = (("positions", "in_position", 3), ("normals", "in_normal", 3), ("radii", "in_radius", 1))
+# What a point has: name of the pose's array, of the vertex attribute, floats. The first two always, radii
+# where points bring their own, half-axes where these are elliptical.
+_ATTRIBUTES = (
+    ("positions", "in_position", 3),
+    ("normals", "in_normal", 3),
+    ("radii", "in_radius", 1),
+    ("axes", "in_axes", 4),
+)
+_UNITS = {"positions": 0, "normals": 1, "radii": 2, "axes": 9}  # of amplify/texels.glsl
+_ROWS_UNIT = 3
 
 
 @dataclass(frozen=True)
@@ -44,8 +51,8 @@ class Shape:
 class Points:
     """The points of a pose that are drawn.
 
-    use_radii: whether they bring their own radius. count: how many. rows: which, ascending; None: all.
-    enlarged: the factor on their size with which they together cover what all do.
+    use_radii: whether they bring their own radius, or half-axes. count: how many. rows: which,
+    ascending; None: all. enlarged: the factor on their size with which they together cover what all do.
     """
 
     pose: GpuPose
@@ -61,9 +68,14 @@ class Points:
         return cls(pose, use_radii, count, rows, math.sqrt(len(pose.cloud) / count) if count else 1.0)
 
     @property
+    def use_axes(self) -> bool:
+        """Whether there are ellipses among them."""
+        return self.use_radii and self.pose.cloud.axes is not None
+
+    @property
     def attributes(self) -> tuple[tuple[str, str, int], ...]:
         """What is read of each: (name of the pose's array, of the vertex attribute, floats)."""
-        return _ATTRIBUTES if self.use_radii else _ATTRIBUTES[:2]
+        return _ATTRIBUTES[: 4 if self.use_axes else 3 if self.use_radii else 2]
 
     @property
     def stride(self) -> int:
@@ -73,32 +85,56 @@ class Points:
     @property
     def defines(self) -> dict[str, object]:
         """For shaders that include amplify/attributes.glsl or amplify/texels.glsl."""
-        return {"HAS_RADIUS": int(self.use_radii), "SAMPLED": int(self.rows is not None)}
+        return {
+            "HAS_RADIUS": int(self.use_radii),
+            "HAS_AXES": int(self.use_axes),
+            "SAMPLED": int(self.rows is not None),
+        }
 
     def bind(self) -> None:
-        """Bind what amplify/texels.glsl reads: texture units 0 to 3."""
-        for unit, (name, _, _) in enumerate(self.attributes):
-            self.pose.array(name).bind(unit)
+        """Bind what amplify/texels.glsl reads: texture units 0 to 3, and 9."""
+        for name, _, _ in self.attributes:
+            self.pose.array(name).bind(_UNITS[name])
         if self.rows is not None:
-            self.rows.bind(3)
+            self.rows.bind(_ROWS_UNIT)
 
 
 def amplify(
-    points: Points, surface: Surface, feed: str, shape: Shape, fragment: str, **uniforms: Any
+    points: Points,
+    surface: Surface,
+    feed: str,
+    shape: Shape,
+    fragment: str,
+    over: bool = False,
+    **uniforms: Any,
 ) -> None:
     """Draw points as shapes, in id order with a strict depth test.
 
-    feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth.
-    uniforms: of both.
+    feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth. over: draw
+    over what the surface holds. uniforms: of both shaders.
     """
     gpu = surface.gpu
     with gpu.timers.measure("splat"):
         surface.raster().clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
+        if over:
+            _restore(surface)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
         draw_shapes(points, feed, shape, fragment, **uniforms)
     with gpu.timers.measure("copy"):
         surface.take_raster()
+
+
+def _restore(surface: Surface) -> None:
+    """Rasterise what the surface holds."""
+    surface.depths.bind(6)
+    surface.rows.bind(7)
+    surface.gpu.ctx.depth_func = "1"
+    triangle = surface.gpu.ctx.vertex_array(
+        surface.gpu.program(("present/present.vert", "amplify/restore.frag")), []
+    )
+    triangle.render(moderngl.TRIANGLES, vertices=3)
+    triangle.release()
 
 
 def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, **uniforms: Any) -> None:

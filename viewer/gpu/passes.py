@@ -268,6 +268,8 @@ def _close(points: Points, surface: Surface, second: Second, **uniforms: Any) ->
     gpu = surface.gpu
     with gpu.timers.measure("close"):
         bind_visible_radii(points)
+        if points.use_axes:
+            points.bind()
         for number, texels in enumerate((surface.depths, surface.rows)):
             texels.buffer.bind_to_storage_buffer(number)
         for step in range(2):

@@ -25,6 +25,7 @@ FORMATS = {
     "colors": gl.RGBA8,
     "ids": gl.R32UI,
     "radii": gl.R32F,
+    "axes": gl.RGBA32F,
 }
 _SAMPLE = 1 << 13  # values that ranges look at
 _SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
@@ -59,7 +60,7 @@ class GpuPose:
         return cloud.bounds() if len(cloud) else Bounds(cloud.origin - 1, cloud.origin + 1)
 
     def array(self, name: str) -> gl.BufferTexture:
-        """positions, normals, colors, radii, ids, or 'scalar:NAME'; uploaded at the first call."""
+        """positions, normals, colors, radii, axes, ids, or 'scalar:NAME'; uploaded at the first call."""
         self.upload([name])
         return self._arrays[name]
 

@@ -63,8 +63,7 @@ def _box(cloud: PointCloud) -> NDArray[np.float32]:
 
 def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
     """What nine of ten radii do not exceed, going by a sample, and what none does; unknown ones aside."""
-    radii = cloud.radii
-    assert radii is not None
+    radii = cloud.splat_reach()
     sample = radii[:: max(1, len(radii) // _SAMPLE)]
     known = sample[(sample > 0) & np.isfinite(sample)]
     largest = float(radii.max(where=np.isfinite(radii), initial=0.0))

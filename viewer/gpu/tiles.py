@@ -7,7 +7,7 @@ lists does not matter. Splats that are too large for lists go through the raster
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -222,7 +222,7 @@ def run(
     name: str,
     surface: Surface,
     lists: TileLists,
-    defines: dict[str, object],
+    defines: Mapping[str, object],
     blocks: Sequence[moderngl.Buffer],
     rastered: Sequence[moderngl.Texture] = (),
     **uniforms: Any,

@@ -16,6 +16,7 @@ T = TypeVar("T")
 
 _CHUNK = 1 << 20  # points converted at a time, so that float64 copies stay small
 _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
+_SMALLEST = 1e-18  # lengths whose squares it can hold
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
@@ -56,7 +57,9 @@ class PointCloud:
     origin:    (3,) float64, scan units
     normals:   (N, 3) float32 as stored in the file (unit length expected), or None
     colors:    (N, 4) uint8, sRGB and alpha, or None
-    radii:     (N,) float32, scan units, or None
+    radii:     (N,) float32, scan units, or None; of an ellipse, that of a circle of its area
+    axes:      (N, 4) float32, scan units, or None: of elliptical splats, one half-axis as a vector, and the
+               length of the other, which is perpendicular to it and to the normal; zeros: round
     scalars:   name -> (N,) array of any real type
     ids:       (N,) uint32, increasing, the index in the file before anything was dropped; None: 0..N-1
     dropped:   how many points were dropped because a coordinate was NaN or infinite
@@ -69,6 +72,7 @@ class PointCloud:
     normals: NDArray[np.float32] | None = None
     colors: NDArray[np.uint8] | None = None
     radii: NDArray[np.float32] | None = None
+    axes: NDArray[np.float32] | None = None
     scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     ids: NDArray[np.uint32] | None = None
     dropped: int = 0
@@ -83,13 +87,15 @@ class PointCloud:
         normals: ArrayLike | None = None,
         colors: ArrayLike | None = None,
         radii: ArrayLike | None = None,
+        axes: ArrayLike | None = None,
         scalars: Mapping[str, ArrayLike] | None = None,
         origin: ArrayLike | None = None,
     ) -> PointCloud:
         """Points with a NaN or infinite coordinate are dropped and counted.
 
         positions: (N, 3) absolute, any real type. colors: (N, 3) or (N, 4), uint8 or
-        float in 0..1. origin: (3,); chosen by `choose_origin` where None.
+        float in 0..1. axes: (N, 4), of which rows without two lengths count as round, with the radius
+        given; the others set it. origin: (3,); chosen by `choose_origin` where None.
         Raises InputError where shapes do not fit.
         """
         points = np.asarray(positions)
@@ -113,15 +119,19 @@ class PointCloud:
         normals_ = pick(normals, "normals", (3,))
         colors_ = pick(colors, "colors", (3, 4))
         radii_ = pick(radii, "radii", (1,))
+        axes_ = pick(axes, "axes", (4,))
         if keep is not None:
             points = points[keep]
+        radii_ = None if radii_ is None else np.ascontiguousarray(radii_, np.float32)
+        radii_, axes_ = (radii_, None) if axes_ is None else _ellipses(radii_, axes_)
         base = choose_origin(points) if origin is None else np.array(origin, np.float64)
         return cls(
             positions=_relative(points, base),
             origin=base,
             normals=None if normals_ is None else np.ascontiguousarray(normals_, np.float32),
             colors=None if colors_ is None else _rgba8(colors_),
-            radii=None if radii_ is None else np.ascontiguousarray(radii_, np.float32),
+            radii=radii_,
+            axes=axes_,
             scalars={name: np.ascontiguousarray(pick(values, f"values of '{name}'", (1,)))
                      for name, values in (scalars or {}).items()},
             ids=None if keep is None else np.flatnonzero(keep).astype(np.uint32),
@@ -134,12 +144,20 @@ class PointCloud:
     @property
     def nbytes(self) -> int:
         """Bytes held by all arrays."""
-        arrays = [self.positions, self.normals, self.colors, self.radii, self.ids]
+        arrays = [self.positions, self.normals, self.colors, self.radii, self.axes, self.ids]
         return sum(a.nbytes for a in [*arrays, *self.scalars.values()] if a is not None)
 
     def world(self) -> NDArray[np.float64]:
         """Absolute positions, (N, 3) float64."""
         return self.positions + self.origin
+
+    def splat_reach(self) -> NDArray[np.float32]:
+        """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
+        assert self.radii is not None
+        if self.axes is None:
+            return self.radii
+        longer = np.maximum(np.linalg.norm(self.axes[:, :3], axis=1), self.axes[:, 3])
+        return np.where(longer > 0, longer, self.radii)
 
     def row_of(self, id: int) -> int | None:
         """Where the arrays hold the point of this id; None where it is not there."""
@@ -244,6 +262,23 @@ def _relative(points: NDArray, origin: NDArray[np.float64]) -> NDArray[np.float3
         stop = start + _CHUNK
         offsets[start:stop] = points[start:stop].astype(np.float64) - origin
     return offsets
+
+
+def _ellipses(
+    radii: NDArray[np.float32] | None, axes: NDArray
+) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
+    """Radii and half-axes as a PointCloud holds them; as they were given where no row has two lengths."""
+    mean = np.zeros(len(axes), np.float32) if radii is None else radii.copy()
+    kept = np.zeros(axes.shape, np.float32)
+    for start in range(0, len(axes), _CHUNK):
+        checkpoint()
+        part = axes[start : start + _CHUNK].astype(np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):
+            lengths = np.stack([np.linalg.norm(part[:, :3], axis=1), part[:, 3]])
+        rows = np.flatnonzero(((lengths > _SMALLEST) & (lengths < _LARGEST)).all(axis=0))
+        kept[start + rows] = part[rows]
+        mean[start + rows] = np.sqrt(lengths[:, rows].prod(axis=0))
+    return (mean, kept) if kept.any() else (radii, None)
 
 
 def _rgba8(colors: NDArray) -> NDArray[np.uint8]:

@@ -16,7 +16,12 @@ Point fetch_point() {
 #else
     const float radius = 0.0;
 #endif
-    return Point(position, normal, radius, uint(first + gl_InstanceID));
+#if HAS_AXES
+    vec4 axes = vec4(number(at + 7), number(at + 8), number(at + 9), number(at + 10));
+#else
+    const vec4 axes = vec4(0.0);
+#endif
+    return Point(position, normal, radius, axes, uint(first + gl_InstanceID));
 }
 
 int corner_number() { return gl_VertexID; }

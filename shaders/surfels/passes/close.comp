@@ -3,6 +3,10 @@
 // Filled pixels are listed and have a negative depth. STEP 0 says which are taken back, reading depths
 // alone, which change in STEP 1, so that the order does not matter.
 #include "surfels/passes/limit.glsl"
+#if HAS_AXES
+#include "amplify/texels.glsl"
+#include "surfels/disc.glsl"
+#endif
 #include "common/item.glsl"
 #include "common/list.glsl"
 
@@ -20,11 +24,38 @@ bool is_empty(ivec2 pixel) {
     return depths[pixel.y * view_size.x + pixel.x] == EMPTY;
 }
 
+#if HAS_AXES
+vec3 form;  // of the pixel's splat, 1 at its border (surfels/disc.glsl)
+#else
+float radius;
+#endif
+
+void begin_splat(float depth, uint row) {
+#if HAS_AXES
+    begin_disc(texel_point(int(row)));
+    vec3 key = disc_key(form);
+    if (view_perspective) form /= key.x * key.x;
+#else
+    radius = visible_radius(depth, row);
+#endif
+}
+
+// How much larger the pixel's splat became in a direction, pixels.
+float growth(vec2 to, float depth) {
+#if HAS_AXES
+    return (enlarge - 1.0) * inversesqrt(form.x * to.x * to.x + to.y * (2.0 * form.y * to.x + form.z * to.y));
+#else
+    return (enlarge - 1.0) * radius * scale_at(depth);
+#endif
+}
+
 // Whether nothing is shown so far away in some direction.
-bool near_outline(vec2 center, float reach) {
+bool near_outline(vec2 center, float depth) {
     for (int i = 0; i < DIRECTIONS; ++i) {
         float angle = 6.2831853 / DIRECTIONS * i;
-        if (is_empty(ivec2(floor(center + reach * vec2(cos(angle), sin(angle)))))) return true;
+        vec2 to = vec2(cos(angle), sin(angle));
+        float reach = growth(to, depth) - SLACK;
+        if (reach > 0.0 && is_empty(ivec2(floor(center + reach * to)))) return true;
     }
     return false;
 }
@@ -35,9 +66,9 @@ void main() {
     uint index = list[i];
     float depth = -uintBitsToFloat(depths[index]);
 #if STEP == 0
-    float reach = (enlarge - 1.0) * visible_radius(depth, rows[index]) * scale_at(depth) - SLACK;
+    begin_splat(depth, rows[index]);
     vec2 center = vec2(index % view_size.x, index / view_size.x) + 0.5;
-    if (reach > 0.0 && near_outline(center, reach)) rows[index] = NONE;
+    if (near_outline(center, depth)) rows[index] = NONE;
 #else
     depths[index] = rows[index] == NONE ? EMPTY : floatBitsToUint(depth);
 #endif

@@ -13,7 +13,7 @@ float visible_radius(float depth, uint row) {
 #else
     const float radius = 0.0;
 #endif
-    return splat_radius(Point(vec3(0.0), vec3(0.0), radius, row), depth);
+    return splat_radius(radius, depth);
 }
 
 // The reversed depth-buffer value that splats must reach to count there.

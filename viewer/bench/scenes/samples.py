@@ -158,6 +158,7 @@ def _joined(parts: list[PointCloud]) -> PointCloud:
         normals=joined([part.normals for part in parts]),
         colors=joined([part.colors for part in parts]),
         radii=joined([part.radii for part in parts]),
+        axes=joined([part.axes for part in parts]),
     )
 
 

@@ -105,6 +105,7 @@ def chosen(cloud: PointCloud, rows: NDArray[np.integer]) -> PointCloud:
         normals=pick(cloud.normals),
         colors=pick(cloud.colors),
         radii=pick(cloud.radii),
+        axes=pick(cloud.axes),
     )
 
 
@@ -121,3 +122,5 @@ def _add(update: Callable[[bytes], object], part: PointCloud | Scene) -> None:
     )  # fmt: skip
     for array in arrays:
         update(b"none" if array is None else array.tobytes())
+    if part.axes is not None:
+        update(part.axes.tobytes())

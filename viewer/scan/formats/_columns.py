@@ -31,6 +31,7 @@ _COLORS = [
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
 ]
 _RADII = [("radius",), ("surfel_radius",)]
+_ELLIPSES = ("radius_u", "radius_v", "tangent_x", "tangent_y", "tangent_z")
 
 
 def cloud_from_columns(columns: Columns) -> PointCloud:
@@ -50,12 +51,14 @@ def cloud_from_columns(columns: Columns) -> PointCloud:
     positions = take(_POSITIONS)
     if positions is None:
         raise InputError(f"no x, y and z among the columns: {', '.join(columns) or 'none'}")
-    normals, colors, radii = take(_NORMALS), take(_COLORS), take(_RADII)
+    normals, colors, radii, ellipses = take(_NORMALS), take(_COLORS), take(_RADII), take([_ELLIPSES])
+    axes, mean = (None, None) if ellipses is None else _half_axes(ellipses)
     return PointCloud.from_arrays(
         positions,
         normals=normals,
         colors=None if colors is None else _bytes_or_units(colors),
-        radii=None if radii is None else radii[:, 0],
+        radii=mean if radii is None else radii[:, 0],
+        axes=axes,
         scalars={name: column.astype(column.dtype.newbyteorder("=")) for name, column in rest.items()},
     )
 
@@ -73,6 +76,7 @@ def columns_from_cloud(
         (normals, cloud.normals),
         (("red", "green", "blue", "alpha"), cloud.colors),
         (("radius",), None if cloud.radii is None else cloud.radii[:, None]),
+        (_ELLIPSES, None if cloud.axes is None else _as_ellipses(cloud.axes)),
     ]
     columns = {
         name: block[:, i] for names, block in blocks if block is not None for i, name in enumerate(names)
@@ -185,6 +189,25 @@ def _bytes_or_units(colors: NDArray) -> NDArray:
     if colors.dtype == np.uint16 and colors.max(initial=0) <= 255:
         return colors.astype(np.uint8)
     return colors
+
+
+def _half_axes(ellipses: NDArray) -> tuple[NDArray, NDArray]:
+    """Half-axes as PointCloud takes them, and radii of circles of the same area, from columns of _ELLIPSES.
+
+    Tangents have any length; where one has none, neither has the half-axis.
+    """
+    numbers = ellipses.astype(np.result_type(ellipses.dtype, np.float32))
+    lengths = np.where(numbers[:, :2] > 0, numbers[:, :2], 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        tangent_length = np.linalg.norm(numbers[:, 2:], axis=1, keepdims=True)
+        unit = numbers[:, 2:] / np.where(tangent_length > 0, tangent_length, 1)
+        return np.hstack([lengths[:, :1] * unit, lengths[:, 1:]]), np.sqrt(lengths.prod(axis=1))
+
+
+def _as_ellipses(axes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The columns of _ELLIPSES, (N, 5); zeros where a splat is round."""
+    length = np.linalg.norm(axes[:, :3], axis=1, keepdims=True)
+    return np.hstack([length, axes[:, 3:], axes[:, :3] / np.where(length > 0, length, 1)])
 
 
 def _absolute(cloud: PointCloud) -> NDArray[np.float32] | NDArray[np.float64]:

@@ -1,10 +1,10 @@
 """NPZ: NumPy arrays by name.
 
 `positions` (N, 3), or (T, N, 3) for a sequence; optional `normals` (…, N, 3), `colors` (…, N, 3 or 4)
-uint8 or float in 0..1, `radii` (…, N), further scalars (…, N) by their names, `origin` (3,) that is to be
-added to the positions, `times` (T,) in seconds, `faces` (F, 3) whole numbers, which tell the topology of
-all frames. Attributes of a sequence may lack T: then all frames share them. Arrays of other shapes are
-left alone.
+uint8 or float in 0..1, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N)
+by their names, `origin` (3,) that is to be added to the positions, `times` (T,) in seconds, `faces` (F, 3)
+whole numbers, which tell the topology of all frames. Attributes of a sequence may lack T: then all frames
+share them. Arrays of other shapes are left alone.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from ._stored import StoredArray
 TITLE = "NPZ"
 SUFFIXES = (".npz",)
 
-_RESERVED = {"positions", "normals", "colors", "radii", "origin", "times"}
+_RESERVED = {"positions", "normals", "colors", "radii", "axes", "origin", "times"}
 _MOST_RATIO = 250  # of unpacked to packed: scans pack to a half or a tenth
 
 
@@ -76,6 +76,7 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             normals=of_points("normals", (3,)),
             colors=of_points("colors", (3,), (4,)),
             radii=of_points("radii", ()),
+            axes=of_points("axes", (4,)),
             scalars=scalars,
             origin=np.zeros(3) if "origin" in arrays else None,
         )
@@ -92,6 +93,7 @@ def write(path: Path, cloud: PointCloud) -> None:
         "normals": cloud.normals,
         "colors": cloud.colors,
         "radii": cloud.radii,
+        "axes": cloud.axes,
     }
     with ZipFile(path, "w", ZIP_STORED) as archive:
         for name, array in arrays.items():

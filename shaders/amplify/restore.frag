@@ -1,0 +1,16 @@
+// What the Surface holds, for the rasteriser to draw over.
+#include "common/view.glsl"
+
+layout(binding = 6) uniform usamplerBuffer depths;
+layout(binding = 7) uniform usamplerBuffer rows;
+
+layout(location = 0) out uint out_row;
+layout(location = 1) out float out_depth;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    int index = pixel.y * view_size.x + pixel.x;
+    out_row = texelFetch(rows, index).r;
+    out_depth = uintBitsToFloat(texelFetch(depths, index).r);
+    gl_FragDepth = out_row == NONE ? 0.0 : stored_depth(out_depth);
+}
