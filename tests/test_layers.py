@@ -36,9 +36,11 @@ LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in part
 
 WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
+COMPILED = "_kernels"  # how the names of modules end that are compiled by numba
 SLOW = WINDOW | {
     "PIL", "OpenEXR",
     "av", "cmap", "jinja2", "lzf", "matplotlib", "open3d", "plyfile", "scipy", "skimage", "tqdm",
+    "DracoPy", "numba",
 }  # fmt: skip
 
 
@@ -128,8 +130,20 @@ def test_slow_libraries_are_imported_where_they_are_used() -> None:
     early = {
         f"{path.relative_to(PACKAGE)} imports {library}"
         for path in modules()
-        if part_of(path) != "app"
+        if part_of(path) != "app" and not path.stem.endswith(COMPILED)
         for library in libraries(imports(run_at_import(parse(path)), path)) & SLOW
+    }
+    assert early == set()
+
+
+def test_compiled_loops_are_imported_where_they_are_used() -> None:
+    """Their decorators need numba, so whoever imports them does."""
+    early = {
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for path in modules()
+        if not path.stem.endswith(COMPILED)
+        for name in imports(run_at_import(parse(path)), path)
+        if any(part.endswith(COMPILED) for part in name.split("."))
     }
     assert early == set()
 

@@ -20,6 +20,7 @@ from .scan.points import PointCloud
 from .scan.pose import Pose
 
 FALLBACK = "points"
+_BUDGET_MS = 15.0  # of a frame for what a backend can go on with in the next
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,9 @@ def render_frame(
     """Draw what is asked for into `surface`; True if a later call would refine it.
 
     wait: whether to wait for estimated attributes and derived data; while they are made on
-    a worker, plain points are drawn instead. share: of the points that need to be drawn; a
-    preview with less than 1 is refined by a call with 1. Raises InputError for what the scan
+    a worker, plain points are drawn instead, and what a backend finds bit by bit is drawn as far as
+    it is. share: of the points that need to be drawn; a preview with less than 1 is refined by a call
+    with 1. Raises InputError for what the scan
     or the parameters do not allow.
     """
     start = time.perf_counter()
@@ -67,7 +69,8 @@ def render_frame(
     surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds))
     if prepared is None:
         surface.stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
-    frame = FrameView(surface.view, params, prepared and prepared.derived, share)
+    budget_ms = None if wait else _BUDGET_MS
+    frame = FrameView(surface.view, params, prepared and prepared.derived, share, budget_ms)
     refinable = backend.draw(pose, frame, surface)
     shade(surface, look)
 

@@ -23,7 +23,8 @@ class Picked:
 
     position: (3,) float64, scan units: the surface at the pixel's centre.
     level: 0 measured, n filled from level n; the fields below are empty where it was filled.
-    row: the point's place in the cloud's arrays. id: its index in the file.
+    row: the point's place in the cloud's arrays; the first of several that are shown as one. id: its index
+    in the file.
     point: (3,) float64, scan units: the point itself. color: (4,) uint8, sRGB and alpha.
     normal: (3,) float32. These two are the scan's own, None where it has none.
     scalars: name -> number.
@@ -64,11 +65,12 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
     depth, row, level = surface.texel(x, y)
     if level == EMPTY:
         return None
-    cloud = surface.pose.stored
+    cloud = surface.scan
     center = np.array([[x + 0.5, y + 0.5]])
     position = surface.view.unproject(center, np.array([depth]))[0] + cloud.origin
     if row == NOTHING:
         return Picked(position, level)
+    row = surface.point_of(row)
     return Picked(
         position,
         level,
@@ -96,7 +98,7 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     limit = texel.depth - pixels * np.linalg.norm(ends[1] - ends[0])
     front = depths < limit
     if front.any():
-        front &= depths < limit - spacings * typical_spacing(surface.pose.stored)
+        front &= depths < limit - spacings * typical_spacing(surface.scan)
     down, across = np.argwhere(front).T - _REACH
     if not _lie_all_round(down, across):
         return x, y

@@ -127,7 +127,7 @@ class Renderer:
         if missing:
             name = f"Estimating {' and '.join(missing)}"
             bare = PointCloud(gpu_pose.cloud.positions, gpu_pose.cloud.origin)
-            result = self._run(entry, missing, name, estimate, (bare, missing), wait)
+            result = self._run(entry, missing, name, estimate, (bare, missing), None, wait)
             if result is None:
                 return None
             gpu_pose.cloud = replace(gpu_pose.cloud, **result)
@@ -136,7 +136,8 @@ class Renderer:
             if backend.derive is None:
                 return Prepared(None)
             name = f"Preparing {backend.title}"
-            result = self._run(entry, key, name, backend.derive, (gpu_pose.cloud, params), wait)
+            args = gpu_pose.cloud, params
+            result = self._run(entry, key, name, backend.derive, args, backend.ready, wait)
             if result is None:
                 return None
             with gpu_pose.preparing("upload"):
@@ -160,9 +161,16 @@ class Renderer:
         return next(r for r in self._resident.values() if r.gpu_pose is gpu_pose)
 
     def _run(
-        self, entry: _Resident, key: Any, name: str, function: Callable[..., Any], args: Any, wait: bool
+        self,
+        entry: _Resident,
+        key: Any,
+        name: str,
+        function: Callable[..., Any],
+        args: Any,
+        ready: Callable[[Any], None] | None,
+        wait: bool,
     ) -> Any:
-        """What the function returns; None while the worker is at it."""
+        """What the function returns; None while the worker is at it. ready: told of it on the worker."""
         job = entry.jobs.get(key)
         if job is not None and job.task.cancelled:
             job = None
@@ -172,7 +180,13 @@ class Renderer:
             if job is None:
                 self._drop_waiting_jobs()  # for poses that were passed meanwhile
                 task = Task(name)
-                call = lambda: self._helper.call(task, function, *args)  # noqa: E731
+
+                def call() -> Any:
+                    made = self._helper.call(task, function, *args)
+                    if ready is not None:
+                        ready(made)
+                    return made
+
                 job = entry.jobs[key] = _Job(task, self._worker.submit(_timed, call))
             if not (wait or job.future.done()):
                 return None

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scenes import NOTHING, looking_down_z, plane, sphere, sphere_hits, variants, zbuffer
+from scenes import NOTHING, looking_down_z, of_variant, plane, sphere, sphere_hits, variants, zbuffer
 
 from viewer.backends import backend, backends
 from viewer.camera import Camera
@@ -19,6 +19,10 @@ from viewer.scan.pose import Pose
 
 Draw = Callable[..., Surface]
 every_backend = pytest.mark.parametrize("name", variants())
+# Those that show the points themselves, where they lie.
+every_backend_of_points = pytest.mark.parametrize(
+    "name", [name for name in variants() if of_variant(name)[0] != "voxels"]
+)
 PROJECTIONS = ("perspective", "orthographic")
 
 
@@ -45,7 +49,7 @@ def test_a_point_is_a_square_of_its_size(draw: Draw, size: int) -> None:
     assert abs(columns.mean() + 0.5 - 32.12) <= 0.51
 
 
-@every_backend
+@every_backend_of_points
 def test_the_nearer_wins_whatever_the_order(draw: Draw, name: str) -> None:
     normals, radii = [[0, 0, 1]] * 2, [0.3, 0.3]
     for order in ([-2.0, -3.0], [-3.0, -2.0]):
@@ -62,7 +66,7 @@ def test_ties_go_to_the_lowest_id(draw: Draw, name: str) -> None:
     assert set(np.unique(surface.id)) == {0, NOTHING}
 
 
-@every_backend
+@every_backend_of_points
 @pytest.mark.parametrize("projection", PROJECTIONS)
 def test_a_plane_has_constant_depth(draw: Draw, name: str, projection: str) -> None:
     camera = looking_down_z(fov_y=40, projection=projection, height=2.0)
@@ -176,7 +180,7 @@ def test_points_behind_the_eye_are_not_seen(draw: Draw, name: str) -> None:
     assert (draw(cloud, looking_down_z(), (32, 32), name).id == NOTHING).all()
 
 
-@every_backend
+@every_backend_of_points
 def test_near_and_far_planes_cut(draw: Draw, name: str) -> None:
     cloud = PointCloud.from_arrays(
         [[0.0, 0, -z] for z in (1, 2, 3)], normals=[[0, 0, 1]] * 3, radii=[0.5] * 3
@@ -217,7 +221,7 @@ def test_a_far_away_scan_looks_as_it_does_at_the_origin(draw: Draw, name: str) -
     assert (one.id != other.id).mean() < 0.005
 
 
-@every_backend
+@every_backend_of_points
 def test_ids_are_those_of_the_file(draw: Draw, name: str) -> None:
     points = np.array([[np.nan, 0, 0], [0, 0, -2.0], [np.inf, 0, 0], [0.5, 0, -2.0]])
     cloud = PointCloud.from_arrays(points, normals=[[0, 0, 1]] * 4, radii=[0.2] * 4)

@@ -12,7 +12,9 @@ A backend answers one question: which surface does each pixel see? Its module ha
 
 and, where it prepares something for a pose,
 
-    derive(cloud, params) -> arrays     CPU only, on any thread
+    derive(cloud, params) -> arrays     CPU only, on any thread, in any process
+    ready(arrays)                       the same in the process that draws, where there is something to
+                                        import or compile before drawing
     upload(gpu, arrays) -> derived      GL thread; `derived.nbytes` and `derived.release()`
 
 which `draw` then finds as `frame.derived`. No list of backends exists anywhere else.
@@ -51,13 +53,15 @@ class FrameView:
 
     share: of the points that need to be drawn, less than 1 while the picture moves and all would
     take too long. A backend that leaves some out says that a later call would refine the picture,
-    and counts them (`Points.of` does); one that is fast enough may draw all.
+    and counts them (`Points.of` does); one that is fast enough may draw all. budget_ms: after which a
+    backend that can draw something coarser does, and says that a later call would refine it; None: never.
     """
 
     view: View
     params: Any
     derived: Any = None
     share: float = 1.0
+    budget_ms: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,11 @@ class Backend:
     def derive(self) -> Callable[[PointCloud, Any], Any] | None:
         """Its derive function, None where it prepares nothing."""
         return getattr(self.module, "derive", None)
+
+    def ready(self, arrays: Any) -> None:
+        """Make this process ready to draw what `derive` gave, on any thread."""
+        if hasattr(self.module, "ready"):
+            self.module.ready(arrays)
 
     def upload(self, gpu: Gpu, arrays: Any) -> Derived:
         """Put what `derive` gave on the GPU."""

@@ -1,16 +1,22 @@
-"""Write poses as PLY, PCD or NPZ, and range views also as EXR.
+"""Write poses as PLY, PCD or NPZ, range views also as EXR, and all poses as octrees in one SVO.
 
 OUT is a file for one pose, or for a sequence a numbered pattern such as out%04d.ply, with
-the times beside it in times.csv.
+the times beside it in times.csv; a .svo holds all poses and their times.
 """
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-from ..export import check_output
+from ..errors import InputError
+from ..export import check_output, is_pattern
 from ..scan import formats
+from ..scan.octree.build import Stop
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
 from .console import progress
 from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, frame_files, open_timeline, read_poses
 
@@ -18,19 +24,61 @@ from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, frame_files, ope
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d convert`."""
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
-    suffixes = " ".join(formats.writable_suffixes(views=True))
+    suffixes = " ".join([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
     parser.add_argument("out", metavar="OUT", type=Path, help=f"{suffixes}, or a pattern with %%04d")
     add_pose_arguments(parser)
+    group = parser.add_argument_group("octrees (.svo)").add_mutually_exclusive_group()
+    group.add_argument(
+        "--delta",
+        type=float,
+        metavar="D",
+        help="share of the positions that may lack a leaf, 0.05 if not given",
+    )
+    group.add_argument("--depth", type=int, metavar="H", help="level of the leaves, 0 to 21, in its stead")
 
 
 def run(args: Namespace) -> int:
     """Write the chosen poses, by default all; broken frames among several are left out."""
+    stop = _stop(args)
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
-        check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
-        with frame_files(args.out, indices) as file_of, progress(len(indices)) as tick:
-            for pose in read_poses(timeline, indices):
-                formats.write(file_of(pose), pose.cloud, pose.views)
-                tick()
+        if args.out.suffix.lower() in formats.scan_suffixes():
+            _write_scan(args.out, timeline, indices, stop)
+        else:
+            _write_frames(args.out, timeline, indices)
     print(args.out)
     return 0
+
+
+def _stop(args: Namespace) -> Stop | None:
+    """Where octrees end; None: as they do by default. Raises InputError where there are none."""
+    told: dict[str, Any] = {}
+    if args.delta is not None:
+        told = {"rule": "delta", "delta": args.delta}
+    elif args.depth is not None:
+        told = {"rule": "depth", "depth": args.depth}
+    if told and args.out.suffix.lower() not in formats.scan_suffixes():
+        raise InputError(f"--{told['rule']} is for octrees", args.out, "Write a .svo, or leave it out")
+    return Stop(**told) if told else None
+
+
+def _write_scan(out: Path, timeline: Timeline, indices: Sequence[int], stop: Stop | None) -> None:
+    check_output(out, formats.scan_suffixes(), several=False)
+    if is_pattern(out):
+        raise InputError("has a place for a number, and one file holds all poses", out, "Leave it out")
+    with progress(len(indices)) as tick:
+
+        def poses() -> Iterator[Pose]:
+            for pose in read_poses(timeline, indices):
+                yield pose
+                tick()
+
+        formats.write_poses(out, poses(), timeline.unit, stop=stop)
+
+
+def _write_frames(out: Path, timeline: Timeline, indices: Sequence[int]) -> None:
+    check_output(out, formats.writable_suffixes(views=True), several=len(indices) > 1)
+    with frame_files(out, indices) as file_of, progress(len(indices)) as tick:
+        for pose in read_poses(timeline, indices):
+            formats.write(file_of(pose), pose.cloud, pose.views)
+            tick()

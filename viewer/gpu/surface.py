@@ -103,6 +103,7 @@ class Surface:
         self.picture = gpu.ctx.buffer(reserve=4 * width * height)
         self._block = gpu.ctx.buffer(reserve=View.BLOCK_BYTES)
         self._shown: tuple[GpuPose, View] | None = None
+        self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
         self.look = Look()
         self.color_range: tuple[float, float] | None = None
         self.stats = Stats()
@@ -115,7 +116,7 @@ class Surface:
 
     def start(self, pose: GpuPose, view: View) -> None:
         """Begin a frame: what backends and shading read from now on."""
-        self._shown = pose, view
+        self._shown, self._stood_for = (pose, view), None
         self._block.write(view.block())
         self.bind_view()
         self._covered_known = False
@@ -125,6 +126,11 @@ class Surface:
     def bind_view(self) -> None:
         """Make this surface's view the one that shaders read."""
         self._block.bind_to_uniform_block(0)
+
+    def show(self, pose: GpuPose, points: NDArray[np.uint32]) -> None:
+        """Say that rows are those of another pose with the same origin: for a backend that shows something
+        made of the points in place of these. points: the row of the point that each of them stands for."""
+        self._shown, self._stood_for = (pose, self.view), (self.pose, points)
 
     def take_covered(self) -> IndexList:
         """The list of covered pixels, for a backend that can fill it at less than the cost of
@@ -197,6 +203,15 @@ class Surface:
     def pose(self) -> GpuPose:
         """The pose that it shows."""
         return self._drawn()[0]
+
+    @property
+    def scan(self) -> PointCloud:
+        """The points of the scan that it shows, be it by something made of them; see `point_of`."""
+        return (self._stood_for[0] if self._stood_for else self.pose).stored
+
+    def point_of(self, row: int) -> int:
+        """The row in `scan` of the point that a row of the surface stands for."""
+        return int(self._stood_for[1][row]) if self._stood_for else row
 
     @property
     def view(self) -> View:

@@ -109,15 +109,18 @@ class FileSequence:
 
 
 class MultiFrameFile:
-    """One file that holds all frames, such as NPY or NPZ with positions (T, N, 3)."""
-
-    unit = None
+    """One file that holds all frames, such as NPY or NPZ with positions (T, N, 3), or SVO."""
 
     def __init__(self, path: Path, count: int) -> None:
         self.name = printable(path.name)
         self.files = (path,)
         self._path = path
         self._count = count
+        self._read = formats.frames(path)
+
+    @property
+    def unit(self) -> str | None:
+        return formats.read_unit(self._path)
 
     def __len__(self) -> int:
         return self._count
@@ -129,4 +132,4 @@ class MultiFrameFile:
         return formats.read_times(self._path)
 
     def load(self, index: int) -> Scanned:
-        return formats.read(self._path, frame=index)
+        return self._read(index)

@@ -17,6 +17,7 @@ from range_scenes import sphere_view
 from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 from viewer.scan.range_view import merge
 
 HEAD = 600  # bytes of a file that hold its header
@@ -75,6 +76,9 @@ def seeds(
     save_arrays(folder)
     for suffix in formats.writable_suffixes():
         formats.write(folder / f"full{suffix}", near_cloud)
+    for suffix in formats.scan_suffixes():
+        poses = [Pose(index, index / 25, "", near_cloud) for index in range(3)]
+        formats.write_poses(folder / f"scan{suffix}", poses, "mm")
     files = {suffix: list(OWN.get(suffix, [])) for suffix in formats.known_suffixes()}
     for path in sorted(folder.iterdir()):
         files[path.suffix].append(path.read_bytes())

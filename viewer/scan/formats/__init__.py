@@ -6,8 +6,10 @@ A format module declares
 - `read(path, frame=0) -> PointCloud`, or a tuple of RangeViews;
 - where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
   `read_times(path)` (seconds, (T,) float64, or None);
+- where frames are told by others: `Frames(path)`, whose `read(frame)` keeps what the next one needs;
 - where it tells the unit of length: `read_unit(path) -> str`, from the header alone;
-- where it can be written: `write(path, cloud)`, or `write_views(path, views)`.
+- where it can be written: `write(path, cloud)`, or `write_views(path, views)`, or, all poses in one file,
+  `write_poses(path, poses, unit, **options)`.
 
 A module may raise any exception: the functions below turn it into one InputError that names the file.
 Modules whose name starts with an underscore are helpers.
@@ -16,12 +18,13 @@ Modules whose name starts with an underscore are helpers.
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +32,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, Scan4DError, unknown_name
 from ...files import whole_file
 from ..points import PointCloud
-from ..pose import Scanned
+from ..pose import Pose, Scanned
 from ..range_view import RangeView, merge
 
 
@@ -44,6 +47,11 @@ def writable_suffixes(views: bool = False) -> list[str]:
     return sorted(
         suffix for suffix, module in _formats().items() if any(hasattr(module, name) for name in writers)
     )
+
+
+def scan_suffixes() -> list[str]:
+    """Every suffix of which one file can be written for all poses of a scan, sorted."""
+    return sorted(suffix for suffix, module in _formats().items() if hasattr(module, "write_poses"))
 
 
 def frame_count(path: Path | str) -> int:
@@ -83,10 +91,30 @@ def read(path: Path | str, frame: int = 0) -> Scanned:
         raise InputError(f"has no frame {frame}", path, f"It holds {frames}, counted from 0")
     where = path if frames == 1 else f"{path}, frame {frame}"
     with _one_message(where, f"cannot be read as {module.TITLE}"):
-        scanned: Scanned = module.read(path, frame)
-        if isinstance(scanned, PointCloud) and not len(scanned):
-            what = f"none of its {scanned.dropped} points has finite coordinates"
-            raise InputError(what if scanned.dropped else "holds no points")
+        return _with_points(module.read(path, frame))
+
+
+def frames(path: Path | str) -> Callable[[int], Scanned]:
+    """What reads the frames of one file, as `read` does, several of them in less time. Raises InputError."""
+    path = Path(path)
+    module = _readable(path)
+    if not hasattr(module, "Frames"):
+        return partial(read, path)
+    failed = f"cannot be read as {module.TITLE}"
+    with _one_message(path, failed):
+        opened = module.Frames(path)
+
+    def read_frame(frame: int) -> Scanned:
+        with _one_message(f"{path}, frame {frame}", failed):
+            return _with_points(opened.read(frame))
+
+    return read_frame
+
+
+def _with_points(scanned: Scanned) -> Scanned:
+    if isinstance(scanned, PointCloud) and not len(scanned):
+        what = f"none of its {scanned.dropped} points has finite coordinates"
+        raise InputError(what if scanned.dropped else "holds no points")
     return scanned
 
 
@@ -115,14 +143,32 @@ def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) 
     if not (views or hasattr(module, "write")):
         hint = f"Points can be written as {', '.join(writable_suffixes())}"
         raise InputError(f"{module.TITLE} holds range views, and this scan has none", path, hint)
-    if not path.parent.is_dir():
-        raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
-    problem = f"cannot be written as {module.TITLE}", "Check free space and permissions"
-    with _one_message(path, *problem), whole_file(path) as temporary:
+    with _writing(path, module) as temporary:
         if hasattr(module, "write"):
             module.write(temporary, cloud)
         else:
             module.write_views(temporary, views)
+
+
+def write_poses(path: Path | str, poses: Iterable[Pose], unit: str, **options: Any) -> None:
+    """Write all poses into one file of a format of `scan_suffixes`, in one step. options: the format's own.
+
+    Raises InputError as `write` does, and what reading the poses raises.
+    """
+    path = Path(path)
+    module = _formats()[path.suffix.lower()]
+    with _writing(path, module) as temporary:
+        module.write_poses(temporary, poses, unit, **options)
+
+
+@contextmanager
+def _writing(path: Path, module: ModuleType) -> Iterator[Path]:
+    """A temporary path that becomes `path` only if the block ends well; what goes wrong is one message."""
+    if not path.parent.is_dir():
+        raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
+    problem = f"cannot be written as {module.TITLE}", "Check free space and permissions"
+    with _one_message(path, *problem), whole_file(path) as temporary:
+        yield temporary
 
 
 @cache

@@ -1,0 +1,290 @@
+"""A sparse octree of the points, drawn as cubes as coarse as the picture allows.
+
+Slomp 2014, VI: octants are divided as long as that tells points apart, and drawn from where
+they are no larger than a pixel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..gpu.amplify import FEEDS, Points
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Stats, Surface
+from ..gpu.view import View
+from ..gpu.voxels import draw_voxels, shade_flat
+from ..params import param
+from ..scan.octree import DEEPEST, Octree
+from ..scan.octree.build import STOPS, Stop, build, shortfall
+from ..scan.octree.traverse import Cut, Sight, Traversal
+from ..scan.points import PointCloud
+from ..scan.spacing import typical_spacing
+from . import FrameView
+
+TITLE = "Voxels"
+
+_UPRIGHT = "cubes are upright: turned points lie in other ones"
+_AROUND_ALL = "octants divide the cube around all points: other points make other octants"
+_THICK = "cubes stand out of the surface by as much as they are large"
+# Rows of the stability suite that cubes cannot hold in principle -> why.
+LIMITS = {
+    "rotated by a quarter turn": _UPRIGHT,
+    "rotated by 37 degrees": _UPRIGHT,
+    "normals parallel to y": _UPRIGHT,
+    "near plane inside the cloud": _AROUND_ALL,
+    "eye inside the cloud": _AROUND_ALL,
+    "zoomed in on 10^-3 of the scan": _AROUND_ALL,
+    "coplanar points": _AROUND_ALL,
+    "collinear points": _AROUND_ALL,
+    "an outlier at 10^6 times the size": _AROUND_ALL,
+    "zero radii": _THICK,
+    "negative radii": _THICK,
+    "NaN radii": _THICK,
+    "coplanar points without normals": "without normals, faces are lit",
+}
+
+_RADIUS_PER_SPACING = 1.5  # as surfels have it, for points without radii of their own
+_LARGEST = np.float32(3e38)  # beyond it a radius is unknown
+_UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
+_ANYWHERE = Sight(np.zeros(3), np.eye(3), 1.0, (1, 1), 1.0, math.inf, perspective=True)
+_PRIMES = np.array([73856093, 19349663, 83492791], np.uint32)  # spatial hash (Teschner et al. 2003, 4.1)
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the voxels backend."""
+
+    stop: str = param(
+        "delta",
+        "Where octants are not divided any more. delta: when few positions share one; depth: at a level; "
+        "occupancy: each by itself, when it holds few points",
+        choices=STOPS,
+        affects="derive",
+    )
+    delta: float = param(
+        0.05,
+        "delta: the share of the positions that may lack an octant of their own",
+        low=0,
+        high=1,
+        affects="derive",
+    )
+    depth: int = param(10, "depth: the level of the leaves", low=0, high=DEEPEST, affects="derive")
+    occupancy: int = param(
+        8, "occupancy: points that are not divided any more", low=1, high=1 << 20, affects="derive"
+    )
+    max_depth: int = param(
+        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11)
+    )
+    pixel_threshold: float = param(
+        1.0, "Octants whose edge is less are drawn in place of what they hold, pixels", low=0.25, high=64.0
+    )
+    least: float = param(
+        0.4,
+        "Least edge of a cube, in diameters of the points' splats: what closes the surface where octants are "
+        "smaller; 0: as large as octants",
+        low=0.0,
+        high=10.0,
+        sweep=(0.0, 0.4, 1.0),
+    )
+    normals: str = param(
+        "auto",
+        "What is lit. smooth: the mean of the points' normals; flat: the cubes' faces; auto: smooth where "
+        "the scan has normals",
+        choices=("auto", "smooth", "flat"),
+        affects="derive",
+    )
+    cull_back: bool = param(False, "Leave out octants whose normals all face away")
+    scatter: bool = param(
+        True, "Send cubes of a few pixels to their pixels one by one; off: all are made by `instancing`"
+    )
+    instancing: str = param(
+        "gs",
+        "How octants become cubes: a geometry shader, uniform blocks, buffer textures, vertex attributes or "
+        "pulled vertices",
+        choices=FEEDS,
+        affects="shader",
+    )
+
+
+def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+    """Normals where they are to be lit."""
+    return ("normals",) if params.normals == "smooth" else ()
+
+
+def derive(cloud: PointCloud, params: Params) -> Octree:
+    """The octree of a pose."""
+    stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
+    return build(cloud, stop)
+
+
+def ready(octree: Octree) -> None:
+    """Cut it once: the first time takes long, on a new machine above all."""
+    traversal = Traversal(octree.prefix(1), _ANYWHERE)
+    traversal.advance()
+    traversal.cut(octree.low)
+
+
+def upload(gpu: Gpu, octree: Octree) -> Voxels:
+    """Nothing is uploaded until a view is known."""
+    return Voxels(gpu, octree)
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Draw the nodes that the view tells apart; complete where all were found, and all shall be drawn."""
+    params: Params = frame.params
+    voxels: Voxels = frame.derived
+    if not voxels.octree.points:
+        surface.clear()
+        return False
+    flat = params.normals == "flat" or (params.normals == "auto" and pose.stored.normals is None)
+    shown = voxels.show(pose, frame, flat)
+    pose.add_ms("upload", shown.pose.take_ms("upload"))
+    surface.show(shown.pose, shown.rows)
+    coarse = frame.share < 1 and bool((shown.cut.level < min(params.max_depth, voxels.octree.depth)).any())
+    _report(shown.cut, voxels.octree, params, surface.stats)
+    if coarse:
+        surface.stats.left_out = round(len(shown.cut) / frame.share) - len(shown.cut)
+    points = Points(shown.pose, use_radii=True, count=len(shown.cut))
+    draw_voxels(points, surface, params.instancing, params.scatter)
+    if flat:
+        shade_flat(points, surface)
+    return coarse or not shown.cut.complete
+
+
+def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
+    stopped = shortfall(octree, Stop(params.stop, params.delta))
+    if stopped:
+        stats.chosen["depth"] = stopped
+    for cause, count in (("out of view", cut.outside), ("facing away", cut.facing_away)):
+        if count:
+            stats.skipped[f"octants {cause}"] = f"{count:,}, with all that they hold"
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What a view shows. rows: (n,) the first point of each node."""
+
+    cut: Cut
+    pose: GpuPose
+    rows: NDArray[np.uint32]
+
+
+class Voxels:
+    """An octree, and the nodes of it that the last view showed."""
+
+    def __init__(self, gpu: Gpu, octree: Octree) -> None:
+        self.octree = octree
+        self._gpu = gpu
+        self._traversal: Traversal | None = None
+        self._asked: tuple[object, ...] = ()
+        self._seen: tuple[object, ...] = ()
+        self._shown: _Shown | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self._shown.pose.uploaded_bytes if self._shown else 0
+
+    def release(self) -> None:
+        """Let go of what the last view showed."""
+        self._traversal = self._shown = None
+
+    def show(self, pose: GpuPose, frame: FrameView, flat: bool) -> _Shown:
+        """The nodes for a view, found anew where it or the parameters changed, else found further."""
+        params: Params = frame.params
+        threshold = params.pixel_threshold / math.sqrt(frame.share)  # four times the nodes at half the edge
+        asked = (threshold, params.max_depth, params.least, params.cull_back, flat)
+        seen = (asked, _view_key(frame.view))
+        if self._shown is not None and self._seen == seen and self._shown.cut.complete:
+            return self._shown
+        sight = sight_of(frame.view, pose.cloud.origin)
+        if self._traversal is None or self._asked != asked:
+            self._traversal = Traversal(
+                self.octree,
+                sight,
+                pixel_threshold=threshold,
+                max_depth=params.max_depth,
+                cull_cones=params.cull_back,
+                margin=math.sqrt(3) * (1 + _UNLIKE) * params.least * float(_radii(pose).max()),
+            )
+        elif self._seen != seen:
+            self._traversal.look(sight)
+        self._asked, self._seen = asked, seen
+        self._traversal.advance(frame.budget_ms)
+        self._shown = self._look_at(self._traversal.cut(pose.cloud.origin), pose, params, flat)
+        return self._shown
+
+    def _look_at(self, cut: Cut, pose: GpuPose, params: Params, flat: bool) -> _Shown:
+        """The nodes of a cut as points, their radii being half of the cubes' edges."""
+        rows = cut.gather(self.octree, "rows")
+        unlike = _unlike(self.octree, cut, pose.cloud.origin)
+        cloud = PointCloud(
+            positions=cut.centers,
+            origin=pose.cloud.origin,
+            # Faces give their own normals to pixels.
+            normals=np.zeros_like(cut.centers) if flat else cut.gather(self.octree, "normals"),
+            colors=None if pose.cloud.colors is None else cut.gather(self.octree, "colors"),
+            radii=np.maximum(cut.halves, params.least * unlike * _radii_at(pose, rows)),
+            scalars=_Scalars(pose.cloud.scalars, rows),
+            ids=cut.numbers(self.octree),  # in the cut's order, near first: no row is looked for by them
+        )
+        return _Shown(cut, GpuPose(self._gpu, cloud), rows)
+
+
+def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
+    """What a cut has to know of a view of a pose with this origin, (3,)."""
+    eye = origin - view.rotation.T @ view.translation
+    return Sight(eye, view.rotation, view.scale, view.size, view.near, view.far, view.perspective)
+
+
+def _view_key(view: View) -> tuple[object, ...]:
+    lens = (view.size, view.scale, view.near, view.far, view.perspective)
+    return (view.rotation.tobytes(), view.translation.tobytes(), *lens)
+
+
+def _radii(pose: GpuPose) -> NDArray[np.float32]:
+    """Of the points' splats, scan units: (N,), or (1,) where all are alike."""
+    return pose.remember("radii of cubes", lambda: _find_radii(pose))
+
+
+def _find_radii(pose: GpuPose) -> NDArray[np.float32]:
+    uniform = np.float32(_RADIUS_PER_SPACING * pose.remember("spacing", lambda: typical_spacing(pose.stored)))
+    if pose.stored.radii is None:
+        return np.array([uniform])
+    return np.where((pose.stored.radii > 0) & (pose.stored.radii < _LARGEST), pose.stored.radii, uniform)
+
+
+def _radii_at(pose: GpuPose, rows: NDArray[np.uint32]) -> NDArray[np.float32]:
+    radii = _radii(pose)
+    return radii if len(radii) == 1 else radii[rows]
+
+
+def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Factors from 1 to 1 + _UNLIKE, (n,), by the nodes' places: cubes that overlap would share the planes
+    of their faces, and rounding would say which of them is seen."""
+    edges = 2 * cut.halves[:, None].astype(np.float64)
+    cells = ((cut.centers + (origin - octree.low)) / edges).astype(np.uint32)
+    mixed = (cells * _PRIMES).sum(axis=1, dtype=np.uint32) * _PRIMES[0] >> np.uint32(22)
+    return 1 + mixed.astype(np.float32) * np.float32(_UNLIKE / 1024)
+
+
+class _Scalars(Mapping[str, NDArray[np.generic]]):
+    """Of each node, those of its lowest point; looked up when they are asked for."""
+
+    def __init__(self, scalars: Mapping[str, NDArray[np.generic]], rows: NDArray[np.uint32]) -> None:
+        self._scalars, self._rows = scalars, rows
+
+    def __getitem__(self, name: str) -> NDArray[np.generic]:
+        return self._scalars[name][self._rows]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._scalars)
+
+    def __len__(self) -> int:
+        return len(self._scalars)

@@ -1,0 +1,147 @@
+"""SVO: octrees of all poses in one file, one after another; docs/octree-files.md has the layout.
+
+Each pose is its leaves: a point in the middle of each, with its colour and normal. Written are geometry,
+colours, normals, times and unit. A pose may be told by the one before it: then that is read too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...task import checkpoint
+from ..octree.build import Stop, build
+from ..octree.cube import Cube, extremes
+from ..octree.leaves import leaf_points
+from ..octree.octree import Octree
+from ..octree.storage import LARGEST_HEADER, Header, from_bytes, read_header, to_bytes
+from ..points import PointCloud
+from ..pose import Pose
+
+TITLE = "SVO"
+SUFFIXES = (".svo",)
+
+_LONGEST = 8  # octrees read for one pose
+_MARGIN = 1 / 8  # around the pose that a cube is made for, of its extent
+_TOO_LARGE = 2.5  # a cube, for a pose of less extent by this factor
+
+
+def frame_count(path: Path) -> int:
+    """How many octrees there are; reads their headers."""
+    return len(_places(path))
+
+
+def read_times(path: Path) -> NDArray[np.float64]:
+    """(T,) seconds."""
+    return np.array([place.header.time for place in _places(path)])
+
+
+def read_unit(path: Path) -> str:
+    """The unit of the first octree."""
+    with open(path, "rb") as file:
+        return read_header(file.read(LARGEST_HEADER))[0].unit
+
+
+def read(path: Path, frame: int = 0) -> PointCloud:
+    """The leaves of one pose. Raises InputError where it, or a pose that it is told by, is damaged."""
+    return Frames(path).read(frame)
+
+
+class Frames:
+    """The poses of one file. The octree read last is kept, so that reading them in turn reads each once.
+
+    Any thread may read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Reads the headers. Raises InputError where the file holds something else."""
+        self._path = path
+        self._places = _places(path)
+        self._last: tuple[int, Octree] | None = None
+        self._reading = Lock()
+
+    def read(self, frame: int) -> PointCloud:
+        """The leaves of one pose. Raises InputError as `read` does."""
+        with self._reading, open(self._path, "rb") as file:
+            start = frame - self._places[frame].header.before
+            previous = None
+            if self._last is not None and start <= self._last[0] < frame:
+                start, previous = self._last[0] + 1, self._last[1]
+            for index in range(start, frame + 1):
+                checkpoint()
+                file.seek(self._places[index].offset)
+                data = file.read(self._places[index].size)
+                previous = from_bytes(data, previous, attributes=index == frame)
+            assert previous is not None, "there is the one asked for"
+            self._last = frame, replace(previous, attributes=())
+        return leaf_points(previous)
+
+
+def write_poses(path: Path, poses: Iterable[Pose], unit: str, stop: Stop | None = None) -> None:
+    """Write the octrees of all poses. stop: where their subdivision ends.
+
+    They share a cube for as long as it fits, since only then one tells of the next.
+    """
+    cube: Cube | None = None
+    previous, chain = None, 0
+    with open(path, "wb") as file:
+        for pose in poses:
+            cube = _cube_for(pose.cloud, cube)
+            octree = build(pose.cloud, stop, cube)
+            told_by = previous if chain < _LONGEST else None
+            data = to_bytes(octree, told_by, chain=chain, time=pose.time, unit=unit)
+            file.write(data)
+            previous, chain = octree, read_header(data)[0].before + 1
+
+
+def _cube_for(cloud: PointCloud, cube: Cube | None) -> Cube:
+    """The cube of the pose before where it fits, else one with a margin; the first pose has one without."""
+    if cube is None:
+        return Cube.of(cloud)
+    low, high = extremes(cloud.positions)
+    offset = cloud.origin - cube.low
+    extent = float((high - low).max())
+    holds = (low + offset >= 0).all() and (high + offset <= cube.edge).all()
+    if holds and cube.edge <= _TOO_LARGE * extent:
+        return cube
+    margin = _MARGIN * extent
+    return Cube.around(low + cloud.origin - margin, high + cloud.origin + margin)
+
+
+class _Place(NamedTuple):
+    """Where an octree is in the file. size: with its header, as far as the file reaches."""
+
+    offset: int
+    size: int
+    header: Header
+
+
+def _places(path: Path) -> list[_Place]:
+    """All octrees of a file. Raises InputError where there is something else, or a chain has no beginning."""
+    places: list[_Place] = []
+    end = path.stat().st_size
+    with open(path, "rb") as file:
+        offset = 0
+        while offset < end:
+            file.seek(offset)
+            try:
+                header, size = read_header(file.read(LARGEST_HEADER))
+            except InputError as error:
+                error.what = f"octree {len(places)}, at byte {offset}: {error.what}"
+                raise
+            size += header.stored
+            places.append(_Place(offset, min(size, end - offset), header))
+            offset += size
+    counts = [0, *(place.header.before for place in places)]
+    for index, (above, here) in enumerate(pairwise(counts)):
+        if here not in (0, above + 1) or here > index:
+            raise InputError(f"octree {index} is told by {here} before it, which are not there")
+    return places

@@ -1,0 +1,169 @@
+"""What the nodes of a tree hold as few bytes: ordered so that equal bytes come together, then LZMA.
+
+Whoever reads a level knows all levels above it and, of a sequence, the whole tree of the pose before. For
+masks that tells two things of each node: the mask that the same octant has in the tree before, and which of
+the octants beside its six faces are there. Nodes of which the same is known have similar masks; they are
+stored together, each mask XOR the one before. Attributes are stored as differences from the parent's.
+"""
+
+from __future__ import annotations
+
+import lzma
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from .neighbors import Bytes, Children, Neighbors
+
+MOST_RATIO = 64  # of unpacked to packed: what packs better stays as it is, so that a file cannot promise more
+_LZMA = {
+    "id": lzma.FILTER_LZMA1,
+    "preset": 6,
+    "dict_size": 1 << 20,
+    **{"lc": 0, "lp": 0, "pb": 0},  # a byte tells nothing of the next, nor does where it stands
+}
+
+
+def pack(values: Bytes) -> bytes:
+    """As LZMA without a header; as they are where that is not shorter, or beyond `MOST_RATIO`."""
+    plain = values.tobytes()
+    packed = lzma.compress(plain, format=lzma.FORMAT_RAW, filters=[_LZMA])
+    return packed if len(plain) <= MOST_RATIO * len(packed) and len(packed) < len(plain) else plain
+
+
+def unpack(block: bytes, size: int) -> Bytes:
+    """The bytes that `pack` was given, as many as there were. Raises InputError where they are others."""
+    if len(block) == size:
+        return np.frombuffer(block, np.uint8)
+    if size > MOST_RATIO * len(block):
+        raise InputError(f"{len(block)} bytes would unpack to {size}")
+    try:
+        plain = lzma.LZMADecompressor(lzma.FORMAT_RAW, filters=[_LZMA]).decompress(block, size)
+    except lzma.LZMAError as error:
+        raise InputError("a level cannot be unpacked") from error
+    if len(plain) != size:
+        raise InputError(f"a level has {len(plain)} bytes instead of {size}")
+    return np.frombuffer(plain, np.uint8)
+
+
+class MaskCoder:
+    """Puts the masks of a level into the order in which they are stored, and back; it begins at the root."""
+
+    def __init__(self, root: int, before: tuple[Bytes, ...] = ()) -> None:
+        """root: how many nodes level 0 has. before: the masks of the tree before, on the same cube."""
+        self._neighbors = Neighbors(root)
+        self._before = before
+        self._counterparts = np.zeros(root, np.int32)  # the same octants in the tree before
+
+    def sort(self, masks: Bytes, told: bool) -> Bytes:
+        """What is stored of this level, (n,). told: by the tree before."""
+        known, order = self._known(told)
+        return (masks ^ known)[order]
+
+    def restore(self, stored: Bytes, told: bool) -> Bytes:
+        """The masks of this level, (n,), from what is stored of it."""
+        known, order = self._known(told)
+        masks = np.empty_like(stored)
+        masks[order] = stored
+        return masks ^ known
+
+    def _known(self, told: bool) -> tuple[Bytes, NDArray[np.intp]]:
+        """The masks of the same octants in the tree before, 0 for none; the order of what is stored."""
+        known = np.zeros(len(self._counterparts), np.uint8)
+        if told and self._before:
+            known = np.append(self._before[0], np.uint8(0))[self._counterparts]
+        key = known.astype(np.uint16) << np.uint16(6) | self._neighbors.around()
+        return known, np.argsort(key, kind="stable")
+
+    def descend(self, masks: Bytes) -> None:
+        """Go on to the level below the one that has these masks."""
+        children = self._neighbors.descend(masks)
+        self._counterparts = self._counterparts[children.parents]
+        if self._before:
+            self._counterparts = Children(self._before[0]).find(self._counterparts, children.octants)
+            self._before = self._before[1:]
+
+
+# --- attributes -------------------------------------------------------------------------
+
+
+def differences(values: Bytes, above: Bytes, masks: Bytes) -> Bytes:
+    """What is stored of (n, k) bytes of a level: how siblings differ from their parents, by columns.
+
+    above: (m, k), the parents'. masks: (m,). An only child has the points of its parent and so
+    its values, which are not stored.
+    """
+    parents, siblings = _families(masks)
+    return (values[siblings] - above[parents[siblings]]).T.ravel()
+
+
+def restored(stored: Bytes, above: Bytes, masks: Bytes) -> Bytes:
+    """(n, k) bytes of a level from their `differences`."""
+    parents, siblings = _families(masks)
+    values = above[parents]
+    values[siblings] += stored.reshape(above.shape[1], -1).T
+    return values
+
+
+def sibling_count(masks: Bytes) -> int:
+    """How many nodes below are not the only child."""
+    counts = np.bitwise_count(masks)
+    return int(counts[counts > 1].sum(dtype=np.int64))
+
+
+def _families(masks: Bytes) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The parent of each child, (n,), and the numbers of the children that have siblings."""
+    counts = np.bitwise_count(masks)
+    parents = np.repeat(np.arange(len(masks)), counts)
+    return parents, np.flatnonzero(counts[parents] > 1)
+
+
+def color_bytes(colors: Bytes) -> Bytes:
+    """(n, 4): green, red and blue less green (modulo 256), and alpha; of red, green, blue, alpha."""
+    red, green, blue, alpha = colors.T
+    return np.stack([green, red - green, blue - green, alpha], axis=1)
+
+
+def colors_of(stored: Bytes) -> Bytes:
+    """(n, 4) colours of their `color_bytes`."""
+    green, red, blue, alpha = stored.T
+    return np.stack([red + green, green, blue + green, alpha], axis=1)
+
+
+def normal_bytes(normals: NDArray[np.float32]) -> Bytes:
+    """(n, 2): unit normals on the octahedron unfolded into a square of 255 x 255 cells, to a degree.
+
+    1..255 along each side; 0, 0 stands for no normal. Cigolle et al. 2014, A Survey of Efficient
+    Representations for Independent Unit Vectors.
+    """
+    length = np.abs(normals).sum(axis=1, keepdims=True)
+    flat = normals / np.where(length > 0, length, np.float32(1))
+    x, y = flat[:, 0], flat[:, 1]
+    below = flat[:, 2] < 0
+    square = np.stack(
+        [
+            np.where(below, (1 - np.abs(y)) * np.where(x < 0, -1, 1), x),
+            np.where(below, (1 - np.abs(x)) * np.where(y < 0, -1, 1), y),
+        ],
+        axis=1,
+    )
+    return np.where(length > 0, np.rint(square * 127) + 128, 0).astype(np.uint8)
+
+
+def normals_of(stored: Bytes) -> NDArray[np.float32]:
+    """(n, 3) float32 normals of their `normal_bytes`; 0 where there is none."""
+    return _normals()[stored[:, 0].astype(np.intp) << 8 | stored[:, 1]]
+
+
+@cache
+def _normals() -> NDArray[np.float32]:
+    """(65536, 3): the normal of each pair of bytes."""
+    x, y = (np.indices((256, 256)).reshape(2, -1) - 128) / 127
+    z = 1 - np.abs(x) - np.abs(y)
+    fold = np.maximum(-z, 0)
+    normals = np.stack([x - np.where(x < 0, -fold, fold), y - np.where(y < 0, -fold, fold), z], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals[0] = 0
+    return normals.astype(np.float32)

@@ -1,0 +1,108 @@
+"""What a sparse voxel octree is: a cube, and a mask of children for each inner node, breadth-first."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+DEEPEST = 21  # the last level: three coordinates of 21 bits are a Morton code of 63
+
+
+@dataclass(frozen=True, eq=False)
+class Attributes:
+    """What the nodes of one level show, means over all points below each.
+
+    colors:  (n, 4) uint8, sRGB and alpha, or None
+    normals: (n, 3) float32, unit length, or None; 0 where normals cancel
+    cones:   (n,) float32, or None: the cosine of the half angle of the cone about the normal that
+             holds all normals below, -1..1; -1 where there is no normal, or a point below has none
+    rows:    (n,) uint32, or None: the lowest row below in the arrays of the cloud
+    """
+
+    colors: NDArray[np.uint8] | None = None
+    normals: NDArray[np.float32] | None = None
+    cones: NDArray[np.float32] | None = None
+    rows: NDArray[np.uint32] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Octree:
+    """The occupied octants of a cube, level by level; level 0 is the cube itself.
+
+    low:        (3,) float64, the cube's lowest corner, absolute, scan units
+    edge:       of the cube, scan units
+    masks:      for each level above the deepest, (n,) uint8, its nodes by ascending Morton code; bit i:
+                child i = x | y << 1 | z << 2 is there. 0: the node is a leaf, which only trees that
+                stop by occupancy have above the deepest level
+    points:     how many points it was made of
+    distinct:   how many different positions these have
+    attributes: for each level, the deepest included, or empty: geometry alone
+    """
+
+    low: NDArray[np.float64]
+    edge: float
+    masks: tuple[NDArray[np.uint8], ...]
+    points: int
+    distinct: int
+    attributes: tuple[Attributes, ...] = ()
+
+    @property
+    def depth(self) -> int:
+        """The deepest level; 0: the cube is the only node."""
+        return len(self.masks)
+
+    @cached_property
+    def counts(self) -> NDArray[np.int64]:
+        """(depth + 1,): how many nodes each level has, oct(h)."""
+        children = [int(np.bitwise_count(masks).sum(dtype=np.int64)) for masks in self.masks]
+        return np.array([min(self.points, 1), *children], np.int64)
+
+    @cached_property
+    def leaves(self) -> int:
+        """How many nodes have no children."""
+        return int(self.counts[-1]) + sum(int(np.count_nonzero(masks == 0)) for masks in self.masks)
+
+    @property
+    def loss(self) -> float:
+        """The share of distinct positions that have no leaf of their own (Slomp 2014, Table III)."""
+        return 1 - self.leaves / self.distinct if self.distinct else 0.0
+
+    @cached_property
+    def first_child(self) -> tuple[NDArray[np.uint32], ...]:
+        """For each level above the deepest, (n,): where in the next level each node's children begin."""
+        ends = [np.cumsum(np.bitwise_count(masks), dtype=np.uint32) for masks in self.masks]
+        return tuple(np.concatenate([np.zeros(1, np.uint32), end[:-1]]) for end in ends)
+
+    def size(self, level: int) -> float:
+        """The edge of a node, scan units."""
+        return math.ldexp(self.edge, -int(level))
+
+    def codes(self, level: int) -> NDArray[np.uint64]:
+        """(oct(level),) ascending Morton codes: three bits a level, x the lowest of them."""
+        codes = np.zeros(int(self.counts[0]), np.uint64)
+        for masks in self.masks[:level]:
+            there = np.flatnonzero(np.unpackbits(masks, bitorder="little"))
+            codes = codes[there >> 3] << np.uint64(3) | (there & 7).astype(np.uint64)
+        return codes
+
+    def cells(self, level: int) -> NDArray[np.int64]:
+        """(oct(level), 3): x, y, z of each node among 2^level along each edge of the cube."""
+        cells = np.zeros((int(self.counts[0]), 3), np.int64)
+        octants = np.array([[child & 1, child >> 1 & 1, child >> 2] for child in range(8)])
+        for masks in self.masks[:level]:
+            there = np.flatnonzero(np.unpackbits(masks, bitorder="little"))
+            cells = 2 * np.take(cells, there >> 3, axis=0) + np.take(octants, there & 7, axis=0)
+        return cells
+
+    def centers(self, level: int) -> NDArray[np.float64]:
+        """(oct(level), 3) float64, absolute, scan units."""
+        return self.low + (self.cells(level) + 0.5) * self.size(level)
+
+    def prefix(self, level: int) -> Octree:
+        """The tree down to a level, which shares its arrays: the same scan, coarser."""
+        level = min(level, self.depth)
+        return replace(self, masks=self.masks[:level], attributes=self.attributes[: level + 1])
