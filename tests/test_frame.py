@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -159,6 +160,21 @@ def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancell
     np.testing.assert_array_equal(prepared.derived.array, pose.cloud.positions[::2])
     assert own.is_prepared(pose, deriving, _Params(), Look())
     assert own.preparing is None
+    own.release()
+
+
+def test_a_backend_is_made_ready_in_the_process_that_draws_and_not_on_its_thread(
+    renderer: Renderer, deriving: Backend
+) -> None:
+    told: list[tuple[int, bool]] = []
+    main = threading.get_ident()
+    vars(deriving.module)["ready"] = lambda arrays: told.append((arrays[1], threading.get_ident() == main))
+    own = Renderer(renderer.gpu)
+    resident = own.resident(pose := Pose(0, 0.0, "x", sphere(1000)))
+    while (prepared := own.prepare(resident, deriving, _Params(), Look(), wait=False)) is None:
+        time.sleep(0.001)
+    assert told == [(prepared.derived.process, False)]
+    assert own.is_prepared(pose, deriving, _Params(), Look())
     own.release()
 
 

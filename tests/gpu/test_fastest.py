@@ -80,14 +80,15 @@ def test_a_folder_that_cannot_be_written_is_passed_over(renderer: Renderer, tmp_
     assert fastest(renderer.gpu, "a task", NAMES, ways([]), tmp_path / "file" / "fastest.json") == "quick"
 
 
+@pytest.mark.parametrize("name", ["surfels", "voxels"])
 def test_splats_on_hardware_go_the_way_that_was_measured(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.setattr(module, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(module, "_TRIAL_POINTS", 1000)
     monkeypatch.setattr(module, "_TRIAL_SIZE", (160, 120))
     cloud = sphere(2000)
-    request = Request(Pose(0, 0.0, "test", cloud), Camera.orbit(cloud.bounds()), "surfels")
+    request = Request(Pose(0, 0.0, "test", cloud), Camera.orbit(cloud.bounds()), name)
     pictures, chosen = [], set()
     for _ in range(2):
         gpu = headless()
@@ -104,5 +105,5 @@ def test_splats_on_hardware_go_the_way_that_was_measured(
     assert len(chosen) == 1
     assert chosen <= {"tiles", *FEEDS}
     np.testing.assert_array_equal(*pictures)
-    params = backend("surfels").params({"instancing": chosen.pop()})
+    params = backend(name).params({"instancing": chosen.pop()})
     assert params.instancing in next(iter(json.loads((tmp_path / "fastest.json").read_text()).values()))

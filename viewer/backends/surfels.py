@@ -16,8 +16,7 @@ import numpy as np
 
 from ..gpu import passes
 from ..gpu.amplify import FEEDS, Points, Shape, amplify
-from ..gpu.context import Gpu
-from ..gpu.fastest import fastest, trial
+from ..gpu.fastest import choose
 from ..gpu.pose import GpuPose
 from ..gpu.subpixel import average, is_subpixel, splat_subpixel
 from ..gpu.surface import Surface
@@ -30,7 +29,7 @@ from . import FrameView
 TITLE = "Surfels"
 
 SURFEL = Shape("surfels/surfel.glsl", corners=4)
-_INSTANCING = ("auto", "tiles", *FEEDS)
+_WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
 # A uniform radius of 1.5 times the spacing closes the surface.
 _RADIUS_PER_SPACING = 1.5
@@ -46,7 +45,7 @@ class Params:
         "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
         "the others: quads from a geometry shader, uniform blocks, buffer textures, vertex attributes or "
         "pulled vertices",
-        choices=_INSTANCING,
+        choices=("auto", *_WAYS),
         affects="shader",
     )
     passes: str = param(
@@ -176,28 +175,14 @@ def _draw_two(
 
 
 def _instancing(params: Params, surface: Surface) -> str:
-    """How points become splats. Where that is left open: tiles on software drivers, and what was the
-    fastest on others when it was measured there; in one pass and in two this need not be the same."""
-    if params.instancing != "auto":
-        return params.instancing
-    gpu, chosen = surface.gpu, "tiles"
-    if not gpu.software:
-        like = Params(passes="two" if params.passes in _TWO else "one")
-        chosen = gpu.keep(("instancing", like.passes), lambda: _fastest(gpu, like))
-        surface.bind_view()  # in place of the trial's
-    surface.stats.chosen["instancing"] = chosen
-    return chosen
+    """How points become splats; in one pass and in two this need not be the same."""
+    like = Params(passes="two" if params.passes in _TWO else "one")
 
-
-def _fastest(gpu: Gpu, params: Params) -> str:
-    names = tuple(name for name in _INSTANCING if name != "auto")
-
-    def ways() -> dict[str, Callable[[], None]]:
-        pose, surface = trial(gpu)
+    def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
         points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {name: partial(_splat, points, surface, params, name, 0.0) for name in names}
+        return {name: partial(_splat, points, surface, like, name, 0.0) for name in _WAYS}
 
-    return fastest(gpu, f"surfels, passes {params.passes}", names, ways)
+    return choose(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
 
 
 def _radii_suffice(pose: GpuPose) -> bool:

@@ -7,14 +7,16 @@ they are no larger than a pixel.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..gpu.amplify import FEEDS, Points
 from ..gpu.context import Gpu
+from ..gpu.fastest import choose
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Stats, Surface
 from ..gpu.view import View
@@ -104,10 +106,10 @@ class Params:
         True, "Send cubes of a few pixels to their pixels one by one; off: all are made by `instancing`"
     )
     instancing: str = param(
-        "gs",
+        "auto",
         "How octants become cubes: a geometry shader, uniform blocks, buffer textures, vertex attributes or "
-        "pulled vertices",
-        choices=FEEDS,
+        "pulled vertices; auto: what is fastest on this device",
+        choices=("auto", *FEEDS),
         affects="shader",
     )
 
@@ -151,10 +153,16 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if coarse:
         surface.stats.left_out = round(len(shown.cut) / frame.share) - len(shown.cut)
     points = Points(shown.pose, use_radii=True, count=len(shown.cut))
-    draw_voxels(points, surface, params.instancing, params.scatter)
+    feed = choose(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
+    draw_voxels(points, surface, feed, params.scatter)
     if flat:
         shade_flat(points, surface)
     return coarse or not shown.cut.complete
+
+
+def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    points = Points.of(pose, surface, 1.0, use_radii=True)
+    return {feed: partial(draw_voxels, points, surface, feed, scattered=False) for feed in FEEDS}
 
 
 def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:

@@ -50,7 +50,27 @@ def fastest(
     return remembered[key]
 
 
-def trial(gpu: Gpu) -> tuple[GpuPose, Surface]:
+def choose(
+    surface: Surface,
+    setting: str,
+    on_software: str,
+    task: str,
+    names: Sequence[str],
+    ways: Callable[[GpuPose, Surface], Mapping[str, Callable[[], object]]],
+) -> str:
+    """What a parameter `instancing` says. Where it is "auto", and told in the statistics: `on_software` on
+    software drivers, on others what is the `fastest` of the ways, which are made for a trial."""
+    if setting != "auto":
+        return setting
+    gpu, chosen = surface.gpu, on_software
+    if not gpu.software:
+        chosen = gpu.keep(("fastest", task), lambda: fastest(gpu, task, names, lambda: ways(*_trial(gpu))))
+        surface.bind_view()  # in place of the trial's
+    surface.stats.chosen["instancing"] = chosen
+    return chosen
+
+
+def _trial(gpu: Gpu) -> tuple[GpuPose, Surface]:
     """Splats to try ways on: a sphere of points in random order, and a picture of it begun."""
     i = np.arange(_TRIAL_POINTS) + 0.5
     polar, turn = np.arccos(1 - 2 * i / _TRIAL_POINTS), np.pi * (1 + 5**0.5) * i
