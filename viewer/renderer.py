@@ -6,6 +6,7 @@ import time
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable
+from concurrent import futures
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,6 +22,7 @@ from .scan.pose import Pose
 from .task import Task
 
 _MEGABYTE = 1 << 20
+_PATIENCE = 0.05  # seconds: a picture late is better than one of points among others
 
 
 @dataclass
@@ -127,7 +129,7 @@ class Renderer:
         if missing:
             name = f"Estimating {' and '.join(missing)}"
             bare = PointCloud(gpu_pose.cloud.positions, gpu_pose.cloud.origin)
-            result = self._run(entry, missing, name, estimate, (bare, missing), None, wait)
+            result = self._run(entry, missing, name, estimate, (bare, missing), wait)
             if result is None:
                 return None
             gpu_pose.cloud = replace(gpu_pose.cloud, **result)
@@ -136,8 +138,8 @@ class Renderer:
             if backend.derive is None:
                 return Prepared(None)
             name = f"Preparing {backend.title}"
-            args = gpu_pose.cloud, params
-            result = self._run(entry, key, name, backend.derive, args, backend.ready, wait)
+            args, on_thread = (gpu_pose.cloud, params), backend.derives_on_thread
+            result = self._run(entry, key, name, backend.derive, args, wait, on_thread)
             if result is None:
                 return None
             with gpu_pose.preparing("upload"):
@@ -167,10 +169,10 @@ class Renderer:
         name: str,
         function: Callable[..., Any],
         args: Any,
-        ready: Callable[[Any], None] | None,
         wait: bool,
+        on_thread: bool = False,
     ) -> Any:
-        """What the function returns; None while the worker is at it. ready: told of it on the worker."""
+        """What the function returns; None while the worker is at it. on_thread: rather than by the helper."""
         job = entry.jobs.get(key)
         if job is not None and job.task.cancelled:
             job = None
@@ -182,12 +184,14 @@ class Renderer:
                 task = Task(name)
 
                 def call() -> Any:
-                    made = self._helper.call(task, function, *args)
-                    if ready is not None:
-                        ready(made)
-                    return made
+                    if not on_thread:
+                        return self._helper.call(task, function, *args)
+                    with task.current():
+                        return function(*args)
 
                 job = entry.jobs[key] = _Job(task, self._worker.submit(_timed, call))
+                if on_thread:  # it may be done in time for this picture
+                    futures.wait([job.future], _PATIENCE)
             if not (wait or job.future.done()):
                 return None
             del entry.jobs[key]

@@ -12,12 +12,12 @@ A backend answers one question: which surface does each pixel see? Its module ha
 
 and, where it prepares something for a pose,
 
-    derive(cloud, params) -> arrays     CPU only, on any thread, in any process
-    ready(arrays)                       the same in the process that draws, where there is something to
-                                        import or compile before drawing
+    derive(cloud, params) -> arrays     CPU only, on any thread
     upload(gpu, arrays) -> derived      GL thread; `derived.nbytes` and `derived.release()`
 
-which `draw` then finds as `frame.derived`. No list of backends exists anywhere else.
+which `draw` then finds as `frame.derived`. A window runs `derive` in a process of its own, or, with
+DERIVES_ON_THREAD = True, on a thread, which is sooner done: for what lets go of the interpreter's lock.
+No list of backends exists anywhere else.
 """
 
 from __future__ import annotations
@@ -106,10 +106,10 @@ class Backend:
         """Its derive function, None where it prepares nothing."""
         return getattr(self.module, "derive", None)
 
-    def ready(self, arrays: Any) -> None:
-        """Make this process ready to draw what `derive` gave, on any thread."""
-        if hasattr(self.module, "ready"):
-            self.module.ready(arrays)
+    @property
+    def derives_on_thread(self) -> bool:
+        """Whether a thread does for `derive`, or it needs a process of its own."""
+        return getattr(self.module, "DERIVES_ON_THREAD", False)
 
     def upload(self, gpu: Gpu, arrays: Any) -> Derived:
         """Put what `derive` gave on the GPU."""

@@ -30,6 +30,7 @@ from ..scan.spacing import typical_spacing
 from . import FrameView
 
 TITLE = "Voxels"
+DERIVES_ON_THREAD = True
 
 _UPRIGHT = "cubes are upright: turned points lie in other ones"
 _AROUND_ALL = "octants divide the cube around all points: other points make other octants"
@@ -122,14 +123,12 @@ def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
 def derive(cloud: PointCloud, params: Params) -> Octree:
     """The octree of a pose."""
     stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
-    return build(cloud, stop)
-
-
-def ready(octree: Octree) -> None:
-    """Cut it once: the first time takes long, on a new machine above all."""
+    octree = build(cloud, stop)
+    # The first cut of a process imports what it needs, of a machine compiles it: not while a window draws.
     traversal = Traversal(octree.prefix(1), _ANYWHERE)
     traversal.advance()
     traversal.cut(octree.low)
+    return octree
 
 
 def upload(gpu: Gpu, octree: Octree) -> Voxels:
@@ -151,7 +150,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     coarse = frame.share < 1 and bool((shown.cut.level < min(params.max_depth, voxels.octree.depth)).any())
     _report(shown.cut, voxels.octree, params, surface.stats)
     if coarse:
-        surface.stats.left_out = round(len(shown.cut) / frame.share) - len(shown.cut)
+        surface.stats.left_out = max(len(pose.cloud) - len(shown.cut), 1)
     points = Points(shown.pose, use_radii=True, count=len(shown.cut))
     feed = choose(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
     draw_voxels(points, surface, feed, params.scatter)
@@ -196,8 +195,9 @@ class Voxels:
 
     @property
     def nbytes(self) -> int:
-        """Bytes held on the GPU."""
-        return self._shown.pose.uploaded_bytes if self._shown else 0
+        """Bytes held: the octree on the CPU, what the last view showed on both sides."""
+        shown = self._shown.pose.uploaded_bytes + self._shown.pose.cloud.nbytes if self._shown else 0
+        return self.octree.nbytes + shown
 
     def release(self) -> None:
         """Let go of what the last view showed."""

@@ -58,7 +58,7 @@ def words(app: App) -> list[tuple[str, str]]:
     surface, counts = app.picture.surface, app.counting.counts
     if surface is not None and surface.stats.left_out:
         left_out = surface.stats.left_out
-        drawn = len(surface.pose.stored) - left_out
+        drawn = len(surface.scan) - left_out
         pixels = math.prod(surface.size) / math.prod(app.picture.size)
         return [
             ("Drawn", f"{drawn:,} at most"),

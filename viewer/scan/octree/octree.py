@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -65,6 +65,12 @@ class Octree:
     def leaves(self) -> int:
         """How many nodes have no children."""
         return int(self.counts[-1]) + sum(int(np.count_nonzero(masks == 0)) for masks in self.masks)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held by masks and attributes."""
+        attributes = (getattr(level, field.name) for level in self.attributes for field in fields(level))
+        return sum(array.nbytes for array in (*self.masks, *attributes) if array is not None)
 
     @property
     def loss(self) -> float:
