@@ -4,12 +4,13 @@
 
 uniform float radius_scale;
 uniform float uniform_radius;  // scan units, for points without one of their own
+uniform float least_radius;    // pixels; what the mask leaves of it reaches a pixel centre
 uniform bool cull_back;
 
 // Scan units. Below the least one a splat can fall between pixel centres, and a far scan would flicker away.
 float splat_radius(float stored, float depth) {
     float radius = stored > 0.0 && stored < 3e38 ? stored : uniform_radius;
-    return max(radius * radius_scale * enlarged, 0.7072 / scale_at(max(depth, view_near)));
+    return max(radius * radius_scale * enlarged, least_radius / scale_at(max(depth, view_near)));
 }
 
 // From a splat's centre towards the eye, view space.

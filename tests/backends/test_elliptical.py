@@ -81,7 +81,8 @@ def brute_force(
         lengths = np.array([np.linalg.norm(u), cloud.axes[i, 3]])
         u -= (u @ n) * n
         u /= np.linalg.norm(u)
-        lengths = np.maximum(lengths, 0.7072 * (-center[2] if view.perspective else 1) / view.scale)
+        pixel = (-center[2] if view.perspective else 1) / view.scale
+        lengths = np.maximum(lengths, 0.7072 / np.sqrt(cutoff) * pixel)
         t = ((center - start) @ n) / (step @ n)
         across = start + t[..., None] * step - center
         form = (across @ u / lengths[0]) ** 2 + (across @ np.cross(n, u) / lengths[1]) ** 2

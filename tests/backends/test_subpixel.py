@@ -77,15 +77,31 @@ def test_without_epsilon_the_nearest_is_alone(draw: Draw) -> None:
     assert_agree(nearest, surfels(draw, CLOUD, camera(), epsilon=0, instancing="gs"), others=0.2)
 
 
-def test_very_many_in_one_pixel(draw: Draw) -> None:
-    count = 200_000
+@pytest.mark.parametrize("count", [200_000, 4_300_000])
+def test_very_many_in_one_pixel(draw: Draw, count: int) -> None:
+    """Of the larger number, normals of 3 x 10 bits would add up to more than 2^31."""
     view, size = looking_down_z(), (9, 9)
-    cloud = in_one_pixel([1.0] * count, [[250, 120, 7]] * count, [[0, 0.6, 0.8]] * count)
+    one = in_one_pixel([1.0], [[250, 120, 7]], [[0, 0, 1]])
+    arrays = (one.world(), one.normals, one.colors, one.radii)
+    positions, normals, colors, radii = (np.repeat(array, count, axis=0) for array in arrays)
+    cloud = PointCloud.from_arrays(positions, normals=normals, colors=colors, radii=radii)
     surface = draw(cloud, view, size, "surfels", Look(light="flat"))
     ((y,), (x,)) = np.nonzero(surface.row != NOTHING)
     assert surface.row[y, x] == 0
     np.testing.assert_array_equal(surface.image()[y, x, :3], [250, 120, 7])
-    np.testing.assert_allclose(surface.normal[y, x], [0, 0.6, 0.8], atol=2e-3)
+    np.testing.assert_allclose(surface.normal[y, x], [0, 0, 1], atol=2e-3)
+
+
+@pytest.mark.parametrize("instancing", ["auto", "tiles", "gs"])
+@pytest.mark.parametrize("mask", [{"mask_cutoff": 0.5}, {"mask_falloff": 100, "mask_cutoff": 0.9}])
+def test_what_the_mask_leaves_reaches_a_pixel(draw: Draw, instancing: str, mask: dict[str, float]) -> None:
+    """Points some pixels apart, each of which is seen, however little of a splat the mask leaves."""
+    x, y = np.meshgrid(np.linspace(-0.8, 0.8, 20), np.linspace(-0.6, 0.6, 15))
+    positions = np.stack([x.ravel(), y.ravel(), np.zeros(300)], axis=1)
+    normals = np.tile([0.0, 0.0, 1.0], (300, 1))
+    cloud = PointCloud.from_arrays(positions, normals=normals, radii=np.full(300, 1e-4))
+    surface = surfels(draw, cloud, Camera((0, 0, 4), (0, 0, 0)), instancing=instancing, **mask)
+    assert len(np.unique(surface.row[surface.row != NOTHING])) == 300
 
 
 def test_the_same_picture_twice(draw: Draw) -> None:
@@ -121,6 +137,20 @@ def test_larger_splats_are_neither_scattered_nor_averaged(draw: Draw) -> None:
         assert surface.stats.chosen["instancing"] == "tiles"
         assert not surface.is_own("normals")
     assert surface.row.min() >= 0
+
+
+def test_an_outlier_before_the_eye_changes_nothing(draw: Draw) -> None:
+    arrays = (CLOUD.positions, CLOUD.normals, CLOUD.radii)
+    view = Camera.orbit(CLOUD.bounds(), 0, 0, aspect=4 / 3)
+    outlier = np.array([[0.0, 0.0, 0.9 * view.eye[2]]])
+    positions, normals, radii = (
+        np.concatenate([array, extra])
+        for array, extra in zip(arrays, (outlier, outlier, arrays[2][:1]), strict=True)
+    )
+    surface = surfels(draw, PointCloud.from_arrays(positions, normals=normals, radii=radii), view)
+    assert surface.stats.chosen["instancing"] == "scatter"
+    assert surface.is_own("normals")
+    assert len(CLOUD) in surface.row
 
 
 def test_no_colours_and_no_radii_of_their_own(draw: Draw) -> None:

@@ -143,6 +143,30 @@ def test_a_slit_is_closed_but_the_outline_stays(draw: Draw, instancing: str) -> 
 
 
 @every_feed
+def test_what_is_filled_goes_by_what_the_mask_leaves(draw: Draw, instancing: str) -> None:
+    """A slit in small splats, and in splats of twice their radius of which the mask leaves a half."""
+    whole = plane(40, 3.0)
+    kept = np.abs(whole.world()[:, 0]) > 0.1
+    positions, normals, radii = whole.world()[kept], whole.normals[kept], whole.radii[kept]
+    camera, size = looking_down_z(fov_y=50), (200, 200)
+    small, masked = (
+        surfels(
+            draw,
+            PointCloud.from_arrays(positions, normals=normals, radii=factor * radii),
+            camera,
+            size,
+            instancing=instancing,
+            passes="two",
+            mask_cutoff=np.exp(-4 / factor**2) + 1e-6,
+        ).row
+        != NOTHING
+        for factor in (1, 2)
+    )
+    assert small[60:140, 90:110].all()
+    assert (small != masked).mean() < 1e-3
+
+
+@every_feed
 @pytest.mark.parametrize("epsilon", [0.5, 1.0, 2.0])
 def test_splats_are_blended_within_epsilon_of_the_nearest(
     draw: Draw, instancing: str, epsilon: float
@@ -321,6 +345,8 @@ def test_empty_poses_and_previews(renderer: Renderer, draw: Draw, instancing: st
     preview = (surface.row != NOTHING).sum()
     assert not render_frame(renderer, request, surface)
     assert preview == pytest.approx((surface.row != NOTHING).sum(), rel=0.05)
+    assert render_frame(renderer, request, surface, share=1e-12)
+    assert (surface.row == NOTHING).all(), "a share that no point falls into"
 
 
 def test_splats_under_a_pixel_do_not_flicker_where_they_are_blended(draw: Draw) -> None:

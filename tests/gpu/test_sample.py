@@ -46,3 +46,9 @@ def test_poses_of_any_count_share_one_ascending_list(renderer: Renderer) -> None
             )
     texels, _ = sample.take(0.6, 2_000_000)
     assert sample.take(0.6, 7)[0] is texels, "no new list for fewer points"
+
+
+def test_a_share_that_no_row_falls_into(renderer: Renderer) -> None:
+    sample = Sample(renderer.gpu)
+    assert sample.take(1e-12, 1000)[1] == 0
+    assert sample.take(1.0, 1000)[1] == 1000

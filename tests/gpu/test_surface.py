@@ -32,6 +32,13 @@ def test_the_depth_buffer_is_really_32_bit_float(renderer: Renderer) -> None:
     raster.release()
 
 
+def test_a_picture_too_long_for_the_rasteriser_is_refused(draw: Draw) -> None:
+    size = (gl.max_raster_edge() + 1, 4)
+    with pytest.raises(InputError, match="along an edge"):
+        draw(CLOUD, CAMERA, size, "surfels", Look(), {"instancing": "gs"})
+    assert draw(CLOUD, CAMERA, size, "points", Look()).size == size
+
+
 def test_a_flat_picture_holds_the_colours_of_the_points(draw: Draw) -> None:
     surface = draw(CLOUD, CAMERA, (80, 60), "surfels", Look(light="flat", background="#0a141e28"))
     image, row = surface.image(), surface.row

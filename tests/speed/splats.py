@@ -1,11 +1,12 @@
 """How long each way from points to splats takes, in one run. Prints a table.
 
-    python tests/speed/splats.py [--counts 100000 1000000] [--size 1920x1280] [--rounds 5] [--away 1] [--set key=value]
+    python tests/speed/splats.py [--counts 100000 1000000] [--size 1920x1280] [--rounds 5] [--away 1]
+                                 [--set key=value]
 
-A sphere that fills half of the picture (--away 1) with radii of 1.5 times the spacing, in random order and in that
-of a scanner; ways take turns, so that a change of the machine's speed hits all alike. Least wall time, and
-least processor time of the process (all threads) over 2: what two free cores would take if the work splits
-evenly, whoever else uses the machine. Drawing alone, without shading and reading back.
+A sphere that fills half of the picture (--away 1) with radii of 1.5 times the spacing, in random order and
+in that of a scanner; ways take turns, so that a change of the machine's speed hits all alike. Least wall
+time, and least processor time of the process (all threads) over 2: what two free cores would take if the work
+splits evenly, whoever else uses the machine. Drawing alone, without shading and reading back.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Each point as a disc that lies in the surface. Closes the gaps between points.
 
-Slomp 2014, IV-A and V: a template quad, aligned to the normal, with a round Gaussian mask
-that is cut off, in a single pass.
+Slomp 2014, IV and V: a template quad, aligned to the normal, with a Gaussian mask that is cut
+off; in one pass, or in two that blend what overlaps. Elliptical where the scan has half-axes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..gpu import passes
 from ..gpu.amplify import FEEDS, Points, Shape, amplify
 from ..gpu.fastest import choose
 from ..gpu.pose import GpuPose
-from ..gpu.subpixel import average, is_subpixel, splat_subpixel
+from ..gpu.subpixel import LEAST_RADIUS, average, is_subpixel, splat_subpixel
 from ..gpu.surface import Surface
 from ..gpu.tiles import FALLBACK, splat
 from ..params import param
@@ -99,16 +99,18 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 
 
 def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
+    mask_limit = min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff)
     uniforms = {
         "radius_scale": params.radius_scale,
         "uniform_radius": uniform_radius,
         "cull_back": params.cull_back,
-        "mask_limit": min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff),
+        "mask_limit": mask_limit,
+        "least_radius": LEAST_RADIUS / math.sqrt(mask_limit),
     }
     larger = params.enlarge if params.passes in _TWO else 1.0
     enlarged = replace(points, enlarged=points.enlarged * larger)
     may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
-    if may_average and is_subpixel(enlarged, surface, params.radius_scale, uniform_radius):
+    if may_average and is_subpixel(enlarged, surface, params.radius_scale, uniform_radius, mask_limit):
         _draw_subpixel(points, surface, params, instancing, uniforms)
     elif params.passes in _TWO:
         _draw_two(points, surface, params, instancing, uniforms)

@@ -56,6 +56,8 @@ _DEPTH_COMPONENT32F = 0x8CAC
 _MAX_TEXTURE_BUFFER_SIZE = 0x8C2B
 _MAX_SHADER_STORAGE_BLOCK_SIZE = 0x90DE
 _MAX_UNIFORM_BLOCK_SIZE = 0x8A30
+_MAX_TEXTURE_SIZE = 0x0D33
+_MAX_RENDERBUFFER_SIZE = 0x84E8
 _READ_FRAMEBUFFER = 0x8CA8
 _SCRATCH_UNIT = 15
 
@@ -80,6 +82,11 @@ def max_storage_block_bytes() -> int:
 def max_uniform_block_bytes() -> int:
     """How many bytes of a buffer a shader may see as a uniform block."""
     return integer(_MAX_UNIFORM_BLOCK_SIZE)
+
+
+def max_raster_edge() -> int:
+    """How many pixels an edge of a `Target` may have."""
+    return min(integer(_MAX_TEXTURE_SIZE), integer(_MAX_RENDERBUFFER_SIZE))
 
 
 def reverse_depth() -> None:

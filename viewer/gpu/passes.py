@@ -131,7 +131,7 @@ def _farthest_first(points: Points, surface: Surface) -> Points:
     """The same points from back to front, by their centres: sorted on the CPU, for each picture."""
     rows = np.arange(len(points.pose.cloud), dtype=np.uint32)
     if points.rows is not None:
-        rows = np.frombuffer(points.rows.buffer.read(4 * points.count), np.uint32)
+        rows = np.frombuffer(points.rows.buffer.read(), np.uint32)[: points.count]
     depths = surface.view.depths(points.pose.cloud.positions[rows])
     rows = rows[np.argsort(-depths, kind="stable")]
     order = gl.BufferTexture(surface.gpu.ctx.buffer(rows if rows.size else bytes(4)), gl.R32UI)
@@ -268,8 +268,7 @@ def _close(points: Points, surface: Surface, second: Second, **uniforms: Any) ->
     gpu = surface.gpu
     with gpu.timers.measure("close"):
         bind_visible_radii(points)
-        if points.use_axes:
-            points.bind()
+        points.bind()
         for number, texels in enumerate((surface.depths, surface.rows)):
             texels.buffer.bind_to_storage_buffer(number)
         for step in range(2):

@@ -59,7 +59,8 @@ class Sample:
             self._gpu.discard(self._texels)
             self._share, self._reach = share, int(count * _GROWTH)
             self._rows = _sampled_rows(self._reach, share)
-            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(self._rows), gl.R32UI)
+            texels = self._rows if self._rows.size else bytes(4)  # a buffer of no bytes is not allowed
+            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(texels), gl.R32UI)
         return self._texels, int(np.searchsorted(self._rows, count))
 
 

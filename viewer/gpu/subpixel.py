@@ -6,6 +6,7 @@ one with each small motion, would flicker.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import moderngl
@@ -19,7 +20,7 @@ from .passes import bind_looks, bind_visible_radii
 from .scatter import scatter
 from .surface import Surface
 
-_LEAST_RADIUS = 0.7072  # pixels: surfels/splat.glsl draws none smaller
+LEAST_RADIUS = 0.7072  # pixels, of what the mask leaves of a disc: a smaller one may miss all pixel centres
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
 _SAMPLE = 1 << 13
 
@@ -41,18 +42,26 @@ class _Sums:
         self.buffer.release()
 
 
-def is_subpixel(points: Points, surface: Surface, radius_scale: float, uniform_radius: float) -> bool:
-    """Whether nearly all discs are as small as any is drawn, and none much larger."""
+def is_subpixel(
+    points: Points, surface: Surface, radius_scale: float, uniform_radius: float, mask_limit: float
+) -> bool:
+    """Whether nearly all discs are as small as any is drawn, and none much larger.
+
+    Outliers count for what none may be. mask_limit: the squared share of a radius that the mask leaves.
+    """
     pose, view = points.pose, surface.view
     nearest = float(view.depths(pose.remember("box", lambda: _box(pose.cloud))).min())
-    if view.perspective and nearest <= view.near:
+    usually_nearest = float(view.depths(pose.bounds.corners() - pose.cloud.origin).min())
+    if view.perspective and min(nearest, usually_nearest) <= view.near:
         return False
     usual = largest = uniform_radius
     if points.use_radii:
         own = pose.remember("radii up to", lambda: _radii_up_to(pose.cloud))
         usual, largest = max(usual, own[0]), max(largest, own[1])
-    pixels = radius_scale * points.enlarged * view.scale / (nearest if view.perspective else 1.0)
-    return usual * pixels < _LEAST_RADIUS and largest * pixels < _LARGEST_RADIUS
+    pixels = radius_scale * math.sqrt(mask_limit) * points.enlarged * view.scale
+    if view.perspective:
+        usual, largest = usual / usually_nearest, largest / nearest
+    return usual * pixels < LEAST_RADIUS and largest * pixels < _LARGEST_RADIUS
 
 
 def _box(cloud: PointCloud) -> NDArray[np.float32]:
@@ -95,6 +104,8 @@ def average(points: Points, surface: Surface, epsilon: float, **uniforms: Any) -
     covered = surface.list_covered()
     sums = surface.keep("mean", lambda: _Sums(gpu, surface.size[0] * surface.size[1]))
     bound = bind_looks(points, surface)
+    # All splats may share a pixel: normals of up to 511, with sign, and colours of up to 255 add up there.
+    bound |= {"NORMAL_DIVISOR": (points.count >> 22) + 1, "COLOR_DIVISOR": f"{(points.count >> 24) + 1}u"}
     with gpu.timers.measure("mean"):
         sums.buffer.bind_to_storage_buffer(0)
         bind_visible_radii(points)
@@ -108,6 +119,5 @@ def average(points: Points, surface: Surface, epsilon: float, **uniforms: Any) -
                 points.bind()
                 gpu.dispatch(program, points.count)
             else:
-                covered.bind()
                 covered.run(program)
                 gpu.ctx.memory_barrier()

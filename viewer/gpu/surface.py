@@ -162,8 +162,18 @@ class Surface:
         gl.clear_words(self.rows.buffer, NOTHING)
 
     def raster(self) -> gl.Raster:
-        """The framebuffer of backends that rasterise; `take_raster` makes it the Surface."""
+        """The framebuffer of backends that rasterise; `take_raster` makes it the Surface.
+
+        Raises InputError for a picture that is too long for one.
+        """
         if self._raster is None:
+            width, height = self.size
+            if max(self.size) > gl.max_raster_edge():
+                raise InputError(
+                    f"a picture of {width}x{height} pixels is too long to be rasterised; this driver "
+                    f"takes {gl.max_raster_edge():,} pixels along an edge",
+                    hint="Use a smaller --size, or --backend points",
+                )
             self._raster = gl.Raster(self.gpu.ctx, self.size)
         return self._raster
 

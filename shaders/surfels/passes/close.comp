@@ -3,10 +3,8 @@
 // Filled pixels are listed and have a negative depth. STEP 0 says which are taken back, reading depths
 // alone, which change in STEP 1, so that the order does not matter.
 #include "surfels/passes/limit.glsl"
-#if HAS_AXES
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
-#endif
 #include "common/item.glsl"
 #include "common/list.glsl"
 
@@ -24,29 +22,17 @@ bool is_empty(ivec2 pixel) {
     return depths[pixel.y * view_size.x + pixel.x] == EMPTY;
 }
 
-#if HAS_AXES
 vec3 form;  // of the pixel's splat, 1 at its border (surfels/disc.glsl)
-#else
-float radius;
-#endif
 
 void begin_splat(float depth, uint row) {
-#if HAS_AXES
     begin_disc(texel_point(int(row)));
     vec3 key = disc_key(form);
     if (view_perspective) form /= key.x * key.x;
-#else
-    radius = visible_radius(depth, row);
-#endif
 }
 
 // How much larger the pixel's splat became in a direction, pixels.
 float growth(vec2 to, float depth) {
-#if HAS_AXES
     return (enlarge - 1.0) * inversesqrt(form.x * to.x * to.x + to.y * (2.0 * form.y * to.x + form.z * to.y));
-#else
-    return (enlarge - 1.0) * radius * scale_at(depth);
-#endif
 }
 
 // Whether nothing is shown so far away in some direction.

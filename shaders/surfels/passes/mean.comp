@@ -1,7 +1,7 @@
 // The mean of the splats that a pixel shows, or that lie at most so far behind: for splats of about a pixel, where
 // the nearest alone would flicker, and a mask's shape cannot be seen. All count the same, as whole numbers, so that sums
-// do not depend on the order. STEP 0: listed pixels are set to zero; 1: each splat is added to its pixels; 2: sums
-// become means, in place.
+// do not depend on the order; NORMAL_DIVISOR and COLOR_DIVISOR keep them in range. STEP 0: listed pixels are set to
+// zero; 1: each splat is added to its pixels; 2: sums become means, in place.
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "surfels/passes/limit.glsl"
@@ -17,13 +17,14 @@ uniform uint item_count;
 
 void visit(uint cell, uint key, uint item_id) {
     uint row = texelFetch(rows, int(cell)).r;
+    if (row == NONE) return;  // two programs round apart at a splat's border
     float depth = uintBitsToFloat(texelFetch(depths, int(cell)).r);
     if (uintBitsToFloat(key) > depth + epsilon * visible_radius(depth, row)) return;
     uvec2 look = texelFetch(looks, int(item_id)).xy, shown = texelFetch(looks, int(row)).xy;
     vec3 n = normal_of(look);
-    ivec3 normal = ivec3(turned(1.0, n, normal_of(shown)) * n);
+    ivec3 normal = ivec3(turned(1.0, n, normal_of(shown)) * n) / NORMAL_DIVISOR;
 #if HAS_COLORS
-    uvec3 color = uvec3(color_of(look));
+    uvec3 color = uvec3(color_of(look)) / COLOR_DIVISOR;
     for (int k = 0; k < 3; ++k) atomicAdd(sums[4u * cell + uint(k)], color[k]);
 #endif
     atomicAdd(sums[4u * cell + 3u], 1u);
@@ -55,6 +56,7 @@ void main() {
     uvec2 look = texelFetch(looks, int(texelFetch(rows, int(cell)).r)).xy;
 #if HAS_COLORS
     vec3 color = vec3(sums[4u * cell], sums[4u * cell + 1u], sums[4u * cell + 2u]) / float(max(count, 1u));
+    color *= float(COLOR_DIVISOR);
     own_colors[cell] = packUnorm4x8(vec4((count == 0u ? color_of(look) : color) / 255.0, 1.0));
 #endif
     for (uint k = 0u; k < 3u; ++k) {

@@ -19,12 +19,12 @@ uint shown[ROWS];
 bool closed[ROWS];  // FILL: pixels that stay as they are
 ivec2 pixel;       // the first of this invocation's
 
-// -1: none, at the end of the last work group.
+// -1: none, at the end of the last work group; its pixels are outside the picture.
 int this_tile() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint at = group * TILES + gl_LocalInvocationID.z;
     int tile = at < texelFetch(work, 3).r ? int(texelFetch(work, int(at) + 4).r) : -1;
-    pixel = ivec2(tile % tiles.x, tile / tiles.x) * TILE;
+    pixel = (tile < 0 ? tiles : ivec2(tile % tiles.x, tile / tiles.x)) * TILE;
     pixel += ivec2(gl_LocalInvocationID.x, gl_LocalInvocationID.y * ROWS);
     return tile;
 }
