@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, sphere
+from scipy.ndimage import distance_transform_edt
 from test_instancing import assert_agree
 
 from viewer.backends import backend
 from viewer.backends.voxels import Params, derive
+from viewer.bench.scenes.catalog import subject
+from viewer.bench.truth.reference import trace
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
@@ -276,3 +279,28 @@ def test_it_is_a_backend_like_others() -> None:
     assert {"stop", "delta", "depth", "occupancy"} <= {
         p.name for p in declared.parameters if p.affects == "derive"
     }
+
+
+@pytest.mark.parametrize("fixed", [{}, {"max_depth": 7}, {"max_depth": 6, "least": 0.0}], ids=str)
+def test_the_demo_scan_is_closed_and_within_a_voxel(draw: Draw, fixed: dict[str, object]) -> None:
+    """Against the exact surface: no more than 0.1 % holes; each place and the outline within the diagonal of
+    the voxel that shows it, which is as far as a point of the octant may be."""
+    import open3d
+
+    moment = subject("demo", None).moment(0)
+    mesh, size = moment.mesh, (320, 240)
+    camera = Camera.orbit(mesh.bounds, 140, 20, aspect=4 / 3)
+    truth = trace(mesh, camera, size)
+    surface = voxels(draw, moment.pose.cloud, camera, size, pixel_threshold=0.25, **fixed)
+    seen = surface.row != NOTHING
+    assert (truth.covered & ~seen).sum() <= 1e-3 * truth.covered.sum()
+    pixel = surface.depth[seen] / surface.view.scale
+    edge = 2 * np.maximum(surface.pose.cloud.radii[surface.row[seen]], 0.7072 * pixel)  # type: ignore[index]
+    centers = np.argwhere(seen)[:, ::-1] + 0.5
+    places = surface.view.unproject(centers, surface.depth[seen]) + moment.pose.cloud.origin - mesh.origin
+    faces = open3d.t.geometry.RaycastingScene()
+    faces.add_triangles(open3d.core.Tensor(mesh.points.positions), open3d.core.Tensor(mesh.faces))
+    away = faces.compute_distance(open3d.core.Tensor(places.astype(np.float32))).numpy()
+    assert (away <= np.sqrt(3) * edge).all()
+    beside = distance_transform_edt(~truth.covered)[seen] * pixel
+    assert (beside <= np.sqrt(3) * edge + pixel).all()
