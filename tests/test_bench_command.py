@@ -99,6 +99,24 @@ def test_the_feeds_are_timed_and_stand_beside_the_papers(run: Run, tmp_path: Pat
     assert f"| `demo` | {rows[0]['n']:,} |".replace(",", "\N{NARROW NO-BREAK SPACE}") in text
 
 
+def test_octrees_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
+    """Without the sequences the demo alone."""
+    (tmp_path / "data").mkdir()
+    small = ("--quick", "--size", "96x64", "--views", 1, "--data", tmp_path / "data")
+    done = run("bench", "--suite", "octrees", *small, "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert "crane is left out" in done.err
+    assert done.out.splitlines()[-1] == str(tmp_path / "out" / "octree-tables.md")
+    rows = read_rows(tmp_path / "out")
+    assert {row["sweep"] for row in rows} == {"instancing", "max_depth"}
+    assert all(bool(row["errors"]) == (row["sweep"] == "max_depth") for row in rows)
+    assert [row["delta"] for row in read_rows(tmp_path / "out" / "octrees.jsonl")] == [2, 5, 10, 50]
+    assert {row["scene"] for row in read_rows(tmp_path / "out" / "octree-sizes.jsonl")} == {"demo"}
+    text = (tmp_path / "out" / "octree-tables.md").read_text(encoding="utf-8")
+    assert text.count("| `demo` |") == 3  # octrees, and levels with two kinds of cubes
+    assert text.count("| `demo`, level 10 |") == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -114,6 +132,7 @@ def test_the_feeds_are_timed_and_stand_beside_the_papers(run: Run, tmp_path: Pat
         (["--suite", "numerics", "--compare", "."], ["--compare"]),
         (["--suite", "slomp", "--scene", "sphere"], ["slomp", "--scene"]),
         (["--suite", "slomp", "--backend", "points"], ["slomp", "--backend"]),
+        (["--suite", "octrees", "--backend", "points"], ["octrees", "--backend"]),
         (["--scene", "sphere", "--size", "20000x20000"], ["20000x20000", "too large"]),
     ],
 )
@@ -179,6 +198,14 @@ def test_a_missing_library_is_told(refused: Refused, tmp_path: Path, monkeypatch
     message = refused("bench", "-o", tmp_path)
     assert "no_such_library" in message
     assert "scan4d[bench]" in message
+
+
+def test_what_octrees_are_compared_with_is_needed_for_them_alone(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench, "find_spec", lambda name: None if name == "DracoPy" else name)
+    assert "DracoPy" in refused("bench", "--suite", "octrees", "-o", tmp_path)
+    assert "DracoPy" not in refused("bench", "--scene", "nowhere", "-o", tmp_path)
 
 
 @pytest.mark.slow

@@ -8,11 +8,12 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from viewer.backends import backends
-from viewer.bench.report import table_two
+from viewer.bench.report import octree_tables, table_two
 from viewer.look import Look
 from viewer.params import Parameter, describe
 
@@ -57,11 +58,12 @@ def test_the_page_of_backends_is_up_to_date(bless: bool) -> None:
     assert page.read_text(encoding="utf-8") == backends_page()
 
 
-def test_the_page_of_table_two_is_up_to_date(bless: bool) -> None:
-    page = ROOT / "docs" / "table-two.md"
-    files = sorted((ROOT / "docs" / "data").glob("table-two*.json"))
+@pytest.mark.parametrize("tables", [table_two, octree_tables], ids=lambda tables: tables.NAME)
+def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: bool) -> None:
+    page = ROOT / "docs" / f"{tables.NAME}.md"
+    files = sorted((ROOT / "docs" / "data").glob(f"{tables.NAME}*.json"))
     assert files
-    made = table_two.page([table_two.read_measurement(file) for file in files])
+    made = tables.page([tables.read_measurement(file) for file in files])
     if bless:
         page.write_text(made, encoding="utf-8")
     assert page.read_text(encoding="utf-8") == made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,6 +113,19 @@ def test_stopping_keeps_the_views_that_all_have_seen(renderer: Renderer) -> None
     assert all(len(row["errors_by_view"]["hole_percent"]) == 1 for row in stopped)
 
 
+def test_ctrl_c_ends_rows_that_are_found_one_by_one(renderer: Renderer) -> None:
+    def rows() -> Iterator[Row]:
+        yield {"row": 0}
+        raise KeyboardInterrupt
+
+    bench, ticks = Bench(renderer, SETTINGS), []
+    bench.tick = lambda: ticks.append(None)
+    assert list(bench.until_stopped(rows())) == [{"row": 0}]
+    assert bench.stopped
+    assert len(ticks) == 1
+    assert not list(bench.until_stopped(rows())), "nor does anything else begin"
+
+
 def test_a_backend_that_cannot_draw_a_scene_is_left_out_and_said(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,10 +150,10 @@ def test_measuring_ticks_as_often_as_it_said(renderer: Renderer) -> None:
 
 def test_what_is_not_judged_is_timed_alone(renderer: Renderer, tmp_path: Path) -> None:
     ticks: list[None] = []
-    bench = Bench(renderer, replace(SETTINGS, judged=False), tmp_path)
+    bench, timed = Bench(renderer, SETTINGS, tmp_path), replace(TORUS, judged=False)
     bench.tick = lambda: ticks.append(None)
-    rows = bench.measure(TORUS)
-    assert len(ticks) == bench.steps(TORUS) == len(DEFAULTS) * SETTINGS.views
+    rows = bench.measure(timed)
+    assert len(ticks) == bench.steps(timed) == len(DEFAULTS) * SETTINGS.views
     assert all(row["errors"] == row["errors_by_view"] == {} for row in rows)
     assert all(len(times) == SETTINGS.views for row in rows for times in row["times_by_view"].values())
     assert not list(tmp_path.iterdir())

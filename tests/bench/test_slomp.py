@@ -52,11 +52,12 @@ def test_each_scan_meets_every_feed_in_two_passes() -> None:
         (COUNTS[scan.name], scan.scene) for scan in slomp.scans()[:-1]
     ]
     assert (groups[-1].scene, groups[-1].count) == ("demo", None)
-    assert {"gs", "ubo", "tbo", "vbo"} <= set(slomp.feeds())
+    assert {"gs", "ubo", "tbo", "vbo"} <= set(slomp.feeds("surfels"))
     for group in groups:
+        assert not group.judged
         floor, *drawn = group.contenders
         assert floor.backend == "gl-points"
-        assert [contender.params.instancing for contender in drawn] == slomp.feeds()
+        assert [contender.params.instancing for contender in drawn] == slomp.feeds("surfels")
         for contender in drawn:
             params = asdict(contender.params)
             others = asdict(backend("surfels").params()) | {

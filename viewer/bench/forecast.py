@@ -22,23 +22,17 @@ def forecast(bench: Bench, groups: Sequence[Group]) -> float:
     That view also loads libraries and compiles shaders, so that no number holds it. Raises
     KeyboardInterrupt where Ctrl-C stopped it.
     """
-    contenders = tuple(dict.fromkeys(c for group in groups for c in group.contenders))
     settings = bench.settings
-    for size in ((96, 64), settings.size):
-        rehearsal = Bench(bench.renderer, replace(settings, size=size, views=1, frames=2))
-        start = time.perf_counter()
-        rows = rehearsal.measure(Group(_REHEARSED, contenders))
-        seconds = time.perf_counter() - start
-        if rehearsal.stopped:
-            raise KeyboardInterrupt
-    count = rows[0]["n"]
-    drawing = sum(row["cpu_ms"]["median"] for row in rows) * (2 + 2 * settings.repeat) / 1e3 / len(rows)
-    # The view, and the two frames of a walk, each about as long.
-    judging = max(seconds / (3 * len(rows)) - drawing, 0)
-    estimating = _estimating() * _BARE_POINTS / count
+    pace = {
+        judged: _rehearse(bench, [group for group in groups if group.judged == judged])
+        for judged in {group.judged for group in groups}
+    }
+    estimating = _estimating() * _BARE_POINTS
+    count = catalog.usual(_REHEARSED, "n") or 1
 
     total = 0.0
     for group in groups:
+        drawing, judging = pace[group.judged]
         pictures = settings.views + bench.walks(group) * settings.frames
         total += _LOADING + len(group.contenders) * pictures * (
             judging + drawing * max(1.0, (group.count or 0) / count)
@@ -48,9 +42,30 @@ def forecast(bench: Bench, groups: Sequence[Group]) -> float:
     return total
 
 
+def _rehearse(bench: Bench, groups: Sequence[Group]) -> tuple[float, float]:
+    """The seconds that it takes to draw and to judge a picture of a torus. groups: of one kind."""
+    contenders = tuple(dict.fromkeys(c for group in groups for c in group.contenders))
+    rehearsed = Group(_REHEARSED, contenders, judged=groups[0].judged)
+    settings = bench.settings
+    for size in ((96, 64), settings.size):
+        rehearsal = Bench(
+            bench.renderer, replace(settings, size=size, views=1, frames=min(2, settings.frames))
+        )
+        start = time.perf_counter()
+        rows = rehearsal.measure(rehearsed)
+        seconds = time.perf_counter() - start
+        if rehearsal.stopped:
+            raise KeyboardInterrupt
+    drawing = sum(row["cpu_ms"]["median"] for row in rows) * (2 + 2 * settings.repeat) / 1e3 / len(rows)
+    if not rehearsed.judged:
+        return drawing, 0.0
+    pictures = 1 + rehearsal.walks(rehearsed) * rehearsal.settings.frames  # each about as long
+    return drawing, max(seconds / (pictures * len(rows)) - drawing, 0)
+
+
 def _estimating() -> float:
-    """The seconds that estimating normals takes for the scene that is rehearsed."""
+    """The seconds that estimating normals takes for a point."""
     cloud = catalog.subject(_REHEARSED, None).moment(0).pose.cloud
     start = time.perf_counter()
     estimate_normals(replace(cloud, normals=None))
-    return time.perf_counter() - start
+    return (time.perf_counter() - start) / len(cloud)

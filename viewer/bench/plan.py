@@ -35,7 +35,8 @@ class Group:
     """A scene and the contenders that take turns on it.
 
     count, noise: None for the scene's own. sweep: "n" or "noise" where the group is a step of such a
-    sweep, or the parameter that all its contenders vary; else empty.
+    sweep, or the parameter that all its contenders vary; else empty. judged: whether errors are found,
+    which takes longer than drawing.
     """
 
     scene: str
@@ -43,6 +44,7 @@ class Group:
     count: int | None = None
     noise: float | None = None
     sweep: str = ""
+    judged: bool = True
 
 
 def plan(

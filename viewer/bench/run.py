@@ -56,15 +56,14 @@ class Settings:
     """How it is measured.
 
     size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of,
-    where they are faster than 250 ms. frames: of a walk, for flicker. judged: whether errors are found, which
-    takes longer than drawing. seed: of viewpoints, samples and noise. data: the folder of real scans.
+    where they are faster than 250 ms. frames: of a walk, for flicker; less than two: none is walked. seed: of
+    viewpoints, samples and noise. data: the folder of real scans.
     """
 
     size: tuple[int, int] = (1920, 1280)
     views: int = 20
     repeat: int = 3
     frames: int = 6
-    judged: bool = True
     seed: int = 0
     data: Path | None = None
 
@@ -126,7 +125,7 @@ class Bench:
         self.tick: Callable[[], object] = int  # called after each step
         self.stopped = False
         self.notes: list[str] = []
-        self._subject = lru_cache(maxsize=1)(settings.subject)
+        self.subject = lru_cache(maxsize=1)(settings.subject)
         self._looked_at: tuple[Moment, list[Camera]] | None = None
 
     def measure(self, group: Group) -> list[Row]:
@@ -135,12 +134,12 @@ class Bench:
         A contender that cannot draw the scene is left out, and `notes` says why. Calls `tick` as often as
         `steps` says. Raises InputError for scenes that cannot be had.
         """
-        subject = self._subject(group)
+        subject = self.subject(group)
         tallies = {contender: _Tally() for contender in group.contenders}
         try:
             for view in range(self.settings.views):
-                self._view(subject, view, tallies, pictured=not group.sweep)
-            for kind, frames, walk in self._walks(subject):
+                self._view(group, subject, view, tallies)
+            for kind, frames, walk in self._walks(group, subject):
                 for contender, tally in tallies.items():
                     try:
                         tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
@@ -157,9 +156,22 @@ class Bench:
 
     def walks(self, group: Group) -> int:
         """How many walks of frames a group has at most."""
-        if not self.settings.judged:
+        if not group.judged or self.settings.frames < 2:
             return 0
-        return 2 if self._subject(group).moments > 1 else 1
+        return 2 if self.subject(group).moments > 1 else 1
+
+    def until_stopped(self, rows: Iterator[Row]) -> Iterator[Row]:
+        """The rows as they are found, with a `tick` after each; Ctrl-C ends them, `stopped` is set."""
+        while not self.stopped:
+            try:
+                row = next(rows, None)
+            except KeyboardInterrupt:
+                self.stopped = True
+                return
+            if row is None:
+                return
+            yield row
+            self.tick()
 
     def note(self, text: str) -> None:
         """Say once what is not as it was asked for."""
@@ -167,20 +179,13 @@ class Bench:
             self.notes.append(text)
 
     def numerics(self, names: Sequence[str]) -> Iterator[Row]:
-        """The lines of the stability suite, for each backend; what one cannot draw is its limit.
-
-        Ctrl-C ends it; `stopped` is set.
-        """
+        """The lines of the stability suite, for each backend; what one cannot draw is its limit."""
         for name, row in product(names, numerics.rows()):
             limit = row.limit_of(backend(name))
             try:
                 found = row.compare(self.renderer, backend(name))
             except InputError as error:
                 found, limit = numerics.Difference(nan, nan, nan), str(error)
-            except KeyboardInterrupt:
-                self.stopped = True
-            if self.stopped:
-                return
             yield {
                 "row": row.name,
                 "backend": name,
@@ -189,11 +194,11 @@ class Bench:
                 "held": row.tolerance.holds(found),
                 "limit": limit,
                 "reason": row.tolerance.reason,
-                **self._where(),
+                **self.where(),
             }
-            self.tick()
 
-    def _where(self) -> Row:
+    def where(self) -> Row:
+        """What of a row says where and when it was measured."""
         gpu = self.renderer.gpu
         return {
             "timer": gpu.timers.kind,
@@ -206,11 +211,10 @@ class Bench:
 
     # --- one view ---------------------------------------------------------------------
 
-    def _view(self, subject: Subject, view: int, tallies: dict[Contender, _Tally], pictured: bool) -> None:
-        """Let all contenders draw a view, time them and judge them. pictured: save how they compare."""
-        moment = subject.moment(view * subject.moments // self.settings.views)
-        camera = self._cameras(subject, moment)[view]
-        judge = self._judge(subject, moment, camera) if self.settings.judged else None
+    def _view(self, group: Group, subject: Subject, view: int, tallies: dict[Contender, _Tally]) -> None:
+        """Let all contenders draw a view, time them and judge them."""
+        moment, camera = self.seen(subject, view)
+        judge = self._judge(subject, moment, camera) if group.judged else None
         turn = view % max(1, len(tallies))  # who is first changes, so that drift hits all alike
         for contender in (*list(tallies)[turn:], *list(tallies)[:turn]):
             surface, tally = Surface(self.renderer.gpu, self.settings.size), tallies[contender]
@@ -225,7 +229,8 @@ class Bench:
                 continue
             tally.covered.append(100 * float((surface.coverage > 0).mean()))
             tally.errors.append(judge.errors(surface) if judge else {})
-            if self.folder and judge and pictured and view == 0 and not contender.sweep:
+            pictured = view == 0 and not (group.sweep or contender.sweep)
+            if self.folder and judge and pictured:
                 _save_comparison(picture_path(self.folder, subject.name, contender.backend), judge, surface)
             surface.release()
             self.tick()
@@ -236,7 +241,7 @@ class Bench:
 
     def _time(self, request: Request, surface: Surface, tally: _Tally, anew: bool) -> None:
         """Add what one view takes: the preparation of a pose that is new to the GPU, then warm draws."""
-        with _undisturbed():
+        with undisturbed():
             reset_peak_rss()
             draw(self.renderer, request, surface)
             if anew:
@@ -254,6 +259,11 @@ class Bench:
         tally.passes.append({name: spread([run[name] for run in runs])["median"] for name in runs[0]})
         tally.peak_rss.append(peak_rss())
 
+    def seen(self, subject: Subject, view: int) -> Frame:
+        """The moment that a view shows, and from where."""
+        moment = subject.moment(view * subject.moments // self.settings.views)
+        return moment, self._cameras(subject, moment)[view]
+
     def _cameras(self, subject: Subject, moment: Moment) -> list[Camera]:
         """Where all views look from, to where the subject is at a moment."""
         if self._looked_at is None or self._looked_at[0] is not moment:
@@ -267,12 +277,12 @@ class Bench:
 
     # --- from frame to frame ----------------------------------------------------------
 
-    def _walks(self, subject: Subject) -> Iterator[tuple[Kind, list[Frame], Walk]]:
+    def _walks(self, group: Group, subject: Subject) -> Iterator[tuple[Kind, list[Frame], Walk]]:
         """An orbit about the first moment; some moments of a sequence whose points are known in all.
 
-        None where nothing is judged.
+        None where the group has none.
         """
-        if not self.settings.judged:
+        if not self.walks(group):
             return
         first, frames = subject.moment(0), self.settings.frames
         start = self._cameras(subject, first)[0]
@@ -327,7 +337,7 @@ class Bench:
                 "repeat": settings.repeat,
                 "frames": settings.frames,
                 **tally.numbers(views),
-                **self._where(),
+                **self.where(),
             }
             for contender, tally in tallies.items()
         ]
@@ -356,7 +366,7 @@ def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
+def undisturbed() -> Iterator[None]:
     """No garbage collection within."""
     gc.disable()
     try:

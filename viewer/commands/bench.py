@@ -11,17 +11,28 @@ import os
 from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 
 from ..backends import backend, backends
-from ..bench import numerics, slomp
+from ..bench import numerics, octree_sizes, octrees, slomp
 from ..bench.forecast import forecast
 from ..bench.plan import Group, plan
+from ..bench.report.octree_tables import write_octree_tables
 from ..bench.report.page import write_report
-from ..bench.report.results import NOTES, NUMERICS, RESULTS, Row, compare, read_rows, write_row
+from ..bench.report.results import (
+    NOTES,
+    NUMERICS,
+    OCTREE_SIZES,
+    OCTREES,
+    RESULTS,
+    Row,
+    compare,
+    read_rows,
+    write_row,
+)
 from ..bench.report.table_two import write_table_two
 from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
@@ -30,7 +41,8 @@ from ..files import whole_file
 from . import arguments, drawing
 from .console import progress, warn
 
-_SUITES = ("scenes", "numerics", "slomp")
+_SUITES = ("scenes", "numerics", "slomp", "octrees")
+_OF_THE_PAPER = {"slomp": (slomp.groups, write_table_two), "octrees": (octrees.groups, write_octree_tables)}
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -83,12 +95,12 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Measure, report, compare. 1 where Ctrl-C stopped it."""
-    _check_libraries()
+    _check_libraries(args.suite)
     if args.compare and args.suite == "numerics":
         raise InputError("--compare is for the scenes", "--suite numerics")
-    if args.suite == "slomp" and (args.backend or args.scene):
+    if args.suite in _OF_THE_PAPER and (args.backend or args.scene):
         raise InputError(
-            "has its own scenes and renderer", "--suite slomp", "Leave out --scene and --backend"
+            "has its own scenes and renderer", f"--suite {args.suite}", "Leave out --scene and --backend"
         )
     old = read_rows(args.compare) if args.compare else None
     names = list(dict.fromkeys(args.backend or backends()))
@@ -105,8 +117,10 @@ def run(args: Namespace) -> int:
     _foretell(bench, groups, tested)
     measured = [
         _write(args.out / RESULTS, bench, sum(map(bench.steps, groups)), _measured(bench, groups)),
-        _write(args.out / NUMERICS, bench, _lines(tested), bench.numerics(tested)),
+        _write(args.out / NUMERICS, bench, _lines(tested), bench.until_stopped(bench.numerics(tested))),
     ]
+    if args.suite == "octrees":
+        measured += _octrees(args.out, bench)
     if not any(measured):
         if bench.stopped:
             raise KeyboardInterrupt
@@ -114,8 +128,9 @@ def run(args: Namespace) -> int:
     stopped = ["Stopped before the end."] if bench.stopped else []
     _write_notes(args.out, [*missing, *bench.notes, *stopped])
     print(write_report(args.out))
-    if args.suite == "slomp":
-        print(write_table_two(args.out))
+    if args.suite in _OF_THE_PAPER:
+        _, write_page = _OF_THE_PAPER[args.suite]
+        print(write_page(args.out))
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
     return int(bench.stopped)
@@ -131,6 +146,21 @@ def _measured(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
         except InputError as error:
             bench.note(f"{group.scene} is left out: {error}")
             warn(bench.notes[-1])
+
+
+def _octrees(out: Path, bench: Bench) -> list[bool]:
+    """Build, cut and store octrees; of each whether there were any."""
+    missing = catalog.names(bench.settings.data)
+    scans = [scan for scan in slomp.scans() if not missing[scan.scene]]
+    print(
+        f"{len(scans) * len(octrees.DELTAS)} rows of octrees, and their sizes: some seconds each", flush=True
+    )
+    trees = bench.until_stopped(octrees.build_and_cut(bench, scans))
+    sizes = bench.until_stopped(map(asdict, octree_sizes.measure(bench.settings.data)))
+    return [
+        _write(out / OCTREES, bench, len(scans) * len(octrees.DELTAS), trees),
+        _write(out / OCTREE_SIZES, bench, 0, sizes),
+    ]
 
 
 def _write(path: Path, bench: Bench, steps: int, rows: Iterator[Row]) -> bool:
@@ -183,8 +213,8 @@ def _settings(args: Namespace) -> Settings:
             f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
-    if args.suite == "slomp":
-        told["judged"] = False  # how right surfels are, the scenes tell
+    if args.suite == "octrees":
+        told["frames"] = 0  # how voxels flicker, the scenes tell
     return replace(_QUICK if args.quick else Settings(), **{k: v for k, v in told.items() if v is not None})
 
 
@@ -193,8 +223,9 @@ def _groups(args: Namespace, settings: Settings, names: Sequence[str]) -> tuple[
     if args.suite == "numerics":
         return [], []
     missing = {name: reason for name, reason in catalog.names(settings.data).items() if reason}
-    if args.suite == "slomp":
-        groups = slomp.groups()
+    if args.suite in _OF_THE_PAPER:
+        make_groups, _ = _OF_THE_PAPER[args.suite]
+        groups = make_groups()
         lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
         return [group for group in groups if group.scene not in lacking], _left_out(lacking)
     known = _QUICK_SCENES if args.quick else catalog.names(settings.data)
@@ -226,8 +257,9 @@ def _write_notes(out: Path, notes: Sequence[str]) -> None:
         path.write_text("".join(f"{note}\n" for note in notes), encoding="utf-8")
 
 
-def _check_libraries() -> None:
-    missing = [name for name in _LIBRARIES if find_spec(name) is None]
+def _check_libraries(suite: str | None) -> None:
+    needed = (*_LIBRARIES, *(("DracoPy",) if suite == "octrees" else ()))
+    missing = [name for name in needed if find_spec(name) is None]
     if missing:
         raise InputError(
             f"the benchmark needs {', '.join(missing)}", hint="Install them: pip install 'scan4d[bench]'"

@@ -15,7 +15,7 @@ from test_results import a_row, times, written
 
 from viewer.bench.report.page import number, overall, stability, summary, write_report
 from viewer.bench.report.pictures import _HOLE, _SPILL, picture_path, side_by_side
-from viewer.bench.report.plots import names, pareto, slope, swept, time_against_error
+from viewer.bench.report.plots import names, pareto, slope, sweeps, swept, time_against_error
 from viewer.bench.report.results import METRICS, Row, error_metrics
 from viewer.errors import InputError
 
@@ -86,6 +86,24 @@ def test_a_sweep_includes_the_defaults_once() -> None:
     counts = [row["n"] for row in swept(rows, "torus", "n") if row["backend"] == "points"]
     assert sorted(counts) == [1000, 10_000, 100_000]
     assert swept([row for row in rows if row["sweep"] != "noise"], "torus", "noise") == []
+
+
+def test_a_line_joins_what_differs_in_one_parameter() -> None:
+    usual = {"size": 1.0, "depth": 9, "feed": "gs"}
+    changes = [
+        {},
+        {"size": 4.0},
+        {"size": 2.0},
+        {"depth": 8},
+        {"depth": 7, "size": 0.0},
+        {"depth": 8, "size": 0.0},
+    ]
+    sweep = ["", "size", "size", "depth", "depth", "depth"]
+    rows = [
+        a_row(ERRORS, 1.0, sweep=name, params=usual | each) for name, each in zip(sweep, changes, strict=True)
+    ]
+    found = [[(row["params"]["size"], row["params"]["depth"]) for row in line] for line in sweeps(rows)]
+    assert found == [[(1.0, 8), (1.0, 9)], [(0.0, 7), (0.0, 8)], [(1.0, 9), (2.0, 9), (4.0, 9)]]
 
 
 def test_floor_and_ceiling_frame_the_backends() -> None:

@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 
+from viewer.bench.report import feeds
+from viewer.bench.report.measurement import Measurement
 from viewer.bench.report.results import RESULTS, Row, write_row
-from viewer.bench.report.table_two import MEASUREMENT, digest, page, read_measurement, write_table_two
+from viewer.bench.report.table_two import page, read_measurement, write_table_two
 from viewer.errors import InputError
 
 
@@ -26,11 +28,16 @@ def a_row(feed: str, gpu: list[float], busy: list[float], **changes: Any) -> Row
     }  # fmt: skip
 
 
+FILE = "table-two.json"
 ROWS = [
     a_row("", [1.0, 1.0], [2.0, 2.0], backend="gl-points", params={}),
     a_row("gs", [10.0, 30.0], [40.0, 80.0]),
     a_row("vbo", [40.0, 60.0], [60.0, 120.0]),
 ]
+
+
+def digest(rows: list[Row]) -> Measurement:
+    return feeds.digest(rows, "surfels", "slomp")
 
 
 def cells(text: str, machine: str) -> list[list[str]]:
@@ -90,7 +97,7 @@ def test_a_measurement_survives_its_file(tmp_path: Path) -> None:
         for row in ROWS:
             write_row(stream, row)
     written = write_table_two(tmp_path)
-    measurement = read_measurement(tmp_path / MEASUREMENT)
+    measurement = read_measurement(tmp_path / FILE)
     assert measurement == digest(ROWS)
     assert written.read_text(encoding="utf-8") == page([measurement])
 
@@ -98,8 +105,8 @@ def test_a_measurement_survives_its_file(tmp_path: Path) -> None:
 def test_what_is_no_measurement_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no feeds"):
         digest([{**row, "sweep": ""} for row in ROWS])
-    path = tmp_path / MEASUREMENT
+    path = tmp_path / FILE
     for text in ("", "[]", json.dumps({"rows": []})):
         path.write_text(text)
-        with pytest.raises(InputError, match=MEASUREMENT):
+        with pytest.raises(InputError, match=FILE):
             read_measurement(path)

@@ -66,6 +66,7 @@ def time_against_error(rows: Sequence[Row], metric: Metric) -> Figure:
 
     Defaults are large and have their 5th to 95th percentile as a bar; a thin line joins a sweep.
     """
+    rows = [row for row in rows if metric.name in row["errors"]]  # others were timed alone
     scenes = {scene: [row for row in rows if row["scene"] == scene] for scene in names(rows, "scene")}
     looks = _looks(rows)
 
@@ -147,6 +148,21 @@ def swept(rows: Iterable[Row], scene: str, sweep: str) -> list[Row]:
     if not any(row["sweep"] == sweep for row in of_scene):
         return []
     return list({(row["backend"], row[sweep]): row for row in of_scene}.values())
+
+
+def sweeps(rows: Sequence[Row]) -> list[list[Row]]:
+    """The rows of one backend that differ in one parameter alone, by its value, for each that is swept."""
+    lines = []
+    for sweep in sorted({row["sweep"] for row in rows} - {""}):
+        alike: dict[str, list[Row]] = {}
+        for row in rows:
+            if row["sweep"] in ("", sweep) and sweep in row["params"]:
+                others = {name: value for name, value in row["params"].items() if name != sweep}
+                alike.setdefault(repr(others), []).append(row)
+        for line in alike.values():
+            line.sort(key=lambda row: (isinstance(row["params"][sweep], str), row["params"][sweep]))
+        lines += [line for line in alike.values() if any(row["sweep"] for row in line)]
+    return lines
 
 
 def names(rows: Iterable[Row], column: str) -> list[str]:
@@ -275,15 +291,12 @@ def _looks(rows: Iterable[Row]) -> dict[str, dict[str, Any]]:
 
 
 def _cloud(axes: Axes, rows: list[Row], metric: Metric, look: dict[str, Any]) -> None:
-    """The rows of one backend: its default with its spread, and each sweep through it."""
+    """The rows of one backend: its default with its spread, and a line for each sweep."""
     time = METRICS["gpu_ms"]
-    defaults = [row for row in rows if row["sweep"] == ""]
-    for sweep in sorted({row["sweep"] for row in rows} - {""}):
-        line = [row for row in rows if row["sweep"] in ("", sweep) and sweep in row["params"]]
-        line.sort(key=lambda row: (isinstance(row["params"][sweep], str), row["params"][sweep]))
+    for line in sweeps(rows):
         x, y = [time.of(row) for row in line], [size(metric, row) for row in line]
         axes.plot(x, y, **look, linewidth=0.6, markersize=3.5, alpha=0.75)
-    for row in defaults:
+    for row in [row for row in rows if row["sweep"] == ""]:
         _default(axes, row, size(metric, row), look)
 
 

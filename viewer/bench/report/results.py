@@ -17,6 +17,7 @@ from ..baselines import CEILING, FLOOR
 Row = dict[str, Any]
 
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
+OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -27,6 +28,8 @@ _NEEDED: dict[str, dict[str, Any]] = {
         "size": list, "seed": int, "views": int, "sweep": str, "gpu_ms": dict, "errors": dict,
     },
     NUMERICS: {"row": str, "backend": str, "held": bool},
+    OCTREES: {"scene": str, "n": int, "delta": int, "poses": int, "ms": dict, "sorts": dict},
+    OCTREE_SIZES: {"scene": str, "points": int, "stop": str, "bits": dict},
 }  # fmt: skip
 
 # --- what is measured -----------------------------------------------------------------
