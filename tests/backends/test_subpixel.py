@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,19 @@ def test_those_of_a_pixel_are_averaged_within_epsilon_of_the_nearest(draw: Draw,
     np.testing.assert_allclose(surface.image()[y, x, :3], [65, 50, 15], atol=1)
     mean = np.array([0.6, 0.6, 3.6]) / np.linalg.norm([0.6, 0.6, 3.6])  # signs need not agree
     np.testing.assert_allclose(surface.normal[y, x], mean, atol=2e-3)
+
+
+@pytest.mark.parametrize(("radii", "share"), [(0.9, 1.0), (1.25, 0.75), (1.5, 0.5), (2.5, 0.0)])
+def test_larger_splats_are_averaged_less_and_less(draw: Draw, radii: float, share: float) -> None:
+    view, size = looking_down_z(), (9, 9)
+    pair = in_one_pixel([1.0, 1.0], [[200, 0, 0], [0, 100, 0]], [[0, 0, 1], [0, 0.6, 0.8]])
+    scale = draw(pair, view, size, "surfels").view.scale
+    cloud = replace(pair, radii=np.full(2, radii * 0.7072 / scale, np.float32))
+    surface = draw(cloud, view, size, "surfels", Look(light="flat"))
+    np.testing.assert_allclose(surface.image()[4, 4, :3], [200 - 100 * share, 50 * share, 0], atol=1)
+    mean = np.array([0, 0.6, 1.8]) / np.linalg.norm([0.6, 1.8])
+    mixed = share * mean + (1 - share) * np.array([0, 0, 1])
+    np.testing.assert_allclose(surface.normal[4, 4], mixed / np.linalg.norm(mixed), atol=3e-3)
 
 
 def test_without_epsilon_the_nearest_is_alone(draw: Draw) -> None:

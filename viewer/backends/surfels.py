@@ -18,7 +18,7 @@ from ..gpu import passes
 from ..gpu.amplify import FEEDS, Points, Shape, amplify
 from ..gpu.fastest import choose
 from ..gpu.pose import GpuPose
-from ..gpu.subpixel import LEAST_RADIUS, average, is_subpixel, splat_subpixel
+from ..gpu.subpixel import LEAST_RADIUS, average, splat_subpixel, subpixel_share
 from ..gpu.surface import Surface
 from ..gpu.tiles import FALLBACK, splat
 from ..params import param
@@ -50,9 +50,8 @@ class Params:
     )
     passes: str = param(
         "one",
-        "How splats that overlap become one surface. one: the nearest is seen, and where all are under a "
-        "pixel, the mean of those close behind it; two: those close behind it "
-        "are blended with it. The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); "
+        "How splats that overlap become one surface. one: the nearest is seen, and where all are about a "
+        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it. The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); "
         "one_no_depth (b); visibility, the first of two alone (c); two_large, the first enlarged as well "
         "(e); sorted, each over those behind it",
         choices=("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
@@ -110,8 +109,11 @@ def _splat(points: Points, surface: Surface, params: Params, instancing: str, un
     larger = params.enlarge if params.passes in _TWO else 1.0
     enlarged = replace(points, enlarged=points.enlarged * larger)
     may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
-    if may_average and is_subpixel(enlarged, surface, params.radius_scale, uniform_radius, mask_limit):
-        _draw_subpixel(points, surface, params, instancing, uniforms)
+    share = 0.0
+    if may_average:
+        share = subpixel_share(enlarged, surface, params.radius_scale, uniform_radius, mask_limit)
+    if share == 1 or (share > 0 and params.passes == "one"):
+        _draw_subpixel(points, surface, params, instancing, share, uniforms)
     elif params.passes in _TWO:
         _draw_two(points, surface, params, instancing, uniforms)
     else:
@@ -127,9 +129,15 @@ def _draw_nearest(points: Points, surface: Surface, instancing: str, uniforms: d
 
 
 def _draw_subpixel(
-    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
+    points: Points,
+    surface: Surface,
+    params: Params,
+    instancing: str,
+    share: float,
+    uniforms: dict[str, Any],
 ) -> None:
-    """Splats of about a pixel: those of a pixel are averaged, in place of any second pass."""
+    """Splats of about a pixel: those of a pixel are averaged, in place of any second pass; the larger they
+    are, the less, so that nothing changes at once while one comes nearer."""
     if params.passes in _TWO:
         surface.stats.skipped["second pass"] = "splats are under a pixel: they are averaged"
     if params.instancing == "auto":
@@ -139,7 +147,7 @@ def _draw_subpixel(
     else:
         _draw_nearest(points, surface, instancing, uniforms)
     if params.epsilon > 0:
-        average(points, surface, params.epsilon, **uniforms)
+        average(points, surface, params.epsilon, share, **uniforms)
 
 
 def _draw_one(

@@ -42,10 +42,11 @@ class _Sums:
         self.buffer.release()
 
 
-def is_subpixel(
+def subpixel_share(
     points: Points, surface: Surface, radius_scale: float, uniform_radius: float, mask_limit: float
-) -> bool:
-    """Whether nearly all discs are as small as any is drawn, and none much larger.
+) -> float:
+    """1 where nearly all discs are as small as any is drawn; 0 where they are twice as large, or some
+    very large; between them in proportion.
 
     Outliers count for what none may be. mask_limit: the squared share of a radius that the mask leaves.
     """
@@ -53,7 +54,7 @@ def is_subpixel(
     nearest = float(view.depths(pose.remember("box", lambda: _box(pose.cloud))).min())
     usually_nearest = float(view.depths(pose.bounds.corners() - pose.cloud.origin).min())
     if view.perspective and min(nearest, usually_nearest) <= view.near:
-        return False
+        return 0.0
     usual = largest = uniform_radius
     if points.use_radii:
         own = pose.remember("radii up to", lambda: _radii_up_to(pose.cloud))
@@ -61,7 +62,9 @@ def is_subpixel(
     pixels = radius_scale * math.sqrt(mask_limit) * points.enlarged * view.scale
     if view.perspective:
         usual, largest = usual / usually_nearest, largest / nearest
-    return usual * pixels < LEAST_RADIUS and largest * pixels < _LARGEST_RADIUS
+    if largest * pixels > _LARGEST_RADIUS:
+        return 0.0
+    return min(max(2 - usual * pixels / LEAST_RADIUS, 0.0), 1.0)
 
 
 def _box(cloud: PointCloud) -> NDArray[np.float32]:
@@ -97,9 +100,9 @@ def splat_subpixel(points: Points, surface: Surface, **uniforms: Any) -> None:
     )
 
 
-def average(points: Points, surface: Surface, epsilon: float, **uniforms: Any) -> None:
+def average(points: Points, surface: Surface, epsilon: float, share: float, **uniforms: Any) -> None:
     """Colours and normals of each pixel: the mean of the discs that lie at most epsilon radii behind
-    what it shows."""
+    what it shows. share: of the mean, 0..1; the rest is what it shows."""
     gpu = surface.gpu
     covered = surface.list_covered()
     sums = surface.keep("mean", lambda: _Sums(gpu, surface.size[0] * surface.size[1]))
@@ -114,7 +117,8 @@ def average(points: Points, surface: Surface, epsilon: float, **uniforms: Any) -
         for step in range(3):
             defines = {"STEP": step, **bound, **points.defines}
             program = gpu.compute("surfels/passes/mean.comp", defines)
-            gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, item_count=points.count, **uniforms)
+            gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, **uniforms)
+            gpu.set(program, share=share, item_count=points.count)
             if step == 1:
                 points.bind()
                 gpu.dispatch(program, points.count)

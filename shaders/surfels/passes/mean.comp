@@ -39,6 +39,7 @@ void main() {
 }
 #else
 #include "common/list.glsl"
+uniform float share;  // of the mean; the rest is the shown splat's
 #if HAS_COLORS
 layout(std430, binding = 4) writeonly buffer Colors { uint own_colors[]; };
 #endif
@@ -53,16 +54,16 @@ void main() {
 #else
     // The shown splat passes, unless two programs round apart: then it is alone.
     uint count = sums[4u * cell + 3u];
+    float mean = count == 0u ? 0.0 : share;
     uvec2 look = texelFetch(looks, int(texelFetch(rows, int(cell)).r)).xy;
 #if HAS_COLORS
     vec3 color = vec3(sums[4u * cell], sums[4u * cell + 1u], sums[4u * cell + 2u]) / float(max(count, 1u));
     color *= float(COLOR_DIVISOR);
-    own_colors[cell] = packUnorm4x8(vec4((count == 0u ? color_of(look) : color) / 255.0, 1.0));
+    own_colors[cell] = packUnorm4x8(vec4(mix(color_of(look), color, mean) / 255.0, 1.0));
 #endif
-    for (uint k = 0u; k < 3u; ++k) {
-        float n = count == 0u ? normal_of(look)[k] : float(normal_sums[3u * cell + k]);
-        normal_sums[3u * cell + k] = floatBitsToInt(n);
-    }
+    vec3 sum = vec3(normal_sums[3u * cell], normal_sums[3u * cell + 1u], normal_sums[3u * cell + 2u]);
+    sum = mix(normal_of(look) / 511.0, sum / max(length(sum), 1e-6), mean);
+    for (uint k = 0u; k < 3u; ++k) normal_sums[3u * cell + k] = floatBitsToInt(sum[k]);
 #endif
 }
 #endif
