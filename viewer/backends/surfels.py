@@ -51,9 +51,10 @@ class Params:
     passes: str = param(
         "one",
         "How splats that overlap become one surface. one: the nearest is seen, and where all are about a "
-        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it. The "
-        "others show why (letters: Slomp 2014, Fig. 3): one_blended (a); one_no_depth (b); visibility, the first of two alone (c); two_large, the first enlarged as well "
-        "(e); sorted, each over those behind it",
+        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it. "
+        "The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); one_no_depth (b); visibility, "
+        "the first of two alone (c); two_large, the first enlarged as well (e); sorted, each over those "
+        "behind it",
         choices=("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
         sweep=("one", "two"),
     )
