@@ -36,7 +36,7 @@ LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in part
 
 WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
-COMPILED = "_kernels"  # how the names of modules end that are compiled by numba
+COMPILED = ("_kernels", "compiled")  # how the names of modules end that are compiled by numba, or by which
 SLOW = WINDOW | {
     "PIL", "OpenEXR",
     "av", "cmap", "jinja2", "lzf", "matplotlib", "open3d", "plyfile", "scipy", "skimage", "tqdm",

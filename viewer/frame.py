@@ -76,7 +76,8 @@ def render_frame(
 
     stats = surface.stats
     stats.backend = backend.name
-    stats.upload_ms, stats.derive_ms = pose.take_ms("upload"), pose.take_ms("derive")
+    stats.upload_ms = sum(each.take_ms("upload") for each in {pose, surface.pose})
+    stats.derive_ms = pose.take_ms("derive")
     stats.passes = timers.passes()
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3

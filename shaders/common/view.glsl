@@ -35,7 +35,7 @@ vec2 to_pixel(vec3 view) {
 
 // View-space position of a pixel coordinate at a depth.
 vec3 from_pixel(vec2 pixel, float depth) {
-    vec2 offset = (pixel - 0.5 * vec2(view_size)) / scale_at(depth);
+    precise vec2 offset = (pixel - 0.5 * vec2(view_size)) / scale_at(depth);
     return vec3(offset.x, -offset.y, -depth);
 }
 

@@ -12,10 +12,8 @@ bool begin_shape(Point point) {
 
     vec3 reach = cube_reach(length_);
     if (depth + reach.z < view_near) return false;
-    if (depth - reach.z > view_near) {
-        vec4 box = cube_box(cube_center, reach);
-        if (any(lessThan(box.zw, vec2(0.0))) || any(greaterThan(box.xy, vec2(view_size)))) return false;
-    }
+    vec4 box = cube_box(cube_center, reach);
+    if (any(lessThan(box.zw, vec2(0.0))) || any(greaterThan(box.xy, vec2(view_size)))) return false;
     vec3 signs = mix(vec3(-1.0), vec3(1.0), greaterThanEqual(to_eye, vec3(0.0))) * length_;
     cube_u = axes[0] * signs.x;
     cube_v = axes[1] * signs.y;

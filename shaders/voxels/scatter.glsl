@@ -8,7 +8,8 @@ float entry_depth(vec2 pixel, vec3 center, float half_length) {
     vec3 from = view_perspective ? vec3(0.0) : from_pixel(pixel, 0.0);
     vec3 direction = view_perspective ? from_pixel(pixel, 1.0) : vec3(0.0, 0.0, -1.0);
     mat3 axes = transpose(mat3(world_to_view));
-    vec3 offset = axes * (center - from), along = axes * direction;
+    // Two programs compare depths of the same cube: `precise`, as in common/view.glsl.
+    precise vec3 offset = axes * (center - from), along = axes * direction;
     along = mix(along, vec3(1e-12), lessThan(abs(along), vec3(1e-12)));
     precise vec3 one = (offset - half_length) / along, other = (offset + half_length) / along;
     precise vec3 enter = min(one, other), leave = max(one, other);
@@ -21,7 +22,7 @@ void scatter(uint i) {
     vec3 center = to_view(point.position);
     float half_length = half_edge(point, -center.z);
     vec3 reach = cube_reach(half_length);
-    if (-center.z - reach.z < view_near) return;
+    if (-center.z + reach.z < view_near) return;
     ivec4 pixels = ivec4(clamp(ceil(cube_box(center, reach) - 0.5), vec4(0.0), vec2(view_size).xyxy));
     for (int y = pixels.y; y < pixels.w; ++y)
         for (int x = pixels.x; x < pixels.z; ++x) {

@@ -13,9 +13,10 @@ vec3 cube_reach(float half_length) {
     return half_length * (abs(axes[0]) + abs(axes[1]) + abs(axes[2]));
 }
 
-// Pixels that a cube may reach: lowest, highest coordinates. For cubes in front of the near plane.
+// Pixels that a cube may reach: lowest, highest coordinates. All of them where it reaches the eye's plane.
 vec4 cube_box(vec3 center, vec3 reach) {
     float depth = -center.z;
+    if (view_perspective && depth <= reach.z) return vec4(vec2(0.0), view_size);
     vec2 grown = reach.xy;
     if (view_perspective) grown = (reach.xy * depth + abs(center.xy) * reach.z) / (depth * (depth - reach.z));
     grown = grown * view_scale + 0.01;  // rounding

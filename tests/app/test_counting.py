@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from scenes import sphere
 
-from viewer.app.scene.counting import Counting
+from viewer.app.scene.counting import Counting, words
 from viewer.app.scene.picture import Picture
 from viewer.camera import Camera
 from viewer.frame import Request, shared_renderer
@@ -51,6 +52,19 @@ def test_a_picture_at_rest_is_counted_once(picture: Picture) -> None:
     assert counting.advance(picture, at_rest=False, now=now), "those of the picture before are gone"
     assert counting.counts is None
     assert counted(counting, picture) == picture.surface.point_counts()
+
+
+@pytest.mark.parametrize("backend", ["points", "voxels"])
+def test_a_preview_says_how_many_of_the_points_are_drawn(picture: Picture, backend: str) -> None:
+    request = replace(REQUEST, backend=backend)
+    while not picture.is_complete:
+        picture.draw(request, SIZE)
+    picture.took(1000.0, goal_ms=10.0)
+    picture.draw(replace(request, camera=REQUEST.camera.orbited(30, 0)), SIZE, held=True)
+    told = dict(words(SimpleNamespace(picture=picture, counting=Counting())))  # type: ignore[arg-type]
+    drawn, left_out = (int(told[name].split()[0].replace(",", "")) for name in ("Drawn", "Preview"))
+    assert 0 < drawn < len(POSE.cloud)
+    assert drawn + left_out == len(POSE.cloud)
 
 
 def test_a_preview_is_not_counted_and_a_count_that_is_overtaken_is_dropped(picture: Picture) -> None:

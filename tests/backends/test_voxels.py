@@ -77,17 +77,15 @@ def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, 
     surface = voxels(draw, CLOUD, camera, max_depth=depth, least=least, pixel_threshold=0.25)
     expected, row = exact(surface)
     seen = surface.row != NOTHING
-    clipped = camera is CAMERAS["near plane"] or camera is CAMERAS["inside"]  # such cubes are cut open
-    agree = seen == np.isfinite(expected)
-    assert (~agree).mean() <= (0.25 if clipped else 2e-4)
+    assert (seen != np.isfinite(expected)).mean() <= 2e-4
     both = seen & np.isfinite(expected)
     same = both & (surface.row == row)
     np.testing.assert_allclose(surface.depth[same], expected[same], rtol=1e-4)
-    if not clipped:
-        others = both & ~same
-        assert others.mean() <= 2e-3
-        error = np.abs(surface.depth[others] / expected[others] - 1)
-        assert np.count_nonzero(error > 1e-5) <= 1e-3 * both.sum()
+    others = both & ~same
+    along_axis = camera is CAMERAS["near plane"]  # in x: rays of one column run within faces
+    assert others.mean() <= (0.03 if along_axis else 2e-3)
+    error = np.abs(surface.depth[others] / expected[others] - 1)
+    assert np.count_nonzero(error > 1e-5) <= (2e-3 if along_axis else 1e-3) * both.sum()
 
 
 @every_camera
@@ -132,7 +130,7 @@ def test_what_is_seen_lies_within_a_cube_of_the_surface(draw: Draw, level: int) 
 def test_an_octant_is_as_large_as_the_picture_asks(draw: Draw) -> None:
     for threshold in (1.0, 6.0):
         surface = voxels(draw, CLOUD, CAMERAS["perspective"], least=0.0, pixel_threshold=threshold)
-        cubes, octree = surface.pose.cloud, derive(CLOUD, Params())
+        cubes, (octree, _) = surface.pose.cloud, derive(CLOUD, Params())
         size = 2 * cubes.radii * surface.view.scale / surface.view.depths(cubes.positions)  # type: ignore[operator]
         inner = cubes.radii > 0.75 * octree.size(octree.depth)  # type: ignore[operator]
         assert inner.any() == (threshold > 1)
@@ -162,7 +160,7 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
         CLOUD.world(), normals=CLOUD.normals, colors=colors, scalars={"row": np.arange(len(CLOUD))}
     )
     surface = voxels(draw, cloud, CAMERAS["perspective"], max_depth=4, look=Look(color_by="row"))
-    octree = derive(cloud, Params())
+    octree, _ = derive(cloud, Params())
     starts = np.cumsum(octree.counts) - octree.counts
     shown = np.unique(surface.id[surface.id != NOTHING])
     assert shown.min() >= starts[4]
@@ -175,6 +173,28 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
     np.testing.assert_array_equal(picked.point, cloud.positions[picked.row] + cloud.origin)
     assert picked.scalars == {"row": picked.row}
     assert surface.value[y, x] == pytest.approx(picked.row)
+
+
+@pytest.mark.parametrize("color_by", ["row", "height", "depth"])
+def test_colours_stand_for_the_same_values_in_every_view(draw: Draw, color_by: str) -> None:
+    cloud = PointCloud.from_arrays(
+        CLOUD.world(), normals=CLOUD.normals, scalars={"row": np.arange(len(CLOUD))}
+    )
+    for camera in (CAMERAS["perspective"], CAMERAS["close"]):
+        shown, points = (
+            draw(cloud, camera, SIZE, name, Look(color_by=color_by)) for name in ("voxels", "points")
+        )
+        assert shown.color_range == points.color_range
+
+
+def test_octants_of_a_new_view_are_told_as_uploaded(renderer: Renderer) -> None:
+    pose, surface = Pose(0, 0.0, "test", CLOUD), Surface(renderer.gpu, SIZE)
+    request = Request(pose, CAMERAS["perspective"], "voxels", Params())
+    for camera in (CAMERAS["perspective"], CAMERAS["close"]):
+        render_frame(renderer, replace(request, camera=camera), surface)
+        assert surface.stats.upload_ms > 0
+        render_frame(renderer, replace(request, camera=camera), surface)
+        assert surface.stats.upload_ms == 0
 
 
 def test_what_faces_away_is_left_out_where_it_is_asked_for(draw: Draw) -> None:
@@ -255,6 +275,14 @@ def test_without_colours_normals_and_radii(draw: Draw) -> None:
     assert not smooth.is_own("normals")
     assert (smooth.row != NOTHING).mean() == covered
     assert np.linalg.norm(smooth.normal[smooth.row != NOTHING], axis=1).min() > 0.99
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf, 2e38])
+def test_radii_that_cannot_be_count_as_unknown(draw: Draw, radius: float) -> None:
+    odd = replace(CLOUD, radii=np.full(len(CLOUD), radius, np.float32))
+    bare = replace(CLOUD, radii=None)
+    shown, expected = (voxels(draw, cloud, CAMERAS["perspective"], least=10.0) for cloud in (odd, bare))
+    np.testing.assert_array_equal(shown.depth, expected.depth)
 
 
 def test_the_depth_says_why_subdivision_ended(draw: Draw) -> None:

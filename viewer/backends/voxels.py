@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,9 @@ from ..gpu.voxels import draw_voxels, shade_flat
 from ..params import param
 from ..scan.octree import DEEPEST, Octree
 from ..scan.octree.build import STOPS, Stop, build, shortfall
+from ..scan.octree.leaves import closing_levels
 from ..scan.octree.traverse import Cut, Sight, Traversal
 from ..scan.points import PointCloud
-from ..scan.spacing import typical_spacing
 from . import FrameView
 
 TITLE = "Voxels"
@@ -34,7 +35,6 @@ DERIVES_ON_THREAD = True
 
 _UPRIGHT = "cubes are upright: turned points lie in other ones"
 _AROUND_ALL = "octants divide the cube around all points: other points make other octants"
-_THICK = "cubes stand out of the surface by as much as they are large"
 # Rows of the stability suite that cubes cannot hold in principle -> why.
 LIMITS = {
     "rotated by a quarter turn": _UPRIGHT,
@@ -45,15 +45,12 @@ LIMITS = {
     "zoomed in on 10^-3 of the scan": _AROUND_ALL,
     "coplanar points": _AROUND_ALL,
     "collinear points": _AROUND_ALL,
+    "collinear points end on, perspective": _AROUND_ALL,
+    "collinear points end on, orthographic": _AROUND_ALL,
     "an outlier at 10^6 times the size": _AROUND_ALL,
-    "zero radii": _THICK,
-    "negative radii": _THICK,
-    "NaN radii": _THICK,
     "coplanar points without normals": "without normals, faces are lit",
 }
 
-_RADIUS_PER_SPACING = 1.5  # as surfels have it, for points without radii of their own
-_LARGEST = np.float32(3e38)  # beyond it a radius is unknown
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
 _ANYWHERE = Sight(np.zeros(3), np.eye(3), 1.0, (1, 1), 1.0, math.inf, perspective=True)
 _PRIMES = np.array([73856093, 19349663, 83492791], np.uint32)  # spatial hash (Teschner et al. 2003, 4.1)
@@ -88,12 +85,12 @@ class Params:
         1.0, "Octants whose edge is less are drawn in place of what they hold, pixels", low=0.25, high=64.0
     )
     least: float = param(
-        0.4,
-        "Least edge of a cube, in diameters of the points' splats: what closes the surface where octants are "
-        "smaller; 0: as large as octants",
+        1.0,
+        "Least edge of a cube, in edges of the smallest octant around it that touches others: what closes "
+        "the surface where octants lie apart; 0: as large as octants",
         low=0.0,
         high=10.0,
-        sweep=(0.0, 0.4, 1.0),
+        sweep=(0.0, 1.0),
     )
     normals: str = param(
         "auto",
@@ -120,20 +117,20 @@ def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
     return ("normals",) if params.normals == "smooth" else ()
 
 
-def derive(cloud: PointCloud, params: Params) -> Octree:
-    """The octree of a pose."""
+def derive(cloud: PointCloud, params: Params) -> tuple[Octree, list[NDArray[np.uint8]]]:
+    """The octree of a pose, and for each level how large its nodes are drawn to close the surface."""
     stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
     octree = build(cloud, stop)
     # The first cut of a process imports what it needs, of a machine compiles it: not while a window draws.
     traversal = Traversal(octree.prefix(1), _ANYWHERE)
     traversal.advance()
     traversal.cut(octree.low)
-    return octree
+    return octree, closing_levels(octree)
 
 
-def upload(gpu: Gpu, octree: Octree) -> Voxels:
+def upload(gpu: Gpu, derived: tuple[Octree, list[NDArray[np.uint8]]]) -> Voxels:
     """Nothing is uploaded until a view is known."""
-    return Voxels(gpu, octree)
+    return Voxels(gpu, *derived)
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
@@ -145,12 +142,11 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         return False
     flat = params.normals == "flat" or (params.normals == "auto" and pose.stored.normals is None)
     shown = voxels.show(pose, frame, flat)
-    pose.add_ms("upload", shown.pose.take_ms("upload"))
     surface.show(shown.pose, shown.rows)
     coarse = frame.share < 1 and bool((shown.cut.level < min(params.max_depth, voxels.octree.depth)).any())
     _report(shown.cut, voxels.octree, params, surface.stats)
     if coarse:
-        surface.stats.left_out = max(len(pose.cloud) - len(shown.cut), 1)
+        surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
     points = Points(shown.pose, use_radii=True, count=len(shown.cut))
     feed = choose(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
     draw_voxels(points, surface, feed, params.scatter)
@@ -185,8 +181,9 @@ class _Shown:
 class Voxels:
     """An octree, and the nodes of it that the last view showed."""
 
-    def __init__(self, gpu: Gpu, octree: Octree) -> None:
+    def __init__(self, gpu: Gpu, octree: Octree, closing: list[NDArray[np.uint8]]) -> None:
         self.octree = octree
+        self._closing = closing
         self._gpu = gpu
         self._traversal: Traversal | None = None
         self._asked: tuple[object, ...] = ()
@@ -197,7 +194,8 @@ class Voxels:
     def nbytes(self) -> int:
         """Bytes held: the octree on the CPU, what the last view showed on both sides."""
         shown = self._shown.pose.uploaded_bytes + self._shown.pose.cloud.nbytes if self._shown else 0
-        return self.octree.nbytes + shown
+        looking = self._traversal.nbytes if self._traversal else 0
+        return self.octree.nbytes + sum(levels.nbytes for levels in self._closing) + looking + shown
 
     def release(self) -> None:
         """Let go of what the last view showed."""
@@ -219,7 +217,7 @@ class Voxels:
                 pixel_threshold=threshold,
                 max_depth=params.max_depth,
                 cull_cones=params.cull_back,
-                margin=math.sqrt(3) * (1 + _UNLIKE) * params.least * float(_radii(pose).max()),
+                margin=self._margin(params.least),
             )
         elif self._seen != seen:
             self._traversal.look(sight)
@@ -228,21 +226,35 @@ class Voxels:
         self._shown = self._look_at(self._traversal.cut(pose.cloud.origin), pose, params, flat)
         return self._shown
 
+    def _margin(self, least: float) -> float:
+        """How far cubes reach beyond the balls around their octants at most, scan units."""
+        half = self.octree.edge / 2
+        levels = [(level, int(found.min())) for level, found in enumerate(self._closing) if len(found)]
+        beyond = (least * (1 + _UNLIKE) * half / 2**closing - half / 2**level for level, closing in levels)
+        return math.sqrt(3) * max(0.0, *beyond)
+
     def _look_at(self, cut: Cut, pose: GpuPose, params: Params, flat: bool) -> _Shown:
         """The nodes of a cut as points, their radii being half of the cubes' edges."""
         rows = cut.gather(self.octree, "rows")
         unlike = _unlike(self.octree, cut, pose.cloud.origin)
+        closing = np.ldexp(np.float32(self.octree.edge / 2), -self._closing_of(cut))
         cloud = PointCloud(
             positions=cut.centers,
             origin=pose.cloud.origin,
             # Faces give their own normals to pixels.
             normals=np.zeros_like(cut.centers) if flat else cut.gather(self.octree, "normals"),
             colors=None if pose.cloud.colors is None else cut.gather(self.octree, "colors"),
-            radii=np.maximum(cut.halves, params.least * unlike * _radii_at(pose, rows)),
+            radii=np.maximum(cut.halves, params.least * unlike * closing),
             scalars=_Scalars(pose.cloud.scalars, rows),
             ids=cut.numbers(self.octree),  # in the cut's order, near first: no row is looked for by them
         )
         return _Shown(cut, GpuPose(self._gpu, cloud), rows)
+
+    def _closing_of(self, cut: Cut) -> NDArray[np.int32]:
+        """(n,): the level of the octants that a node is drawn as large as."""
+        borders = np.flatnonzero(np.diff(cut.level, prepend=255, append=255)).tolist()
+        parts = [self._closing[cut.level[a]][cut.index[a:b]] for a, b in pairwise(borders)]
+        return np.concatenate([np.empty(0, np.int32), *parts]).astype(np.int32)
 
 
 def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
@@ -254,23 +266,6 @@ def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
 def _view_key(view: View) -> tuple[object, ...]:
     lens = (view.size, view.scale, view.near, view.far, view.perspective)
     return (view.rotation.tobytes(), view.translation.tobytes(), *lens)
-
-
-def _radii(pose: GpuPose) -> NDArray[np.float32]:
-    """Of the points' splats, scan units: (N,), or (1,) where all are alike."""
-    return pose.remember("radii of cubes", lambda: _find_radii(pose))
-
-
-def _find_radii(pose: GpuPose) -> NDArray[np.float32]:
-    uniform = np.float32(_RADIUS_PER_SPACING * pose.remember("spacing", lambda: typical_spacing(pose.stored)))
-    if pose.stored.radii is None:
-        return np.array([uniform])
-    return np.where((pose.stored.radii > 0) & (pose.stored.radii < _LARGEST), pose.stored.radii, uniform)
-
-
-def _radii_at(pose: GpuPose, rows: NDArray[np.uint32]) -> NDArray[np.float32]:
-    radii = _radii(pose)
-    return radii if len(radii) == 1 else radii[rows]
 
 
 def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -77,7 +77,8 @@ def _write_scan(out: Path, timeline: Timeline, indices: Sequence[int], stop: Sto
 
 
 def _write_frames(out: Path, timeline: Timeline, indices: Sequence[int]) -> None:
-    check_output(out, formats.writable_suffixes(views=True), several=len(indices) > 1)
+    known = sorted([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
+    check_output(out, known, several=len(indices) > 1)
     with frame_files(out, indices) as file_of, progress(len(indices)) as tick:
         for pose in read_poses(timeline, indices):
             formats.write(file_of(pose), pose.cloud, pose.views)

@@ -86,8 +86,8 @@ def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
 
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:
-    """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles."""
-    pose, source = surface.pose, value_source(look, surface.pose.cloud)
+    """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles of the scan's points."""
+    pose, source = surface.scanned, value_source(look, surface.pose.cloud)
     if source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample))
     elif source == "height":

@@ -215,9 +215,14 @@ class Surface:
         return self._drawn()[0]
 
     @property
+    def scanned(self) -> GpuPose:
+        """The pose of the scan that it shows, be it by something made of its points."""
+        return self._stood_for[0] if self._stood_for else self.pose
+
+    @property
     def scan(self) -> PointCloud:
-        """The points of the scan that it shows, be it by something made of them; see `point_of`."""
-        return (self._stood_for[0] if self._stood_for else self.pose).stored
+        """The points of `scanned`; see `point_of`."""
+        return self.scanned.stored
 
     def point_of(self, row: int) -> int:
         """The row in `scan` of the point that a row of the surface stands for."""

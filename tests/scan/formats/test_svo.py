@@ -247,6 +247,7 @@ def test_convert_with_a_delta(tmp_path: Path) -> None:
         (["a.svo", "--depth", "22"], "depth: 22 is outside 0 to 21"),
         (["a.svo", "--delta", "nan"], "delta"),
         (["missing/a.svo"], "there is no folder"),
+        (["a.jpg"], "Known: .exr, .npz, .pcd, .ply, .svo"),
     ],
 )
 def test_convert_refuses(

@@ -360,3 +360,21 @@ def test_normals_keep_their_direction_to_a_degree() -> None:
 
 def test_what_has_no_normal_gets_none() -> None:
     assert np.array_equal(normals_of(normal_bytes(np.zeros((2, 3), np.float32))), np.zeros((2, 3)))
+
+
+def test_few_bytes_cannot_promise_very_many_octants(monkeypatch: pytest.MonkeyPatch) -> None:
+    lattice = np.stack(np.meshgrid(*[np.arange(16)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    octree = build(PointCloud.from_arrays(lattice + 0.5), Stop(rule="depth", depth=4), attributes=False)
+    stored = to_bytes(octree)
+    monkeypatch.setattr(storage, "_FREE", 1000)
+    assert from_bytes(stored).counts.tolist() == octree.counts.tolist()
+    monkeypatch.setattr(coding, "MOST_RATIO", 4)
+    with pytest.raises(InputError, match="4,681 octants, which is too many"):
+        from_bytes(stored)
+
+
+def test_what_would_promise_too_much_is_stored_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    octree = build(ball(), attributes=False)
+    packed = to_bytes(octree)
+    monkeypatch.setattr(storage, "_are_too_many", lambda nodes, stored: stored <= len(packed))
+    assert to_bytes(octree) == to_bytes(octree, packed=False)

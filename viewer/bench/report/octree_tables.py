@@ -175,7 +175,7 @@ def _levels(measurements: Sequence[Measurement]) -> str:
     rows, above = [], None
     for each in measurements:
         for row in each["levels"]:
-            cubes = f"at least {row['least']:g} splats" if row["least"] else "octants"
+            cubes = "closed" if row["least"] else "octants"
             named = [f"`{row['scene']}`", cubes, each["device"]]
             busy = np.median(row["busy_ms"]) / each["processors"]
             times = [number(np.median(row["gpu_ms"])), number(busy) if each["timer"] == "finish" else ""]

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from .compiled import compiled
 
 _HALF_DIAGONAL = math.sqrt(3) / 2  # of a cube of edge 1
 
@@ -39,13 +40,13 @@ _WITHIN, _CELL = np.uint64(1 << 63), np.uint64((1 << 21) - 1)
 _Y, _Z = np.uint64(21), np.uint64(42)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _center(place: np.uint64, edge: float) -> tuple[float, float, float]:
     x, y, z = np.int64(place & _CELL), np.int64(place >> _Y & _CELL), np.int64(place >> _Z & _CELL)
     return (x + 0.5) * edge, (y + 0.5) * edge, (z + 0.5) * edge
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def descend(
     places: NDArray[np.uint64],
     indices: NDArray[np.uint32],
@@ -121,7 +122,7 @@ def descend(
     return followed, shown, outside, away
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _faces_away(
     normals: NDArray[np.float32],
     cones: NDArray[np.float32],
@@ -152,7 +153,7 @@ def _faces_away(
     return bool(cosine * reach > sine * radius and towards < -(sine * reach + cosine * radius))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def find_centers(
     places: NDArray[np.uint64], edge: float, low: NDArray[np.float64], centers: NDArray[np.float32]
 ) -> None:

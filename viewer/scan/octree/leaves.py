@@ -1,4 +1,4 @@
-"""The leaves of an octree as points."""
+"""The leaves of an octree as points, and how large nodes have to be to close a surface."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ def leaf_points(octree: Octree) -> PointCloud:
             return None
         return np.concatenate([getattr(octree.attributes[level], name)[leaves[level]] for level in levels])
 
-    touching = _touching(octree)
+    touching = touching_levels(octree)
     found = np.concatenate([touching[level][leaves[level]] for level in levels]).astype(np.int32)
-    if len(found):
-        found = np.maximum(found, int(np.median(found)) - _MOST_COARSER)
+    found = _not_much_coarser(found)
     return PointCloud.from_arrays(
         np.concatenate([octree.centers(level)[leaves[level]] for level in levels]),
         normals=of_leaves("normals"),
@@ -43,7 +42,17 @@ def leaf_points(octree: Octree) -> PointCloud:
     )
 
 
-def _touching(octree: Octree) -> list[Bytes]:
+def closing_levels(octree: Octree) -> list[Bytes]:
+    """For each level, (n,): the level of the octant around each node that is as large as the gaps beside it:
+    nodes that are drawn so large close the surface, however small they are themselves."""
+    return [_not_much_coarser(found) for found in touching_levels(octree)]
+
+
+def _not_much_coarser(found: NDArray) -> NDArray:
+    return np.maximum(found, max(int(np.median(found)) - _MOST_COARSER, 0)) if len(found) else found
+
+
+def touching_levels(octree: Octree) -> list[Bytes]:
     """For each level, (n,): the deepest level at which a node, or one around it, touches enough others."""
     neighbors = Neighbors(int(octree.counts[0]))
     levels = [np.zeros(int(octree.counts[0]), np.uint8)]

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from .compiled import compiled
 from .octree import DEEPEST
 
 _BLOCK = 4096  # points that are fetched and then worked on
@@ -23,7 +23,7 @@ _8, _16, _24, _BYTE = np.uint32(8), np.uint32(16), np.uint32(24), np.uint32(255)
 _SLACK = np.float32(1e-6)  # that cones are opened by, for rounding
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_masks(
     codes: NDArray[np.uint64],
     levels: NDArray[np.uint8],
@@ -44,14 +44,14 @@ def fill_masks(
                 masks[node[level - 1]] |= np.uint8(1) << np.uint8(child)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gather_colors(colors: NDArray[np.uint32], rows: NDArray[np.uint32], gathered: NDArray[np.uint32]) -> None:
     """The colours (N,), four bytes each, of some rows (M,)."""
     for i in range(len(rows)):
         gathered[i] = colors[rows[i]]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gather_units(normals: NDArray[np.float32], rows: NDArray[np.uint32], units: NDArray[np.float32]) -> None:
     """The normals (N, 3) of some rows (M,), of length 1; 0 where there is none or it is not finite."""
     for start in range(0, len(rows), _BLOCK):
@@ -74,7 +74,7 @@ def gather_units(normals: NDArray[np.float32], rows: NDArray[np.uint32], units: 
 # child wander up, and where nothing is held, as mostly, a node shows what its only child shows.
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def lowest_rows(
     levels: NDArray[np.uint8],
     ends: NDArray[np.uint8],
@@ -96,7 +96,7 @@ def lowest_rows(
         held[above] = min(held[above], lowest)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def mean_colors(
     levels: NDArray[np.uint8],
     ends: NDArray[np.uint8],
@@ -136,7 +136,7 @@ def mean_colors(
         held[above, 4] += points
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def mean_normals(
     levels: NDArray[np.uint8],
     ends: NDArray[np.uint8],
@@ -170,7 +170,7 @@ def mean_normals(
         held[above, 3] += points
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def open_cones(
     levels: NDArray[np.uint8],
     ends: NDArray[np.uint8],

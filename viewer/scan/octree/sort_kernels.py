@@ -6,9 +6,9 @@ Each lets other threads go on. Imported where points are sorted, as numba takes 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from .compiled import compiled
 from .octree import DEEPEST
 
 BUCKET_BITS = 12  # of a code: the first four levels
@@ -20,7 +20,7 @@ _FEW = 16  # codes that insertion sorts fastest
 _DIGIT = 9  # bits that a larger bucket is divided by at most
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def widen(positions: NDArray[np.float32], low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
     """Make low and high, (3,) each, hold all positions (N, 3)."""
     for i in range(len(positions)):
@@ -29,7 +29,7 @@ def widen(positions: NDArray[np.float32], low: NDArray[np.float64], high: NDArra
             high[axis] = max(high[axis], positions[i, axis])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _spread(cell: np.uint64) -> np.uint64:
     """The 21 bits of a coordinate, two zeros between each and the next."""
     cell = (cell | cell << np.uint64(32)) & np.uint64(0x1F00000000FFFF)
@@ -39,7 +39,7 @@ def _spread(cell: np.uint64) -> np.uint64:
     return (cell | cell << np.uint64(2)) & np.uint64(0x1249249249249249)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def encode(
     positions: NDArray[np.float32],
     steps_per_unit: float,
@@ -63,7 +63,7 @@ def encode(
             counts[codes[start + i] >> _BUCKET_SHIFT] += 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_buckets(
     unsorted: NDArray[np.uint64],
     first_row: int,
@@ -79,7 +79,7 @@ def fill_buckets(
         codes[place], rows[place] = unsorted[i], first_row + i
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def sort_buckets(codes: NDArray[np.uint64], rows: NDArray[np.uint32], starts: NDArray[np.int64]) -> None:
     """Sort each bucket's codes, and the rows with them; equal codes keep their order.
 
@@ -104,7 +104,7 @@ def sort_buckets(codes: NDArray[np.uint64], rows: NDArray[np.uint32], starts: ND
                 count = _divide(codes, rows, begin, end, spare_codes, spare_rows, ends, waiting, count)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _insertion_sort(codes: NDArray[np.uint64], rows: NDArray[np.uint32]) -> None:
     for i in range(1, len(codes)):
         code, row = codes[i], rows[i]
@@ -115,7 +115,7 @@ def _insertion_sort(codes: NDArray[np.uint64], rows: NDArray[np.uint32]) -> None
         codes[place], rows[place] = code, row
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _first_digit(codes: NDArray[np.uint64]) -> tuple[np.uint64, int]:
     """Where the highest bits that differ begin, and how many of them to divide by; 0: codes are equal."""
     differing = np.uint64(0)
@@ -131,7 +131,7 @@ def _first_digit(codes: NDArray[np.uint64]) -> tuple[np.uint64, int]:
     return shift, bits if differing else 0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _divide(
     codes: NDArray[np.uint64],
     rows: NDArray[np.uint32],
@@ -170,7 +170,7 @@ def _divide(
     return count
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def apart(
     first: NDArray[np.uint64],
     second: NDArray[np.uint64],
@@ -193,7 +193,7 @@ def apart(
         histogram[level] += 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def count_distinct(
     positions: NDArray[np.float32],
     rows: NDArray[np.uint32],

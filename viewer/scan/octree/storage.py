@@ -22,6 +22,7 @@ from .octree import DEEPEST, Attributes, Octree
 
 MAGIC = b"\x8dSVO"
 VERSION = 1
+_FREE = 1 << 22  # nodes of any tree: some 300 MB as points
 MOST_BEFORE = 255  # trees that have to be read before one
 
 _PACKED, _COLORS, _NORMALS = 1, 2, 4  # bits of `Header.flags`
@@ -113,6 +114,8 @@ def to_bytes(
     kind = (_PACKED * packed | _kinds(octree), chain if told else 0, told)
     cube = (octree.low, octree.edge)
     header = Header(*kind, time, *cube, octree.points, octree.distinct, unit, levels)
+    if packed and _are_too_many(int(octree.counts.sum()), header.stored):
+        return to_bytes(octree, time=time, unit=unit, packed=False)
     return header.to_bytes() + b"".join(above + own for above, own in blocks)
 
 
@@ -123,6 +126,9 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     Raises InputError where bytes are missing or damaged.
     """
     header, size = read_header(data)
+    whole = [level.nodes for level, _ in zip(header.levels, _whole_levels(header, data[size:]), strict=False)]
+    if _are_too_many(sum(whole), len(data)):
+        raise InputError(f"says that {len(data):,} bytes hold {sum(whole):,} octants, which is too many")
     if header.before and (previous is None or not _same_cube(header, previous)):
         raise InputError("is told by the octree before it, which is missing")
     told = previous.masks if header.before and previous is not None else ()
@@ -176,6 +182,12 @@ def _is_possible(header: Header) -> bool:
         and header.levels[0].masks == 0
         and (header.before > 0) == (header.told > 0)
     )
+
+
+def _are_too_many(nodes: int, stored: int) -> bool:
+    """Whether nodes would take far more memory than what is stored of them: such trees are stored as they
+    are, and bytes that promise one are refused."""
+    return nodes > max(_FREE, coding.MOST_RATIO * stored)
 
 
 def _same_cube(one: Octree | Header, other: Octree) -> bool:

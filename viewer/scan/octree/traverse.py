@@ -138,6 +138,11 @@ class Traversal:
         self._rooms: dict[tuple[str, int], _Nodes] = {}
         self.look(sight)
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the memory that it works in."""
+        return sum(room.places.nbytes + room.indices.nbytes for room in self._rooms.values())
+
     def look(self, sight: Sight) -> None:
         """Begin anew, with another view."""
         self._eye = np.asarray(sight.eye, np.float64) - self.octree.low

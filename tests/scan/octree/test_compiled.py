@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+KERNEL = """
+from viewer.scan.octree.compiled import compiled
+
+@compiled
+def twice(number):
+    return 2 * number
+"""
+
+
+def run(folder: Path, cache: Path | None, limit: str = "") -> tuple[int, int]:
+    """(what twice(21) is, how often it was found on disk) in a process of its own."""
+    script = f"{limit}\nimport kernel\nprint(kernel.twice(21), sum(kernel.twice.stats.cache_hits.values()))"
+    paths = os.pathsep.join([str(folder), str(Path(__file__).parents[3])])
+    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"NUMBA_CACHE_DIR": str(cache or "")}
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    result, hits = done.stdout.split()
+    return int(result), int(hits)
+
+
+def written(tmp_path: Path) -> tuple[Path, Path]:
+    """(folder of a module with a compiled function, a folder to keep the result in)."""
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    (tmp_path / "cache").mkdir()
+    return tmp_path, tmp_path / "cache"
+
+
+def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
+    folder, cache = written(tmp_path)
+    assert run(folder, cache) == (42, 0)
+    assert run(folder, cache) == (42, 1)
+
+
+def test_damaged_files_are_made_anew(tmp_path: Path) -> None:
+    folder, cache = written(tmp_path)
+    run(folder, cache)
+    for suffix in ("nbi", "nbc"):
+        for file in cache.rglob(f"*.{suffix}"):
+            file.write_bytes(file.read_bytes()[:20])
+        assert run(folder, cache) == (42, 0)
+        assert run(folder, cache) == (42, 1)
+
+
+def test_a_full_disk_only_costs_time(tmp_path: Path) -> None:
+    folder, cache = written(tmp_path)
+    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))"
+    assert run(folder, cache, full) == (42, 0)
+    assert run(folder, cache) == (42, 0)  # nothing half-written was kept
+
+
+def test_folders_that_cannot_be_written_only_cost_time(tmp_path: Path) -> None:
+    folder, _ = written(tmp_path)
+    nowhere = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"  # none that can be written
+    assert run(folder, None, nowhere) == (42, 0)
