@@ -100,7 +100,7 @@ def test_levels_have_time_and_error() -> None:
     first, second = lines(page([measured()]), "6")
     assert first[:5] == ["`demo`", "octants", "a card", "6", "4.00"]
     assert first[5:] == ["8.00", "0.250", "1.50", "2.00", "4.00", "6.00", "30.0"]
-    assert second[:4] == ["`demo`", "at least 0.4 splats", "a card", "6"]
+    assert second[:4] == ["`demo`", "closed", "a card", "6"]
     assert lines(page([measured()]), "7")[0][:4] == ["", "", "", "7"]
 
 
