@@ -283,7 +283,7 @@ def test_very_many_splats_in_one_pixel_stay_in_range(draw: Draw) -> None:
 
 
 def test_large_splats_are_blended_by_the_rasteriser(draw: Draw) -> None:
-    cloud = sphere(300)
+    cloud = sphere(100)
     camera, size = Camera(eye=(0.3, 0.5, 1.5), fov_y=60), (480, 360)
     tiles, quads = (
         surfels(draw, cloud, camera, size, instancing=name, passes="two") for name in ("tiles", "gs")

@@ -22,7 +22,7 @@ from .surface import Surface
 TILE = 8  # pixels of a tile's edge
 _MOST_TILES = 2048  # along an edge of the picture: what bin.comp's words have bits for
 _DISC_BYTES = 16  # of a point in each of two buffers
-_LARGE_TILES = 31 * 31  # a disc that covers more is rasterised
+_LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
 # Entries of one tile's list: llvmpipe ends all loops of an invocation after 65 535 turns, and a pass may go
 # over its list twice; on hardware a pixel alone with so many would be slow.
@@ -179,7 +179,7 @@ def tile_lists(points: Points, surface: Surface, side: int = ALL, **uniforms: An
         lists = surface.keep("tiles", lambda: TileLists(surface.gpu, surface.size))
         if not lists.fill(points, side, **uniforms):
             reason = f"too long lists, {lists.length:,} entries"
-        elif lists.large * _LARGE_TILES > lists.length:
+        elif lists.large * _LARGE_COST > lists.length:
             reason = f"{lists.large:,} large splats"
     if reason:
         surface.stats.skipped["tiles"] = f"{reason}: all rasterised"
