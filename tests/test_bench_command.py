@@ -46,6 +46,7 @@ def mesh(tmp_path: Path) -> Path:
     return write_ply(tmp_path / "ball.ply")
 
 
+@pytest.mark.slow
 def test_a_mesh_of_ones_own_is_measured_reported_and_compared(run: Run, mesh: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     scenes = ("--scene", mesh, "--suite", "scenes")
