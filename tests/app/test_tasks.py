@@ -121,7 +121,7 @@ def told(tasks: str) -> dict[str, int]:
 
 
 def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
-    person.press("b")  # points, which break apart
+    person.press("shift", "b")  # points, which break apart
     person.app.expect("with points")
     for _ in FACES:
         before = person.look()
@@ -137,7 +137,7 @@ def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
         person.task = "A3"
         person.press("b")
         assert holes(person.look().surface()) < 1e-4
-        person.press("b")
+        person.press("shift", "b")
         assert holes(person.look().surface()) == broken
         person.task = "A4"
         person.turn_wheel(-18)

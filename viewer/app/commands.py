@@ -257,7 +257,8 @@ _TOOLS = Menu("Tools", (
     _MEASURING,
     (
         Listing("Renderer", _renderers),
-        Command("backend", "Next renderer", lambda app: app.rendering.choose_next(), "B"),
+        Command("backend", "Next renderer", lambda app: app.rendering.step(1), "B"),
+        Command("backend_before", "Renderer before", lambda app: app.rendering.step(-1), "Shift+B"),
         _LEVELS,
     ),
     (_PLAYBACK,),

@@ -27,11 +27,11 @@ class Rendering:
         """Draw with a backend."""
         self._app.session.backend = name
 
-    def choose_next(self) -> None:
-        """Draw with the next backend."""
+    def step(self, by: int) -> None:
+        """Draw with the next backend, 1, or the one before, -1."""
         if self.backend is not None:
             names = list(backends())
-            self.choose(names[(names.index(self.backend) + 1) % len(names)])
+            self.choose(names[(names.index(self.backend) + by) % len(names)])
 
     @property
     def _params(self) -> Any:
