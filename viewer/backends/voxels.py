@@ -85,12 +85,12 @@ class Params:
         1.0, "Octants whose edge is less are drawn in place of what they hold, pixels", low=0.25, high=64.0
     )
     least: float = param(
-        1.0,
+        1.25,
         "Least edge of a cube, in edges of the smallest octant around it that touches others: what closes "
         "the surface where octants lie apart; 0: as large as octants",
         low=0.0,
         high=10.0,
-        sweep=(0.0, 1.0),
+        sweep=(0.0, 1.25),
     )
     normals: str = param(
         "auto",
