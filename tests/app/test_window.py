@@ -301,6 +301,7 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(hands: RunningApp) ->
     assert difference(Screenshot(hands).pixels, before.pixels) == 0
 
 
+@pytest.mark.slow
 def test_a_recording_holds_what_was_shown_and_is_drawn_again(
     screen: Screen, tmp_path: Path, data_dir: Path
 ) -> None:

@@ -106,6 +106,7 @@ def keys_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("keys_file")
+@pytest.mark.slow
 def test_exact_distances_that_follow_their_points_are_undone_and_saved(
     screen: Screen, tmp_path: Path
 ) -> None:
