@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -237,7 +236,7 @@ class Voxels:
         """The nodes of a cut as points, their radii being half of the cubes' edges."""
         rows = cut.gather(self.octree, "rows")
         unlike = _unlike(self.octree, cut, pose.cloud.origin)
-        closing = np.ldexp(np.float32(self.octree.edge / 2), -self._closing_of(cut))
+        closing = np.ldexp(np.float32(self.octree.edge / 2), -cut.pick(self._closing).astype(np.int32))
         cloud = PointCloud(
             positions=cut.centers,
             origin=pose.cloud.origin,
@@ -249,12 +248,6 @@ class Voxels:
             ids=cut.numbers(self.octree),  # in the cut's order, near first: no row is looked for by them
         )
         return _Shown(cut, GpuPose(self._gpu, cloud), rows)
-
-    def _closing_of(self, cut: Cut) -> NDArray[np.int32]:
-        """(n,): the level of the octants that a node is drawn as large as."""
-        borders = np.flatnonzero(np.diff(cut.level, prepend=255, append=255)).tolist()
-        parts = [self._closing[cut.level[a]][cut.index[a:b]] for a, b in pairwise(borders)]
-        return np.concatenate([np.empty(0, np.int32), *parts]).astype(np.int32)
 
 
 def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:

@@ -31,7 +31,7 @@ def leaf_points(octree: Octree) -> PointCloud:
             return None
         return np.concatenate([getattr(octree.attributes[level], name)[leaves[level]] for level in levels])
 
-    touching = touching_levels(octree)
+    touching = _touching_levels(octree)
     found = np.concatenate([touching[level][leaves[level]] for level in levels]).astype(np.int32)
     found = _not_much_coarser(found)
     return PointCloud.from_arrays(
@@ -45,14 +45,14 @@ def leaf_points(octree: Octree) -> PointCloud:
 def closing_levels(octree: Octree) -> list[Bytes]:
     """For each level, (n,): the level of the octant around each node that is as large as the gaps beside it:
     nodes that are drawn so large close the surface, however small they are themselves."""
-    return [_not_much_coarser(found) for found in touching_levels(octree)]
+    return [_not_much_coarser(found) for found in _touching_levels(octree)]
 
 
 def _not_much_coarser(found: NDArray) -> NDArray:
     return np.maximum(found, max(int(np.median(found)) - _MOST_COARSER, 0)) if len(found) else found
 
 
-def touching_levels(octree: Octree) -> list[Bytes]:
+def _touching_levels(octree: Octree) -> list[Bytes]:
     """For each level, (n,): the deepest level at which a node, or one around it, touches enough others."""
     neighbors = Neighbors(int(octree.counts[0]))
     levels = [np.zeros(int(octree.counts[0]), np.uint8)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -77,12 +78,15 @@ class Cut:
 
     def gather(self, octree: Octree, name: str) -> NDArray:
         """(n, ...): an attribute of the nodes by its name, which the tree has."""
+        return self.pick([getattr(level, name) for level in octree.attributes])
+
+    def pick(self, values: Sequence[NDArray]) -> NDArray:
+        """(n, ...): of values of all nodes, level by level, those of the nodes of the cut."""
         borders = np.flatnonzero(np.diff(self.level, prepend=255, append=255))
         parts = [
-            np.take(getattr(octree.attributes[self.level[a]], name), self.index[a:b], axis=0)
-            for a, b in pairwise(borders.tolist())
+            np.take(values[self.level[a]], self.index[a:b], axis=0) for a, b in pairwise(borders.tolist())
         ]
-        return np.concatenate(parts) if parts else getattr(octree.attributes[0], name)[:0]
+        return np.concatenate(parts) if parts else values[0][:0]
 
 
 @dataclass(frozen=True, eq=False)
