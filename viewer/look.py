@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -64,6 +64,13 @@ def value_source(look: Look, cloud: PointCloud) -> str | None:
     if look.color_by not in cloud.scalars:
         raise unknown_name("colour source", look.color_by, [*COLOR_BY, *cloud.scalars])
     return look.color_by
+
+
+def drawable(look: Look, cloud: PointCloud) -> Look:
+    """The look where the cloud has what it colours by, else with colours of its own choice: frames of one
+    scan may differ in their scalars."""
+    has_source = look.color_by in COLOR_BY or look.color_by in cloud.scalars
+    return look if has_source else replace(look, color_by="auto")
 
 
 def wants_normals(look: Look) -> bool:
