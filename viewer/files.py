@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import InputError
 
@@ -29,6 +32,28 @@ def whole_file(path: Path | str) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink()
+
+
+def open_plain(path: Path | str) -> BinaryIO:
+    """A file, open for reading bytes. Raises OSError, also where it is a folder, a device or a pipe.
+
+    None of these is waited for or read from.
+    """
+    waiting = getattr(os, "O_NONBLOCK", 0)  # without it, opening a pipe waits for a writer
+    stream = open(path, "rb", opener=lambda name, flags: os.open(name, flags | waiting))
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        stream.close()
+        raise OSError(errno.EINVAL, "Is not a plain file", str(path))
+    return stream
+
+
+def read_text(path: Path | str, most_bytes: int) -> str:
+    """The text of a plain file in UTF-8, at most so many bytes of it. Raises OSError, UnicodeDecodeError."""
+    with open_plain(path) as stream:
+        data = stream.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise OSError(errno.EFBIG, f"Is longer than {most_bytes:,} bytes", str(path))
+    return data.decode("utf-8")
 
 
 def user_folder() -> Path:
