@@ -34,17 +34,17 @@ def whole_file(path: Path | str) -> Iterator[Path]:
             temporary.unlink()
 
 
-def open_plain(path: Path | str) -> BinaryIO:
+@contextmanager
+def open_plain(path: Path | str) -> Iterator[BinaryIO]:
     """A file, open for reading bytes. Raises OSError, also where it is a folder, a device or a pipe.
 
     None of these is waited for or read from.
     """
     waiting = getattr(os, "O_NONBLOCK", 0)  # without it, opening a pipe waits for a writer
-    stream = open(path, "rb", opener=lambda name, flags: os.open(name, flags | waiting))
-    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-        stream.close()
-        raise OSError(errno.EINVAL, "Is not a plain file", str(path))
-    return stream
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | waiting)) as stream:
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "Is not a plain file", str(path))
+        yield stream
 
 
 def read_text(path: Path | str, most_bytes: int) -> str:
