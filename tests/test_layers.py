@@ -23,6 +23,8 @@ LAYERS = (
         "marks",
         "task",
         "helper",
+        "signals",
+        "unfinished",
         "scan",
     },
     {"gpu"},

@@ -13,6 +13,7 @@ from typing import NoReturn
 
 from .errors import InputError, Scan4DError
 from .geometry import up_vector
+from .signals import ending_as_interrupts
 
 COMMANDS = ("view", "render", "info", "convert", "simulate", "bench", "backends", "doctor")
 
@@ -33,7 +34,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = list(sys.argv[1:] if argv is None else argv)
     try:
-        code = _run(argv)
+        with ending_as_interrupts():
+            code = _run(argv)
         sys.stdout.flush()  # here, where it is noticed that nobody reads it
         return code
     except SystemExit as stop:  # --help

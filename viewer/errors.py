@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import re
+
 
 class Scan4DError(Exception):
     """Base of all errors that are shown to a user without a traceback.
@@ -38,3 +41,34 @@ class NoOpenGLError(Scan4DError):
 def unknown_name(kind: str, name: str, known: list[str] | tuple[str, ...]) -> InputError:
     """The error for a name that is not one of `known`; it lists them all."""
     return InputError(f"unknown {kind} '{name}'", hint=f"Known: {', '.join(sorted(known))}")
+
+
+_PERMISSION = "permission denied", "Check the permissions of the file and of its folder"
+_FULL = "the disk is full", "Make room, or use another disk"
+_SYSTEM = {
+    errno.EACCES: _PERMISSION,
+    errno.EPERM: _PERMISSION,
+    errno.ENOSPC: _FULL,
+    getattr(errno, "EDQUOT", errno.ENOSPC): _FULL,  # a share of it
+    errno.EFBIG: ("larger than a file may be here", "Use another disk"),
+    errno.EROFS: ("its file system is read-only", "Use another folder"),
+    errno.ENAMETOOLONG: ("its name is too long", "Use a shorter one"),
+    errno.ENOENT: ("no such file or folder", "Check its name"),
+    errno.EISDIR: ("is a folder", "Name a file in it"),
+    errno.ENOTDIR: ("a part of its path is no folder", "Check its name"),
+    errno.ELOOP: ("its links lead in a circle", "Name the file itself"),
+    errno.EMFILE: ("too many files are open", "Close other programs, or raise 'ulimit -n'"),
+    errno.ENFILE: ("too many files are open", "Close other programs"),
+    errno.ENOMEM: ("not enough memory", "Close other programs"),
+    errno.EIO: ("the disk fails to read or write it", "Copy it to another disk"),
+}
+_CUT_SHORT = re.compile(r"[0-9]+ requested and [0-9]+ written")  # all that numpy tells of a full disk
+
+
+def explained(error: OSError, hint: str | None = None) -> tuple[str, str | None]:
+    """What the system refused, and what to try: "the disk is full", "Make room, or use another disk".
+
+    hint: what to try where the cause is another one than those that are known.
+    """
+    number = errno.ENOSPC if _CUT_SHORT.match(str(error)) else error.errno
+    return _SYSTEM.get(number or 0, (error.strerror or str(error) or type(error).__name__, hint))

@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import BinaryIO
 
-from .errors import InputError
+from .errors import InputError, explained
 
 
 @contextmanager
@@ -21,17 +21,31 @@ def whole_file(path: Path | str) -> Iterator[Path]:
     Whatever goes wrong, a former file of that name stays as it was and nothing else remains.
     Raises InputError where the file cannot be written.
     """
+    from .unfinished import temporary_file  # which needs to know the cache folder
+
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
-        yield temporary
-        os.replace(temporary, path)
+        with temporary_file(path) as temporary:
+            yield temporary
+            _store(temporary)
+            os.replace(temporary, path)
+        with suppress(OSError):  # not every file system can
+            _store(path.parent)
     except OSError as error:
-        what = f"cannot be written: {error.strerror or error}"
-        raise InputError(what, path, "Check free space and permissions") from error
+        what, hint = explained(error)
+        raise InputError(f"cannot be written: {what}", path, hint) from error
+
+
+def _store(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk, so that a power cut finds them whole."""
+    is_folder = os.path.isdir(path)
+    if is_folder and os.name == "nt":  # where folders cannot be opened
+        return
+    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
     finally:
-        with suppress(OSError):
-            temporary.unlink()
+        os.close(descriptor)
 
 
 @contextmanager
