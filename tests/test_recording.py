@@ -75,10 +75,11 @@ def test_what_earlier_versions_did_not_tell_has_its_default(tmp_path: Path) -> N
     assert Recording.load(path).entries[0] == replace(FIRST, marks=Marks(), unit=None)
 
 
-def test_an_anonymous_description_tells_all_but_the_scan() -> None:
-    told, whole = (json.loads(FIRST.description(anonymous)) for anonymous in (True, False))
-    assert whole["scan"] == "knot"
-    assert told == whole | {"scan": None}
+def test_an_anonymous_description_tells_neither_scan_nor_a_unit_of_its_own() -> None:
+    told, whole = (json.loads(entry.description()) for entry in (FIRST.without_names(), FIRST))
+    assert (whole["scan"], whole["anonymous"]) == ("knot", False)
+    assert told == whole | {"scan": None, "anonymous": True}
+    assert replace(FIRST, unit="jane").without_names().unit == "units"
 
 
 def test_the_recorder_notes_what_changes_and_when() -> None:

@@ -177,21 +177,6 @@ def test_marks_are_for_pictures_that_show_the_look(suffix: str, refused: Callabl
 # --- without names --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", [".png", ".exr", ".mp4"])
-def test_an_anonymous_picture_tells_no_name(suffix: str, run: Run, folder: Path) -> None:
-    (folder / "jane_doe.npz").write_bytes((folder / "ball.npz").read_bytes())
-    scan = folder / "jane_doe.npz"
-    assert run("render", scan, *SMALL, "--anonymous", "-o", f"a{suffix}").code == 0
-    data = Path(f"a{suffix}").read_bytes()
-    assert b"jane" not in data
-    assert str(folder).encode() not in data
-    if suffix == ".mp4":
-        return
-    assert str(fingerprint([scan])).encode() in data
-    assert run("render", scan, *SMALL, "-o", f"named{suffix}").code == 0
-    assert b"jane_doe" in Path(f"named{suffix}").read_bytes()
-
-
 def test_an_anonymous_picture_is_drawn_again_when_its_scan_is_named(
     run: Run, refused: Callable[..., str]
 ) -> None:

@@ -229,6 +229,10 @@ class Camera:
         eye, target = np.array(self.eye) + shift, np.array(self.target) + shift
         return replace(self, eye=_vector(eye), target=_vector(target))
 
+    def moved(self, by: NDArray[np.float64]) -> Camera:
+        """Moved with its target along the world's axes. by: (3,) scan units."""
+        return replace(self, eye=_vector(np.add(self.eye, by)), target=_vector(np.add(self.target, by)))
+
     def zoomed(self, factor: float) -> Camera:
         """Nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
         return self.at_distance(self.distance / factor)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +28,10 @@ class Look:
     head light where it has normals, else eye-dome lighting, which needs depth alone.
     """
 
-    color_by: str = param("auto", f"What gives the colour: {', '.join(COLOR_BY)}, or a scalar's name")
+    color_by: str = param(
+        "auto",
+        f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, or #N for scalar N",
+    )
     light: str = param(
         "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
         choices=("auto", "flat", "head", "fixed"),
@@ -61,16 +66,32 @@ def value_source(look: Look, cloud: PointCloud) -> str | None:
         return look.color_by
     if look.color_by in COLOR_BY:
         return None
-    if look.color_by not in cloud.scalars:
+    if (scalar := _scalar(look, cloud)) is None:
         raise unknown_name("colour source", look.color_by, [*COLOR_BY, *cloud.scalars])
-    return look.color_by
+    return scalar
 
 
 def drawable(look: Look, cloud: PointCloud) -> Look:
     """The look where the cloud has what it colours by, else with colours of its own choice: frames of one
     scan may differ in their scalars."""
-    has_source = look.color_by in COLOR_BY or look.color_by in cloud.scalars
+    has_source = look.color_by in COLOR_BY or _scalar(look, cloud) is not None
     return look if has_source else replace(look, color_by="auto")
+
+
+def unnamed(look: Look, cloud: PointCloud) -> Look:
+    """The same look, which tells the number of the scalar that it colours by rather than its name."""
+    if look.color_by in COLOR_BY or (scalar := _scalar(look, cloud)) is None:
+        return look
+    return replace(look, color_by=f"#{[*cloud.scalars].index(scalar) + 1}")
+
+
+def _scalar(look: Look, cloud: PointCloud) -> str | None:
+    """The scalar that `color_by` names or numbers, counted from 1; None where the cloud has none such, or it
+    is called like another source."""
+    scalar, number = look.color_by, re.fullmatch("#([1-9][0-9]{0,8})", look.color_by)
+    if scalar not in cloud.scalars and number is not None:
+        scalar = next(islice(cloud.scalars, int(number[1]) - 1, None), "")
+    return scalar if scalar in cloud.scalars and scalar not in COLOR_BY else None
 
 
 def wants_normals(look: Look) -> bool:

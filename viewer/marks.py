@@ -112,8 +112,9 @@ def scale_bar(camera: Camera, size: tuple[float, float]) -> tuple[float, float]:
 
 def quantity(look: Look, unit: str) -> str:
     """The number that the look colours by, with its unit where it is a length."""
-    is_length = look.color_by in ("depth", "height")
-    return f"{look.color_by.capitalize()} ({unit})" if is_length else look.color_by
+    if look.color_by in ("depth", "height"):
+        return f"{look.color_by.capitalize()} ({unit})"
+    return "Value" if look.color_by.startswith("#") else look.color_by
 
 
 def number(value: float, span: float) -> str:

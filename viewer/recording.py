@@ -19,6 +19,8 @@ import hashlib
 import json
 import math
 import os
+import re
+import secrets
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -26,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .anonymous import anonymous_unit
 from .backends import backend as find_backend
 from .camera import Camera
 from .errors import InputError, unknown_name
@@ -43,17 +46,20 @@ from .scan.timeline import Timeline
 FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
 _TICK = 0.001  # seconds that time stamps are rounded to
-_LATER: dict[str, Any] = {"at": 0.0, "marks": {}, "unit": None}  # what earlier files lack, and pictures
+# What earlier files lack, and pictures.
+_LATER: dict[str, Any] = {"at": 0.0, "marks": {}, "unit": None, "anonymous": False}
 
 
 @dataclass(frozen=True)
 class Entry:
     """One picture that was shown: all that is needed to draw it again.
 
-    scan: as the user named it, None where that is left out. hash: of its files (see `fingerprint`), None
+    scan: as the user named it, None where it is anonymous. hash: of its files (see `fingerprint`), None
     where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
     params: the backend's own `Params`. marks: what is drawn over it. unit: of length, as marks have it;
-    None for the scan's own. at: seconds since the recording began; entries that differ in it alone are equal.
+    None for the scan's own. anonymous: whether camera, time and look are those of the scan as
+    `anonymous_request` has it. at: seconds since the recording began; entries that differ in it alone are
+    equal.
     """
 
     scan: str | None
@@ -67,13 +73,14 @@ class Entry:
     look: Look
     marks: Marks = field(default_factory=Marks)
     unit: str | None = None
+    anonymous: bool = False
     at: float = field(default=0.0, compare=False)
 
     @classmethod
     def of(
         cls,
         request: Request,
-        scan: str,
+        scan: str | None,
         hash: str | None,
         size: tuple[int, int],
         unit: str,
@@ -121,10 +128,14 @@ class Entry:
         read["marks"] = parse(Marks, read["marks"], "mark")
         return cls(**read)
 
-    def description(self, anonymous: bool = False) -> str:
-        """The JSON text that a picture carries. anonymous: with the hash of its scan, not its name."""
-        told = replace(self, scan=None) if anonymous else self
-        return json.dumps(_head() | told.to_json())
+    def without_names(self) -> Entry:
+        """What an anonymous picture tells, of a scan that is as `anonymous_request` has it."""
+        unit = None if self.unit is None else anonymous_unit(self.unit)
+        return replace(self, scan=None, unit=unit, anonymous=True)
+
+    def description(self) -> str:
+        """The JSON text that a picture carries."""
+        return json.dumps(_head() | self.to_json())
 
 
 @dataclass(frozen=True)
@@ -201,13 +212,17 @@ class Recorder:
         return round(now - self._began, 3)
 
 
-def fingerprint(files: Sequence[Path]) -> str | None:
+def fingerprint(files: Sequence[Path], salt: str | None = None) -> str | None:
     """A hash that tells whether a scan is still the same: its kind, and 16 hex digits of a SHA-256.
 
     "sha256:" is of the bytes of a single file, as sha256sum gives it; "files:" is of the names and sizes of
-    several files, or of one above 256 MiB. None where there are no files, or they cannot be read.
+    several files, or of one above 256 MiB. With a salt, which stands before it, "salted:" is of sizes and
+    bytes, of large files at both ends: names cannot be guessed from it, and two pictures of one scan have
+    nothing in common. None where there are no files, or they cannot be read.
     """
     try:
+        if salt is not None:
+            return _salted(files, salt) if files else None
         if len(files) == 1 and os.path.getsize(files[0]) <= _HASHED_BYTES:
             with open(files[0], "rb") as stream:
                 return f"sha256:{hashlib.file_digest(stream, 'sha256').hexdigest()[:16]}"
@@ -215,6 +230,29 @@ def fingerprint(files: Sequence[Path]) -> str | None:
     except OSError:
         return None
     return f"files:{hashlib.sha256(listed.encode()).hexdigest()[:16]}" if files else None
+
+
+def new_salt() -> str:
+    """A salt for the hashes of anonymous pictures, 16 hex digits by chance."""
+    return secrets.token_hex(8)
+
+
+def fingerprint_as(known: str | None, files: Sequence[Path]) -> str | None:
+    """The hash of files in the way that a known one was made."""
+    salted = re.fullmatch("salted:([0-9a-f]{16}):[0-9a-f]{16}", known or "")
+    return fingerprint(files, salted[1] if salted else None)
+
+
+def _salted(files: Sequence[Path], salt: str) -> str:
+    digest = hashlib.sha256(salt.encode())
+    most = _HASHED_BYTES // len(files) // 2  # at either end
+    for file in files:
+        with open(file, "rb") as stream:
+            size = os.fstat(stream.fileno()).st_size
+            digest.update(f"{size} ".encode() + stream.read(most))
+            stream.seek(max(size - most, stream.tell()))
+            digest.update(stream.read(most))
+    return f"salted:{salt}:{digest.hexdigest()[:16]}"
 
 
 def is_recording(path: Path) -> bool:

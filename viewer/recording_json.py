@@ -75,6 +75,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "look": (_object, "a look"),
     "marks": (_object, "marks by name"),
     "unit": (lambda value: value is None or _word(value), "a unit"),
+    "anonymous": (lambda value: isinstance(value, bool), "true or false"),
     "at": (_stamp, "a time within a day, in seconds"),
     "seconds": (_stamp, "a time within a day, in seconds"),
 }

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..anonymous import anonymous_request
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError
@@ -25,7 +26,7 @@ from ..frame import Request, choose
 from ..look import Look
 from ..marks import MARKS, Legend, marks_of
 from ..params import parse
-from ..recording import Entry, fingerprint
+from ..recording import Entry, fingerprint, new_salt
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
@@ -50,7 +51,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--anonymous", action="store_true",
-        help="pictures tell the hash of their scan, and neither its name nor its path",
+        help="pictures do not tell which scan they show, where it was and when",
     )  # fmt: skip
     parser.add_argument(
         "--progress", action="store_true", help="say what is drawn on standard output, a line of JSON a step"
@@ -119,12 +120,16 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         shots = drawing.shots(indices, args.turntable)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
         fps = drawing.film_rate(timeline, indices, args.fps)
-        hash = fingerprint(timeline.files) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
+        salt = new_salt() if args.anonymous else None
+        hash = fingerprint(timeline.files, salt) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
         marks = marks_of(args.marks)
 
         def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
             for shot, request in _requests(args, timeline, shots, size, look, values):
+                if args.anonymous:
+                    request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
+                entry = entry.without_names() if args.anonymous else entry
                 yield shot.number, request, entry, entry.legend(timeline)
 
         yield Plan(len(shots), size, fps, pictures())
@@ -148,7 +153,7 @@ def _draw(plan: Plan, args: Namespace) -> None:
                 draw(renderer, request, surface)
                 tick()
             drawn = request
-            put(surface, number, entry.description(args.anonymous), legend)
+            put(surface, number, entry.description(), legend)
         if args.stats:
             _write_json(stats.summary(renderer, surface, request, frames), args.stats)
 

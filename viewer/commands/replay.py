@@ -9,11 +9,12 @@ from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from ..anonymous import anonymous_pose, anonymous_request
 from ..errors import InputError
 from ..export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
 from ..frame import Request
 from ..marks import Legend, marks_of
-from ..recording import Entry, Recording, fingerprint, places_of
+from ..recording import Entry, Recording, fingerprint, fingerprint_as, new_salt, places_of
 from ..scan.open import DEMO, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS
@@ -70,17 +71,18 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
     """
     timeline: Timeline | None = None
     opened, source, failed, drawn = None, None, None, False
+    salt = new_salt() if args.anonymous else None
     try:
         for number, entry in enumerate(entries):
             if timeline is None or (entry.scan, entry.hash) != opened:
                 if timeline is not None:
                     timeline.close()
-                found, timeline, hash = _scan_of(entry, args)
+                found, timeline, hash = _scan_of(entry, args, salt)
                 opened = entry.scan, entry.hash
             if entry is not source:
                 source = entry
                 try:
-                    request, failed = entry.request(timeline.pose(entry.pose)), None
+                    request, failed = _request(entry, args, timeline), None
                 except InputError as error:
                     if not _may_be_left_out(entry, timeline, entries):
                         raise
@@ -88,7 +90,7 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
                         warn(f"{timeline.name}: frame {entry.pose} is left out: {error}")
                     failed = error
                 else:
-                    shown = _completed(entry, args, found, hash, timeline)
+                    shown = _completed(entry, request, args, found, hash, timeline)
             if failed is None:
                 drawn = True
                 yield number, request, shown, shown.legend(timeline)
@@ -99,10 +101,29 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
             timeline.close()
 
 
-def _completed(entry: Entry, args: Namespace, scan: str, hash: str | None, timeline: Timeline) -> Entry:
-    """The entry with what is known by now, and with the marks and the unit that the arguments tell."""
+def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
+    """The picture of an entry, anonymous where it or the arguments are. Raises InputError."""
+    pose, start = timeline.pose(entry.pose), float(timeline.times[0])
+    if entry.anonymous:
+        return entry.request(anonymous_pose(pose, start))
+    request = entry.request(pose)
+    return anonymous_request(request, start) if args.anonymous else request
+
+
+def _completed(
+    entry: Entry, request: Request, args: Namespace, scan: str, hash: str | None, timeline: Timeline
+) -> Entry:
+    """The entry with what is known by now, and with the marks and the unit that the arguments tell.
+
+    What is anonymous stays so.
+    """
     marks = entry.marks if args.marks is None else marks_of(args.marks)
-    return replace(entry, scan=scan, hash=hash, marks=marks, unit=args.unit or entry.unit or timeline.unit)
+    unit = args.unit or entry.unit or timeline.unit
+    shown = replace(entry, scan=scan, hash=hash, marks=marks, unit=unit)
+    if not (entry.anonymous or args.anonymous):
+        return shown
+    time = float(request.pose.time)
+    return replace(shown, time=time, camera=request.camera, look=request.look).without_names()
 
 
 def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:
@@ -110,10 +131,11 @@ def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry])
     return entry.pose in timeline.broken and any(other.pose != entry.pose for other in entries)
 
 
-def _scan_of(entry: Entry, args: Namespace) -> tuple[str, Timeline, str | None]:
+def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Timeline, str | None]:
     """The scan of an entry: how it was found, opened, and its hash.
 
-    Raises InputError where it is unusable, or where the one that was named is another one.
+    salt: of the hash where what is drawn is made anonymous. Raises InputError where it is unusable, or where
+    the one that was named is another one.
     """
     if args.scan is not None:
         found, timeline = args.scan, open_scan(args.scan)
@@ -122,14 +144,14 @@ def _scan_of(entry: Entry, args: Namespace) -> tuple[str, Timeline, str | None]:
         raise InputError("does not tell its scan", args.replay, hint)
     else:
         found, timeline = _open(entry.scan, args.replay)
-    hash = fingerprint(timeline.files)
+    hash = fingerprint_as(entry.hash, timeline.files)
     if None not in (hash, entry.hash) and hash != entry.hash:
         if args.scan is not None:
             timeline.close()
             what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
             raise InputError(what, found, "Name that one, as it was")
         warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
-    return found, timeline, hash
+    return found, timeline, hash if salt is None or entry.anonymous else fingerprint(timeline.files, salt)
 
 
 def _open(scan: str, path: Path) -> tuple[str, Timeline]:
