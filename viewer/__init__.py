@@ -2,21 +2,44 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-from .camera import Camera
-from .errors import Scan4DError
-from .look import Look
-from .scan.open import open_scan
-from .scan.points import PointCloud
-from .scan.pose import Pose
-from .scan.range_view import RangeView
-
+TYPE_CHECKING = False  # as `typing` has it, which takes its time to import
 if TYPE_CHECKING:
+    from typing import Any
+
+    from .camera import Camera
+    from .errors import Scan4DError
     from .gpu.surface import Surface
+    from .look import Look
+    from .scan.open import open_scan
+    from .scan.points import PointCloud
+    from .scan.pose import Pose
+    from .scan.range_view import RangeView
 
 __version__ = "0.1.0"
 __all__ = ["Camera", "Look", "PointCloud", "Pose", "RangeView", "Scan4DError", "open_scan", "render"]
+
+_HOMES = {
+    "Camera": "camera",
+    "Look": "look",
+    "PointCloud": "scan.points",
+    "Pose": "scan.pose",
+    "RangeView": "scan.range_view",
+    "Scan4DError": "errors",
+    "open_scan": "scan.open",
+}
+
+
+def __getattr__(name: str) -> object:
+    """What the package gives, imported when it is first used.
+
+    So the command line, which is in this package, is there to take an interrupt before anything else is.
+    """
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    from importlib import import_module
+
+    globals()[name] = found = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return found
 
 
 def render(

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import errno
 import re
+import reprlib
+from collections.abc import Iterable
+
+_SHOWN = 80  # characters of a value that a message shows
 
 
 class Scan4DError(Exception):
@@ -38,9 +42,25 @@ class NoOpenGLError(Scan4DError):
     exit_code = 3
 
 
-def unknown_name(kind: str, name: str, known: list[str] | tuple[str, ...]) -> InputError:
-    """The error for a name that is not one of `known`; it lists them all."""
-    return InputError(f"unknown {kind} '{name}'", hint=f"Known: {', '.join(sorted(known))}")
+def unknown_name(kind: str, name: str, known: Iterable[str]) -> InputError:
+    """The error for a name that is not one of `known`; it tells which are close to it, and lists them all."""
+    known = sorted(known)
+    hint = f"{did_you_mean(name, known)}Known: {', '.join(known)}"
+    return InputError(f"unknown {kind} '{shortened(name)}'", hint=hint)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A question that names what is close to a name, "Did you mean 'points'? "; empty where nothing is."""
+    import difflib  # 3 ms
+
+    close = difflib.get_close_matches(name[:_SHOWN], list(known), n=2)
+    return f"Did you mean {' or '.join(map(repr, close))}? " if close else ""
+
+
+def shortened(value: object) -> str:
+    """A value as messages show it, whatever it is: long ones are cut."""
+    text = value if isinstance(value, str) else reprlib.repr(value)
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 
 _PERMISSION = "permission denied", "Check the permissions of the file and of its folder"

@@ -1,25 +1,67 @@
-"""What a command says while it works: warnings and progress, on standard error."""
+"""What a command says while it works: results on standard output; warnings and progress on standard error.
+
+Control characters that files and names bring are shown as \\x1b, and do nothing to a terminal.
+"""
 
 from __future__ import annotations
 
 import json
+import os
+import re
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
+from typing import Any, TextIO
+
+from ..errors import Scan4DError, explained
+
+# What ends lines or moves, colours or turns round what stands there; and surrogates, which nothing can show.
+_CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+_is_quiet = False
+
+
+def plain(text: str, keep: str = "") -> str:
+    """The text with its control characters escaped, but for those to keep."""
+    return _CONTROLS.sub(lambda found: found[0] if found[0] in keep else repr(found[0])[1:-1], text)
 
 
 def warn(text: str) -> None:
-    """One line on standard error, above a progress bar if there is one."""
-    if "tqdm" in sys.modules:
-        sys.modules["tqdm"].tqdm.write(f"scan4d: {text}", file=sys.stderr)
-    else:
-        print(f"scan4d: {text}", file=sys.stderr)
+    """One line on standard error, above a progress bar if there is one; none under --quiet."""
+    if not _is_quiet:
+        complain(f"scan4d: {plain(text)}")
+
+
+def complain(text: str) -> None:
+    """Text on standard error, above a progress bar if there is one. Where nobody can read it, it is lost."""
+    text = plain(text, keep="\n")
+    with suppress(OSError):
+        if "tqdm" in sys.modules:
+            sys.modules["tqdm"].tqdm.write(text, file=sys.stderr)
+        else:
+            print(text, file=sys.stderr)
+
+
+def tell(*lines: object) -> None:
+    """Lines on standard output, at once: what was written, or will take how long. None under --quiet."""
+    if not _is_quiet:
+        print(*lines, sep="\n", flush=True)
 
 
 def say(**values: object) -> None:
     """One line of JSON on standard output, at once."""
     print(json.dumps(values), flush=True)
+
+
+@contextmanager
+def quietly(is_quiet: bool) -> Iterator[None]:
+    """Meanwhile there are no warnings, no progress and nothing to `tell`, if so."""
+    global _is_quiet
+    before, _is_quiet = _is_quiet, is_quiet
+    try:
+        yield
+    finally:
+        _is_quiet = before
 
 
 @contextmanager
@@ -32,10 +74,47 @@ def progress(total: int, as_lines: bool = False) -> Iterator[Callable[[], object
         steps = count(1)
         yield lambda: say(drawn=next(steps), of=total)
         return
-    if not sys.stderr.isatty():
+    if _is_quiet or not sys.stderr.isatty():
         yield lambda: None
         return
     from tqdm import tqdm
 
     with tqdm(total=total, delay=1, leave=False) as bar:
         yield bar.update
+
+
+class ReaderGone(Exception):
+    """Nobody reads standard output any more, which is no failure to speak of."""
+
+
+class PlainOutput:
+    """Standard output as commands print to it: with control characters escaped.
+
+    Where it cannot be written it raises Scan4DError or ReaderGone, once; later output goes nowhere, so that
+    Python does not complain of it at its end.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """As of a stream."""
+        return self._do(lambda: self._stream.write(plain(text, keep="\n")))
+
+    def flush(self) -> None:
+        """As of a stream."""
+        self._do(self._stream.flush)
+
+    def _do(self, action: Callable[[], Any]) -> Any:
+        try:
+            return action()
+        except OSError as error:
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+            if isinstance(error, BrokenPipeError):
+                raise ReaderGone from error
+            what, hint = explained(error)
+            raise Scan4DError(f"cannot be written: {what}", "standard output", hint) from error
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
