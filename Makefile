@@ -13,7 +13,7 @@ setup: ## system libraries, and .venv with all dependencies; what is there is le
 	@tools/setup.sh
 
 run: setup ## open the demo scan, or yours: make run SCAN=path (without a display: into out/)
-	.venv/bin/scan4d view $(if $(SCAN),"$(SCAN)") --fallback out
+	.venv/bin/scan4d view $(if $(SCAN),"$(SCAN)") --fallback out --force
 
 test: setup ## the tests, without the slow ones
 	$(PYTHON) -m pytest -m "not slow"
@@ -22,7 +22,7 @@ test-all: setup ## all tests
 	$(PYTHON) -m pytest
 
 bench: setup ## run time against error, in two minutes: out/bench/report.html; all of it: make bench QUICK=
-	.venv/bin/scan4d bench $(QUICK) -o out/bench
+	.venv/bin/scan4d bench $(QUICK) -o out/bench --force
 
 lint: setup ## ruff and mypy
 	$(PYTHON) -m ruff check .

@@ -64,7 +64,9 @@ def test_a_mesh_of_ones_own_is_measured_reported_and_compared(run: Run, mesh: Pa
     }
 
     # Once more into the same folder, beside what was there.
-    done = run("bench", *scenes, *SMALL, "-o", out, "--compare", out)
+    old = tmp_path / "old.jsonl"
+    old.write_bytes((out / RESULTS).read_bytes())
+    done = run("bench", *scenes, *SMALL, "-o", out, "--compare", old, "--force")
     assert done.code == 0
     assert "worse" not in done.out
     errors = [
@@ -183,7 +185,7 @@ def test_ctrl_c_before_the_first_row_leaves_former_results(
         view(*arguments, **keywords)
 
     monkeypatch.setattr(Bench, "_view", interrupted)
-    done = run("bench", "--scene", "sphere", "--suite", "scenes", *SMALL, "-o", tmp_path)
+    done = run("bench", "--scene", "sphere", "--suite", "scenes", *SMALL, "-o", tmp_path, "--force")
     assert (done.code, done.err) == (1, "scan4d: stopped\n")
     assert (tmp_path / RESULTS).read_text() == "former\n"
     assert not (tmp_path / "report.html").exists()

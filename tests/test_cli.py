@@ -142,7 +142,7 @@ def test_orbit_and_up(
     camera = front(cloud, azimuth=azimuth, elevation=elevation, distance=distance, up=up)
     expected = viewer.render(cloud, camera, (96, 64), "surfels").image()
     assert np.array_equal(picture(tmp_path / "a.png"), expected)
-    assert run(*ball, f"--up={up}", f"--orbit={argument}").code == 0
+    assert run(*ball, f"--up={up}", f"--orbit={argument}", "--force").code == 0
     assert np.array_equal(picture(tmp_path / "a.png"), expected)
 
 
@@ -457,7 +457,7 @@ def test_no_opengl_is_code_3(run: Run, scans: Path, tmp_path: Path, monkeypatch:
 
 
 def test_the_device_is_passed_on(scans: Path, tmp_path: Path) -> None:
-    ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL)
+    ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--force")
     assert finish(process(*ball, "--device", 0)).code == 0
     done = finish(process(*ball, "--device", 99))
     assert done.code == 3
@@ -574,7 +574,7 @@ def test_convert_of_a_sequence_keeps_its_times(
         assert np.array_equal(timeline.times, np.array(indices) / 12)
         for place, index in enumerate(indices):
             assert np.array_equal(timeline.pose(place).cloud.positions, cloud_at(index).positions)
-    again = run("convert", scans / "sequence", tmp_path / "out%03d.ply", "--fps", 12, *choice)
+    again = run("convert", scans / "sequence", tmp_path / "out%03d.ply", "--fps", 12, "--force", *choice)
     assert again.code == 0
 
 

@@ -79,7 +79,7 @@ def test_a_picture_is_drawn_again_from_itself(suffix: str, choice: list[object],
 def test_pictures_of_a_turntable_are_drawn_again(run: Run) -> None:
     assert run("render", "sequence", "--pose", 1, "--turntable", 3, *SMALL, "-o", "t%d.png").code == 0
     for number in range(3):
-        assert run("render", "--replay", f"t{number}.png", "-o", "again.png").code == 0
+        assert run("render", "--replay", f"t{number}.png", "-o", "again.png", "--force").code == 0
         assert np.array_equal(picture(Path("again.png")), picture(Path(f"t{number}.png")))
 
 
@@ -104,7 +104,7 @@ def test_every_entry_of_a_recording_is_drawn_at_its_size(run: Run) -> None:
         settings = ["--set", "point_size=3"] if wanted.backend == "points" else []
         done = run(
             "render", "sequence", "--pose", wanted.pose, "--camera", "camera.json", "--size", size,
-            "--backend", wanted.backend, *settings, "--look", "color_by=height", "-o", "expected.png",
+            "--backend", wanted.backend, *settings, "--look", "color_by=height", "-o", "expected.png", "--force",
         )  # fmt: skip
         assert done.code == 0
         assert np.array_equal(pictures[number], picture(Path("expected.png"))), number
@@ -151,7 +151,7 @@ def test_a_picture_with_marks_is_drawn_again_from_itself(run: Run) -> None:
     assert exrs == [0, 0]
     with np.load("a.npz") as found, np.load("bare.npz") as expected:
         assert all(np.array_equal(bits(found[name]), bits(expected[name])) for name in expected)
-    assert run("render", "--replay", "a.exr", "-o", "again.png").code == 0
+    assert run("render", "--replay", "a.exr", "-o", "again.png", "--force").code == 0
     assert Path("again.png").read_bytes() == Path("a.png").read_bytes()
 
 

@@ -51,7 +51,7 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
 
 
 def remove_leftovers() -> None:
-    """Delete what processes that are gone have noted; nothing whose name has another form than those above."""
+    """Delete what processes that are gone have noted; nothing whose name has another form than theirs."""
     with suppress(OSError):
         for lock_file in [entry for entry in _folder().iterdir() if entry.suffix == _LOCK]:
             if lock_file != _NOTES.lock_file:

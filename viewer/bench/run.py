@@ -27,6 +27,7 @@ from ..frame import Request
 from ..gpu.surface import Surface
 from ..look import Look
 from ..renderer import Renderer
+from ..signals import Interrupts
 from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from . import baselines, numerics
 from .baselines import CEILING, FLOOR
@@ -123,6 +124,7 @@ class Bench:
         Surface(renderer.gpu, settings.size).release()  # raises before anything is traced
         self.renderer, self.settings, self.folder = renderer, settings, folder
         self.tick: Callable[[], object] = int  # called after each step
+        self.interrupts = Interrupts()  # let in while something is measured
         self.stopped = False
         self.notes: list[str] = []
         self.subject = lru_cache(maxsize=1)(settings.subject)
@@ -137,18 +139,23 @@ class Bench:
         subject = self.subject(group)
         tallies = {contender: _Tally() for contender in group.contenders}
         try:
-            for view in range(self.settings.views):
-                self._view(group, subject, view, tallies)
-            for kind, frames, walk in self._walks(group, subject):
-                for contender, tally in tallies.items():
-                    try:
-                        tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
-                    except InputError as error:
-                        self.note(f"{subject.name}: no flicker of {contender.backend}: {error}")
-                    self.tick()
+            with self.interrupts.let_in():
+                self._measure(group, subject, tallies)
         except KeyboardInterrupt:
             self.stopped = True
         return self._rows(group, subject, tallies)
+
+    def _measure(self, group: Group, subject: Subject, tallies: dict[Contender, _Tally]) -> None:
+        """Fill the tallies, view by view."""
+        for view in range(self.settings.views):
+            self._view(group, subject, view, tallies)
+        for kind, frames, walk in self._walks(group, subject):
+            for contender, tally in tallies.items():
+                try:
+                    tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
+                except InputError as error:
+                    self.note(f"{subject.name}: no flicker of {contender.backend}: {error}")
+                self.tick()
 
     def steps(self, group: Group) -> int:
         """How often measuring a group ticks."""
@@ -164,7 +171,8 @@ class Bench:
         """The rows as they are found, with a `tick` after each; Ctrl-C ends them, `stopped` is set."""
         while not self.stopped:
             try:
-                row = next(rows, None)
+                with self.interrupts.let_in():
+                    row = next(rows, None)
             except KeyboardInterrupt:
                 self.stopped = True
                 return

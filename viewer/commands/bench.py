@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib.util import find_spec
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 
 from ..backends import backend, backends
@@ -21,7 +21,7 @@ from ..bench import numerics, octree_sizes, octrees, slomp
 from ..bench.forecast import forecast
 from ..bench.plan import Group, plan
 from ..bench.report.octree_tables import write_octree_tables
-from ..bench.report.page import write_report
+from ..bench.report.page import PAGE, write_report
 from ..bench.report.results import (
     NOTES,
     NUMERICS,
@@ -36,10 +36,12 @@ from ..bench.report.results import (
 from ..bench.report.table_two import write_table_two
 from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
-from ..errors import InputError
+from ..errors import InputError, explained
 from ..files import whole_file
+from ..signals import held_interrupts
 from . import arguments, drawing
 from .console import progress, warn
+from .outputs import add_force_argument, claim
 
 _SUITES = ("scenes", "numerics", "slomp", "octrees")
 _OF_THE_PAPER = {"slomp": (slomp.groups, write_table_two), "octrees": (octrees.groups, write_octree_tables)}
@@ -64,6 +66,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         required=True,
         help="the folder of the results",
     )
+    add_force_argument(parser)
     parser.add_argument(
         "--backend", nargs="+", metavar="NAME", help="default: all; gl-points and mesh are always in"
     )
@@ -110,17 +113,20 @@ def run(args: Namespace) -> int:
     groups, missing = _groups(args, settings, names)
     tested = names if args.suite in (None, "numerics") else []
     bench = Bench(drawing.renderer(args.device), settings, args.out)
+    _claim(args, groups, bool(tested))
     _make_folder(args.out)
     for name in missing:
         warn(name)
 
     _foretell(bench, groups, tested)
-    measured = [
-        _write(args.out / RESULTS, bench, sum(map(bench.steps, groups)), _measured(bench, groups)),
-        _write(args.out / NUMERICS, bench, _lines(tested), bench.until_stopped(bench.numerics(tested))),
-    ]
-    if args.suite == "octrees":
-        measured += _octrees(args.out, bench)
+    steps = sum(map(bench.steps, groups))
+    with held_interrupts() as bench.interrupts:  # rows that are measured are written whatever happens
+        measured = [
+            _write(args.out / RESULTS, bench, steps, _measured(bench, groups)),
+            _write(args.out / NUMERICS, bench, _lines(tested), bench.until_stopped(bench.numerics(tested))),
+        ]
+        if args.suite == "octrees":
+            measured += _octrees(args.out, bench)
     if not any(measured):
         if bench.stopped:
             raise KeyboardInterrupt
@@ -134,6 +140,15 @@ def run(args: Namespace) -> int:
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
     return int(bench.stopped)
+
+
+def _claim(args: Namespace, groups: Sequence[Group], numerics: bool) -> None:
+    """Raise InputError where the folder has results that are not to be replaced."""
+    names = [*([RESULTS] if groups else []), *([NUMERICS] if numerics else []), PAGE]
+    if args.suite == "octrees":
+        names += [OCTREES, OCTREE_SIZES]
+    compared = [args.compare, args.compare / RESULTS] if args.compare else []
+    claim([args.out / name for name in names], [*compared, *map(Path, args.scene or ())], args.force)
 
 
 def _measured(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
@@ -166,7 +181,8 @@ def _octrees(out: Path, bench: Bench) -> list[bool]:
 def _write(path: Path, bench: Bench, steps: int, rows: Iterator[Row]) -> bool:
     """Write rows as they come; whether there were any.
 
-    Those of an earlier run stay where they are until there is a new one, then beside it as old-*.
+    Those of an earlier run stay where they are until there is a new one, then beside it as old-*, those
+    before as old-2-* and so on: none is lost, also where several runs were stopped.
     """
     with progress(steps) as bench.tick:
         first = next(rows, None)
@@ -174,15 +190,20 @@ def _write(path: Path, bench: Bench, steps: int, rows: Iterator[Row]) -> bool:
             return False
         try:
             if path.is_file() and path.stat().st_size:
-                path.replace(path.with_name(f"old-{path.name}"))
+                path.replace(_free_beside(path))
             with open(path, "w", encoding="utf-8") as stream:
                 for row in chain([first], rows):
                     write_row(stream, row)
         except OSError as error:
-            raise InputError(
-                f"cannot be written: {error.strerror or error}", path, "Check free space"
-            ) from error
+            what, hint = explained(error)
+            raise InputError(f"cannot be written: {what}", path, hint) from error
     return True
+
+
+def _free_beside(path: Path) -> Path:
+    """old-NAME, or old-2-NAME and so on where that is taken."""
+    names = chain([f"old-{path.name}"], (f"old-{n}-{path.name}" for n in count(2)))
+    return next(old for old in map(path.with_name, names) if not os.path.lexists(old))
 
 
 def _lines(names: Sequence[str]) -> int:
@@ -249,7 +270,8 @@ def _make_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}", out) from error
+        what, hint = explained(error)
+        raise InputError(f"cannot be written: {what}", out, hint) from error
 
 
 def _write_notes(out: Path, notes: Sequence[str]) -> None:

@@ -18,7 +18,16 @@ from ..scan.octree.build import Stop
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from .console import progress
-from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, frame_files, open_timeline, read_poses
+from .outputs import add_force_argument, claim, scan_inputs
+from .scans import (
+    SCAN_HELP,
+    add_pose_arguments,
+    chosen_poses,
+    frame_files,
+    frame_outputs,
+    open_timeline,
+    read_poses,
+)
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -26,6 +35,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     suffixes = " ".join([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
     parser.add_argument("out", metavar="OUT", type=Path, help=f"{suffixes}, or a pattern with %%04d")
+    add_force_argument(parser)
     add_pose_arguments(parser)
     group = parser.add_argument_group("octrees (.svo)").add_mutually_exclusive_group()
     group.add_argument(
@@ -43,9 +53,9 @@ def run(args: Namespace) -> int:
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
         if args.out.suffix.lower() in formats.scan_suffixes():
-            _write_scan(args.out, timeline, indices, stop)
+            _write_scan(args, timeline, indices, stop)
         else:
-            _write_frames(args.out, timeline, indices)
+            _write_frames(args, timeline, indices)
     print(args.out)
     return 0
 
@@ -62,10 +72,12 @@ def _stop(args: Namespace) -> Stop | None:
     return Stop(**told) if told else None
 
 
-def _write_scan(out: Path, timeline: Timeline, indices: Sequence[int], stop: Stop | None) -> None:
+def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], stop: Stop | None) -> None:
+    out = args.out
     check_output(out, formats.scan_suffixes(), several=False)
     if is_pattern(out):
         raise InputError("has a place for a number, and one file holds all poses", out, "Leave it out")
+    claim([out], scan_inputs(timeline), args.force)
     with progress(len(indices)) as tick:
 
         def poses() -> Iterator[Pose]:
@@ -76,10 +88,11 @@ def _write_scan(out: Path, timeline: Timeline, indices: Sequence[int], stop: Sto
         formats.write_poses(out, poses(), timeline.unit, stop=stop)
 
 
-def _write_frames(out: Path, timeline: Timeline, indices: Sequence[int]) -> None:
+def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> None:
     known = sorted([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
-    check_output(out, known, several=len(indices) > 1)
-    with frame_files(out, indices) as file_of, progress(len(indices)) as tick:
+    check_output(args.out, known, several=len(indices) > 1)
+    claim(frame_outputs(args.out, indices), scan_inputs(timeline), args.force)
+    with frame_files(args.out) as file_of, progress(len(indices)) as tick:
         for pose in read_poses(timeline, indices):
             formats.write(file_of(pose), pose.cloud, pose.views)
             tick()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from .. import frame
 from ..camera import Camera
+from ..export import numbered
 from ..frame import Request
 from ..gpu.context import headless
 from ..gpu.surface import Surface
@@ -50,6 +52,12 @@ def shots(indices: Sequence[int], turntable: int | None = None) -> list[Shot]:
     if len(indices) == 1:
         return [Shot(k, indices[0], 360 * k / turntable) for k in range(turntable)]
     return [Shot(index, index, 360 * k / turntable) for k, index in enumerate(indices)]
+
+
+def outputs(out: Path, numbers: Iterable[int], stats: Path | None = None) -> list[Path]:
+    """The files that pictures of these numbers go to, and that of their stats."""
+    pictures = dict.fromkeys(numbered(out, number) for number in numbers)  # once, for a film
+    return [*pictures, *([stats] if stats else [])]
 
 
 def turntable_camera(

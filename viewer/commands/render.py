@@ -23,7 +23,7 @@ from ..errors import InputError
 from ..export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..files import whole_file
 from ..frame import Request, choose
-from ..look import Look
+from ..look import Look, drawable
 from ..marks import MARKS, Legend, marks_of
 from ..params import parse
 from ..recording import Entry, fingerprint, new_salt
@@ -31,9 +31,19 @@ from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
 from . import arguments, drawing, replay, stats
-from .console import progress, say
+from .console import progress, say, warn
 from .drawing import Plan, Shot
-from .scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline, read_poses
+from .outputs import add_force_argument, claim, scan_inputs
+from .scans import (
+    SCAN_HELP,
+    add_pose_arguments,
+    check_color_source,
+    chosen_poses,
+    frame_title,
+    framing,
+    open_timeline,
+    read_poses,
+)
 
 _SIZE = (1920, 1280)
 
@@ -56,6 +66,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--progress", action="store_true", help="say what is drawn on standard output, a line of JSON a step"
     )
+    add_force_argument(parser)
     add_pose_arguments(parser)
     picture = parser.add_argument_group("the picture")
     picture.add_argument("--size", type=arguments.size, metavar="WxH", help="default 1920x1280")
@@ -75,7 +86,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         help=f"draw over .png and .mp4: {', '.join(MARKS)}",
     )  # fmt: skip
     camera = parser.add_argument_group("from where").add_mutually_exclusive_group()
-    camera.add_argument("--camera", type=Camera.load, metavar="FILE.json", help="as a file has it")
+    camera.add_argument("--camera", type=Path, metavar="FILE.json", help="as a file has it")
     camera.add_argument(
         "--orbit", type=_orbit, metavar="AZIMUTH,ELEVATION[,DISTANCE]",
         help="degrees, and scan units; without a distance, fitted",
@@ -114,18 +125,22 @@ def _planned(args: Namespace) -> Iterator[Plan]:
     look, values = parse(Look, {"up": args.up, **dict(args.look)}, "look"), dict(args.set)
     if args.backend:
         find_backend(args.backend).params(values)  # wrong names are told before anything is read
+    camera = Camera.load(args.camera) if args.camera else None
     scan, size = args.scan or DEMO, args.size or _SIZE
     with open_timeline(args, scan) as timeline:
         indices = chosen_poses(args, timeline) or [0]
         shots = drawing.shots(indices, args.turntable)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
+        outputs = drawing.outputs(args.out, [shot.number for shot in shots], args.stats)
+        claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
+        check_color_source(look, timeline, indices)
         fps = drawing.film_rate(timeline, indices, args.fps)
         salt = new_salt() if args.anonymous else None
         hash = fingerprint(timeline.files, salt) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
         marks = marks_of(args.marks)
 
         def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
-            for shot, request in _requests(args, timeline, shots, size, look, values):
+            for shot, request in _requests(args, timeline, shots, size, look, values, camera):
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
@@ -170,23 +185,29 @@ def _requests(
     size: tuple[int, int],
     look: Look,
     values: dict[str, object],
+    camera: Camera | None,
 ) -> Iterator[tuple[Shot, Request]]:
-    """What to draw for each shot. The first pose settles the backend, several the camera."""
+    """What to draw for each shot. The first pose settles the backend, several the camera if there is none.
+
+    A pose without the scalar that the look colours by is reported, and has colours of its own choice.
+    """
     chosen = None
-    camera_of = _camera(args, timeline, shots, size)
+    camera_of = _camera(args, timeline, shots, size) if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or choose(pose.cloud, args.backend, values)
+        own = drawable(look, pose.cloud)
+        if own is not look:
+            title = frame_title(timeline, pose.index)
+            warn(f"{timeline.name}: {title} has no '{look.color_by}', and is drawn in other colours")
         for shot in shots:
             if shot.pose == pose.index:
-                yield shot, Request(pose, camera_of(shot), *chosen, look)
+                yield shot, Request(pose, camera_of(shot), *chosen, own)
 
 
 def _camera(
     args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int]
 ) -> Callable[[Shot], Camera]:
-    """The camera of each shot."""
-    if args.camera:
-        return lambda shot: args.camera
+    """The camera of each shot, fitted."""
     aspect = size[0] / size[1]
     bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from argparse import Namespace
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +18,11 @@ from ..recording import Entry, Recording, fingerprint, fingerprint_as, new_salt,
 from ..scan.open import DEMO, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS
+from . import drawing
 from .console import warn
 from .drawing import Plan
+from .outputs import claim, scan_inputs
+from .scans import check_color_source
 
 # What the recording tells, by the names of arguments.
 _TOLD = (
@@ -37,8 +40,19 @@ def planned(args: Namespace) -> Iterator[Plan]:
     fps = DEFAULT_FPS if args.fps is None else args.fps
     if args.out.suffix.lower() == FILM_SUFFIX:
         entries = _film(recording, fps)
+    outputs = drawing.outputs(args.out, range(len(entries)), args.stats)
+    claim(outputs, [args.replay, *_scan_files(entries, args)], args.force)
     with closing(_pictures(entries, args)) as pictures:
         yield Plan(len(set(map(id, entries))), entries[0].size, fps, pictures)
+
+
+def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
+    """The files that the scans of the entries are read from; what is wrong with these is told later."""
+    for scan in dict.fromkeys(args.scan or entry.scan for entry in entries):
+        with suppress(InputError):
+            if scan is not None:
+                with open_scan(scan) if args.scan else _open(scan, args.replay)[1] as timeline:
+                    yield from scan_inputs(timeline)
 
 
 def _check_arguments(args: Namespace) -> None:
@@ -107,6 +121,7 @@ def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     if entry.anonymous:
         return entry.request(anonymous_pose(pose, start))
     request = entry.request(pose)
+    check_color_source(entry.look, timeline, [entry.pose])
     return anonymous_request(request, start) if args.anonymous else request
 
 

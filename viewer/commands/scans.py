@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from ..export import is_pattern, numbered
 from ..files import whole_file
+from ..look import COLOR_BY, Look, drawable
 from ..scan.open import open_scan
 from ..scan.points import Bounds
 from ..scan.pose import Pose
@@ -110,6 +111,33 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
     return Bounds(np.min([b.low for b in boxes], axis=0), np.max([b.high for b in boxes], axis=0))
 
 
+def check_color_source(look: Look, timeline: Timeline, indices: Sequence[int]) -> None:
+    """Raise InputError where none of these poses has what the look colours by; it lists what there is.
+
+    Broken ones are passed over; it reads until one has it.
+    """
+    if look.color_by in COLOR_BY:
+        return
+    readable, scalars = False, dict[str, None]()
+    for index in indices:
+        try:
+            cloud = timeline.pose(index).cloud
+        except InputError:
+            continue
+        if drawable(look, cloud) is look:
+            return
+        readable, scalars = True, scalars | dict.fromkeys(cloud.scalars)
+    if readable:
+        error = unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars])
+        where = timeline.name if len(indices) > 1 else frame_title(timeline, indices[0])
+        raise InputError(error.what, where, error.hint)
+
+
+def frame_title(timeline: Timeline, index: int) -> str:
+    """A frame's number and file, for messages."""
+    return f"frame {index} ({timeline.label(index)})"
+
+
 def first_readable(timeline: Timeline) -> Pose:
     """The first pose that is not broken, and no other is read. Raises InputError where all are."""
     pose = next(iter(timeline), None)
@@ -128,16 +156,20 @@ def _report(timeline: Timeline, said: int) -> int:
     return said + len(messages)
 
 
-@contextmanager
-def frame_files(out: Path, indices: Sequence[int]) -> Iterator[Callable[[Pose], Path]]:
-    """The file that each pose goes to; for a pattern, times.csv beside them when all are written.
-
-    Raises InputError where there is a times.csv that tells the times of other files.
-    """
+def frame_outputs(out: Path, indices: Sequence[int]) -> list[Path]:
+    """All that `frame_files` leads to. Raises InputError where a times.csv tells the times of other files."""
+    files = [numbered(out, index) for index in indices]
+    if not is_pattern(out):
+        return files
     times_file = out.with_name(TIMES_FILE)
+    _check_times_file(times_file, {file.name for file in files})
+    return [*files, times_file]
+
+
+@contextmanager
+def frame_files(out: Path) -> Iterator[Callable[[Pose], Path]]:
+    """The file that each pose goes to; for a pattern, times.csv beside them when all are written."""
     rows: list[tuple[str, float]] = []
-    if is_pattern(out):
-        _check_times_file(times_file, {numbered(out, index).name for index in indices})
 
     def file_of(pose: Pose) -> Path:
         path = numbered(out, pose.index)
@@ -146,6 +178,7 @@ def frame_files(out: Path, indices: Sequence[int]) -> Iterator[Callable[[Pose], 
 
     yield file_of
     if is_pattern(out):
+        times_file = out.with_name(TIMES_FILE)
         with whole_file(times_file) as path, open(path, "w", newline="", encoding="utf-8") as stream:
             csv.writer(stream).writerows([("file", "time"), *rows])
 

@@ -21,7 +21,16 @@ from ..scan.pose import Pose
 from ..scan.range_view import merge
 from . import arguments
 from .console import progress
-from .scans import add_pose_arguments, chosen_poses, frame_files, framing, open_timeline, read_poses
+from .outputs import add_force_argument, claim, scan_inputs
+from .scans import (
+    add_pose_arguments,
+    chosen_poses,
+    frame_files,
+    frame_outputs,
+    framing,
+    open_timeline,
+    read_poses,
+)
 
 _FACES_FILE = "mesh_topology.ply"  # beside the frames of a sequence that moves one mesh
 _HINT = "Name the mesh that has them with --faces"
@@ -38,6 +47,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--faces", type=Path, metavar="FILE",
         help=f"the faces of every frame; default: {_FACES_FILE} where it is beside them, else each its own",
     )  # fmt: skip
+    add_force_argument(parser)
     add_pose_arguments(parser)
     pods = parser.add_argument_group("the scanner")
     places = pods.add_mutually_exclusive_group()
@@ -81,12 +91,15 @@ def run(args: Namespace) -> int:
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
         check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
-        faces_of = _faces_reader(Path(args.scan), args.faces)
+        shared = args.faces or _faces_beside(Path(args.scan))
+        inputs = [*scan_inputs(timeline), *([shared] if shared else [])]
+        claim(frame_outputs(args.out, indices), inputs, args.force)
+        faces_of = _faces_reader(Path(args.scan), shared)
         faces_of(timeline.label(indices[0]))  # told before all frames are looked at
         aspect = args.size[0] / args.size[1]
         bounds = framing(timeline, indices)
         pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up)
-        with frame_files(args.out, indices) as file_of, progress(len(indices)) as tick:
+        with frame_files(args.out) as file_of, progress(len(indices)) as tick:
             for pose in read_poses(timeline, indices):
                 mesh = _mesh(pose, faces_of(pose.label))
                 views = capture(
@@ -110,11 +123,20 @@ def _faults(args: Namespace, pods: int) -> list[Faults]:
     return [replace(common, noise=args.noise[pod % len(args.noise)]) for pod in range(pods)]
 
 
-def _faces_reader(scan: Path, named: Path | None) -> Callable[[str], Faces]:
-    """A function from the label of a frame to its faces. named: the file that has those of all."""
-    folder = scan if scan.is_dir() else scan.parent
+def _faces_beside(scan: Path) -> Path | None:
+    """The file beside the frames of a sequence that has the faces of all, where there is one."""
+    folder = _folder_of(scan)
     beside = [folder / _FACES_FILE, *([folder.parent / _FACES_FILE] if folder.name == "frames" else [])]
-    shared = named or (None if scan.is_file() else next(filter(Path.is_file, beside), None))
+    return None if scan.is_file() else next(filter(Path.is_file, beside), None)
+
+
+def _folder_of(scan: Path) -> Path:
+    return scan if scan.is_dir() else scan.parent
+
+
+def _faces_reader(scan: Path, shared: Path | None) -> Callable[[str], Faces]:
+    """A function from the label of a frame to its faces. shared: the file that has those of all."""
+    folder = _folder_of(scan)
     read_once = cache(read_faces)
 
     def faces_of(label: str) -> Faces:

@@ -11,17 +11,20 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from ..camera import Camera
-from ..errors import InputError, NoOpenGLError
+from ..errors import InputError, NoOpenGLError, explained
 from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
 from ..look import Look
 from ..recording import Recording, is_recording, place_of
 from ..scan.listing import named_scans
 from ..scan.open import DEMO
+from ..scan.timeline import Timeline
 from ..timing import draw
+from ..unfinished import remove_leftovers
 from . import drawing
 from .console import progress, warn
 from .doctor import display
+from .outputs import add_force_argument, claim, scan_inputs
 from .scans import SCAN_HELP, framing, open_timeline, read_poses
 
 _SIZE = (1200, 800)
@@ -34,6 +37,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fallback", type=Path, metavar="DIR", help="where no window can be opened, play into this folder"
     )
+    add_force_argument(parser)
 
 
 def run(args: Namespace) -> int:
@@ -58,9 +62,18 @@ def run(args: Namespace) -> int:
     try:
         args.fallback.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot be made: {error.strerror}", args.fallback) from error
-    for number, scan in enumerate(scans):
-        _play(args, scan, f"{number}_" if len(scans) > 1 else "")
+        what, hint = explained(error)
+        raise InputError(f"cannot be made: {what}", args.fallback, hint) from error
+    prefixes = [f"{number}_" if len(scans) > 1 else "" for number in range(len(scans))]
+    outputs: list[Path] = []
+    inputs: list[Path] = []
+    for scan, prefix in zip(scans, prefixes, strict=True):
+        with open_timeline(args, scan) as timeline:
+            outputs += _files(args.fallback, prefix, timeline)
+            inputs += scan_inputs(timeline)
+    claim(outputs, inputs, args.force)
+    for scan, prefix in zip(scans, prefixes, strict=True):
+        _play(args, scan, prefix)
     return 0
 
 
@@ -80,14 +93,26 @@ def _open_window(args: Namespace, scans: list[str], replay: Path | None) -> int:
         )
     from .. import app
 
+    remove_leftovers()
     return app.run(scans, unit=args.unit, fps=args.fps, up=args.up, device=args.device, replay=replay)
+
+
+def _stem(folder: Path, prefix: str, timeline: Timeline) -> str:
+    """How the names of a scan's files begin."""
+    return str(folder / (prefix + re.sub(r"[^\w-]+", "_", timeline.name)))
+
+
+def _files(folder: Path, prefix: str, timeline: Timeline) -> list[Path]:
+    """What `_play` writes."""
+    stem = _stem(folder, prefix, timeline)
+    pictures = [f"{stem}_{index:04d}.png" for index in range(len(timeline))]
+    return [Path(name) for name in (*pictures, f"{stem}.mp4", f"{stem}_contact_sheet.png")]
 
 
 def _play(args: Namespace, scan: str, prefix: str) -> None:
     """Draw all poses of a scan into the folder, and say what is there."""
     with open_timeline(args, scan) as timeline:
-        stem = prefix + re.sub(r"[^\w-]+", "_", timeline.name)
-        name = str(args.fallback / stem)
+        name = _stem(args.fallback, prefix, timeline)
         indices = list(range(len(timeline)))
         on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
         fps = drawing.film_rate(timeline, indices, args.fps)

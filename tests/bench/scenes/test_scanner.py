@@ -276,7 +276,7 @@ def test_faces_are_found_from_wherever_the_frames_are_named(
     out = ("--pose", 2, "--size", "40x30", "-o", tmp_path / "a.exr")
     assert simulate(horse / pattern, *out) == (0, "")
     named = exr.read(tmp_path / "a.exr")
-    assert simulate(horse, *out, "--faces", horse / "mesh_topology.ply") == (0, "")
+    assert simulate(horse, *out, "--faces", horse / "mesh_topology.ply", "--force") == (0, "")
     assert all(map(same, named, exr.read(tmp_path / "a.exr")))
 
 

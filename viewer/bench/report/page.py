@@ -34,6 +34,7 @@ from .results import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PAGE = "report.html"
 # What the summary shows of each default row; then what is plotted besides.
 _SUMMARY = (
     "gpu_ms", "cpu_ms", "prepare_ms", "bytes_gpu", "hole_percent", "spill_percent", "depth_median_px",
@@ -114,7 +115,7 @@ def write_report(folder: Path) -> Path:
         metrics=shown,
         every=[(title(row), [number(metric.of(row)) for metric in shown]) for row in rows],
     )
-    path = folder / "report.html"
+    path = folder / PAGE
     with whole_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path
