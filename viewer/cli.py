@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import _signal as signal  # type: ignore[import-not-found]  # as `signal` has it, which takes 5 ms
 import _thread
-import signal
 import sys
 from collections.abc import Sequence
 
@@ -53,7 +53,7 @@ def _end_quietly_when_interrupted() -> None:
 def _interrupts_again(kind: type[BaseException]) -> bool:
     """Whether an exception that nobody takes is an interrupt, which is raised once more then."""
     if issubclass(kind, KeyboardInterrupt):
-        _thread.interrupt_main()
+        _thread.start_new_thread(_thread.interrupt_main, ())  # by another, since here it would be lost again
         return True
     return False
 
