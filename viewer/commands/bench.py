@@ -40,7 +40,7 @@ from ..errors import InputError, explained
 from ..files import whole_file
 from ..signals import held_interrupts
 from . import arguments, drawing
-from .console import progress, warn
+from .console import progress, tell, warn
 from .outputs import add_force_argument, claim
 
 _SUITES = ("scenes", "numerics", "slomp", "octrees")
@@ -133,10 +133,10 @@ def run(args: Namespace) -> int:
         raise InputError("; ".join(bench.notes) or "there is nothing to measure")
     stopped = ["Stopped before the end."] if bench.stopped else []
     _write_notes(args.out, [*missing, *bench.notes, *stopped])
-    print(write_report(args.out))
+    tell(write_report(args.out))
     if args.suite in _OF_THE_PAPER:
         _, write_page = _OF_THE_PAPER[args.suite]
-        print(write_page(args.out))
+        tell(write_page(args.out))
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
     return int(bench.stopped)
@@ -167,9 +167,7 @@ def _octrees(out: Path, bench: Bench) -> list[bool]:
     """Build, cut and store octrees; of each whether there were any."""
     missing = catalog.names(bench.settings.data)
     scans = [scan for scan in slomp.scans() if not missing[scan.scene]]
-    print(
-        f"{len(scans) * len(octrees.DELTAS)} rows of octrees, and their sizes: some seconds each", flush=True
-    )
+    tell(f"{len(scans) * len(octrees.DELTAS)} rows of octrees, and their sizes: some seconds each")
     trees = bench.until_stopped(octrees.build_and_cut(bench, scans))
     sizes = bench.until_stopped(map(asdict, octree_sizes.measure(bench.settings.data)))
     return [
@@ -217,9 +215,9 @@ def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str]) -> N
         rows = sum(len(group.contenders) for group in groups)
         minutes = f"{seconds / 60:.0f} minutes" if seconds >= 100 else f"{seconds:.0f} seconds"
         scenes = len({group.scene for group in groups})
-        print(f"{rows} rows on {scenes} scenes: about {minutes}", flush=True)
+        tell(f"{rows} rows on {scenes} scenes: about {minutes}")
     if tested:
-        print(f"{_lines(tested)} rows of the stability suite: some seconds a backend", flush=True)
+        tell(f"{_lines(tested)} rows of the stability suite: some seconds a backend")
 
 
 def _settings(args: Namespace) -> Settings:

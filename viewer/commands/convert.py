@@ -17,7 +17,7 @@ from ..scan import formats
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from .console import progress
+from .console import progress, tell
 from .outputs import add_force_argument, claim, scan_inputs
 from .scans import (
     SCAN_HELP,
@@ -56,7 +56,7 @@ def run(args: Namespace) -> int:
             _write_scan(args, timeline, indices, stop)
         else:
             _write_frames(args, timeline, indices)
-    print(args.out)
+    tell(args.out)
     return 0
 
 

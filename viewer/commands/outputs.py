@@ -10,11 +10,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError, explained
-from ..files import printable
 from ..scan.sources import FACES_FILE
 from ..scan.timeline import Timeline
 from ..scan.times import TIMES_FILE
 from ..unfinished import remove_leftovers
+from .console import plain
 
 
 def add_force_argument(parser: ArgumentParser) -> None:
@@ -75,7 +75,7 @@ def _agreed(there: Sequence[Path]) -> bool:
     """Whether a person says that these are replaced; without a terminal nobody does."""
     if not (sys.stdin and sys.stdin.isatty() and sys.stderr and sys.stderr.isatty()):
         return False
-    question = f"{printable(str(there[0]))}: is there already{_and_more(there)}. Replace? [y/N] "
+    question = f"{plain(str(there[0]))}: is there already{_and_more(there)}. Replace? [y/N] "
     print(question, end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 

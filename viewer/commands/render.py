@@ -31,7 +31,7 @@ from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
 from . import arguments, drawing, replay, stats
-from .console import progress, say, warn
+from .console import progress, say, tell, warn
 from .drawing import Plan, Shot
 from .outputs import add_force_argument, claim, scan_inputs
 from .scans import (
@@ -115,7 +115,7 @@ def run(args: Namespace) -> int:
         raise InputError(f"are not drawn on '{args.out.suffix}' files", "--marks", hint)
     with (replay.planned if args.replay else _planned)(args) as plan:
         _draw(plan, args)
-    print(args.out)
+    tell(args.out)
     return 0
 
 

@@ -22,7 +22,7 @@ from ..scan.timeline import Timeline
 from ..timing import draw
 from ..unfinished import remove_leftovers
 from . import drawing
-from .console import progress, warn
+from .console import progress, tell, warn
 from .doctor import display
 from .outputs import add_force_argument, claim, scan_inputs
 from .scans import SCAN_HELP, framing, open_timeline, read_poses
@@ -56,7 +56,7 @@ def run(args: Namespace) -> int:
     except NoOpenGLError as error:
         if args.fallback is None:
             raise
-        print(f"No window: {error.what}. Playing into {args.fallback} instead.", flush=True)
+        tell(f"No window: {error.what}. Playing into {args.fallback} instead.")
     for problem in problems:
         warn(str(problem))
     try:
@@ -133,4 +133,4 @@ def _play(args: Namespace, scan: str, prefix: str) -> None:
                     thumbnails.append(thumbnail(image))
                 tick()
     contact_sheet(thumbnails, f"{name}_contact_sheet.png")
-    print(f"{name}_%04d.png\n{name}_contact_sheet.png\n{name}.mp4")
+    tell(f"{name}_%04d.png\n{name}_contact_sheet.png\n{name}.mp4")
