@@ -15,11 +15,20 @@ _DEFAULT_BUDGET = 1 << 30
 
 def default_budget() -> int:
     """Bytes of poses to keep: 1 GiB, or what SCAN4D_CACHE_MB says."""
-    text = os.environ.get(BUDGET_VARIABLE)
+    told = megabytes(BUDGET_VARIABLE)
+    return _DEFAULT_BUDGET if told is None else told
+
+
+def megabytes(variable: str) -> int | None:
+    """The bytes that an environment variable tells in megabytes; None where it is not there.
+
+    Raises InputError where it is no number.
+    """
+    text = os.environ.get(variable)
     if text is None:
-        return _DEFAULT_BUDGET
+        return None
     if not text.isdecimal():
-        raise InputError(f"'{text}' is not a number of megabytes", BUDGET_VARIABLE, "For example 1024")
+        raise InputError(f"'{text}' is not a number of megabytes", variable, "For example 1024")
     return int(text) << 20
 
 

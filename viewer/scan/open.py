@@ -103,6 +103,13 @@ def matches(pattern: str) -> list[Path]:
     return [Path(name) for name in glob.glob(wild) if exact.fullmatch(name)]
 
 
+def searches_folders(path: str) -> bool:
+    """Whether a name is a pattern with wild cards in its folders, which may stand for a whole disk."""
+    folder, name = os.path.split(path)
+    is_pattern = "**" in name or glob.has_magic(folder) or _PRINTF.search(folder) is not None
+    return is_pattern and not os.path.exists(path)
+
+
 def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     """The frames among the files, in natural order; empty where there is none.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -13,6 +13,8 @@ from .colors import srgb8_from_linear
 from .points import UNKNOWN_UNIT, PointCloud
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
+_AT_ONCE = 1 << 17  # pixels worked on together
+_MERGING_BYTES = 100  # that `merge` takes for a point
 _STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
 
 
@@ -83,7 +85,9 @@ class RangeView:
 
     def positions(self) -> NDArray[np.float64]:
         """World positions of the valid pixels in row order, (N, 3)."""
-        return self._from_eye() + self.eye
+        from_eye = self._from_eye()
+        from_eye += self.eye
+        return from_eye
 
     def normals(self) -> NDArray[np.float32]:
         """World normals of the valid pixels in row order, (N, 3), unit length, towards the pod.
@@ -111,11 +115,17 @@ class RangeView:
 
     def _from_eye(self) -> NDArray[np.float64]:
         """From the pod to the point of each valid pixel in row order, along the world's axes, (N, 3)."""
-        row, column = np.nonzero(self.valid())
-        depth = self.depth[row, column].astype(np.float64)
-        x = (column + 0.5 - self.cx) / self.fx * depth
-        y = (self.cy - row - 0.5) / self.fy * depth
-        return np.stack([x, y, -depth], axis=1) @ self._camera_to_world().T
+        valid, turn = self.valid(), self._camera_to_world().T
+        from_eye = np.empty((np.count_nonzero(valid), 3))
+        done, height = 0, max(1, _AT_ONCE // valid.shape[1])
+        for top in range(0, len(valid), height):
+            row, column = np.nonzero(valid[top : top + height])
+            depth = self.depth[top : top + height][row, column].astype(np.float64)
+            x = (column + 0.5 - self.cx) / self.fx * depth
+            y = (self.cy - (row + top) - 0.5) / self.fy * depth
+            from_eye[done : done + len(row)] = np.stack([x, y, -depth], axis=1) @ turn
+            done += len(row)
+        return from_eye
 
 
 def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
@@ -126,26 +136,38 @@ def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
     make them, see `RangeView.normals`. Raises InputError where no view sees a point.
     """
     valid = [view.valid() for view in views]
-    ids = np.flatnonzero(np.concatenate([pixels.ravel() for pixels in valid])).astype(np.uint32)
+    counts = [int(np.count_nonzero(pixels)) for pixels in valid]
+    starts, pixels_before = np.cumsum([0, *counts]), np.cumsum([0, *(pixels.size for pixels in valid)])
+    points, ids = np.empty((starts[-1], 3)), np.empty(starts[-1], np.uint32)
+    for view, pixels, start, end, before in zip(
+        views, valid, starts[:-1], starts[1:], pixels_before, strict=False
+    ):
+        points[start:end] = view.positions()
+        ids[start:end] = np.flatnonzero(pixels) + before
 
-    def of_points(name: str) -> NDArray | None:
+    def of_points(name: str, made: Callable[[NDArray], NDArray] = np.asarray) -> NDArray | None:
         images = [getattr(view, name) for view in views]
         if any(image is None for image in images):
             return None
-        return np.concatenate([image[pixels] for image, pixels in zip(images, valid, strict=True)])
+        return np.concatenate([made(image[pixels]) for image, pixels in zip(images, valid, strict=True)])
 
-    color, confidence = of_points("color"), of_points("confidence")
-    counts = [np.count_nonzero(pixels) for pixels in valid]
     scalars = {"view": np.repeat(np.arange(len(views), dtype=np.uint16), counts)}
+    confidence = of_points("confidence")
     cloud = PointCloud.from_arrays(
-        np.concatenate([view.positions() for view in views]),
+        points,
         normals=np.concatenate([view.normals() for view in views]) if normals else None,
-        colors=None if color is None else srgb8_from_linear(color),
+        colors=of_points("color", srgb8_from_linear),
         scalars=scalars if confidence is None else scalars | {"confidence": confidence},
     )
     if not len(cloud):
         raise InputError("holds no points: no pixel inside the masks has a depth")
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
+
+
+def memory_of_merging(views: Sequence[RangeView]) -> int:
+    """Bytes that views and what `merge` makes of them take at most at a time, without normals."""
+    points = sum(int(np.count_nonzero(view.valid())) for view in views)
+    return sum(view.nbytes + view.mask.size for view in views) + points * _MERGING_BYTES
 
 
 def _is_rigid(matrix: NDArray[np.float64]) -> bool:

@@ -135,7 +135,7 @@ def test_headers_that_promise_too_much(shape: tuple[int, ...], tmp_path: Path) -
     with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
         archive.writestr("positions.npy", header(shape) + bytes(6 * 12))
     for name in ("scan.npy", "scan.npz"):
-        with pytest.raises(InputError, match=r"promises .* bytes and holds 72|has no frame 0"):
+        with pytest.raises(InputError, match=r"promises .* bytes and holds 72|holds no points"):
             read(tmp_path / name)
 
 
@@ -165,7 +165,7 @@ def test_constant_arrays_of_modest_size_are_no_bomb(path: Path) -> None:
         ({"xyz": np.eye(3)}, "no array 'positions', only: xyz"),
         ({"positions": np.zeros((4, 2))}, r"array 'positions' has shape \(4, 2\). Positions are \(N, 3\)"),
         ({"positions": np.zeros((2, 2, 4, 3))}, "has shape"),
-        ({"positions": np.zeros((0, 5, 3))}, "has no frame 0. It holds 0"),
+        ({"positions": np.zeros((0, 5, 3))}, "holds no points"),
         ({"positions": np.zeros((0, 3))}, "holds no points"),
         ({"positions": np.array([["a", "b", "c"]])}, "expected numbers"),
         ({"positions": np.zeros((1, 3), complex)}, "expected numbers"),

@@ -111,7 +111,7 @@ def test_damaged_compressed_data(path: Path) -> None:
     packed, unpacked = struct.unpack("<II", whole[:8])
     cases = {
         whole[:20]: f"holds 12 of its {packed} bytes",
-        whole[:4]: "ends before its compressed data",
+        whole[:4]: "ends early: 4 bytes where 8 should be",
         struct.pack("<II", packed, 10**9)
         + whole[8:]: "holds 1000000000 bytes of points, its header promises",
         struct.pack("<II", 1, unpacked) + whole[8:]: f"1 bytes of compressed data cannot hold {unpacked}",
@@ -135,7 +135,7 @@ def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
         ({"POINTS": None, "WIDTH": None}, "no WIDTH line"),
         ({"SIZE": "4 4 4"}, "differ in length"),
         ({"SIZE": "4 4 3 4 8 2"}, "unknown PCD type and size 'F3'"),
-        ({"COUNT": f"1 1 1 1 {10**12} 1"}, "promises 3 points"),
+        ({"COUNT": f"1 1 1 1 {10**12} 1"}, "has 1,000,000,000,005 values a point, more than the 4,096"),
         ({"COUNT": "1 1 1 1 0 1"}, "promises 3 points"),
         ({"POINTS": "0"}, "promises 0 points"),
         ({"POINTS": "-3"}, "promises -3 points"),

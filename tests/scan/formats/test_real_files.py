@@ -12,7 +12,7 @@ from viewer.errors import InputError
 from viewer.scan.formats import known_suffixes, read
 
 REFUSED = {
-    "odd/ply/assimp_issue623.ply": "row 0: property 'vertex_indices': early end-of-line",
+    "odd/ply/assimp_issue623.ply": "row 0 of vertex ends before its vertex_indices",
     "odd/ply/assimp_pond.0.ply": "holds 70048 of the 70051 vertices",
     "odd/ply/cat_header_missing_property_keyword_00022.ply": "the header line 'float x' says nothing",
     "odd/ply/pdal_no_vertex.ply": "has no vertex element",
@@ -25,7 +25,7 @@ REFUSED = {
     "odd/ply/truedepth_raw_frame-045.ply": "has no vertex element, only: metadata, color, depth",
     "odd/pcd/missingheader.pcd": "has no DATA line",
     "odd/pcd/stereo_left.pcd": "no x, y and z among the columns: red, green, blue",
-    "odd/pts_ptx_txt/badheader.txt": "line 1 is neither numbers nor names with x, y, z",
+    "odd/pts_ptx_txt/badheader.txt": "line 1 names 'x' twice, and not x, y and z",
     "odd/pts_ptx_txt/text.txt": "line 1 is neither numbers nor names with x, y, z",
     "odd/other/no_vertex.obj": "holds no points",
 }

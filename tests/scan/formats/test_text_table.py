@@ -100,7 +100,7 @@ def test_guesses_without_names(values: list[float], names: str) -> None:
     ("text", "reason"),
     [
         ("This is a letter, not a scan.\n", "line 1 is neither numbers nor names with x, y, z"),
-        ("X,Y,X\n1,2,3\n", "neither numbers nor names"),
+        ("X,Y,X\n1,2,3\n", "line 1 names 'x' twice"),
         ("x y z\n", "holds no rows of numbers"),
         ("# only a remark\n", "holds no rows of numbers"),
         ("1 2\n3 4\n", "fewer than three numbers"),

@@ -29,11 +29,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, Scan4DError, unknown_name
+from ...errors import InputError, Scan4DError, explained, unknown_name
 from ...files import whole_file
 from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, merge
+
+_LONGEST_MESSAGE = 400  # characters
 
 
 def known_suffixes() -> list[str]:
@@ -180,15 +182,20 @@ def _formats() -> dict[str, ModuleType]:
 
 def _readable(path: Path) -> ModuleType:
     """The format of a file that exists and is not empty."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(what, path, hint) from error
     if path.is_dir():
         raise InputError("is a folder, not a file", path)
-    if not path.exists():
-        raise InputError("no such file", path, "Check the path")
+    if not path.is_file():
+        raise InputError("is a device or a pipe, not a file", path, "Copy what it gives into a file")
     suffix = path.suffix.lower()
     if suffix not in _formats():
-        error = unknown_name("file suffix", suffix, known_suffixes())
-        raise InputError(error.what, path, error.hint)
-    if path.stat().st_size == 0:
+        unknown = unknown_name("file suffix", suffix, known_suffixes())
+        raise InputError(unknown.what, path, unknown.hint)
+    if status.st_size == 0:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")
     return _formats()[suffix]
 
@@ -205,8 +212,16 @@ def _one_message(
         with np.errstate(all="ignore"):
             yield
     except Scan4DError as error:
-        raise InputError(error.what, error.where or where, error.hint or hint) from error
+        raise InputError(_bounded(error.what), error.where or where, error.hint or hint) from error
     except MemoryError as error:
         raise InputError(f"{failed}: not enough memory", where, "Close other programs") from error
+    except OSError as refused:
+        what, told = explained(refused, hint)
+        raise InputError(f"{failed}: {what}", where, told) from refused
     except Exception as error:
-        raise InputError(f"{failed}: {str(error) or type(error).__name__}", where, hint) from error
+        raise InputError(_bounded(f"{failed}: {str(error) or type(error).__name__}"), where, hint) from error
+
+
+def _bounded(what: str) -> str:
+    """A message that may quote a file, at a length that can be read."""
+    return what if len(what) <= _LONGEST_MESSAGE else what[:_LONGEST_MESSAGE] + " ..."

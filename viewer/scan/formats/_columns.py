@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain, islice
-from typing import BinaryIO
+from functools import partial
+from itertools import chain, count, islice
+from typing import IO, AnyStr, BinaryIO
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
@@ -15,7 +16,9 @@ from numpy.typing import DTypeLike, NDArray
 from ...errors import InputError
 from ...task import checkpoint
 from ..points import PointCloud
+from ._admission import LONGEST_LINE
 
+_AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
 _ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
 Columns = Mapping[str, NDArray]  # name -> (N,)
 
@@ -32,6 +35,42 @@ _COLORS = [
 ]
 _RADII = [("radius",), ("surfel_radius",)]
 _ELLIPSES = ("radius_u", "radius_v", "tangent_x", "tangent_y", "tangent_z")
+_GEOMETRY = {"rgb", "rgba", *chain(*_POSITIONS, *_NORMALS, *_COLORS, *_RADII, _ELLIPSES)}
+
+
+def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
+    """Columns by name. Of several scalars of one name the second is called `name_2`, and so on.
+
+    Raises InputError where two columns have a name of geometry, in any case: nobody knows which counts.
+    """
+    columns: dict[str, NDArray] = {}
+    seen: dict[str, int] = {}
+    for name, column in pairs:
+        key = name.lower() if name.lower() in _GEOMETRY else name
+        seen[key] = seen.get(key, 0) + 1
+        if seen[key] > 1:
+            if key in _GEOMETRY:
+                raise InputError(f"two columns are called '{name}'", hint="Rename one of them")
+            name = next(free for n in count(seen[key]) if (free := f"{name}_{n}") not in columns)
+        columns[name] = column
+    return columns
+
+
+def first_repeated(names: Iterable[str]) -> str | None:
+    """The first name that stands there a second time; None where all differ."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None
+
+
+def listed(names: Iterable[str], most: int = 12, longest: int = 40) -> str:
+    """Names of a file for a message: some of them, shortened where they are long."""
+    names = list(names)
+    shown = [name if len(name) <= longest else name[:longest] + "..." for name in names[:most]]
+    return ", ".join([*shown, f"and {len(names) - most} more"] if len(names) > most else shown) or "none"
 
 
 def cloud_from_columns(columns: Columns) -> PointCloud:
@@ -50,7 +89,7 @@ def cloud_from_columns(columns: Columns) -> PointCloud:
 
     positions = take(_POSITIONS)
     if positions is None:
-        raise InputError(f"no x, y and z among the columns: {', '.join(columns) or 'none'}")
+        raise InputError(f"no x, y and z among the columns: {listed(columns)}")
     normals, colors, radii, ellipses = take(_NORMALS), take(_COLORS), take(_RADII), take([_ELLIPSES])
     axes, mean = (None, None) if ellipses is None else _half_axes(ellipses)
     return PointCloud.from_arrays(
@@ -99,8 +138,16 @@ def records(columns: Columns) -> NDArray[np.void]:
 
 
 def text_lines(stream: BinaryIO) -> Iterator[str]:
-    """The lines of a stream from where it stands; Latin-1 takes any byte."""
-    return (line.decode("latin-1") for line in stream)
+    """The lines of a stream from where it stands, as `bounded_lines`; Latin-1 takes any byte."""
+    return (line.decode("latin-1") for line in bounded_lines(stream))
+
+
+def bounded_lines(stream: IO[AnyStr]) -> Iterator[AnyStr]:
+    """The lines of a stream. Raises InputError where one is longer than any row of numbers."""
+    for number, line in enumerate(iter(partial(stream.readline, LONGEST_LINE + 1), stream.read(0)), 1):
+        if len(line) > LONGEST_LINE:
+            raise InputError(f"line {number} has more than {LONGEST_LINE:,} characters")
+        yield line
 
 
 def parse_table(
@@ -115,22 +162,26 @@ def parse_table(
     rows: how many to read at most. What is allocated follows the text, not `rows`.
     Raises InputError where something is not a number or a row is too short.
     """
-    filled = (line for line in lines if line.strip() and not line.startswith(("#", "//")))
+    filled = (line for line in lines if (start := line.lstrip()) and not start.startswith(("#", "//")))
     wanted = islice(filled, None if rows is None else min(rows, sys.maxsize))
-    parts: list[NDArray[np.float64]] = []
+    table = np.empty((0, len(columns or range(3))))
     done = 0
     while first := list(islice(wanted, 1)):
         checkpoint(done / rows if rows else None)
         part = _parse_rows(chain(first, islice(wanted, _ROWS_AT_ONCE - 1)), columns, delimiter, done)
-        if parts and part.shape[1] != parts[0].shape[1]:
-            number, before, now = done + 1, parts[0].shape[1], part.shape[1]
+        if not done:
+            table = np.empty((0, part.shape[1]))
+        if part.shape[1] != table.shape[1]:
             raise InputError(
-                f"not a table of numbers: the number of columns changed from {before} to {now} at row "
-                f"{number} of the points"
+                f"not a table of numbers: the number of columns changed from {table.shape[1]} to "
+                f"{part.shape[1]} at row {done + 1} of the points"
             )
-        parts.append(part)
+        if done + len(part) > len(table):  # grown in place, so that there is never a second one
+            table.resize((done + len(part) + done // 8, part.shape[1]), refcheck=False)
+        table[done : done + len(part)] = part
         done += len(part)
-    return np.concatenate(parts) if parts else np.empty((0, len(columns or range(3))))
+    table.resize((done, table.shape[1]), refcheck=False)
+    return table
 
 
 def _parse_rows(
@@ -145,19 +196,15 @@ def _parse_rows(
         raise InputError(f"not a table of numbers: {reason} of the points") from error
 
 
-def declared(columns: Columns, dtypes: Mapping[str, DTypeLike]) -> dict[str, NDArray]:
-    """Columns parsed from text in the types that the header declares.
+def declared(name: str, column: NDArray[np.float64], dtype: DTypeLike) -> NDArray:
+    """A column parsed from text, in the type that the header declares.
 
     Coordinates stay float64: text may hold more digits than the declared type. A whole-number column
     that does not fit its type stays float64 too.
     """
-    return {
-        name: column if name.lower() in _POSITIONS[0] else _fitted(column, np.dtype(dtypes[name]))
-        for name, column in columns.items()
-    }
-
-
-def _fitted(column: NDArray[np.float64], dtype: np.dtype) -> NDArray:
+    dtype = np.dtype(dtype)
+    if name.lower() in _POSITIONS[0]:
+        return column
     if dtype.kind in "iu":
         limits = np.iinfo(dtype)
         if not ((column >= limits.min) & (column <= limits.max)).all():
@@ -185,10 +232,19 @@ def _address(array: NDArray) -> int:
 def _bytes_or_units(colors: NDArray) -> NDArray:
     """Colours as PointCloud takes them. Floats beyond 1 and small uint16 count in 0..255."""
     if colors.dtype.kind == "f" and np.nanmax(colors, initial=0) > 1:
-        return np.clip(colors, 0, 255) / 255
+        return _in_bytes(colors)
     if colors.dtype == np.uint16 and colors.max(initial=0) <= 255:
         return colors.astype(np.uint8)
     return colors
+
+
+def _in_bytes(colors: NDArray) -> NDArray[np.uint8]:
+    """Floats in 0..255 rounded; NaN: 0."""
+    rounded = np.empty(colors.shape, np.uint8)
+    for start in range(0, len(colors), _AT_ONCE):
+        part = colors[start : start + _AT_ONCE]
+        rounded[start : start + _AT_ONCE] = np.rint(np.clip(np.nan_to_num(part), 0, 255))
+    return rounded
 
 
 def _half_axes(ellipses: NDArray) -> tuple[NDArray, NDArray]:
@@ -196,12 +252,18 @@ def _half_axes(ellipses: NDArray) -> tuple[NDArray, NDArray]:
 
     Tangents have any length; where one has none, neither has the half-axis.
     """
-    numbers = ellipses.astype(np.result_type(ellipses.dtype, np.float32))
-    lengths = np.where(numbers[:, :2] > 0, numbers[:, :2], 0)
-    with np.errstate(over="ignore", invalid="ignore"):
-        tangent_length = np.linalg.norm(numbers[:, 2:], axis=1, keepdims=True)
-        unit = numbers[:, 2:] / np.where(tangent_length > 0, tangent_length, 1)
-        return np.hstack([lengths[:, :1] * unit, lengths[:, 1:]]), np.sqrt(lengths.prod(axis=1))
+    dtype = np.result_type(ellipses.dtype, np.float32)
+    axes, mean = np.empty((len(ellipses), 4), dtype), np.empty(len(ellipses), dtype)
+    for start in range(0, len(ellipses), _AT_ONCE):
+        rows = slice(start, start + _AT_ONCE)
+        numbers = ellipses[rows].astype(dtype)
+        lengths = np.where(numbers[:, :2] > 0, numbers[:, :2], 0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            tangent_length = np.linalg.norm(numbers[:, 2:], axis=1, keepdims=True)
+            unit = numbers[:, 2:] / np.where(tangent_length > 0, tangent_length, 1)
+            axes[rows] = np.hstack([lengths[:, :1] * unit, lengths[:, 1:]])
+            mean[rows] = np.sqrt(lengths.prod(axis=1))
+    return axes, mean
 
 
 def _as_ellipses(axes: NDArray[np.float32]) -> NDArray[np.float32]:

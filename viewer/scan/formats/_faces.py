@@ -9,7 +9,7 @@ from dataclasses import replace
 from ..points import PointCloud
 
 
-def with_faces(cloud: PointCloud, faces: Iterable[bytes]) -> PointCloud:
+def with_faces(cloud: PointCloud, faces: Iterable[bytes | memoryview]) -> PointCloud:
     """The cloud with the topology that faces between its points give it; itself where there are none.
 
     faces: all of them as the file holds them, in pieces of any size.

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
+from io import BytesIO
+from threading import Lock
 from typing import IO
 
 import numpy as np
@@ -11,8 +14,12 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ._admission import MOST_FRAMES, check_count
 
-_CHUNK = 1 << 24  # bytes read at a time, so that a packed stream needs no second copy
+_CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
+_LONGEST_HEADER = 10_000  # bytes, as numpy has it
+_CONVERTED = 6  # bytes that a PointCloud makes of a number, beside two copies of it
+_quietly = Lock()
 
 
 @dataclass(frozen=True)
@@ -31,33 +38,59 @@ class StoredArray:
 
     @classmethod
     def open(cls, name: str, stream: IO[bytes], size: int) -> StoredArray:
-        """Read the header; size: bytes of header and values. Raises InputError or ValueError."""
+        """Read the header; size: bytes of header and values.
+
+        Raises InputError, also where it promises more than is held, or ValueError.
+        """
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         version = npy.read_magic(stream)
         if version not in headers:
             raise InputError(f"array '{name}' has format version {version}")
-        shape, column_order, dtype = headers[version](stream)
-        return cls(name, stream, shape, dtype, column_order, size - stream.tell())
+        head = stream.read(2 * version[0])
+        length = int.from_bytes(head, "little")
+        if length > _LONGEST_HEADER:
+            raise InputError(f"array '{name}' has a header of {length:,} bytes")
+        header = BytesIO(head + stream.read(length))
+        # numpy warns of headers written by Python 2. What warnings do is one for all threads.
+        with _quietly, warnings.catch_warnings(action="ignore"):
+            shape, column_order, dtype = headers[version](header)
+        array = cls(name, stream, shape, dtype, column_order, size - stream.tell())
+        if not dtype.hasobject and (min(shape, default=0) < 0 or array.nbytes > array.size):
+            raise InputError(f"array '{name}' promises {array.nbytes} bytes and holds {array.size}")
+        return array
+
+    @property
+    def nbytes(self) -> int:
+        """Of all values."""
+        return math.prod(self.shape) * self.dtype.itemsize
 
     @property
     def sequence(self) -> tuple[int, ...]:
         """Of positions: (T,) where they are (T, N, 3), () where they are (N, 3). Else raises InputError."""
+        self._check_type()
         if len(self.shape) not in (2, 3) or self.shape[-1] != 3:
             raise InputError(
                 f"array '{self.name}' has shape {self.shape}", hint="Positions are (N, 3) or (T, N, 3)"
             )
+        if self.dtype.kind not in "fiu":
+            raise InputError(f"array '{self.name}' is of type {self.dtype}, expected numbers")
+        if not self.nbytes:
+            raise InputError(f"holds no points: array '{self.name}' has shape {self.shape}")
+        check_count(math.prod(self.shape[:-2]), MOST_FRAMES, "frames")
         return self.shape[:-2]
+
+    def memory(self, frame: int | None = None) -> int:
+        """Bytes that `read` and a PointCloud made of it take at most at a time."""
+        is_part = frame is not None and not self.column_order
+        values = math.prod(self.shape[1:] if is_part else self.shape)
+        return values * (2 * self.dtype.itemsize + _CONVERTED)
 
     def read(self, frame: int | None = None) -> NDArray:
         """The whole array, or one entry along its first axis. To be called once.
 
-        Raises InputError for pickled objects and where the header promises more than is held.
+        Raises InputError for pickled objects and where the stream ends early.
         """
-        if self.dtype.hasobject:
-            raise InputError(f"array '{self.name}' holds pickled objects, which are refused")
-        promised = math.prod(self.shape) * self.dtype.itemsize
-        if promised > self.size or min(self.shape, default=0) < 0:
-            raise InputError(f"array '{self.name}' promises {promised} bytes and holds {self.size}")
+        self._check_type()
         if frame is None:
             return self._values(self.shape)
         if self.column_order:
@@ -65,6 +98,10 @@ class StoredArray:
         shape = self.shape[1:]
         self.stream.seek(frame * math.prod(shape) * self.dtype.itemsize, 1)
         return self._values(shape)
+
+    def _check_type(self) -> None:
+        if self.dtype.hasobject:
+            raise InputError(f"array '{self.name}' holds pickled objects, which are refused")
 
     def _values(self, shape: tuple[int, ...]) -> NDArray:
         flat = np.empty(math.prod(shape) * self.dtype.itemsize, np.uint8)

@@ -17,16 +17,16 @@ import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
-from threading import Lock
-from typing import Any
+from threading import Lock, get_ident
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..points import UNKNOWN_UNIT
-from ..range_view import RangeView
-from ._packed import check_unpacked_size
+from ..range_view import RangeView, memory_of_merging
+from ._admission import admit, opened, size_of
 
 TITLE = "EXR"
 SUFFIXES = (".exr",)
@@ -34,7 +34,7 @@ SUFFIXES = (".exr",)
 _PINHOLE = ("fx", "fy", "cx", "cy")
 _FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
 _SAMPLE_BYTES = 4  # of a channel, at most
-_MOST_RATIO = 1000  # of unpacked to packed: pictures where nearly all is empty pack to a 500th
+_VIEW_BYTES = 7  # of a pixel: mask and colour
 _decoding = Lock()
 
 
@@ -45,21 +45,41 @@ def read_unit(path: Path) -> str | None:
 
 def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
     """The views in the order of the parts. Raises InputError where a part is damaged or no range view."""
+    with opened(path) as stream:
+        headers = _headers(path)
+        for number, header in enumerate(headers):
+            _check_form(header, _name(header, number))
+        admit(size_of(stream), sum(_memory(header) for header in headers))
+        images = _decoded(path, len(headers))
+        views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
+        admit(size_of(stream), memory_of_merging(views))
+    return views
+
+
+def _decoded(path: Path, parts: int) -> list[dict[str, NDArray]]:
+    """The channels of every part by name, (H, W) each."""
     import OpenEXR
 
-    headers = _headers(path)
-    for number, header in enumerate(headers):
-        _check_form(header, _name(header, number))
-    check_unpacked_size(path, sum(_unpacked_size(header) for header in headers), _MOST_RATIO)
     # OpenEXR leaves damaged parts out and prints that to standard output, where results go.
-    with _decoding, redirect_stdout(sys.stderr), OpenEXR.File(str(path), separate_channels=True) as file:
-        if len(file.parts) != len(headers):
-            raise InputError(f"only {len(file.parts)} of its {len(headers)} parts can be decoded")
-        images = [{name: channel.pixels for name, channel in part.channels.items()} for part in file.parts]
-    return tuple(
-        _view(header, pixels, _name(header, number))
-        for number, (header, pixels) in enumerate(zip(headers, images, strict=True))
-    )
+    muted = redirect_stdout(_OfOthers(sys.stdout))
+    with _decoding, muted, OpenEXR.File(str(path), separate_channels=True) as file:
+        if len(file.parts) != parts:
+            raise InputError(f"only {len(file.parts)} of its {parts} parts can be decoded")
+        return [{name: channel.pixels for name, channel in part.channels.items()} for part in file.parts]
+
+
+class _OfOthers:
+    """Standard output but for what the thread prints that has made it."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._thread = stream, get_ident()
+
+    def write(self, text: str) -> int:
+        """As a text stream does."""
+        return len(text) if get_ident() == self._thread else self._stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def write_views(path: Path, views: Sequence[RangeView]) -> None:
@@ -108,10 +128,11 @@ def _check_form(header: dict[str, Any], name: str) -> None:
         raise InputError(f"'{name}' is no range view, it lacks: {', '.join(missing)}", hint=_FORM)
 
 
-def _unpacked_size(header: dict[str, Any]) -> int:
+def _memory(header: dict[str, Any]) -> int:
+    """Bytes that a part takes at most at a time, decoded and as a view."""
     low, high = (corner.astype(int) for corner in header["dataWindow"])
     width, height = (high - low + 1).tolist()
-    return width * height * len(header["channels"]) * _SAMPLE_BYTES
+    return max(width, 0) * max(height, 0) * (_SAMPLE_BYTES * len(header["channels"]) + _VIEW_BYTES)
 
 
 def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> RangeView:
@@ -119,13 +140,13 @@ def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> Rang
     fx, fy, cx, cy = (_number(header[key]) for key in _PINHOLE)
     # The corner of what is stored, where a program has cropped the picture.
     left, top = (header["dataWindow"][0] - header["displayWindow"][0]).tolist()
-    depth = pixels["Z"].astype(np.float32)
-    color = [pixels[channel].astype(np.float16) for channel in "RGB" if channel in pixels]
+    depth = pixels["Z"].astype(np.float32, copy=False)
+    color = [pixels[channel].astype(np.float16, copy=False) for channel in "RGB" if channel in pixels]
     return RangeView(
         depth=depth,
         mask=pixels["mask"] > 0.5 if "mask" in pixels else np.ones(depth.shape, bool),
         color=np.stack(color, axis=2) if len(color) == 3 else None,
-        confidence=pixels["confidence"].astype(np.float32) if "confidence" in pixels else None,
+        confidence=pixels["confidence"].astype(np.float32, copy=False) if "confidence" in pixels else None,
         fx=fx,
         fy=fy,
         cx=cx - left,

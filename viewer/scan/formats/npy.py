@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ..points import PointCloud
+from ._admission import admit, opened, size_of
 from ._stored import StoredArray
 
 TITLE = "NPY"
@@ -15,16 +16,18 @@ SUFFIXES = (".npy",)
 
 def frame_count(path: Path) -> int:
     """T of a (T, N, 3) array, else 1."""
-    with open(path, "rb") as stream:
-        return math.prod(_positions(stream, path).sequence)
+    with opened(path) as stream:
+        return math.prod(_positions(stream).sequence)
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
     """One frame of the positions; the other frames are not read. Raises InputError."""
-    with open(path, "rb") as stream:
-        positions = _positions(stream, path)
-        return PointCloud.from_arrays(positions.read(frame if positions.sequence else None))
+    with opened(path) as stream:
+        positions = _positions(stream)
+        share = frame if positions.sequence else None
+        admit(size_of(stream), positions.memory(share))
+        return PointCloud.from_arrays(positions.read(share))
 
 
-def _positions(stream: BinaryIO, path: Path) -> StoredArray:
-    return StoredArray.open("positions", stream, path.stat().st_size)
+def _positions(stream: BinaryIO) -> StoredArray:
+    return StoredArray.open("positions", stream, size_of(stream))

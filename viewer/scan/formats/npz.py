@@ -10,11 +10,12 @@ share them. Arrays of other shapes are left alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from zipfile import ZIP_STORED, ZipFile
+from typing import BinaryIO
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
 import numpy as np
 from numpy.lib import format as npy
@@ -22,67 +23,58 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..points import PointCloud
+from ._admission import MOST_MEMBERS, admit, check_count, opened, size_of
+from ._columns import first_repeated
 from ._faces import with_faces
-from ._packed import check_unpacked_size
 from ._stored import StoredArray
 
 TITLE = "NPZ"
 SUFFIXES = (".npz",)
 
-_RESERVED = {"positions", "normals", "colors", "radii", "axes", "origin", "times"}
-_MOST_RATIO = 250  # of unpacked to packed: scans pack to a half or a tenth
+_OF_POINTS: dict[str, list[tuple[int, ...]]] = {
+    "positions": [(3,)],
+    "normals": [(3,)],
+    "colors": [(3,), (4,)],
+    "radii": [()],
+    "axes": [(4,)],
+}
+_OF_ALL = {"origin", "times"}
+_SAVE_ANEW = "Save it with numpy.savez"
+_MOST_RATIO, _FREE = 64, 16 << 20  # bytes unpacked for those packed, and beyond: scans pack to a tenth
+_ENCRYPTED = 1  # a bit of a member's flags
 
 
 def frame_count(path: Path) -> int:
     """T of (T, N, 3) positions, else 1."""
-    with _arrays(path) as arrays:
+    with opened(path) as stream, _arrays(stream) as arrays:
         return math.prod(_positions(arrays).sequence)
 
 
 def read_times(path: Path) -> NDArray[np.float64] | None:
     """The array `times`, (T,) float64 seconds, or None."""
-    with _arrays(path) as arrays:
+    with opened(path) as stream, _arrays(stream) as arrays:
         sequence = _positions(arrays).sequence
         return _vector(arrays["times"], *sequence) if sequence and "times" in arrays else None
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
     """One frame; arrays that are not needed and other frames are not kept. Raises InputError."""
-    with _arrays(path) as arrays:
-        positions = _positions(arrays)
-        count = positions.shape[-2]
-        sequence = positions.sequence
-
-        def of_points(name: str, *tails: tuple[int, ...]) -> NDArray | None:
-            """The frame's share of an array, whose entries for a point have one of the shapes `tails`."""
-            if name not in arrays:
-                return None
-            shapes = [(count, *tail) for tail in tails]
-            if arrays[name].shape in shapes:
-                return arrays[name].read()
-            if sequence and arrays[name].shape in [(*sequence, *shape) for shape in shapes]:
-                return arrays[name].read(frame)
-            raise InputError(f"array '{name}' has shape {arrays[name].shape}, expected {shapes[-1]}")
-
-        scalars = {
-            name: array.read(None if array.shape == (count,) else frame)
-            for name, array in arrays.items()
-            if name not in _RESERVED
-            and array.dtype.kind in "fiub"
-            and array.shape in ((count,), (*sequence, count))
-        }
+    with opened(path) as stream, _arrays(stream) as arrays:
+        shares = _shares(arrays, frame)
+        faces = _faces(arrays)
+        needed = [arrays[name].memory(share) for name, share in shares.items()]
+        admit(size_of(stream), sum(needed) + (faces.memory() if faces else 0))
+        values = {name: arrays[name].read(share) for name, share in shares.items()}
         cloud = PointCloud.from_arrays(
-            positions.read(frame if sequence else None),
-            normals=of_points("normals", (3,)),
-            colors=of_points("colors", (3,), (4,)),
-            radii=of_points("radii", ()),
-            axes=of_points("axes", (4,)),
-            scalars=scalars,
+            values.pop("positions"),
+            **{name: values.pop(name, None) for name in ("normals", "colors", "radii", "axes")},
+            scalars=values,
             origin=np.zeros(3) if "origin" in arrays else None,
         )
+        del values
         if "origin" in arrays:
             cloud = replace(cloud, origin=_vector(arrays["origin"], 3))
-        return with_faces(cloud, _faces(arrays))
+        return with_faces(cloud, [np.ascontiguousarray(faces.read()).data] if faces else [])
 
 
 def write(path: Path, cloud: PointCloud) -> None:
@@ -103,17 +95,52 @@ def write(path: Path, cloud: PointCloud) -> None:
 
 
 @contextmanager
-def _arrays(path: Path) -> Iterator[dict[str, StoredArray]]:
+def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
     """All arrays of the archive by name, open as long as the context lasts."""
-    with ZipFile(path) as archive, ExitStack() as streams:
-        members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
-        unpacked = sum(member.file_size for member in members)
-        check_unpacked_size(path, unpacked, _MOST_RATIO, "Save it with numpy.savez")
+    with ZipFile(stream) as archive, ExitStack() as members:
+        infos = [info for info in archive.infolist() if info.filename.endswith(".npy")]
+        _check_members(infos, size_of(stream))
         yield {
-            name: StoredArray.open(name, streams.enter_context(archive.open(member)), member.file_size)
-            for member in members
-            for name in [member.filename.removesuffix(".npy")]
+            name: StoredArray.open(name, members.enter_context(archive.open(info)), info.file_size)
+            for info in infos
+            for name in [info.filename.removesuffix(".npy")]
         }
+
+
+def _check_members(infos: Sequence[ZipInfo], held: int) -> None:
+    """Raise InputError where an archive of `held` bytes is not as numpy writes it."""
+    check_count(len(infos), MOST_MEMBERS, "arrays")
+    if twice := first_repeated(info.filename for info in infos):
+        raise InputError(f"two arrays are called '{twice}'", hint=_SAVE_ANEW)
+    for info in infos:
+        if info.compress_type not in (ZIP_STORED, ZIP_DEFLATED) or info.flag_bits & _ENCRYPTED:
+            raise InputError(f"'{info.filename}' is packed in another way than numpy does", hint=_SAVE_ANEW)
+    unpacked = sum(info.file_size for info in infos)
+    if unpacked > _FREE + _MOST_RATIO * held:
+        raise InputError(f"{held} bytes would unpack to {unpacked}", hint=_SAVE_ANEW)
+
+
+def _shares(arrays: dict[str, StoredArray], frame: int) -> dict[str, int | None]:
+    """The arrays of points, and which entry of each belongs to the frame; None: all of it is shared.
+
+    Raises InputError where a reserved name has another shape than the positions ask for.
+    """
+    positions = _positions(arrays)
+    sequence, count = positions.sequence, positions.shape[-2]
+    shares: dict[str, int | None] = {}
+    for name, array in arrays.items():
+        shapes = [(count, *tail) for tail in _OF_POINTS.get(name, [()])]
+        if array.shape in shapes:
+            share = None
+        elif sequence and array.shape in [(*sequence, *shape) for shape in shapes]:
+            share = frame
+        elif name in _OF_POINTS:
+            raise InputError(f"array '{name}' has shape {array.shape}, expected {shapes[-1]}")
+        else:
+            continue
+        if name in _OF_POINTS or (name not in _OF_ALL and array.dtype.kind in "fiub"):
+            shares[name] = share
+    return shares
 
 
 def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
@@ -123,14 +150,14 @@ def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
     return arrays["positions"]
 
 
-def _faces(arrays: dict[str, StoredArray]) -> Iterator[bytes]:
+def _faces(arrays: dict[str, StoredArray]) -> StoredArray | None:
     faces = arrays.get("faces")
-    if faces and len(faces.shape) == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":
-        yield faces.read().tobytes()
+    fits = faces and len(faces.shape) == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu"
+    return faces if fits else None
 
 
 def _vector(array: StoredArray, length: int) -> NDArray[np.float64]:
-    values = array.read()
-    if values.shape != (length,) or values.dtype.kind not in "fiu" or not np.isfinite(values).all():
+    fits = array.shape == (length,) and array.dtype.kind in "fiu"
+    if not (fits and np.isfinite(values := array.read()).all()):
         raise InputError(f"array '{array.name}' is not {length} finite numbers")
     return values.astype(np.float64)

@@ -7,6 +7,7 @@ Read here and not by a library because those at hand drop vertices that no trian
 from __future__ import annotations
 
 from collections.abc import Iterator
+from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
 
@@ -14,59 +15,65 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..points import PointCloud
-from ._columns import parse_table
+from ._admission import opened
+from ._columns import bounded_lines, parse_table
 from ._faces import with_faces
 
 TITLE = "OBJ"
 SUFFIXES = (".obj",)
 
+_CORNERS_AT_ONCE = 1 << 18
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
     """The vertices (`v x y z [w]` or `v x y z r g b`) and their normals (`vn`). Raises InputError."""
-    table = parse_table(_lines(path, "v"))
-    cloud = PointCloud.from_arrays(
-        table[:, :3],
-        normals=_normals(path, len(table)),
-        colors=table[:, 3:6] if table.shape[1] >= 6 else None,
-    )
-    return with_faces(cloud, (line.encode("latin-1") for line in _lines(path, "f")))
+    with opened(path) as stream:
+        text = TextIOWrapper(stream, "latin-1")
+        table = parse_table(_lines(text, "v"))
+        cloud = PointCloud.from_arrays(
+            table[:, :3],
+            normals=_normals(text, len(table)),
+            colors=table[:, 3:6] if table.shape[1] >= 6 else None,
+        )
+        return with_faces(cloud, (line.encode("latin-1") for line in _lines(text, "f")))
 
 
-def _normals(path: Path, count: int) -> NDArray[np.float64] | None:
+def _normals(text: TextIOWrapper, count: int) -> NDArray[np.float64] | None:
     """A normal for each of `count` vertices, (count, 3), or None where not every vertex has one.
 
     They stand in the order of the vertices, or the faces tell; a vertex whose corners have several
     normals gets their mean.
     """
-    normals = parse_table(_lines(path, "vn"), (0, 1, 2))
+    normals = parse_table(_lines(text, "vn"), (0, 1, 2))
     if not len(normals):
         return None
-    start = parse_table(islice(_corners(path), _LOOK), (0, 2), "/")
+    start = parse_table(islice(_corners(text), _LOOK), (0, 2), "/")
     if len(normals) == count and (start[:, 0] == start[:, 1]).all():
         return normals
     sizes = np.array([count, len(normals)])
-    corners = parse_table(_corners(path), (0, 2), "/")
-    corners = np.where(corners < 0, corners + sizes, corners - 1)  # negative: counted from the end
-    vertex, normal = corners[((corners >= 0) & (corners < sizes)).all(axis=1)].astype(np.intp).T
-    sums = np.zeros((count, 3))
-    np.add.at(sums, vertex, normals[normal])
-    if not np.bincount(vertex, minlength=count).all():
+    sums, corners_of = np.zeros((count, 3)), np.zeros(count, np.intp)
+    all_corners = _corners(text)
+    while len(corners := parse_table(islice(all_corners, _CORNERS_AT_ONCE), (0, 2), "/")):
+        corners = np.where(corners < 0, corners + sizes, corners - 1)  # negative: counted from the end
+        vertex, normal = corners[((corners >= 0) & (corners < sizes)).all(axis=1)].astype(np.intp).T
+        np.add.at(sums, vertex, normals[normal])
+        np.add.at(corners_of, vertex, 1)
+    if not corners_of.all():
         return None
     return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), np.finfo(np.float32).tiny)
 
 
-def _lines(path: Path, keyword: str) -> Iterator[str]:
-    """What follows the keyword, of every line that starts with it."""
+def _lines(text: TextIOWrapper, keyword: str) -> Iterator[str]:
+    """What follows the keyword, of every line that starts with it; from the beginning of the file."""
     starts = (keyword + " ", keyword + "\t")
-    with open(path, encoding="latin-1") as lines:
-        for line in lines:
-            if line.startswith(starts):
-                yield line[len(keyword) :]
+    text.seek(0)
+    for line in bounded_lines(text):
+        if line.startswith(starts):
+            yield line[len(keyword) :]
 
 
-def _corners(path: Path) -> Iterator[str]:
+def _corners(text: TextIOWrapper) -> Iterator[str]:
     """The face corners that name a normal: `vertex/[texture]/normal`."""
-    for line in _lines(path, "f"):
+    for line in _lines(text, "f"):
         yield from (corner for corner in line.split() if corner.count("/") == 2)

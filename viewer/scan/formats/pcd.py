@@ -18,11 +18,22 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, unknown_name
 from ..points import PointCloud
+from ._admission import (
+    MOST_COLUMNS,
+    admit,
+    check_count,
+    opened,
+    read_exactly,
+    read_records,
+    size_of,
+    too_few,
+)
 from ._columns import (
     Columns,
     cloud_from_columns,
     columns_from_cloud,
     declared,
+    named,
     parse_table,
     records,
     text_lines,
@@ -34,6 +45,8 @@ SUFFIXES = (".pcd",)
 _HEADER_LIMIT = 1 << 16  # bytes looked at for the header
 _TYPES = {"F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8"}
 _PADDING = "_"
+_LONGEST_WORD = 40  # of a file, in a message
+_COPIES = 3  # of unpacked data, in memory at a time
 _LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
 
 
@@ -63,13 +76,12 @@ class _Header:
 
 def read(path: Path, frame: int = 0) -> PointCloud:
     """All finite points of a PCD file. Raises InputError."""
-    size = path.stat().st_size
-    with open(path, "rb") as stream:
-        header = _read_header(stream.read(_HEADER_LIMIT), size)
+    with opened(path) as stream:
+        header = _read_header(stream.read(_HEADER_LIMIT))
         if header.encoding not in _ENCODINGS:
-            raise unknown_name("PCD encoding", header.encoding, list(_ENCODINGS))
+            raise unknown_name("PCD encoding", header.encoding[:_LONGEST_WORD], list(_ENCODINGS))
         stream.seek(header.size)
-        columns = _ENCODINGS[header.encoding](stream, header, size - header.size)
+        columns = _ENCODINGS[header.encoding](stream, header)
     return cloud_from_columns(columns)
 
 
@@ -98,7 +110,7 @@ def write(path: Path, cloud: PointCloud) -> None:
         records(columns).tofile(stream)
 
 
-def _read_header(head: bytes, file_size: int) -> _Header:
+def _read_header(head: bytes) -> _Header:
     end = re.search(rb"^DATA[ \t]+(\w+)[ \t\r]*(\n|\Z)", head, re.MULTILINE)
     if end is None:
         raise InputError("is not a PCD file: it has no DATA line")
@@ -114,53 +126,54 @@ def _read_header(head: bytes, file_size: int) -> _Header:
         raise InputError("FIELDS, SIZE, TYPE and COUNT of the PCD header differ in length")
     for code in (type_ + size for type_, size in zip(types, sizes, strict=True)):
         if code not in _TYPES:
-            raise unknown_name("PCD type and size", code, list(_TYPES))
+            raise unknown_name("PCD type and size", code[:_LONGEST_WORD], list(_TYPES))
     sides = words["POINTS"] if "POINTS" in words else words["WIDTH"] + words["HEIGHT"]
     points = math.prod(map(int, sides))
-    if points < 1 or min(counts) < 1 or sum(counts) > file_size:
+    if points < 1 or min(counts) < 1:
         raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
+    check_count(sum(counts), MOST_COLUMNS, "values a point")
     fields = [_Field(n, (t + s).lower(), c) for n, t, s, c in zip(names, types, sizes, counts, strict=True)]
     return _Header(fields, points, end[1].decode().lower(), end.end())
 
 
-def _read_ascii(stream: BinaryIO, header: _Header, size: int) -> Columns:
+def _read_ascii(stream: BinaryIO, header: _Header) -> Columns:
     start = stream.read(_HEADER_LIMIT)
     stream.seek(header.size)
     delimiter = "," if b"," in start else None
     table = parse_table(text_lines(stream), delimiter=delimiter, rows=header.points)
     if len(table) < header.points:
-        raise _too_few(len(table), header)
+        raise too_few(len(table), header.points, "points")
     ends = np.cumsum([f.count for f in header.fields])
     if table.shape[1] < ends[-1]:
         raise InputError(f"its rows hold {table.shape[1]} values, the header promises {ends[-1]}")
     blocks = np.split(table, ends[:-1], axis=1)
-    types = {column: f.type for f in header.fields for column in f.columns}
-    return _unpacked(declared(_columns(header, blocks), types))
+    return _unpacked(
+        _columns(
+            header, [declared(f.name, block, f.type) for f, block in zip(header.fields, blocks, strict=True)]
+        )
+    )
 
 
-def _read_binary(stream: BinaryIO, header: _Header, size: int) -> Columns:
-    dtype = header.dtype
-    if header.points * dtype.itemsize > size:
-        raise _too_few(size // dtype.itemsize, header)
-    rows = np.fromfile(stream, dtype, header.points)
-    return _unpacked(_columns(header, [rows[name] for name in dtype.names or ()]))
+def _read_binary(stream: BinaryIO, header: _Header) -> Columns:
+    rows = read_records(stream, header.dtype, header.points, "points")
+    return _unpacked(_columns(header, [rows[name] for name in header.dtype.names or ()]))
 
 
-def _read_compressed(stream: BinaryIO, header: _Header, size: int) -> Columns:
+def _read_compressed(stream: BinaryIO, header: _Header) -> Columns:
     """One LZF stream that holds field after field, each for all points."""
     import lzf
 
-    if size < 8:
-        raise InputError("ends before its compressed data")
-    packed, unpacked = struct.unpack("<II", stream.read(8))
+    packed, unpacked = struct.unpack("<II", read_exactly(stream, 8))
     promised = header.points * header.dtype.itemsize
     if unpacked != promised:
         raise InputError(f"holds {unpacked} bytes of points, its header promises {promised}")
-    if packed > size - 8:
-        raise InputError(f"holds {size - 8} of its {packed} bytes of compressed data")
+    held = size_of(stream) - stream.tell()
+    if packed > held:
+        raise InputError(f"holds {held} of its {packed} bytes of compressed data")
     if unpacked > packed * _LZF_MAX_RATIO:
         raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked}")
-    data = lzf.decompress(stream.read(packed), unpacked)
+    admit(size_of(stream), packed + _COPIES * unpacked)
+    data = lzf.decompress(read_exactly(stream, packed), unpacked)
     if data is None or len(data) != unpacked:
         raise InputError("its compressed data are damaged")
     blocks, start = [], 0
@@ -176,12 +189,12 @@ _ENCODINGS = {"ascii": _read_ascii, "binary": _read_binary, "binary_compressed":
 
 def _columns(header: _Header, blocks: list[NDArray]) -> dict[str, NDArray]:
     """blocks: (N, count) of every field."""
-    return {
-        name: block[:, i]
+    return named(
+        (name, block[:, i])
         for f, block in zip(header.fields, blocks, strict=False)
         if f.name != _PADDING
         for i, name in enumerate(f.columns)
-    }
+    )
 
 
 def _unpacked(columns: dict[str, NDArray]) -> Columns:
@@ -193,7 +206,3 @@ def _unpacked(columns: dict[str, NDArray]) -> Columns:
             if name == "rgba" and channels[:, 3].any():  # many writers leave alpha 0
                 columns["alpha"] = channels[:, 3]
     return columns
-
-
-def _too_few(held: int, header: _Header) -> InputError:
-    return InputError(f"holds {held} of the {header.points} points that its header promises")

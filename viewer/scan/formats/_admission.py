@@ -1,0 +1,108 @@
+"""What a file may take to be read. Every reader asks here before it allocates, and reads what it promises or
+fails.
+
+Reading may take 10 times the bytes of the file and 180 MiB more, and never more than half of the machine's
+memory. The variable SCAN4D_READ_MB replaces both by a number of megabytes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...files import open_plain
+from ..cache import megabytes
+
+READ_VARIABLE = "SCAN4D_READ_MB"
+MOST_COLUMNS = 4096  # the longest descriptors of points in use have 1344 values
+MOST_FRAMES = 1 << 20  # of one file: nine hours at 30 a second
+MOST_MEMBERS = 1024  # of an archive
+LONGEST_LINE = 1 << 20  # characters of text
+
+_RATIO = 10  # of the memory that reading takes to the size of the file
+_FREE = 180 << 20  # bytes that reading any file may take
+_CHUNK = 1 << 20  # bytes passed on at a time
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """A file, open to be read. Raises OSError, also where it is no plain file.
+
+    Raises InputError where the file has become shorter when all is read: then there is no telling what was.
+    """
+    with open_plain(path) as stream:
+        held = size_of(stream)
+        yield stream
+        if size_of(stream) < held:
+            raise InputError("was cut short while it was read", hint="Open it again when it is whole")
+
+
+def size_of(stream: BinaryIO) -> int:
+    """The bytes of an open file."""
+    return os.fstat(stream.fileno()).st_size
+
+
+def most_memory(held: int) -> int:
+    """Bytes that reading a file of `held` bytes may take at a time. Raises InputError for a bad variable."""
+    told = megabytes(READ_VARIABLE)
+    return min(_RATIO * held + _FREE, _half_of_memory()) if told is None else told
+
+
+def _half_of_memory() -> int:
+    if not hasattr(os, "sysconf"):  # Windows
+        return 1 << 63
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+
+
+def admit(held: int, needed: int) -> None:
+    """Raise InputError, before anything is allocated, where a file would take more memory than it may.
+
+    held: the bytes of the file. needed: those that reading it takes at most at a time.
+    """
+    if needed > most_memory(held):
+        what = f"reading its {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
+        hint = f"Where you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"
+        raise InputError(what, hint=hint)
+
+
+def check_count(number: int, most: int, what: str) -> None:
+    """Raise InputError where a file has more of something than any scan; what: for example "columns"."""
+    if number > most:
+        raise InputError(f"has {number:,} {what}, more than the {most:,} that are read")
+
+
+def read_exactly(stream: BinaryIO, size: int) -> bytes:
+    """The next bytes of a stream. Raises InputError where there are fewer."""
+    data = stream.read(size)
+    if len(data) != size:
+        raise InputError(f"ends early: {len(data)} bytes where {size} should be")
+    return data
+
+
+def read_rest(stream: BinaryIO) -> Iterator[bytes]:
+    """What is left of a file, in pieces. Raises InputError where the file gets shorter meanwhile."""
+    left = size_of(stream) - stream.tell()
+    while left > 0:
+        yield (part := read_exactly(stream, min(left, _CHUNK)))
+        left -= len(part)
+
+
+def read_records(stream: BinaryIO, dtype: np.dtype, count: int, what: str) -> NDArray:
+    """The next records of a file, (count,). what: as the file calls them. Raises InputError for fewer."""
+    held = (size_of(stream) - stream.tell()) // dtype.itemsize
+    rows = np.fromfile(stream, dtype, count if count <= held else 0)
+    if len(rows) < count:
+        raise too_few(min(held, len(rows) or held), count, what)
+    return rows
+
+
+def too_few(held: int, promised: int, what: str) -> InputError:
+    """The error for a file that holds fewer rows than its header promises; what: as it calls them."""
+    return InputError(f"holds {held} of the {promised} {what} that its header promises")
