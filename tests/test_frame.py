@@ -261,3 +261,11 @@ def test_estimates_are_the_same_whoever_makes_them(renderer: Renderer) -> None:
         own.release()
     np.testing.assert_array_equal(clouds[0].normals, clouds[1].normals)
     np.testing.assert_array_equal(clouds[0].radii, clouds[1].radii)
+
+
+def test_a_frame_that_fails_still_tells_what_drew(renderer: Renderer) -> None:
+    pose, surface = Pose(0, 0.0, "x", sphere(100)), Surface(renderer.gpu, (60, 40))
+    request = Request(pose, Camera.orbit(pose.cloud.bounds()), "points", look=Look(color_by="missing"))
+    with pytest.raises(InputError, match="missing"):
+        render_frame(renderer, request, surface)
+    assert surface.stats.backend == "points"

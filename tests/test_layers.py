@@ -30,7 +30,7 @@ LAYERS = (
     {"gpu"},
     {"backends"},
     {"renderer", "frame", "timing", "export", "pick", "measurement", "anonymous"},
-    {"recording", "recording_json", "render_job", "__init__"},
+    {"journal", "recording", "recording_json", "render_job", "__init__"},
     {"app", "bench"},
     {"cli", "commands"},
 )

@@ -67,15 +67,15 @@ def render_frame(
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
     surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds))
+    stats = surface.stats
+    stats.backend = backend.name
     if prepared is None:
-        surface.stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
+        stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
     budget_ms = None if wait else _BUDGET_MS
     frame = FrameView(surface.view, params, prepared and prepared.derived, share, budget_ms)
     refinable = backend.draw(pose, frame, surface)
     shade(surface, look)
 
-    stats = surface.stats
-    stats.backend = backend.name
     stats.upload_ms = sum(each.take_ms("upload") for each in {pose, surface.pose})
     stats.derive_ms = pose.take_ms("derive")
     stats.passes = timers.passes()

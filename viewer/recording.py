@@ -148,10 +148,7 @@ class Recording:
     def save(self, path: Path) -> None:
         """Write its JSON. Raises InputError where it cannot be written."""
         before = (None, *self.entries[:-1])
-        lines = (
-            json.dumps({"at": entry.at} | entry.to_json(last))
-            for entry, last in zip(self.entries, before, strict=True)
-        )
+        lines = (json.dumps(_change(entry, last)) for entry, last in zip(self.entries, before, strict=True))
         head = json.dumps(_head() | {"seconds": self.seconds}).strip("{}")
         text = f'{{\n{head}, "entries": [\n' + ",\n".join(lines) + "\n]}\n"
         with whole_file(path) as temporary:
@@ -163,7 +160,11 @@ class Recording:
 
         Raises InputError, which names the file and the entry, for whatever is wrong in it.
         """
-        data = read_json(path)
+        return cls.from_json(read_json(path), path)
+
+    @classmethod
+    def from_json(cls, data: Any, path: Path) -> Recording:
+        """The recording of a JSON object of this file. Raises InputError for whatever is wrong in it."""
         if not isinstance(data, dict) or "format" not in data:
             raise InputError("is no recording", path, "Use a JSON that the window has recorded, or a picture")
         if data["format"] != FORMAT:
@@ -199,10 +200,16 @@ class Recorder:
     def __len__(self) -> int:
         return len(self._entries)
 
-    def note(self, entry: Entry, now: float) -> None:
-        """Take down what is shown from now on, unless it is what was shown before."""
-        if not self._entries or entry != self._entries[-1]:
-            self._entries.append(replace(entry, at=self._since(now)))
+    def note(self, entry: Entry, now: float) -> dict[str, Any] | None:
+        """Take down what is shown from now on, unless it is what was shown before.
+
+        Returns what has changed, as the recording's file will have it; None where nothing has.
+        """
+        before = self._entries[-1] if self._entries else None
+        if entry == before:
+            return None
+        self._entries.append(replace(entry, at=self._since(now)))
+        return _change(self._entries[-1], before)
 
     def finish(self, now: float) -> Recording:
         """All that was noted, which must be something."""
@@ -303,6 +310,11 @@ def _parsed(complete: Mapping[str, Any], where: object) -> Entry:
 
 def _head() -> dict[str, Any]:
     return {"format": FORMAT, "version": __version__}
+
+
+def _change(entry: Entry, before: Entry | None) -> dict[str, Any]:
+    """An entry as a recording has it, after the one before."""
+    return {"at": entry.at} | entry.to_json(before)
 
 
 def _plain(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from pathlib import Path
 
 import pytest
@@ -120,3 +121,30 @@ def test_a_folder_in_its_place_is_told(file: Path) -> None:
 def test_commands_are_plain_data() -> None:
     assert all(dataclasses.is_dataclass(command) for command in COMMANDS.values())
     assert Keys({"fit": "F8"}).of["fit"] == "F8"
+
+
+def test_keys_nested_without_end_leave_the_usual_ones(file: Path) -> None:
+    of, (problem,) = load_text(file, "[keys]\nplay = " + "[" * 5000)
+    assert "cannot be read" in problem
+    assert of == USUAL
+
+
+def test_a_pipe_or_a_huge_file_is_not_waited_for(file: Path) -> None:
+    file.parent.mkdir(parents=True)
+    os.mkfifo(file)
+    keys, (problem,) = load(file)
+    assert "cannot be read" in problem
+    assert keys.of == USUAL
+    file.unlink()
+    file.touch()
+    os.truncate(file, 400 * 2**20)  # a hole, which takes no room
+    keys, (problem,) = load(file)
+    assert "longer than" in problem
+    assert keys.of == USUAL
+
+
+def test_of_many_faults_a_few_are_told(file: Path) -> None:
+    of, problems = load_text(file, "[keys]\n" + "".join(f'command_{n} = "F8"\n' for n in range(50)))
+    assert len(problems) == 6
+    assert "45 more lines" in problems[-1]
+    assert of == USUAL

@@ -123,3 +123,35 @@ def shown(picture: Picture) -> tuple[np.ndarray, ...]:
 
 def turned(request: Request) -> Request:
     return replace(request, camera=request.camera.orbited(10, 0))
+
+
+@pytest.mark.parametrize("step", ["bring", "render_frame"])
+def test_whatever_fails_is_a_problem_and_the_image_before_stays(
+    picture: Picture, step: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture.draw(REQUEST, SIZE)
+    before = shown(picture)[0]
+    monkeypatch.setattr(picture_module, step, failing)
+    assert picture.draw(turned(REQUEST), SIZE)
+    assert str(picture.problem).startswith("Drawing failed (ValueError: of a library)")
+    assert not picture.is_there
+    assert picture.is_visible
+    np.testing.assert_array_equal(shown(picture)[0], before)
+    assert not picture.draw(turned(REQUEST), SIZE), "it is not tried again and again"
+    assert math.isinf(picture.better_at(playing=False))
+    monkeypatch.undo()
+    assert picture.draw(REQUEST, SIZE)
+    assert picture.is_there
+
+
+def test_a_surface_that_nothing_was_drawn_into_is_not_shown(
+    picture: Picture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture.draw(REQUEST, SIZE)
+    monkeypatch.setattr(picture_module, "render_frame", failing)
+    picture.draw(REQUEST, (30, 20))
+    assert not picture.is_visible
+
+
+def failing(*args: object, **options: object) -> bool:
+    raise ValueError("of a library")

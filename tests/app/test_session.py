@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from viewer.app.session import Session
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.look import Look
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
@@ -47,3 +52,11 @@ def test_a_scan_is_found_again_where_it_was_left() -> None:
     assert (session.index, session.camera) == (4, Camera())
     session.turn_to("two")
     assert session.index == 2
+
+
+def test_a_frame_without_the_chosen_scalar_is_drawn_in_other_colours_and_the_choice_stays() -> None:
+    with_q = replace(BARE, cloud=replace(BARE.cloud, scalars={"q": np.zeros(3, np.float32)}))
+    session = Session("scan", camera=Camera(), look=Look(color_by="q", light="flat"))
+    assert session.request(with_q).look == session.look
+    assert session.request(BARE).look == Look(color_by="auto", light="flat")
+    assert session.request(with_q).look.color_by == "q"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import fields, replace
 from itertools import count
@@ -204,7 +205,7 @@ def kept(file: Path) -> Settings:
     return load(file)[0]
 
 
-def test_the_keeper_saves_what_is_at_rest(file: Path) -> None:
+def test_the_keeper_saves_now_and_then_also_what_goes_on_changing(file: Path) -> None:
     keeper = Keeper(file, Settings())
     looks = 0
 
@@ -217,14 +218,24 @@ def test_the_keeper_saves_what_is_at_rest(file: Path) -> None:
     for now in (0.0, 0.1, 5.0):
         assert keeper.look(now, current) is None
     assert looks == 2, "now and then"
+    assert not file.exists(), "nothing has changed"
+    for index in range(5):  # as while a scan plays
+        states.append(replace(FULL, places={"/scans/a": Left(index)}))
+        keeper.look(10.0 + 5 * index, current)
+        finish(keeper)
+        assert kept(file) == states[-1]
     states.append(FULL)
-    keeper.look(10.0, current)
-    states.append(replace(FULL, theme="dark"))
-    keeper.look(15.0, current)
-    assert not file.exists(), "it is changing"
-    keeper.look(20.0, current)
-    assert keeper.close(states[-1]) is None
-    assert kept(file) == states[-1]
+    keeper.look(30.5, current)
+    finish(keeper)
+    assert kept(file) == states[-2], "it was saved a moment ago"
+    assert keeper.close(FULL) is None
+    assert kept(file) == FULL
+
+
+def finish(keeper: Keeper) -> None:
+    """Wait until it has written."""
+    if keeper._writing is not None:
+        keeper._writing.result()
 
 
 def test_closing_saves_at_once_and_only_what_has_changed(file: Path) -> None:
@@ -266,3 +277,41 @@ SCREENS = [(0, 0, 1920, 1040), (1920, -200, 1280, 1024)]
 )
 def test_a_window_comes_back_only_where_it_can_be_reached(place: Place, expected: Place | None) -> None:
     assert reachable(place, SCREENS) == expected
+
+
+def test_a_file_that_is_no_file_is_told_and_stays(file: Path) -> None:
+    file.parent.mkdir(parents=True)
+    os.mkfifo(file)
+    loaded, (message,) = load(file)  # rather than wait for a writer
+    assert loaded == Settings()
+    assert "cannot be read" in message
+
+
+def test_a_huge_file_is_put_aside_unread(file: Path) -> None:
+    written(file, "")
+    os.truncate(file, 400 * 2**20)  # a hole, which takes no room
+    loaded, (message,) = load(file)
+    assert loaded == Settings()
+    assert "too large" in message
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("name", ["turn_seconds", "text_scale", "window", "look", "pace", "params", "places"])
+@pytest.mark.parametrize("text", ["1" + "0" * 400, "[" * 900 + "]" * 900, '{"a": ' * 400 + "1" + "}" * 400])
+def test_numbers_and_nesting_without_end_are_left_out(file: Path, name: str, text: str) -> None:
+    loaded, problems = load(written(file, f'{{"format": 1, "theme": "light", "{name}": {text}}}'))
+    assert problems == []
+    assert loaded.theme == "light", "the rest holds"
+    assert getattr(loaded, name) == getattr(Settings(), name) or name == "places"
+
+
+def test_names_of_files_that_are_not_utf_8_come_back_and_impossible_ones_do_not(file: Path) -> None:
+    name = os.fsdecode(b"/scans/caf\xe9")
+    save(replace(FULL, recent=(name,), places={name: Left(3)}), file)
+    loaded = load(file)[0]
+    assert loaded.recent == (name,)
+    assert loaded.places == {name: Left(3)}
+    data = json.loads(file.read_text()) | {"places": {"\ud800": {}, "/b": {"index": 2}}, "recent": ["\ud800"]}
+    loaded = load(written(file, data))[0]
+    assert loaded.places == {"/b": Left(2)}
+    assert loaded.recent == ()

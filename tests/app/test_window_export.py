@@ -248,3 +248,21 @@ def test_a_cancelled_export_leaves_nothing_and_closing_asks(app: RunningApp, fol
     assert app.process.wait(30) == 0
     assert listed(folder) == before
     assert not re.search("Traceback", app.log())
+
+
+@pytest.mark.slow
+def test_a_signal_cancels_an_export_without_asking(
+    tmp_path_factory: pytest.TempPathFactory, folder: Path
+) -> None:
+    before = listed(folder)
+    with (
+        virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
+        running_app(screen, folder, "jane_doe") as app,
+    ):
+        begin_a_long_one(app, folder)
+        app.process.terminate()
+        assert app.process.wait(30) == 0
+        assert "asks before it closes" not in app.log()
+        assert "Traceback" not in app.log()
+    assert listed(folder) == before
+    assert list(folder.glob(".scan4d_*")) == []

@@ -103,7 +103,7 @@ class RunningApp:
 
     def log(self) -> str:
         """All that it has reported so far."""
-        return self._log.read_text()
+        return self._log.read_text(errors="replace")
 
     def expect(self, pattern: str) -> re.Match[str]:
         """Wait until a line that was not expected before matches; fails when the app ends."""
@@ -141,14 +141,25 @@ class RunningApp:
 
 
 @contextmanager
-def running_app(screen: Screen, folder: Path, *scans: object) -> Iterator[RunningApp]:
-    """The window on these scans, filling the screen. Screenshots go into the folder."""
-    log = folder / "log"
+def running_app(
+    screen: Screen, folder: Path, *scans: object, before: str = "", home: Path | None = None
+) -> Iterator[RunningApp]:
+    """The window on these scans, filling the screen. Screenshots go into the folder.
+
+    before: Python that is run first, to have something fail. home: where settings and unfinished recordings
+    are kept; else in the folder.
+    """
+    log, home = folder / "log", home or folder
     with log.open("wb") as stream:
         process = subprocess.Popen(
-            [sys.executable, "-c", _RUN, *map(str, scans)],
+            [sys.executable, "-c", before + _RUN, *map(str, scans)],
             cwd=folder,
-            env={**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(folder / "config")},
+            env={
+                **screen.env,
+                "PYTHONPATH": str(ROOT),
+                "XDG_CONFIG_HOME": str(home / "config"),
+                "XDG_STATE_HOME": str(home / "state"),
+            },
             stderr=stream,
         )
     app = RunningApp(screen, process, log)
@@ -162,7 +173,8 @@ def running_app(screen: Screen, folder: Path, *scans: object) -> Iterator[Runnin
         screen.do("windowmove", window, 0, 0, "windowsize", window, width, height)
         if not is_full:
             app.expect("view at")
-        app.expect("drew frame .*")
+        if not (is_full and app.frames()):
+            app.expect("drew frame .*")
         app.settle()
         yield app
     finally:

@@ -15,7 +15,7 @@ def run(
     device: int | None = None,
     replay: Path | None = None,
 ) -> int:
-    """Open a window on the first of the scans and return 0 when it is closed.
+    """Open a window on the first of the scans and return 0 when it is closed, by a signal too.
 
     scans: as a user names them (see `named_scans`); the others can be chosen in the window, which tells
     what is wrong with those that cannot be opened. up: the up axis. device: has no effect on a window,
@@ -31,25 +31,31 @@ def run(
     if not found:
         raise problems[0]
     timeline = open_scan(found[0], unit, fps)
-    from ..files import user_folder  # only now: a wrong name is told without waiting for ImGui
-    from . import settings
-    from .app import App
-    from .loop import Loop
-    from .window import Window
+    from .closing import Signals
 
-    remembered, notes = settings.load(user_folder() / settings.FILE)
-    window = Window("Scan4D", remembered.window)
-    try:
-        app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up)
-        for note in notes:
-            app.note(note)
-        app.scans.tell(problems)
-        if device is not None:
-            app.note("The display's own GPU draws the window; a device number has no effect on it.")
-        if replay is not None:
-            app.capture.replay(replay)
-        Loop(app).run()
-        app.close()
-    finally:
-        window.destroy()
+    with Signals() as signals:
+        from ..files import user_folder  # only now: a wrong name is told without waiting for ImGui
+        from . import settings
+        from .app import App
+        from .loop import Loop
+        from .window import Window
+
+        remembered, notes = settings.load(user_folder() / settings.FILE)
+        window = Window("Scan4D", remembered.window)
+        try:
+            app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up)
+            try:
+                for note in notes:
+                    app.note(note)
+                app.scans.tell(problems)
+                app.capture.find_unfinished()
+                if device is not None:
+                    app.note("The display's own GPU draws the window; a device number has no effect on it.")
+                if replay is not None:
+                    app.capture.replay(replay)
+                Loop(app, signals).run()
+            finally:
+                app.close()
+        finally:
+            window.destroy()
     return 0

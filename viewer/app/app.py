@@ -6,6 +6,7 @@ import logging
 import os
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ..scan.open import open_scan
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
 from . import keys, settings, theme
+from .failures import Failures
 from .files.browser import Browser
 from .files.opening import Opened, Opening, begin
 from .files.scans import Scans, title
@@ -45,7 +47,8 @@ class App:
 
     session: what the user has chosen. playback: the scan. picture: the 3D view.
     capture: pictures and recordings of it. exporting: pictures and films at other sizes.
-    theme: of the panels. notices: what the user was told. keys: which do what. help: its open pages.
+    theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
+    keys: which do what. help: its open pages.
     pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
     rendering: which backend draws.
     scans: those to go to without a dialog. browser: the dialog that finds others.
@@ -69,6 +72,7 @@ class App:
         self.session = remembered.session(scans[0], up)
         self.theme = remembered.theme
         self.notices = Notices()
+        self.failures = Failures(self.note)
         self.help: Help = Help()
         self.keys, problems = keys.load(self._keys_file)
         for problem in problems:
@@ -211,8 +215,12 @@ class App:
     def _choose_prepared(self) -> None:
         """Go back to what was drawn before, or to plain points."""
         if self.picture.request is not None:
+            drawn, chosen = self.picture.request.look, self.session.look
             request = self.picture.without_preparing(self.picture.request)
-            self.session.backend, self.session.look = str(request.backend), request.look
+            look = request.look
+            if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
+                look = replace(look, color_by=chosen.color_by)
+            self.session.backend, self.session.look = str(request.backend), look
 
     @property
     def hash(self) -> str | None:
@@ -299,14 +307,26 @@ class App:
         """Its width / height."""
         return self.view_size[0] / self.view_size[1]
 
+    def keep(self, now: float) -> None:
+        """Save what is to come back, where it has changed. now: by the clock, seconds."""
+        if problem := self.keeper.look(now, self.remembered):
+            self.note(problem)
+
     def close(self) -> None:
         """Save what is being recorded and what is to come back, and let go of everything but the window."""
-        self.capture.close()
-        self.counting.cancel()
+        for name, end in (
+            ("Saving", self.capture.close),
+            ("Keeping settings", self._keep_at_last),
+            ("Counting", self.counting.cancel),
+            ("Exporting", self.exporting.close),
+            ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop
+            ("Opening", self._opening.cancel),
+            ("Reading", self.playback.close),
+            ("Drawing", self.picture.release),
+        ):
+            with self.failures.told(name):
+                end()
+
+    def _keep_at_last(self) -> None:
         if problem := self.keeper.close(self.remembered()):
             self.note(problem)
-        self.exporting.close()
-        self.window.hide()  # what is being read may take a moment to stop
-        self._opening.cancel()
-        self.playback.close()
-        self.picture.release()

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from ..errors import InputError, unknown_name
-from ..files import whole_file
+from ..files import read_text, whole_file
 from .commands import COMMANDS
 
 if TYPE_CHECKING:
     from .app import App
 
 FILE = "keys.toml"
+_MOST_BYTES, _MOST_TOLD = 64 * 2**10, 5
 _MODIFIERS = {"Ctrl": imgui.Key.mod_ctrl, "Shift": imgui.Key.mod_shift, "Alt": imgui.Key.mod_alt}
 _NAMED = {
     "Space": "space", "Enter": "enter", "Tab": "tab", "Backspace": "backspace", "Delete": "delete",
@@ -72,8 +73,9 @@ class Keys:
             return
         for command, pressed in self._chords:
             flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
-            if imgui.shortcut(pressed, flags) and command.can(app):
-                command.act(app)
+            with app.failures.told(command.title):
+                if imgui.shortcut(pressed, flags) and command.can(app):
+                    command.act(app)
 
 
 def load(path: Path) -> tuple[Keys, list[str]]:
@@ -82,14 +84,17 @@ def load(path: Path) -> tuple[Keys, list[str]]:
     What is wrong is left out: the usual keys hold for it.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        given = tomllib.loads(text)
+        given = tomllib.loads(read_text(path, _MOST_BYTES))
     except FileNotFoundError:
         return Keys(), []
-    except (OSError, ValueError) as error:  # of encoding and of TOML
-        return Keys(), [str(InputError(f"cannot be read ({error})", path, "The usual keys hold"))]
+    except (OSError, ValueError, RecursionError) as error:  # of encoding and of TOML as well
+        what = getattr(error, "strerror", None) or error
+        return Keys(), [str(InputError(f"cannot be read ({what})", path, "The usual keys hold"))]
     changes, problems = _checked(given)
-    return Keys(changes), [str(InputError(problem.what, path, problem.hint)) for problem in problems]
+    told = [str(InputError(problem.what, path, problem.hint)) for problem in problems[:_MOST_TOLD]]
+    if len(problems) > _MOST_TOLD:
+        told.append(f"{path}: {len(problems) - _MOST_TOLD} more lines cannot be used")
+    return Keys(changes), told
 
 
 def _checked(given: Mapping[str, Any]) -> tuple[dict[str, str], list[InputError]]:

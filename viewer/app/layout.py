@@ -27,15 +27,21 @@ _STILL = (
 
 
 def draw(app: App) -> Place:
-    """Declare all widgets; returns where the 3D view is."""
+    """Declare all widgets; returns where the 3D view is. Where a part fails, the others are there."""
+    told = app.failures.told
     app.keys.handle(app)
-    escape.handle(app)
+    with told("Escape"):
+        escape.handle(app)
     place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
-    tasks.draw(app, place, head)
-    help.draw(app)
-    app.browser.draw()
-    export_dialog.draw(app)
-    measuring_panel.draw_dialog(app)
+    for name, draw_part in (
+        ("The list of work", lambda: tasks.draw(app, place, head)),
+        ("Help", lambda: help.draw(app)),
+        ("The dialog that opens scans", app.browser.draw),
+        ("The export dialog", lambda: export_dialog.draw(app)),
+        ("The dialog that saves measurements", lambda: measuring_panel.draw_dialog(app)),
+    ):
+        with told(name):
+            draw_part()
     return place
 
 
@@ -46,29 +52,35 @@ def _draw_view_alone(app: App) -> tuple[Place, float]:
 
 def _draw_parts(app: App) -> tuple[Place, float]:
     whole = imgui.get_io().display_size
-    top = _draw_head(app, whole.x)
+    top = 0
+    with app.failures.told("The menu"):
+        top = _draw_head(app, whole.x)
     em = imgui.get_font_size()
     # Whole numbers, so that the picture's edges fall on pixels.
     width = max(1, int(whole.x - min(_PANEL_WIDTH * em, 0.5 * whole.x)))
     bottom = int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y))
     height = max(1, bottom - top)
     view_and_head = _draw_view(app, top, width, height)
-    _place("panel", width, top, whole.x - width, height)
-    panel.draw(app)
-    imgui.end()
-    _place("timeline", 0, bottom, whole.x, whole.y - bottom)
-    timeline_bar.draw(app)
-    imgui.end()
+    with app.failures.told("The panel"):
+        _place("panel", width, top, whole.x - width, height)
+        panel.draw(app)
+        imgui.end()
+    with app.failures.told("The timeline"):
+        _place("timeline", 0, bottom, whole.x, whole.y - bottom)
+        timeline_bar.draw(app)
+        imgui.end()
     return view_and_head
 
 
 def _draw_view(app: App, top: int, width: int, height: int) -> tuple[Place, float]:
     """Declare the view; returns where it is, and how much of its top notes take."""
-    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-    _place("view", 0, top, width, height)
-    imgui.pop_style_var()
-    head = view.draw(app)
-    imgui.end()
+    head = 0.0
+    with app.failures.told("The view"):
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+        _place("view", 0, top, width, height)
+        imgui.pop_style_var()
+        head = view.draw(app)
+        imgui.end()
     return (0, top, width, height), head
 
 

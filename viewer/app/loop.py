@@ -12,37 +12,51 @@ from .turns import Turns
 
 if TYPE_CHECKING:
     from .app import App
+    from .closing import Signals
 
 log = logging.getLogger(__name__)
 
 _WATCH = 0.25  # seconds between looks at what workers have done while nothing is awaited
 _AWAIT = 0.015  # the same while a pose or a scan is awaited
+_CALM = 0.1  # seconds before going on after something has failed, which might do so again at once
 _RATE = 25.0  # pictures a second while the camera moves
 _FASTEST = 30.0  # the same while a scan plays that has more
 _BUSY = 0.9  # of the time between pictures that the window may take over one
 
 
 class Loop:
-    """Runs an app."""
+    """Runs an app until its window is closed, or a signal says so."""
 
-    def __init__(self, app: App) -> None:
+    def __init__(self, app: App, signals: Signals) -> None:
         self._app = app
+        self._signals = signals
         self._turns = Turns()
         self._reported: Any = None
 
     def run(self) -> None:
-        """Go on until the window is closed."""
+        """Go on until the window is closed, whatever goes wrong meanwhile."""
+        failures = self._app.failures
         while not self._ends():
-            self._turns.add("late", 1e3 * self._app.window.wait(self._patience(time.monotonic())))
-            with self._turns.part("advance"):
-                changed = self._advance(time.monotonic())
-            if changed or self._app.window.due:
-                self._draw()
-            self._turns.end()
+            before = failures.count
+            with failures.told("The window"):
+                self._turn()
+            if failures.count != before:
+                time.sleep(_CALM)
+
+    def _turn(self) -> None:
+        self._turns.add("late", 1e3 * self._app.window.wait(self._patience(time.monotonic())))
+        with self._turns.part("advance"):
+            changed = self._advance(time.monotonic())
+        if changed or self._app.window.due:
+            self._draw()
+        self._turns.end()
 
     def _ends(self) -> bool:
-        """Whether the window is closed, and the user was asked where that cancels an export."""
+        """Whether the window is closed, and the user was asked where that cancels an export; a signal asks
+        nobody."""
         window = self._app.window
+        if self._signals.came:
+            return True
         if window.is_closing and self._app.exporting.keeps_open():
             window.is_closing = False
             window.touch()
@@ -62,39 +76,46 @@ class Loop:
     def _advance(self, now: float) -> bool:
         """Take in what time and workers have brought; True where there is something to show."""
         app = self._app
-        app.take_opened()
-        if app.window.dropped:
-            dropping.take(app, app.window.take_dropped())
-        listed = app.scans.advance(), app.browser.advance()
-        if problem := app.keeper.look(now, app.remembered):
-            app.note(problem)
-        app.exporting.advance()
-        app.capture.advance(now)
-        app.playback.advance(now)
-        app.pass_on_messages()
+        changed = False
+        for name, advance in (
+            ("Opening", app.take_opened),
+            ("Taking what was dropped", lambda: dropping.take(app, app.window.take_dropped())),
+            ("Listing scans", app.scans.advance),
+            ("Listing a folder", app.browser.advance),
+            ("Keeping settings", lambda: app.keep(now)),
+            ("Exporting", app.exporting.advance),
+            ("Saving", lambda: app.capture.advance(now)),
+            ("Playing", lambda: app.playback.advance(now)),
+            ("Reading", app.pass_on_messages),
+            ("Turning", lambda: app.steering.advance(now)),
+            ("Counting", lambda: app.counting.advance(app.picture, not app.moving, now)),
+        ):
+            with app.failures.told(name):
+                changed |= bool(advance())
         told = app.notices.count, len(app.notices.shown(now))
         cached = app.playback.timeline.cached()
         report = (app.playback.pose, app.session.index, cached, told, tasks.report(app))
-        changed, self._reported = report != self._reported, report
-        turned = app.steering.advance(now)
-        counted = app.counting.advance(app.picture, not app.moving, now)
-        better = now >= app.picture.better_at(app.playback.player.playing)
-        return changed or turned or counted or any(listed) or better
+        changed |= report != self._reported
+        self._reported = report
+        return changed or now >= app.picture.better_at(app.playback.player.playing)
 
     def _draw(self) -> None:
         app, start = self._app, time.perf_counter()
         with self._turns.part("widgets"):
             app.window.begin()
-            app.place_view(app.window.to_pixels(*layout.draw(app)))
-        start_picture = time.perf_counter()
-        drew = self._draw_picture()
+            with app.failures.told("The window"):
+                app.place_view(app.window.to_pixels(*layout.draw(app)))
+        start_picture, drew = time.perf_counter(), False
+        with app.failures.told("Drawing"):
+            drew = self._draw_picture()
         self._turns.add("picture" if drew else "upload", (time.perf_counter() - start_picture) * 1e3)
         if drew and not app.moving:
             app.window.touch(frames=1)  # for what the panel says about it
         with self._turns.part("show"):
-            app.window.fill(app.palette.panel)
-            if app.picture.is_visible and (app.picture.is_there or app.playback.problem is None):
-                app.picture.present(*app.view_corner)
+            with app.failures.told("Showing the picture"):
+                app.window.fill(app.palette.panel)
+                if app.picture.is_visible and (app.picture.is_there or app.playback.problem is None):
+                    app.picture.present(*app.view_corner)
             app.window.end()
         if drew:
             app.picture.took((time.perf_counter() - start) * 1e3, self._goal_ms)
@@ -106,8 +127,11 @@ class Loop:
             return False
         app.steering.settle(pose)
         playing, held = app.playback.player.playing, app.steering.moves
+        app.rendering.tell_missing(pose)
         drew = app.picture.draw(app.session.request(pose), app.view_size, playing=playing, held=held)
-        if drew:
+        if drew and app.picture.problem is not None:
+            app.failures.tell("Drawing", app.picture.problem)
+        elif drew:
             app.capture.note_shown()
         return drew
 

@@ -55,7 +55,8 @@ def _draw_button(app: App, command: Command) -> None:
     if is_on:
         imgui.push_style_color(imgui.Col_.text, theme.packed(app.palette.accent))
     if imgui.button(command.short):
-        command.act(app)
+        with app.failures.told(command.title):
+            command.act(app)
     if is_on:
         imgui.pop_style_color()
     imgui.end_disabled()
@@ -66,7 +67,8 @@ def _draw(app: App, entry: Command | Listing | Menu) -> None:
     if isinstance(entry, Command):
         is_on = entry.is_on is not None and entry.is_on(app)
         if imgui.menu_item(entry.title, app.keys.of[entry.name], is_on, entry.can(app))[0]:
-            entry.act(app)
+            with app.failures.told(entry.title):
+                entry.act(app)
     elif imgui.begin_menu(entry.title):
         if isinstance(entry, Listing):
             _draw_items(app, entry)

@@ -40,8 +40,7 @@ def draw(app: App) -> None:
         if _section("Renderer"):
             _draw_renderer(app, pose)
         if _section("Look"):
-            choices = {"color_by": [*COLOR_BY, *pose.cloud.scalars]}
-            app.session.look = widgets.edit(app.session.look, choices)
+            app.session.look = widgets.edit(app.session.look, {"color_by": _colors(app, pose)})
             _draw_projection(app)
         if _section("Bookmarks", is_open=bool(app.session.bookmarks)):
             app.bookmarks.draw(app)
@@ -92,6 +91,14 @@ def _draw_renderer(app: App, pose: Pose) -> None:
     session.params[name] = widgets.edit(params)
 
 
+def _colors(app: App, pose: Pose) -> dict[str, str]:
+    """What can give colours, and the title of each: also what is chosen although the frame lacks it."""
+    there = [*COLOR_BY, *pose.cloud.scalars]
+    chosen = app.session.look.color_by
+    missing = {} if chosen in there else {chosen: f"{printable(chosen)} (not here)"}
+    return {name: printable(name) for name in there} | missing
+
+
 def _draw_projection(app: App) -> None:
     widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth")
     now = app.session.camera.projection if app.session.camera else PROJECTIONS[0]
@@ -109,7 +116,7 @@ def _draw_statistics(app: App) -> None:
     imgui.same_line(max(imgui.get_content_region_avail().x - 8 * imgui.get_font_size(), width))
     timers.enabled = imgui.checkbox("Time each pass", timers.enabled)[1]
     imgui.set_item_tooltip("Measure each pass of a picture; this makes it a little slower")
-    if surface is None or pose is None or app.picture.request is None:
+    if surface is None or pose is None or not app.picture.is_there:
         return
     x, y, z = app.picture.bounds(pose).high - app.picture.bounds(pose).low
     _row(

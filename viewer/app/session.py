@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..files import absolute
 from ..frame import Request, choose
 from ..geometry import Vector
-from ..look import Look
+from ..look import Look, drawable
 from ..scan.open import DEMO
 from ..scan.pose import Pose
 from .playing.player import Pace
@@ -81,10 +81,13 @@ class Session:
         return name, self.params.setdefault(name, defaults)
 
     def request(self, pose: Pose) -> Request:
-        """The picture to draw of a pose. The camera must be set."""
+        """The picture to draw of a pose, in other colours where it lacks the scalar that gives them.
+
+        The camera must be set.
+        """
         assert self.camera is not None
         name, params = self.chosen(pose)
-        return Request(pose, self.camera, name, params, self.look)
+        return Request(pose, self.camera, name, params, drawable(self.look, pose.cloud))
 
     def turn_to(self, scan: str) -> None:
         """Go to another scan, where it was left."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -17,7 +18,7 @@ import numpy as np
 from ..backends import backend
 from ..camera import Camera
 from ..errors import InputError
-from ..files import whole_file
+from ..files import read_text, whole_file
 from ..geometry import up_vector
 from ..look import COLOR_BY, Look
 from ..marks import Marks
@@ -37,7 +38,10 @@ _MOST_PLACES = 200
 _UPRIGHT = 0.999  # cosine between a camera's up and the scan's
 _LOOK_EVERY = 3.0  # seconds between looks at what has changed
 _OF_ONE_SCAN = ("up", "low", "high")  # of a look: no use for the next scan
-_WRONG = (InputError, TypeError, ValueError, KeyError, AttributeError, ArithmeticError)  # by odd JSON
+_MOST_BYTES = 32 * 2**20  # of the file
+_WRONG = (  # by odd JSON
+    InputError, TypeError, ValueError, KeyError, AttributeError, ArithmeticError, RecursionError,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -104,10 +108,12 @@ def load(path: Path) -> tuple[Settings, list[str]]:
     A file that is damaged or of another version is put aside, and all starts anew.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_text(path, _MOST_BYTES))
     except FileNotFoundError:
         return Settings(), []
     except OSError as error:
+        if error.errno == errno.EFBIG:
+            return Settings(), [_put_aside(path, "is too large")]
         return Settings(), [str(InputError(f"cannot be read ({error.strerror})", path, "All starts anew"))]
     except (ValueError, RecursionError):  # of encoding as well
         return Settings(), [_put_aside(path, "is damaged")]
@@ -133,26 +139,25 @@ class Keeper:
     def __init__(self, path: Path, saved: Settings) -> None:
         self._path = path
         self._saved: Settings | None = saved
-        self._seen = saved
         self._next_look = 0.0
         self._writing: Future[None] | None = None
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="settings")
 
     def look(self, now: float, current: Callable[[], Settings]) -> str | None:
-        """Save what has changed and is at rest; now and then only. now: by the clock, seconds.
+        """Save what has changed; now and then only. now: by the clock, seconds.
 
         Returns what went wrong, once: from then on only closing tries again.
         """
         if now < self._next_look:
             return None
         self._next_look = now + _LOOK_EVERY
+        if problem := self._take_problem():
+            return problem
         settings = current()
-        if settings == self._seen and settings != self._saved and not self._is_writing:
+        if settings != self._saved and not self._is_writing:
             self._saved = settings
             self._writing = self._worker.submit(save, settings, self._path)
-            return None
-        self._seen = settings
-        return self._take_problem()
+        return None
 
     def close(self, current: Settings) -> str | None:
         """Save, and wait for it. Returns what went wrong."""
@@ -261,6 +266,7 @@ def _turn_seconds(data: Any) -> float:
 def _text(data: Any) -> str:
     if not isinstance(data, str) or not data or "\0" in data:
         raise InputError("is no text")
+    os.fsencode(data)  # else it cannot be shown, nor be a path
     return data
 
 
@@ -279,7 +285,11 @@ def _left(data: Any) -> Left:
 
 
 def _places(data: Any) -> dict[str, Left]:
-    return {name: _left(left) for name, left in data.items() if "\0" not in name}
+    places = {}
+    for name, left in data.items():
+        with suppress(*_WRONG):
+            places[_text(name)] = _left(left)
+    return places
 
 
 _READERS: dict[str, Callable[[Any], Any]] = {

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from imgui_bundle import ImVec2, imgui
 
+from ..files import printable
 from ..look import rgba
 from ..params import Parameter, describe
 from . import theme
@@ -22,14 +23,14 @@ _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
-def edit(values: T, choices: Mapping[str, Sequence[str]] | None = None) -> T:
+def edit(values: T, choices: Mapping[str, Mapping[str, str]] | None = None) -> T:
     """A row of label and widget for each parameter; the same object while nothing is edited.
 
-    choices: words to choose from, for parameters that declare none.
+    choices: words to choose from and their titles, for parameters that declare none.
     """
     for parameter in describe(type(values)):
         old = getattr(values, parameter.name)
-        words = parameter.choices or (choices or {}).get(parameter.name, ())
+        words = (choices or {}).get(parameter.name, {})
         imgui.push_id(parameter.name)
         label(parameter.name.replace("_", " ").capitalize(), parameter.help)
         new = _edit_optional(parameter, old) if parameter.optional else _edit(parameter, old, words)
@@ -69,16 +70,16 @@ def _edit_optional(parameter: Parameter, value: Any) -> Any:
     if value is not None:
         imgui.same_line()
         imgui.set_next_item_width(-1)
-        value = _edit(parameter, value, parameter.choices)
+        value = _edit(parameter, value)
     return value
 
 
-def _edit(parameter: Parameter, value: Any, words: Sequence[str]) -> Any:
+def _edit(parameter: Parameter, value: Any, words: Mapping[str, str] | None = None) -> Any:
     name = "##value"
     if parameter.type is bool:
         return imgui.checkbox(name, value)[1]
-    if words:
-        return choose(name, value, words)
+    if words or parameter.choices:
+        return choose(name, value, list(words or parameter.choices), words)
     if parameter.type is str:
         return _edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
     return _edit_number(name, parameter, value)
@@ -121,6 +122,20 @@ def _edit_color(name: str, value: str) -> str:
 def _edit_text(name: str, value: str) -> str:
     entered, new = imgui.input_text(name, value, imgui.InputTextFlags_.enter_returns_true.value)
     return new if entered else value
+
+
+def edit_path(name: str, path: str, flags: int = 0) -> tuple[bool, str]:
+    """A field for a path; what ImGui says of the field, and the path."""
+    told, text = imgui.input_text(name, printable(path), flags)
+    return told, edited(path, text)
+
+
+def edited(path: str, text: str) -> str:
+    """A path whose `printable` form the user has changed to this text: what is not UTF-8 in it stays, unless
+    that part was changed."""
+    heads = (path[:end] for end in range(len(path), -1, -1))
+    kept = next(head for head in heads if text.startswith(printable(head)))
+    return kept + text[len(printable(kept)) :]
 
 
 def shortened(text: str, width: float) -> str:

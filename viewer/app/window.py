@@ -195,6 +195,8 @@ class Window(GlfwWindow):
 
     def begin(self) -> None:
         """Begin a frame: widgets may be declared from here on."""
+        if imgui.get_current_context().within_frame_scope:  # the one before did not come to its end
+            imgui.end_frame()
         self._set_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()

@@ -98,7 +98,7 @@ class Browser:
     def _go(self, folder: Path, select: str = "") -> None:
         """Show a folder."""
         self._folder, self._select = folder, select
-        self._text = printable(str(folder))
+        self._text = str(folder)
         self._rows, self._problem, self._chosen = [], None, 0
         self._listing = in_background(Task("Listing a folder"), lambda: list_folder(folder))
 
@@ -148,7 +148,8 @@ class Browser:
             self._go_up()
         imgui.same_line()
         imgui.set_next_item_width(-1)
-        entered, self._text = imgui.input_text("##path", self._text, imgui.InputTextFlags_.enter_returns_true)
+        returns = imgui.InputTextFlags_.enter_returns_true
+        entered, self._text = widgets.edit_path("##path", self._text, returns)
         imgui.set_item_tooltip("A folder, a file, or a pattern such as frame%04d.ply; Enter goes there")
         if entered:
             self._enter_text()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def take(app: App, paths: Sequence[str]) -> None:
     """Open what was dropped together: a whole sequence as one scan, else the first, and the others listed.
 
-    A recording or a picture is replayed where it was dropped alone.
+    A recording or a picture is replayed where it was dropped alone. paths: none where nothing was dropped.
     """
     told = [path for path in paths if os.path.isfile(path) and is_recording(Path(path))]
     if told and len(paths) == 1:

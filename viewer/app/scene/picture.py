@@ -18,6 +18,7 @@ from ...pick import Picked, before_gap, pick
 from ...renderer import Renderer
 from ...scan.points import Bounds
 from ...scan.pose import Pose
+from ..failures import in_words
 from .detail import Detail, Level
 from .motion import Motion
 
@@ -31,9 +32,9 @@ class Picture:
     """Draws requests for the view.
 
     request: what was drawn last, None before. problem: why it could not be drawn, None
-    where it could. size: of the view, pixels. While it moves, a picture may be a preview, of
-    fewer points and pixels, which is drawn in full at rest. surface: what the picture shows,
-    smaller than the view where it is a preview. number: of pictures drawn so far. shown_at: by
+    where it could; the image before stays then. size: of the view, pixels. While it moves, a picture may
+    be a preview, of fewer points and pixels, which is drawn in full at rest. surface: what the picture
+    shows, smaller than the view where it is a preview. number: of pictures drawn so far. shown_at: by
     the clock, when the last one was there.
     """
 
@@ -69,7 +70,7 @@ class Picture:
             request.pose, request.camera, request.backend, request.params, request.look, size,
             self.gpu.timers.enabled,
         )  # fmt: skip
-        now = time.monotonic()
+        now, before = time.monotonic(), self.surface
         if wanted != self._drawn:
             self._motion.change(now, playing or held)
         elif now < self.better_at(playing):
@@ -87,8 +88,9 @@ class Picture:
             self._level = self._detail(request).level if playing or now < self._motion.ends else Level()
             self.surface = surface = self._surface_of(self._level)
             refinable = render_frame(self.renderer, request, surface, wait=False, share=self._level.share)
-        except Scan4DError as problem:
-            self._drawn, self.request, self.problem = wanted, request, problem
+        except Exception as error:  # whatever a scan brings, the window stays
+            self._drawn, self.request, self.problem = wanted, request, _problem(error)
+            self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
             return True
         self._note_drawn(request, surface, refinable)
         return True
@@ -170,8 +172,8 @@ class Picture:
 
     @property
     def is_visible(self) -> bool:
-        """Whether there is an image to show: after `clear` the one before, until the next is drawn."""
-        return self.surface is not None and self.problem is None
+        """Whether there is an image to show: where the last request was not drawn, the one before."""
+        return self.surface is not None
 
     def present(self, left: int, bottom: int) -> None:
         """Copy it to the window. left, bottom: its corner, pixels from the window's lower left."""
@@ -202,8 +204,6 @@ class Picture:
 
     def clear(self) -> None:
         """Forget what is shown, whose image stays until the next request is drawn."""
-        if self.problem is not None:
-            self.surface = None
         self._drawn = self.request = self.problem = self._bounded = self._picked = None
         self._prepared_at = math.inf
 
@@ -226,3 +226,12 @@ class Picture:
             surface.release()
         self._presenter.release()
         self.renderer.release()
+
+
+def _problem(error: Exception) -> Scan4DError:
+    """Why there is no picture, as users read it."""
+    if isinstance(error, Scan4DError):
+        return error
+    problem = Scan4DError(in_words("Drawing", error))
+    problem.__cause__ = error
+    return problem

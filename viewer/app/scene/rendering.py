@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...backends import backends
+from ...look import drawable
+from ...scan.pose import Pose
 from . import levels
 
 if TYPE_CHECKING:
@@ -16,6 +18,18 @@ class Rendering:
 
     def __init__(self, app: App) -> None:
         self._app = app
+        self._missed: tuple[str, str] | None = None  # scan and scalar, told last
+
+    def tell_missing(self, pose: Pose) -> None:
+        """Tell, once a scan, that a frame has not the scalar that the user chose to colour by."""
+        session = self._app.session
+        missed = session.scan, session.look.color_by
+        if missed != self._missed and drawable(session.look, pose.cloud) != session.look:
+            self._missed = missed
+            self._app.note(
+                f"Frame {pose.index + 1} has no '{missed[1]}' to colour by: "
+                "other colours are shown until a frame has it."
+            )
 
     @property
     def backend(self) -> str | None:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 
 from ...camera import Camera
+from ...files import printable
 from ...geometry import Vector
+from ...scan.pose import Pose
 from .. import notices, theme
 from ..tools import measuring_view
 from . import cube, legend, navigation
@@ -28,28 +30,39 @@ _RED = 0xE0483E  # 0xRRGGBB
 
 def draw(app: App) -> float:
     """Declare the view in the current ImGui window, which it fills; returns where notes at its top end."""
-    size = imgui.get_content_region_avail()
+    size, told = imgui.get_content_region_avail(), app.failures.told
     cube.take_mouse(app, size)
     if app.steering.cube.under_mouse is not None:
         imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
     imgui.invisible_button("view", size, _BUTTONS)
-    app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
+    with told("Looking what is under the mouse"):
+        app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
     if app.session.camera is not None and app.playback.pose is not None:
-        radius = app.picture.bounds(app.playback.pose).radius
-        sets_pivot = imgui.is_mouse_double_clicked(0) and not app.measuring.active
-        if imgui.is_item_hovered() and sets_pivot:
-            app.steering.set_pivot()
-        app.session.camera = _navigate(app, app.session.camera, size, radius)
-        if app.session.pivot and imgui.is_item_hovered():
-            _draw_pivot(app.session.camera, app.session.pivot, size)
-        measuring_view.draw(app, size)
-    cube.draw(app, size)
-    legend.draw(app, size)
-    head = _draw_note(text, size) if (text := _note(app)) else measuring_view.draw_banner(app, size)
+        with told("Moving the view"):
+            _move(app, app.session.camera, app.playback.pose, size)
+        with told("Measuring"):
+            measuring_view.draw(app, size)
+    with told("The cube"):
+        cube.draw(app, size)
+    with told("Scale bar and colour bar"):
+        legend.draw(app, size)
+    text = printable(_note(app) or "")
+    head = _draw_note(text, size) if text else measuring_view.draw_banner(app, size)
     notices.draw(app, size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
     return head
+
+
+def _move(app: App, camera: Camera, pose: Pose, size: ImVec2) -> None:
+    """Take what the mouse does to the camera."""
+    sets_pivot = imgui.is_mouse_double_clicked(0) and not app.measuring.active
+    if imgui.is_item_hovered() and sets_pivot:
+        app.steering.set_pivot()
+        camera = app.session.camera or camera
+    app.session.camera = _navigate(app, camera, size, app.picture.bounds(pose).radius)
+    if app.session.pivot and imgui.is_item_hovered():
+        _draw_pivot(app.session.camera, app.session.pivot, size)
 
 
 def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:

@@ -11,11 +11,13 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from ...errors import InputError
+from ...errors import InputError, explained
 from ...export import write_png
 from ...files import free_file, working_folder
+from ...journal import Journal, journals, saved
 from ...recording import Entry, Recorder
 from ...task import Task, in_background
+from ..failures import in_words
 from .replaying import Replaying
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ class Capture:
         self.recorder: Recorder | None = None
         self.replaying: Replaying | None = None
         self.last: Path | None = None
+        self._journal: Journal | None = None  # of what is recorded
         self._saving: list[Future[tuple[Path | None, str]]] = []  # pictures, in the order of their names
         self._naming = Lock()  # one free name at a time
 
@@ -65,21 +68,50 @@ class Capture:
         now = time.monotonic()
         if self.recorder is None:
             self.recorder = Recorder(now)
-            self.note_shown()
             self._app.note("Recording what is shown, until you stop it.")
+            self._begin_journal()
+            self.note_shown()
             return
         recorder, self.recorder = self.recorder, None
+        path, words = None, "Nothing was shown while recording."
         if len(recorder):
             path, words = self._saved(".json", recorder.finish(now).save)
             self.last = path or self.last
-            self._app.note(words)
-        else:
-            self._app.note("Nothing was shown while recording.")
+        self._end_journal(is_needed=len(recorder) > 0 and path is None)
+        self._app.note(words)
 
     def note_shown(self) -> None:
         """Take down what is shown where that is being recorded."""
-        if self.recorder is not None and (entry := self.shown()) is not None:
-            self.recorder.note(entry, time.monotonic())
+        if self.recorder is None or (entry := self.shown()) is None:
+            return
+        change = self.recorder.note(entry, time.monotonic())
+        if change is not None and self._journal is not None:
+            try:
+                self._journal.add(change)
+            except OSError as error:
+                self._tell_unsafe(error)
+
+    def _begin_journal(self) -> None:
+        try:
+            self._journal = Journal(working_folder())
+        except OSError as error:
+            self._tell_unsafe(error)
+
+    def _tell_unsafe(self, error: OSError) -> None:
+        self._end_journal(is_needed=True)
+        what, _ = explained(error)
+        self._app.note(f"The recording is kept in memory alone until you stop it: {what}.")
+
+    def _end_journal(self, is_needed: bool) -> None:
+        """is_needed: to save what is in it at the next start."""
+        journal, self._journal = self._journal, None
+        if journal is not None:
+            (journal.leave if is_needed else journal.remove)()
+
+    def find_unfinished(self) -> None:
+        """Save what processes have recorded that were killed meanwhile."""
+        for journal in journals():
+            self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
 
     def _saved(self, suffix: str, write: Callable[[Path], None]) -> tuple[Path | None, str]:
         """Write a file under the next free name; returns it, None where that fails, and what to tell."""
@@ -87,15 +119,16 @@ class Capture:
             path = free_file(working_folder(), suffix)
             try:
                 write(path)
-            except (InputError, OSError) as error:
-                return None, str(error)
+            except Exception as error:  # whatever a folder brings, the window stays
+                return None, in_words(f"Saving {path}", error)
         return path, f"Saved {path}"
 
     def _tell_saved(self) -> None:
         """Tell of the pictures that have been written."""
         while self._saving and self._saving[0].done():
             _, words = self._saving.pop(0).result()
-            self._app.note(words)
+            if words:
+                self._app.note(words)
 
     # --- replaying --------------------------------------------------------------------
 
@@ -131,7 +164,16 @@ class Capture:
 
     def close(self) -> None:
         """Save what is being recorded, and wait for pictures that are being written."""
-        wait(self._saving)
-        self._tell_saved()
         if self.recorder is not None:
             self.toggle_recording()
+        wait(self._saving)
+        self._tell_saved()
+
+
+def _saved_late(journal: Path) -> tuple[Path | None, str]:
+    """The recording that a journal becomes, None where none does; and what to tell."""
+    try:
+        path = saved(journal)
+    except InputError as error:
+        return None, str(error)
+    return path, f"Saved a recording that was not finished: {path}" if path else ""

@@ -118,7 +118,7 @@ def _edit_place(choices: Choices, problems: dict[str, str]) -> Choices:
     )
     imgui.end_disabled()
     widgets.label("Folder", _HELP["folder"])
-    folder = imgui.input_text("##folder", choices.folder)[1]
+    folder = widgets.edit_path("##folder", choices.folder)[1]
     _draw_problems(problems, "folder")
     widgets.label("Name", _HELP["name"])
     name = imgui.input_text("##name", choices.name)[1]

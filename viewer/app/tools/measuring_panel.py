@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
+from ...files import printable
 from ...measurement import End, Reading
 from ...scan.points import UNKNOWN_UNIT
 from .. import widgets
@@ -109,12 +110,12 @@ def draw_dialog(app: App) -> None:
             imgui.set_keyboard_focus_here()
             measuring.to_type = False
         imgui.set_next_item_width(-1)
-        changed, measuring.saving = imgui.input_text("##path", measuring.saving)
+        changed, measuring.saving = widgets.edit_path("##path", measuring.saving)
         if changed:
             measuring.problem = ""
         is_entered = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
         exists = measuring.replaces
-        imgui.text_wrapped(measuring.problem or ("This file is there already." if exists else ""))
+        imgui.text_wrapped(printable(measuring.problem) or ("This file is there already." if exists else ""))
         if imgui.button("Replace" if exists else "Save") or (is_entered and not exists):
             measuring.save()
         imgui.same_line()

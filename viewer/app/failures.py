@@ -1,0 +1,76 @@
+"""What goes wrong in the window itself becomes a message, and the window goes on."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from imgui_bundle import imgui
+
+from ..errors import Scan4DError
+from ..task import Cancelled
+
+log = logging.getLogger(__name__)
+_PAUSE = 10.0  # seconds without it, after which the same is told again
+_LONGEST = 200  # letters of what a library says
+
+
+class Failures:
+    """count: of all there were."""
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        """note: tells the user something."""
+        self.count = 0
+        self._note = note
+        self._last: dict[str, float] = {}  # by the clock, when each happened
+
+    @contextmanager
+    def told(self, what: str) -> Iterator[None]:
+        """Whatever goes wrong inside is told; the widgets that were begun there are ended. what: goes on."""
+        state = _state_of_widgets()
+        try:
+            yield
+        except (Exception, Cancelled) as error:
+            if state is not None:
+                _end_widgets(state)
+            self.tell(what, error)
+
+    def tell(self, what: str, error: BaseException) -> None:
+        """Tell what went wrong: once, however many frames in a row it does. what: was being done."""
+        now, self.count = time.monotonic(), self.count + 1
+        before, self._last[what] = self._last.get(what, -math.inf), now
+        if now - before > _PAUSE:
+            log.debug("%s failed", what, exc_info=error)
+            self._note(in_words(what, error))
+
+
+def in_words(what: str, error: BaseException) -> str:
+    """One line for users."""
+    if isinstance(error, Scan4DError):
+        return str(error)
+    said = " ".join(str(error).split())[:_LONGEST]
+    return f"{what} failed ({type(error).__name__}{': ' if said else ''}{said}); all else goes on."
+
+
+def _state_of_widgets() -> imgui.internal.ErrorRecoveryState | None:
+    """Which widgets have begun; None outside of a frame."""
+    context = imgui.get_current_context()
+    if context is None or not context.within_frame_scope:
+        return None
+    state = imgui.internal.ErrorRecoveryState()
+    imgui.internal.error_recovery_store_state(state)
+    return state
+
+
+def _end_widgets(state: imgui.internal.ErrorRecoveryState) -> None:
+    """End what has begun since then, without an error and a line in ImGui's log for each."""
+    io, context = imgui.get_io(), imgui.get_current_context()
+    before = io.config_error_recovery_enable_assert, io.config_error_recovery_enable_tooltip
+    flags, context.debug_log_flags = context.debug_log_flags, 0
+    io.config_error_recovery_enable_assert = io.config_error_recovery_enable_tooltip = False
+    imgui.internal.error_recovery_try_to_recover_state(state)
+    io.config_error_recovery_enable_assert, io.config_error_recovery_enable_tooltip = before
+    context.debug_log_flags = flags
