@@ -179,3 +179,8 @@ def test_the_range_is_the_one_that_was_shaded_with(draw: Callable[..., Surface])
     assert surface.color_range is not None
     assert 1e7 < surface.color_range[0] < 1e7 + 0.1 < 1e7 + 0.9 < surface.color_range[1] < 1e7 + 1
     assert draw(cloud, Camera.orbit(cloud.bounds())).color_range is None
+
+
+@pytest.mark.parametrize("size", [(1, 1), (10, 8), (3, 100), (100, 3), (20, 20)])
+def test_in_the_smallest_pictures_what_has_no_pixel_is_left_out(size: tuple[int, int]) -> None:
+    assert marked(gray(size), replace(LEGEND, marks=ALL), VALUES).shape == (*size[::-1], 4)

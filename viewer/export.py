@@ -8,6 +8,7 @@ Every file takes its name only when it is complete.
 from __future__ import annotations
 
 import math
+import os
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +22,7 @@ from zlib import Z_RLE
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import InputError, explained
 from .files import whole_file
 from .look import Look, rgba
 from .marks import Legend, marked
@@ -68,9 +69,9 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     if suffix not in suffixes:
         what = f"cannot write '{suffix}' files" if suffix else "has no suffix that tells the format"
         raise InputError(what, path, f"Known: {', '.join(suffixes)}")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):  # which raises nothing
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError("is a folder", path, "Name a file in it")
     places = len(_NUMBER.findall(path.name))
     film = suffix == FILM_SUFFIX
@@ -137,7 +138,8 @@ def read_description(path: Path) -> str:
         text = (_png_texts if path.suffix.lower() == ".png" else _exr_header)(path).get(_DESCRIPTION)
     except Exception as error:  # whatever a damaged picture does to a reader
         if isinstance(error, OSError) and error.errno:
-            raise InputError(f"cannot be read: {error.strerror}", path, "Check its name") from error
+            what, hint = explained(error)
+            raise InputError(f"cannot be read: {what}", path, hint) from error
         raise InputError("cannot be read as a picture", path, "It is damaged, or of another kind") from error
     if not isinstance(text, str):
         hint = "Those that 'scan4d render' and the window save are"
@@ -157,7 +159,7 @@ def _png_texts(path: Path) -> dict[Any, Any]:
 def _exr_header(path: Path) -> dict[str, Any]:
     import OpenEXR
 
-    with open(path, "rb"), OpenEXR.File(str(path), header_only=True) as file:  # open tells what is missing
+    with open(path, "rb") as stream, OpenEXR.File(stream, header_only=True) as file:
         return dict(file.header())
 
 

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, Any, NamedTuple, ParamSpec, TypeVar
@@ -24,6 +25,7 @@ from .task import Task
 P = ParamSpec("P")
 R = TypeVar("R")
 _NICE = 10  # the window's own work goes first
+_WATCH = 0.5  # seconds between looks at who started this process
 _NO_CONSOLE = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows it would open a window of its own
 
 
@@ -35,10 +37,25 @@ def start_python(code: str, *arguments: str, nice: int, **streams: Any) -> subpr
     """
     # The same modules as here, whatever lies in the working directory.
     begin = f"import os, sys; sys.path[:] = {sys.path!r}; hasattr(os, 'nice') and os.nice({nice})"
+    begin += f"\nfrom {__name__} import end_with; end_with({os.getpid()})"
     return subprocess.Popen(
         [sys.executable, "-c", f"{begin}\n{code}", *arguments],
         stdout=subprocess.PIPE, creationflags=_NO_CONSOLE, **streams,
     )  # fmt: skip
+
+
+def end_with(parent: int) -> None:
+    """From now on this process gets SIGTERM when the one that started it is gone, however that ended.
+
+    parent: its number. Where the system forgets nothing of parents (Windows), nothing happens.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=watch, name="parent", daemon=True).start()
 
 
 class _Progress(NamedTuple):

@@ -265,12 +265,15 @@ class _Overlay:
 
     def box(self, box: Box, color: Color) -> None:
         left, top, right, bottom = map(round, box)
-        self._draw.rectangle((left, top, right - 1, bottom - 1), color)
+        if left < right and top < bottom:  # else the picture is too small for it
+            self._draw.rectangle((left, top, right - 1, bottom - 1), color)
 
     def gradient(self, box: Box, colors: NDArray[np.uint8]) -> None:
         from PIL import Image
 
         left, top, right, bottom = map(round, box)
+        if left >= right or top >= bottom:
+            return
         rows = colors[np.linspace(len(colors) - 1, 0, bottom - top).round().astype(int)]
         stripe = np.repeat(rows[:, None], right - left, axis=1)
         self.image.paste(Image.fromarray(np.ascontiguousarray(stripe)), (left, top))

@@ -66,7 +66,7 @@ def _is_there(path: Path) -> bool:
     except OSError as error:
         what, hint = explained(error)
         raise InputError(f"cannot be written: {what}", path, hint) from error
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError("is a folder", path, "Name a file in it")
     return True
 

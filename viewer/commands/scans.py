@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..export import is_pattern, numbered
-from ..files import whole_file
+from ..files import printable, whole_file
 from ..look import COLOR_BY, Look, drawable
 from ..scan.open import open_scan
 from ..scan.points import Bounds
@@ -162,7 +162,7 @@ def frame_outputs(out: Path, indices: Sequence[int]) -> list[Path]:
     if not is_pattern(out):
         return files
     times_file = out.with_name(TIMES_FILE)
-    _check_times_file(times_file, {file.name for file in files})
+    _check_times_file(times_file, {printable(file.name) for file in files})
     return [*files, times_file]
 
 
@@ -173,7 +173,7 @@ def frame_files(out: Path) -> Iterator[Callable[[Pose], Path]]:
 
     def file_of(pose: Pose) -> Path:
         path = numbered(out, pose.index)
-        rows.append((path.name, pose.time))
+        rows.append((printable(path.name), pose.time))  # as labels have it
         return path
 
     yield file_of

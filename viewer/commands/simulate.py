@@ -19,8 +19,9 @@ from ..export import check_output
 from ..scan import formats
 from ..scan.pose import Pose
 from ..scan.range_view import merge
+from ..scan.timeline import Timeline
 from . import arguments
-from .console import progress
+from .console import progress, tell
 from .outputs import add_force_argument, claim, scan_inputs
 from .scans import (
     add_pose_arguments,
@@ -94,20 +95,20 @@ def run(args: Namespace) -> int:
         shared = args.faces or _faces_beside(Path(args.scan))
         inputs = [*scan_inputs(timeline), *([shared] if shared else [])]
         claim(frame_outputs(args.out, indices), inputs, args.force)
-        faces_of = _faces_reader(Path(args.scan), shared)
-        faces_of(timeline.label(indices[0]))  # told before all frames are looked at
+        faces_of = _faces_reader(timeline, shared)
+        faces_of(indices[0])  # told before all frames are looked at
         aspect = args.size[0] / args.size[1]
         bounds = framing(timeline, indices)
         pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up)
         with frame_files(args.out) as file_of, progress(len(indices)) as tick:
             for pose in read_poses(timeline, indices):
-                mesh = _mesh(pose, faces_of(pose.label))
+                mesh = _mesh(pose, faces_of(pose.index))
                 views = capture(
                     mesh, pods, args.size, faults, seed=args.seed, frame=pose.index, unit=timeline.unit
                 )
                 formats.write(file_of(pose), merge(views, normals=True), views)
                 tick()
-    print(args.out)
+    tell(args.out)
     return 0
 
 
@@ -125,26 +126,21 @@ def _faults(args: Namespace, pods: int) -> list[Faults]:
 
 def _faces_beside(scan: Path) -> Path | None:
     """The file beside the frames of a sequence that has the faces of all, where there is one."""
-    folder = _folder_of(scan)
+    folder = scan if scan.is_dir() else scan.parent
     beside = [folder / _FACES_FILE, *([folder.parent / _FACES_FILE] if folder.name == "frames" else [])]
     return None if scan.is_file() else next(filter(Path.is_file, beside), None)
 
 
-def _folder_of(scan: Path) -> Path:
-    return scan if scan.is_dir() else scan.parent
-
-
-def _faces_reader(scan: Path, shared: Path | None) -> Callable[[str], Faces]:
-    """A function from the label of a frame to its faces. shared: the file that has those of all."""
-    folder = _folder_of(scan)
+def _faces_reader(timeline: Timeline, shared: Path | None) -> Callable[[int], Faces]:
+    """A function from the index of a frame to its faces. shared: the file that has those of all."""
     read_once = cache(read_faces)
 
-    def faces_of(label: str) -> Faces:
+    def faces_of(index: int) -> Faces:
         if shared is not None:
             return read_once(shared)
-        path = next((path for path in (folder / "frames" / label, folder / label) if path.is_file()), None)
-        if path is None:
-            raise InputError("is no mesh: it has no faces", label, _HINT)
+        if len(timeline.files) != len(timeline):  # one file of many frames, or the demo
+            raise InputError("is no mesh: it has no faces", timeline.label(index), _HINT)
+        path = timeline.files[index]
         try:
             faces = read_faces(path)
         except InputError as error:
