@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from command_line import Run
+from disks import small_disk
 from scenes import sphere
 from written import film, picture
 
@@ -129,6 +131,23 @@ def test_a_signal_leaves_nothing_at_once(name: str, number: signal.Signals, fold
             if path.name != "times.csv":
                 check(path)
         clear()
+
+
+@pytest.mark.parametrize("kilobytes", [16, 100, 700, 2500])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_disk_that_fills_up_leaves_whole_files(name: str, kilobytes: int, run: Run, folder: Path) -> None:
+    command, check = COMMANDS[name]
+    Path("out").rmdir()
+    with small_disk(folder / "out", kilobytes):
+        done = run(*command)
+        if done.code:
+            assert done.code == 2
+            assert re.fullmatch(r"scan4d: [^\n]*the disk is full[^\n]*\n", done.err)
+        assert hidden(folder) == []
+        for path in sorted(Path("out").iterdir()):
+            if path.name != "times.csv":
+                check(path)
+        assert done.code or len(list(Path("out").iterdir())) in (1, 12, 13)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

@@ -6,12 +6,13 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run
+from disks import small_disk
 from scenes import sphere
 from written import picture
 
@@ -335,22 +336,6 @@ def test_marks_on_the_smallest_pictures(size: str, run: Run) -> None:
     assert picture(Path("b.png")).shape[1::-1] == tuple(map(int, size.split("x")))
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 64 KiB."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
-    try:
-        mounted = subprocess.run(mount, capture_output=True).returncode == 0
-    except OSError:
-        mounted = False
-    if not mounted:
-        pytest.skip("no file system can be mounted here")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)
-
-
 class Noise:
     """A surface that nothing packs, at any moment another one."""
 
@@ -372,17 +357,19 @@ class Noise:
 
 
 @pytest.mark.parametrize("suffix", [*export.OUTPUT_SUFFIXES, ".ply", ".pcd", ".svo"])
-def test_a_full_disk_is_told_and_nothing_is_left(suffix: str, small_disk: Path) -> None:
+def test_a_full_disk_is_told_and_nothing_is_left(suffix: str, tmp_path: Path) -> None:
     points = PointCloud(np.random.default_rng(0).random((50_000, 3), np.float32), np.zeros(3))
-    path, noise = small_disk / f"a{suffix}", Noise()
-    with pytest.raises(InputError, match="the disk is full") as error:  # noqa: PT012
-        if suffix in export.OUTPUT_SUFFIXES:
-            with export.pictures(path, (320, 240), 25) as put:
-                for number in range(20 if suffix == ".mp4" else 1):
-                    put(noise, number, None, None)  # type: ignore[arg-type]
-        elif suffix == ".svo":
-            formats.write_poses(path, [Pose.of(0, 0.0, "a", points)], "mm", stop=Stop("depth", depth=16))
-        else:
-            formats.write(path, points)
-    assert "Make room" in str(error.value)
-    assert list(small_disk.iterdir()) == []
+    noise = Noise()
+    with small_disk(tmp_path / "disk", 64) as disk:
+        path = disk / f"a{suffix}"
+        with pytest.raises(InputError, match="the disk is full") as error:  # noqa: PT012
+            if suffix in export.OUTPUT_SUFFIXES:
+                with export.pictures(path, (320, 240), 25) as put:
+                    for number in range(20 if suffix == ".mp4" else 1):
+                        put(noise, number, None, None)  # type: ignore[arg-type]
+            elif suffix == ".svo":
+                formats.write_poses(path, [Pose.of(0, 0.0, "a", points)], "mm", stop=Stop("depth", depth=16))
+            else:
+                formats.write(path, points)
+        assert "Make room" in str(error.value)
+        assert list(disk.iterdir()) == []
