@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from written import film, picture
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.errors import InputError, Scan4DError
+from viewer.export import numbered
 from viewer.look import Look
 from viewer.marks import Marks
 from viewer.recording import Entry, Recording
@@ -52,7 +54,8 @@ def listed() -> list[str]:
 def test_pictures_are_those_of_a_replay_and_replace_former_ones(run: Run) -> None:
     Path("out/p1.png").write_bytes(b"former")
     task = Task("export")
-    made = make(task, turned(), Path("out/p%d.png"), 25.0, anonymous=False)
+    replaced = [Path("out/p1.png")]
+    made = make(task, turned(), Path("out/p%d.png"), 25.0, anonymous=False, replaced=replaced)
     assert made.files == tuple(Path(f"out/p{n}.png") for n in range(COUNT))
     assert listed() == ["p0.png", "p1.png", "p2.png"]
     assert (task.progress, made.warnings, bool(made.device)) == (1.0, (), True)
@@ -140,3 +143,54 @@ def test_modules_of_the_working_directory_are_not_taken_for_scan4d() -> None:
     from viewer.export import read_description
 
     assert json.loads(read_description(file))["scan"] == "doe.npz"
+
+
+@pytest.mark.parametrize("name", ["p.png", "p%02d.png", "p.mp4"])
+def test_files_that_have_come_meanwhile_stay_and_all_are_called_differently(name: str) -> None:
+    out = Path("out", name)
+    former = numbered(out, 1)
+    former.write_bytes(b"former")
+    several = "%" in name or name.endswith("mp4")
+    made = make(Task("export"), turned(COUNT if several else 1), out, 25.0, anonymous=False)
+    assert former.read_bytes() == b"former"
+    stem = out.stem + "_2"
+    expected = dict.fromkeys(numbered(out.with_stem(stem), n) for n in range(COUNT if several else 1))
+    assert made.files == tuple(expected)
+    assert listed() == sorted([former.name, *(path.name for path in expected)])
+
+
+def test_the_folder_names_the_scan_no_longer_than_it_takes_to_read_that(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    named = []
+
+    class Watched(Task):
+        def report(self, progress: float) -> None:
+            files = [path for path in Path("out").rglob("*") if path.is_file() and not path.suffix]
+            named.append([path for path in Path("out").rglob("*.json")])
+            assert all(b"doe" not in path.read_bytes() for path in files)
+
+    make(Watched("export"), turned(), Path("out/p%d.png"), 25.0, anonymous=True)
+    assert named == [[]] * COUNT
+
+
+def test_folders_and_scans_that_are_no_utf_8(folder: Path) -> None:
+    cafe = Path(os.fsdecode(b"caf\xe9"))
+    cafe.mkdir()
+    Path("doe.npz").rename(cafe / "doe.npz")
+    first = replace(turned(1).entries[0], scan=str(cafe / "doe.npz"))
+    (file,) = make(Task("export"), Recording((first,)), cafe / "a.png", 25.0, anonymous=False).files
+    assert Recording.load(file).entries[0].scan == first.scan
+    gone = Recording((replace(first, scan="gone.ply"), first))
+    with pytest.raises(Scan4DError) as caught:
+        make(Task("export"), Recording((gone.entries[0],)), cafe / "b.png", 25.0, anonymous=False)
+    assert ".scan4d_" not in str(caught.value)
+    assert sorted(path.name for path in cafe.iterdir()) == ["a.png", "doe.npz"]
+
+
+def test_a_scan_that_a_recording_may_not_ask_for_is_named_beside_it() -> None:
+    Path("a").mkdir()
+    Path("doe.npz").rename("a/doe.npz")
+    first = replace(turned(1).entries[0], scan="*/doe.npz")
+    (file,) = make(Task("export"), Recording((first,)), Path("out/a.png"), 25.0, anonymous=False).files
+    assert Recording.load(file).entries[0].scan == "*/doe.npz"

@@ -35,6 +35,8 @@ def run(
 
     with Signals() as signals:
         from ..files import user_folder  # only now: a wrong name is told without waiting for ImGui
+        from ..task import Task, in_background
+        from ..unfinished import remove_leftovers
         from . import settings
         from .app import App
         from .loop import Loop
@@ -49,6 +51,7 @@ def run(
                     app.note(note)
                 app.scans.tell(problems)
                 app.capture.find_unfinished()
+                in_background(Task("Tidying"), remove_leftovers)
                 if device is not None:
                     app.note("The display's own GPU draws the window; a device number has no effect on it.")
                 if replay is not None:

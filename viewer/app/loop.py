@@ -44,7 +44,10 @@ class Loop:
                 time.sleep(_CALM)
 
     def _turn(self) -> None:
-        self._turns.add("late", 1e3 * self._app.window.wait(self._patience(time.monotonic())))
+        patience = _WATCH
+        with self._app.failures.told("The window"):
+            patience = self._patience(time.monotonic())
+        self._turns.add("late", 1e3 * self._app.window.wait(patience))
         with self._turns.part("advance"):
             changed = self._advance(time.monotonic())
         if changed or self._app.window.due:

@@ -160,7 +160,9 @@ def _draw_end(app: App, can: bool) -> None:
     if can:
         names = dict.fromkeys(numbered(out, n).name for n in (numbers[0], numbers[-1]))
         imgui.text_wrapped(f"{len(numbers)} picture{'s' * (len(numbers) > 1)}: {' to '.join(names)}")
-    if exporting.replaced:
+    if exporting.refused:
+        _warn(f"{exporting.refused[0].name} is a file of the scan, and is not replaced.")
+    elif exporting.replaced:
         _warn(_there_already([path.name for path in exporting.replaced]))
     imgui.begin_disabled(not can)
     if imgui.button("Replace" if exporting.replaced else "Export"):

@@ -13,6 +13,7 @@ from ...files import working_folder
 from ...marks import Marks
 from ...render_job import Made, make
 from ...task import Cancelled, Task, in_background
+from ..files.inputs import inputs_among
 from . import export_plan
 from .export_plan import Choices, free_name
 
@@ -28,7 +29,8 @@ class Exporting:
     """The dialog's state, and one export at a time.
 
     choices, marks: as the user left them. is_open: whether the dialog is. replaced: files that an export
-    would replace, which the dialog asks about. is_leaving: whether to ask before the window closes.
+    would replace, which the dialog asks about. refused: those of them that are the scan's own. is_leaving:
+    whether to ask before the window closes.
     task: the export that runs, None without one.
     """
 
@@ -38,6 +40,7 @@ class Exporting:
         self.marks = marks
         self.is_open = False
         self.replaced: list[Path] = []
+        self.refused: list[Path] = []
         self.is_leaving = False
         self.task: Task | None = None
         self._work: Future[Made] | None = None
@@ -77,7 +80,7 @@ class Exporting:
     def change(self, choices: Choices, marks: Marks) -> None:
         """Take in what the user has edited."""
         if (choices, marks) != (self.choices, self.marks):
-            self.choices, self.marks, self.replaced = choices, marks, []
+            self.choices, self.marks, self.replaced, self.refused = choices, marks, [], []
 
     def problems(self) -> dict[str, str]:
         """What is wrong with the choices, by field."""
@@ -87,8 +90,9 @@ class Exporting:
         """Export, unless that would replace files that the user was not asked about; closes the dialog."""
         there = export_plan.present(self.choices, self.count)
         shown, choices, app = self._app.capture.shown(), self.choices, self._app
-        if there != self.replaced or shown is None:
-            self.replaced = there
+        self.refused = inputs_among(there, app.playback.timeline)
+        if self.refused or there != self.replaced or shown is None:
+            self.replaced = [] if self.refused else there
             return
         self.is_open, self.replaced = False, []
         times = app.playback.timeline.times
@@ -96,7 +100,9 @@ class Exporting:
         out, rate, anonymous = choices.out(), choices.rate(times), choices.anonymous
         numbers = choices.numbers(self.count)
         task = self.task = Task(f"Exporting {choices.name}")
-        self._work = in_background(task, lambda: make(task, recording, out, rate, anonymous, numbers))
+        self._work = in_background(
+            task, lambda: make(task, recording, out, rate, anonymous, numbers, replaced=there)
+        )
         log.debug("exporting %s", out)
 
     def advance(self) -> None:

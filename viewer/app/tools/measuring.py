@@ -15,6 +15,7 @@ from ...errors import InputError
 from ...files import absolute, free_file, working_folder
 from ...measurement import End, Measurements, Reading, in_words, read, save, table, to_text
 from ...pick import before_gap, is_seen, pick
+from ..files.inputs import inputs_among
 from ..session import known_as
 
 if TYPE_CHECKING:
@@ -153,6 +154,8 @@ class Measuring:
         assert self.saving is not None
         try:
             file = csv_file(self.saving)
+            if inputs_among([file], self.app.playback.timeline):
+                raise InputError("is a file of the scan, and is not replaced", file, "Use another name")
             save(file, self._table())
         except InputError as error:
             self.problem, self.to_type = str(error), True

@@ -1,0 +1,212 @@
+"""The window outlives its scans: what they lack, their names, and what goes wrong while they are shown."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import sphere
+from virtual_screen import PATIENCE, RunningApp, Screen, running_app, virtual_screen
+
+from viewer.recording import Recording
+from viewer.scan import formats
+from viewer.scan.points import PointCloud
+
+SIZE = (1280, 720)
+COLOR_BY = (1175, 198)  # its box in the panel
+Q = (1175, 389)  # the eighth item of its list
+
+
+@pytest.fixture(scope="module")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
+        yield screen
+
+
+def spheres(folder: Path, count: int = 3) -> Path:
+    folder.mkdir()
+    for index in range(count):
+        formats.write(folder / f"{index}.npz", sphere(500, radius=1 + 0.1 * index))
+    return folder
+
+
+@pytest.fixture
+def lacking(tmp_path: Path) -> Path:
+    """A scan of three frames whose last has no q."""
+    folder, points = tmp_path / "lacking", np.random.default_rng(0).standard_normal((300, 3))
+    folder.mkdir()
+    for index in range(3):
+        scalars = {"q": np.arange(300, dtype=np.float32)} if index < 2 else {}
+        formats.write(folder / f"{index}.npz", PointCloud.from_arrays(points, scalars=scalars))
+    return folder
+
+
+def close(app: RunningApp) -> None:
+    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
+    assert app.process.wait(PATIENCE) == 0
+
+
+def saved(app: RunningApp, key: str) -> Recording:
+    """What a picture or a recording tells, that a key has saved."""
+    app.screen.do("key", key)
+    return Recording.load(Path(app.expect(r"Saved (.+)")[1]))
+
+
+def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
+    screen: Screen, tmp_path: Path, lacking: Path
+) -> None:
+    other = spheres(tmp_path / "other", 1)
+    with running_app(screen, tmp_path, lacking, other) as app:
+        screen.do("key", "Page_Down")
+        app.expect("opened .*other")
+        app.settle()
+        screen.do("key", "Page_Up")
+        app.expect("opened .*lacking")
+        app.settle()
+        top = 30  # the list of scans stands above
+        for left, y in (COLOR_BY, Q):
+            screen.do("mousemove", left, y + top, "sleep", 0.2, "click", 1, "sleep", 0.4)
+        screen.do("mousemove", 2, SIZE[1] - 2)
+        app.settle()
+        (with_q,) = saved(app, "p").entries
+        assert with_q.look.color_by == "q"
+        screen.do("key", "End")
+        app.expect("Frame 3 has no 'q' to colour by")
+        app.settle()
+        (without,) = saved(app, "p").entries
+        assert (without.pose, without.look.color_by) == (2, "auto")
+        screen.do("key", "r")
+        app.expect("Recording")
+        screen.do("key", "space")
+        for frame in (0, 1, 2, 1, 2, 0):
+            app.expect(f"drew frame {frame} ")
+        screen.do("key", "space")
+        played = saved(app, "r").entries
+        assert {(e.look.color_by == "q") == (e.pose < 2) for e in played} == {True}
+        screen.do("key", "Page_Down")
+        app.expect("Frame 1 has no 'q' to colour by")
+        screen.do("key", "Page_Up")
+        app.expect("opened .*lacking")
+        screen.do("key", "Home")
+        app.settle()
+        assert saved(app, "p").entries[0].look.color_by == "q"
+        close(app)
+    assert app.log().count("has no 'q'") == 2, "once a scan"
+    assert "Traceback" not in app.log()
+
+
+# Each makes one thing of the window fail from its fifth time on.
+FAILING = """
+def fail(name):
+    from importlib import import_module
+    path, _, name = name.rpartition(".")
+    try:
+        owner = import_module(path)
+    except ImportError:
+        path, _, kind = path.rpartition(".")
+        owner = getattr(import_module(path), kind)
+    whole, times = getattr(owner, name), []
+    def failing(*args, **options):
+        times.append(1)
+        if len(times) >= 5:
+            raise ValueError("made to fail")
+        return whole(*args, **options)
+    setattr(owner, name, failing)
+"""
+PARTS = [
+    "viewer.app.panel._draw_statistics", "viewer.app.playing.timeline_bar._draw_track",
+    "viewer.app.scene.cube.draw", "viewer.app.scene.view._navigate", "viewer.app.menu.draw_toolbar",
+    "viewer.app.scene.picture.render_frame", "viewer.app.scene.picture.Picture.present",
+    "viewer.app.scene.picture.Picture.pick", "viewer.app.playing.playback.Playback.advance",
+    "viewer.app.app.App.remembered", "viewer.app.app.App.pass_on_messages", "viewer.app.loop.Loop._patience",
+    "viewer.app.window.Window.begin", "viewer.app.window.Window.end", "viewer.app.keys.Keys.handle",
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PARTS)
+def test_whatever_fails_in_each_frame_is_told_once_and_the_window_goes_on(
+    screen: Screen, tmp_path: Path, name: str
+) -> None:
+    scan = spheres(tmp_path / "scan", 2)
+    with running_app(screen, tmp_path, scan, before=FAILING + f"fail({name!r})\n") as app:
+        screen.do("key", "r", "sleep", 0.2, "key", "space")
+        for x in range(300, 700, 20):
+            screen.do("mousemove", x, 300, "sleep", 0.1)
+        screen.do("mousemove", 400, 300, "mousedown", 1, "mousemove", 460, 320, "mouseup", 1, "sleep", 0.2)
+        app.expect("made to fail")
+        screen.do("key", "space", "sleep", 0.5, "mousemove", 2, SIZE[1] - 2)
+        time.sleep(1.0)
+        before = app.cpu_seconds()
+        time.sleep(2.0)
+        assert app.cpu_seconds() - before < 1.0, "it does not spin"
+        assert app.process.poll() is None
+        app.process.terminate()
+        assert app.process.wait(PATIENCE) == 0
+    told = re.findall(r"^.* failed \(ValueError: made to fail\).*$", app.log(), re.MULTILINE)
+    assert 1 <= len(told) <= 2, told
+    assert app.log().count("Traceback") <= 2
+    assert re.search(r"Saved .+\.json|Nothing was shown", app.log()) or "Recording" not in app.log()
+    if not name.endswith("remembered"):
+        assert json.loads((tmp_path / "config" / "scan4d" / "settings.json").read_text())["window"]
+
+
+def test_folders_and_files_that_are_no_utf_8(screen: Screen, tmp_path: Path) -> None:
+    """The working directory, the scan and its folder; a picture, a recording, its replay, the dialogs."""
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    scan = spheres(folder / os.fsdecode(b"kn\xf6t"), 2)
+    (scan / "0.npz").rename(scan / os.fsdecode(b"0\xff.npz"))
+    (scan / "1.npz").rename(scan / os.fsdecode(b"1\xff.npz"))
+    with running_app(screen, folder, scan, home=tmp_path) as app:
+        screen.do("key", "p")
+        app.expect(r"Saved .*caf�/scan4d_0001.png")
+        screen.do("key", "r")
+        app.expect("Recording")
+        screen.do("key", "Right")
+        app.expect("drew frame 1 ")
+        screen.do("key", "r")
+        app.expect(r"Saved .*caf�/scan4d_0001.json")
+        screen.do("key", "shift+r")
+        app.expect("replays frame 0")
+        app.expect("replays frame 1")
+        app.settle(1.0)
+        screen.do("key", "ctrl+o")  # the dialog that opens scans
+        app.settle()
+        screen.do("key", "Escape", "sleep", 0.3)
+        screen.do("key", "ctrl+e")
+        app.expect("export dialog opens")
+        app.settle()
+        screen.do("key", "Escape", "sleep", 0.3, "key", "Escape")
+        app.settle()
+        close(app)
+    assert "Traceback" not in app.log()
+    assert " failed (" not in app.log()
+    assert sorted(os.fsencode(path.name) for path in folder.iterdir()) == [
+        b"kn\xf6t", b"log", b"scan4d_0001.json", b"scan4d_0001.png",
+    ]  # fmt: skip
+    assert [entry.scan for entry in Recording.load(folder / "scan4d_0001.json").entries] == [str(scan)] * 2
+    kept = json.loads((tmp_path / "config" / "scan4d" / "settings.json").read_text())
+    assert kept["recent"] == [str(scan)]
+    with running_app(screen, folder, scan, home=tmp_path) as app:
+        assert "drew frame 1 " in app.log(), "it was left there"
+        close(app)
+
+
+def test_settings_and_keys_that_are_bombs_do_not_keep_the_window_from_opening(
+    screen: Screen, tmp_path: Path
+) -> None:
+    config = tmp_path / "config" / "scan4d"
+    config.mkdir(parents=True)
+    (config / "keys.toml").write_text("[keys]\nplay = " + "[" * 5000)
+    os.mkfifo(config / "settings.json")
+    with running_app(screen, tmp_path, spheres(tmp_path / "scan", 1)) as app:
+        assert "keys.toml: cannot be read" in app.log()
+        assert "settings.json: cannot be read" in app.log()
+        close(app)
