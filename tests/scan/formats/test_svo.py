@@ -103,9 +103,9 @@ def test_reading_in_turn_reads_each_octree_once(scan: Path, monkeypatch: pytest.
     read: list[bool] = []
     original = svo.from_bytes
 
-    def noted(*arguments: object, attributes: bool) -> object:
+    def noted(*arguments: object, attributes: bool, **options: object) -> object:
         read.append(attributes)
-        return original(*arguments, attributes=attributes)
+        return original(*arguments, attributes=attributes, **options)
 
     monkeypatch.setattr(svo, "from_bytes", noted)
     frames = formats.frames(scan)

@@ -40,7 +40,7 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
 }
 _OF_ALL = {"origin", "times"}
 _SAVE_ANEW = "Save it with numpy.savez"
-_MOST_RATIO, _FREE = 64, 16 << 20  # bytes unpacked for those packed, and beyond: scans pack to a tenth
+_MOST_RATIO, _FREE = 64, 180 << 20  # bytes to unpack for those packed, and beyond: scans pack to a tenth
 _ENCRYPTED = 1  # a bit of a member's flags
 
 

@@ -25,12 +25,15 @@ from ..octree.octree import Octree
 from ..octree.storage import LARGEST_HEADER, Header, from_bytes, read_header, to_bytes
 from ..points import PointCloud
 from ..pose import Pose
+from ._admission import MOST_FRAMES, admit, check_count, opened, read_exactly, size_of
 
 TITLE = "SVO"
 SUFFIXES = (".svo",)
 
 _LONGEST = 8  # octrees read for one pose
 _MARGIN = 1 / 8  # around the pose that a cube is made for, of its extent
+_NODE_BYTES = 68  # that decoding takes for a node of the largest level, beside attributes
+_LEAF_BYTES = 60  # that points take for a leaf
 _TOO_LARGE = 2.5  # a cube, for a pose of less extent by this factor
 
 
@@ -46,7 +49,7 @@ def read_times(path: Path) -> NDArray[np.float64]:
 
 def read_unit(path: Path) -> str:
     """The unit of the first octree."""
-    with open(path, "rb") as file:
+    with opened(path) as file:
         return read_header(file.read(LARGEST_HEADER))[0].unit
 
 
@@ -70,7 +73,7 @@ class Frames:
 
     def read(self, frame: int) -> PointCloud:
         """The leaves of one pose. Raises InputError as `read` does."""
-        with self._reading, open(self._path, "rb") as file:
+        with self._reading, opened(self._path) as file:
             start = frame - self._places[frame].header.before
             previous = None
             if self._last is not None and start <= self._last[0] < frame:
@@ -78,9 +81,11 @@ class Frames:
             for index in range(start, frame + 1):
                 checkpoint()
                 file.seek(self._places[index].offset)
-                data = file.read(self._places[index].size)
-                previous = from_bytes(data, previous, attributes=index == frame)
+                admit(size_of(file), self._places[index].memory)
+                data = read_exactly(file, self._places[index].size)
+                previous = from_bytes(data, previous, attributes=index == frame, leaves_only=True)
             assert previous is not None, "there is the one asked for"
+            admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES)
             self._last = frame, replace(previous, attributes=())
         return leaf_points(previous)
 
@@ -123,13 +128,18 @@ class _Place(NamedTuple):
     size: int
     header: Header
 
+    @property
+    def memory(self) -> int:
+        """Bytes that decoding it takes at most at a time."""
+        nodes = max(level.nodes for level in self.header.levels)
+        return nodes * (_NODE_BYTES + 4 * self.header.width)
+
 
 def _places(path: Path) -> list[_Place]:
     """All octrees of a file. Raises InputError where there is something else, or a chain has no beginning."""
     places: list[_Place] = []
-    end = path.stat().st_size
-    with open(path, "rb") as file:
-        offset = 0
+    with opened(path) as file:
+        offset, end = 0, size_of(file)
         while offset < end:
             file.seek(offset)
             try:
@@ -138,6 +148,9 @@ def _places(path: Path) -> list[_Place]:
                 error.what = f"octree {len(places)}, at byte {offset}: {error.what}"
                 raise
             size += header.stored
+            check_count(len(places), MOST_FRAMES, "octrees")
+            if places and header.unit != places[0].header.unit:
+                raise InputError(f"octree {len(places)} has another unit of length than the first")
             places.append(_Place(offset, min(size, end - offset), header))
             offset += size
     counts = [0, *(place.header.before for place in places)]

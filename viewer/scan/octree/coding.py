@@ -113,10 +113,10 @@ def sibling_count(masks: Bytes) -> int:
     return int(counts[counts > 1].sum(dtype=np.int64))
 
 
-def _families(masks: Bytes) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _families(masks: Bytes) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
     """The parent of each child, (n,), and the numbers of the children that have siblings."""
     counts = np.bitwise_count(masks)
-    parents = np.repeat(np.arange(len(masks)), counts)
+    parents = np.repeat(np.arange(len(masks), dtype=np.int32), counts)
     return parents, np.flatnonzero(counts[parents] > 1)
 
 
@@ -154,7 +154,7 @@ def normal_bytes(normals: NDArray[np.float32]) -> Bytes:
 
 def normals_of(stored: Bytes) -> NDArray[np.float32]:
     """(n, 3) float32 normals of their `normal_bytes`; 0 where there is none."""
-    return _normals()[stored[:, 0].astype(np.intp) << 8 | stored[:, 1]]
+    return _normals()[stored[:, 0].astype(np.uint16) << np.uint16(8) | stored[:, 1]]
 
 
 @cache

@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 DEEPEST = 21  # the last level: three coordinates of 21 bits are a Morton code of 63
+_AT_ONCE = 1 << 16  # nodes worked on together, so that steps between take little memory
+_TOGETHER = (  # shifts and masks that bring every third bit together
+    (2, 0x10C30C30C30C30C3), (4, 0x100F00F00F00F00F), (8, 0x1F0000FF0000FF), (16, 0x1F00000000FFFF),
+    (32, 0x1FFFFF),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +112,33 @@ class Octree:
 
     def centers(self, level: int) -> NDArray[np.float64]:
         """(oct(level), 3) float64, absolute, scan units."""
-        return self.low + (self.cells(level) + 0.5) * self.size(level)
+        return self.centers_of(self.codes(level), level)
+
+    def centers_of(
+        self, codes: NDArray[np.uint64], level: int, origin: NDArray[np.float64] | None = None
+    ) -> NDArray[Any]:
+        """(n, 3), scan units, of the nodes of a level with these codes (n,).
+
+        float64, absolute; float32 from an origin where there is one.
+        """
+        centers = np.empty((len(codes), 3), np.float64 if origin is None else np.float32)
+        for start in range(0, len(codes), _AT_ONCE):
+            some = slice(start, start + _AT_ONCE)
+            for axis in range(3):
+                cells = _every_third_bit(codes[some] >> np.uint64(axis))
+                absolute = self.low[axis] + (cells + 0.5) * self.size(level)
+                centers[some, axis] = absolute if origin is None else absolute - origin[axis]
+        return centers
 
     def prefix(self, level: int) -> Octree:
         """The tree down to a level, which shares its arrays: the same scan, coarser."""
         level = min(level, self.depth)
         return replace(self, masks=self.masks[:level], attributes=self.attributes[: level + 1])
+
+
+def _every_third_bit(codes: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The coordinate that the bits 0, 3, 6... of Morton codes hold."""
+    bits = codes & np.uint64(0x1249249249249249)
+    for shift, mask in _TOGETHER:
+        bits = (bits | bits >> np.uint64(shift)) & np.uint64(mask)
+    return bits

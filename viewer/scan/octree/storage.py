@@ -73,6 +73,11 @@ class Header:
         """How many bytes the levels take."""
         return sum(level.masks + level.attributes for level in self.levels)
 
+    @property
+    def width(self) -> int:
+        """Bytes of attributes for a node."""
+        return 4 * bool(self.flags & _COLORS) + 2 * bool(self.flags & _NORMALS)
+
     def to_bytes(self) -> bytes:
         """As it stands before the levels."""
         unit = self.unit.encode()
@@ -119,10 +124,13 @@ def to_bytes(
     return header.to_bytes() + b"".join(above + own for above, own in blocks)
 
 
-def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = True) -> Octree:
+def from_bytes(
+    data: bytes, previous: Octree | None = None, attributes: bool = True, leaves_only: bool = False
+) -> Octree:
     """The tree of `to_bytes`; the coarser one where the bytes end behind one of its levels.
 
     previous: the tree before, where the header says that it takes one. attributes: False leaves them out.
+    leaves_only: those of levels without a leaf are empty arrays.
     Raises InputError where bytes are missing or damaged.
     """
     header, size = read_header(data)
@@ -134,14 +142,20 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     told = previous.masks if header.before and previous is not None else ()
     coder = MaskCoder(header.levels[0].nodes, told)
     masks: list[Bytes] = []
-    values: list[Bytes] = []
+    found: list[Attributes] = []
+    values: Bytes | None = None
     for level, (above, own) in zip(header.levels, _whole_levels(header, data[size:]), strict=False):
         if level is not header.levels[0]:
             masks.append(_read_masks(above, header, coder, len(masks)))
-        if attributes and _width(header.flags):
-            values.append(_read_attributes(own, header.flags, masks, values))
-    found = tuple(_attributes(each, header.flags) for each in values)
-    return Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, found)
+        if attributes and header.width:
+            below = _read_attributes(own, header.width, masks, values)
+            if values is not None:
+                shown = not leaves_only or (masks[-1] == 0).any()
+                found.append(_attributes(values if shown else values[:0], header.flags))
+            values = below
+    if values is not None:
+        found.append(_attributes(values, header.flags))
+    return Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, tuple(found))
 
 
 def read_header(data: bytes) -> tuple[Header, int]:
@@ -234,7 +248,8 @@ def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> 
     masks = coding.unpack(stored, header.levels[level].nodes)
     if header.flags & _PACKED:
         masks = coder.restore(masks, told=bool(header.told >> level & 1))
-        coder.descend(masks)
+        if level + 2 < len(header.levels):
+            coder.descend(masks)
     if np.bitwise_count(masks).sum(dtype=np.int64) != header.levels[level + 1].nodes:
         raise InputError(f"level {level + 1} of an octree has not as many nodes as its header says")
     return masks
@@ -249,11 +264,6 @@ def _kinds(octree: Octree) -> int:
         return 0
     root = octree.attributes[0]
     return _COLORS * (root.colors is not None) | _NORMALS * (root.normals is not None)
-
-
-def _width(flags: int) -> int:
-    """Bytes of attributes for a node."""
-    return 4 * bool(flags & _COLORS) + 2 * bool(flags & _NORMALS)
 
 
 def _store_attributes(octree: Octree) -> list[bytes]:
@@ -275,12 +285,12 @@ def _bytes(attributes: Attributes) -> Bytes:
     return np.concatenate(parts, axis=1)
 
 
-def _read_attributes(stored: bytes, flags: int, masks: list[Bytes], values: list[Bytes]) -> Bytes:
-    """(n, k) bytes of the next level. masks, values: of the levels above."""
-    if not values:
-        return coding.unpack(stored, _width(flags)).reshape(1, -1)
-    size = _width(flags) * coding.sibling_count(masks[-1])
-    return coding.restored(coding.unpack(stored, size), values[-1], masks[-1])
+def _read_attributes(stored: bytes, width: int, masks: list[Bytes], above: Bytes | None) -> Bytes:
+    """(n, k) bytes of the next level. masks: of the levels above. above: the bytes of the last of them."""
+    if above is None:
+        return coding.unpack(stored, width).reshape(1, -1)
+    size = width * coding.sibling_count(masks[-1])
+    return coding.restored(coding.unpack(stored, size), above, masks[-1])
 
 
 def _attributes(values: Bytes, flags: int) -> Attributes:
