@@ -30,18 +30,26 @@ def test_values_are_parsed_by_their_declaration() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"sise": 1}, "unknown parameter 'sise'. Known: limit, mode, on, scale, size"),
+        ({"sise": 1}, "unknown parameter 'sise'. Did you mean 'size'? Known: limit, mode, on, scale, size"),
         ({"size": "x"}, "'x' is no int"),
         ({"size": 10}, "outside 1 to 9"),
         ({"scale": "nan"}, "'nan' is no float"),
         ({"on": "maybe"}, "'maybe' is no bool"),
         ({"mode": "three"}, "Known: one, two"),
+        ({"size": True}, "'True' is no int"),
+        ({"size": 2.5}, "'2.5' is no int"),
+        ({"scale": 1e39}, "'1e+39' is no float"),
+        ({"scale": 10**4000}, "is no float"),
+        ({"scale": False}, "'False' is no float"),
+        ({"on": [[]]}, "'[[]]' is no bool"),
+        ({"mode": "x" * 5000}, "unknown mode 'xxx"),
     ],
 )
 def test_bad_values_are_explained(given: dict[str, object], message: str) -> None:
     with pytest.raises(InputError) as caught:
         parse(Example, given)
     assert message in str(caught.value)
+    assert len(str(caught.value)) < 300
 
 
 @pytest.mark.parametrize("name", list(backends()))
@@ -70,6 +78,12 @@ def _cloud() -> object:
 def test_unknown_backend_lists_the_known() -> None:
     with pytest.raises(InputError, match=r"unknown backend 'nerf'. Known: points, surfels"):
         backend("nerf")
+
+
+@pytest.mark.parametrize("color", ["#ff 00 ", "#\uff10fffff", "#fffffff", "ffffff", "#12345\n"])
+def test_what_is_no_colour_is_refused(color: str) -> None:
+    with pytest.raises(InputError, match="is no colour"):
+        Look(background=color)
 
 
 def test_look_is_declared_like_a_backend() -> None:

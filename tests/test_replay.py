@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run
+from hostile_values import variants
 from scenes import sphere
 from written import bits, film, picture
 
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.export import marked, read_description
+from viewer.frame import render_frame
+from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.recording import Entry, Recording, fingerprint
+from viewer.renderer import Renderer
 from viewer.scan import formats
+from viewer.scan.open import open_scan
 
 SMALL = ("--size", "96x64")
 
@@ -104,7 +114,8 @@ def test_every_entry_of_a_recording_is_drawn_at_its_size(run: Run) -> None:
         settings = ["--set", "point_size=3"] if wanted.backend == "points" else []
         done = run(
             "render", "sequence", "--pose", wanted.pose, "--camera", "camera.json", "--size", size,
-            "--backend", wanted.backend, *settings, "--look", "color_by=height", "-o", "expected.png", "--force",
+            "--backend", wanted.backend, *settings, "--look", "color_by=height", "-o", "expected.png",
+            "--force",
         )  # fmt: skip
         assert done.code == 0
         assert np.array_equal(pictures[number], picture(Path("expected.png"))), number
@@ -297,3 +308,66 @@ def test_replay_takes_nothing_that_the_recording_tells(
     message = refused("render", "--replay", "a.json", "-o", "p%d.png", *arguments)
     assert all(word in message for word in words), message
     assert sorted(folder.iterdir()) == before
+
+
+# --- recordings of others -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["/**/*.ply", "**", "a/**.ply", "*/ball.npz", "[a-z]*/../x", "f%d/a.ply"])
+def test_a_recording_does_not_search_through_folders(
+    name: str, run: Run, refused: Callable[..., str], tmp_path: Path
+) -> None:
+    Path("folder").mkdir()
+    formats.write(Path("folder") / "ball.npz", sphere(100))
+    Recording((entry(scan=name),)).save(Path("a.json"))
+    message = refused("render", "--replay", "a.json", "-o", "a.png")
+    assert "scan4d render SCAN --replay" in message
+    assert refused("view", "a.json", "--fallback", "out") == message
+    assert run("render", "sequence", "--replay", "a.json", "-o", "a.png").code == 0
+
+
+@pytest.mark.parametrize("name", ["sequence/f*.npz", "sequence/f%d.npz", "sequence", "[1]/f0.npz"])
+def test_a_recording_opens_what_is_in_one_folder(name: str, run: Run) -> None:
+    if name.startswith("["):  # which has the name of a pattern
+        Path("sequence").rename("[1]")
+    Recording((entry(scan=name),)).save(Path("a.json"))
+    assert run("render", "--replay", "a.json", "-o", "a.png") == (0, "a.png\n", "")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has neither")
+@pytest.mark.parametrize("name", ["pipe.json", "pipe.png", "pipe.exr"])
+def test_pipes_and_devices_are_no_recordings(name: str, refused: Callable[..., str]) -> None:
+    os.mkfifo(name)
+    assert "no plain file" in refused("render", "--replay", name, "-o", "a.png")
+    assert "no plain file" in refused("render", "--replay", "/dev/zero", "-o", "a.png")
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [["--backend", "surfels"], ["--backend", "points", "--camera", "camera.json"]],
+    ids=["perspective", "orthographic"],
+)
+def test_no_recording_is_an_internal_error(choice: list[str], renderer: Renderer, run: Run) -> None:
+    Camera(eye=(0, 0, 5), projection="orthographic", height=3.0, near=1.0, far=9.0).save("camera.json")
+    marks = ("--look", "color_by=height", "--marks", "scale_bar", "color_bar", "stamp")
+    size = (16, 12)
+    assert run("render", "ball.npz", "-o", "a.png", "--size", "16x12", *choice, *marks).code == 0
+    drawn = {}
+    for description in variants(json.loads(read_description(Path("a.png")))):
+        Path("a.json").write_text(json.dumps(description))
+        try:
+            usable = Recording.load(Path("a.json")).entries[0]
+        except InputError:
+            pass
+        else:
+            drawn[usable.description()] = usable
+    assert len(drawn) > 100
+    surface = Surface(renderer.gpu, size)
+    with open_scan("ball.npz") as timeline:
+        for usable in drawn.values():
+            if usable.pose or usable.size != size:
+                continue
+            with suppress(InputError):
+                while render_frame(renderer, usable.request(timeline.pose(0)), surface):
+                    pass
+                marked(surface.image(), usable.legend(timeline), surface.color_range)

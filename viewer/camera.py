@@ -5,19 +5,25 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, unknown_name
+from .errors import InputError, explained, shortened, unknown_name
+from .files import parsed_json, read_text
 from .geometry import Vector, front_vector, up_vector
 from .scan.points import Bounds
 
 PROJECTIONS = ("perspective", "orthographic")
 _FIT_MARGIN = 1.04
 _STEEPEST = 89.5  # elevation in degrees that orbiting reaches
+_LARGEST, _SMALLEST = 1e24, 1e-24  # lengths whose squares, sums and ratios stay finite
+_SMALLEST_SUBJECT = 1e-18  # whose distances float32 can square
+_NARROWEST, _WIDEST = 1e-4, 179.9  # fields of view that a picture can be drawn with, degrees
+_MOST_BYTES = 2**20  # of a file; ours have some 300
 
 
 @dataclass(frozen=True)
@@ -40,22 +46,23 @@ class Camera:
 
     def __post_init__(self) -> None:
         for name in ("eye", "target", "up"):
-            value = tuple(float(v) for v in getattr(self, name))
-            if len(value) != 3 or not all(map(math.isfinite, value)):
-                raise InputError(f"the camera's {name} is not three finite numbers")
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, _three_numbers(name, getattr(self, name)))
         if self.projection not in PROJECTIONS:
-            raise unknown_name("projection", str(self.projection), PROJECTIONS)
-        if not 0 < self.fov_y < 180:
-            raise InputError(f"the camera's fov_y is {self.fov_y}, expected 0 to 180 degrees")
+            raise unknown_name("projection", shortened(self.projection), PROJECTIONS)
+        fov_y = _number(self.fov_y)
+        if fov_y is None or not _NARROWEST <= fov_y <= _WIDEST:
+            what = f"the camera's fov_y is {shortened(self.fov_y)}"
+            raise InputError(f"{what}, expected {_NARROWEST:g} to {_WIDEST} degrees")
+        object.__setattr__(self, "fov_y", fov_y)
         for name in ("height", "near", "far"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise InputError(f"the camera's {name} is {value}, expected a positive number")
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _length(name, getattr(self, name)))
         if self.near is not None and self.far is not None and self.near >= self.far:
             raise InputError("the camera's near plane is not in front of its far plane")
-        if self.distance == 0:
+        if self.distance < _SMALLEST:
             raise InputError("the camera's eye and target are the same point")
+        if math.hypot(*self.up) < _SMALLEST:
+            raise InputError("the camera's up has no direction")
 
     # --- making one -------------------------------------------------------------------
 
@@ -78,6 +85,7 @@ class Camera:
         towards +x. elevation: degrees, positive is above. distance: scan units; None: as
         near as shows all of the bounds at this aspect (width / height).
         """
+        bounds = _with_extent(bounds)
         above = np.array(up_vector(up), float)
         front = np.array(front_vector(up), float)
         right = np.cross(above, front)
@@ -88,7 +96,7 @@ class Camera:
         # At the poles the view axis is parallel to up: keep the picture's up continuous there.
         screen_up = math.cos(e) * above - math.sin(e) * (math.cos(a) * front + math.sin(a) * right)
         camera = cls(
-            eye=_vector(bounds.center + direction * (bounds.radius or 1.0)),
+            eye=_vector(bounds.center + direction * bounds.radius),
             target=_vector(bounds.center),
             up=_vector(screen_up if abs(math.cos(e)) < 1e-6 else above),
             projection=projection,
@@ -106,19 +114,17 @@ class Camera:
         for name in data:
             if name not in known:
                 raise unknown_name("camera field", name, known)
-        try:
-            return cls(**data)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"a camera field has a wrong type: {error}") from error
+        return cls(**data)
 
     @classmethod
     def load(cls, path: str | Path) -> Camera:
         """Read a camera's JSON file; raises InputError naming the file."""
         try:
-            return cls.from_json(json.loads(Path(path).read_text(encoding="utf-8")))
+            return cls.from_json(parsed_json(read_text(path, _MOST_BYTES)))
         except OSError as error:
-            raise InputError(f"cannot read the camera: {error.strerror}", path) from error
-        except (ValueError, UnicodeDecodeError) as error:
+            what, hint = explained(error)
+            raise InputError(f"cannot read the camera: {what}", path, hint) from error
+        except ValueError as error:  # of the text's encoding as well
             raise InputError(f"not a JSON file: {error}", path) from error
         except InputError as error:
             raise InputError(error.what, path, error.hint) from error
@@ -177,8 +183,7 @@ class Camera:
 
     def fit(self, bounds: Bounds, aspect: float = 1.0) -> Camera:
         """The same direction, as near as shows the box of `bounds` whole, with a small margin."""
-        if bounds.radius == 0:
-            bounds = bounds.grown(max(1e-6 * float(np.abs(bounds.center).max()), 0.5))
+        bounds = _with_extent(bounds)
         x, y, z = self.rotation() @ (bounds.corners() - bounds.center).T
         tangent = math.tan(math.radians(self.fov_y) / 2) / _FIT_MARGIN
         # Each corner must lie within the picture's edges: |y| <= tangent * (distance - z).
@@ -276,6 +281,42 @@ class Camera:
         if float(np.subtract(self.eye, point) @ back) <= 0:
             return self
         return replace(camera, eye=_vector(camera.eye + shift), target=point)
+
+
+def _with_extent(bounds: Bounds) -> Bounds:
+    """The bounds, with room around what is a single point, or as good as one."""
+    away = float(np.abs(bounds.center).max())
+    if bounds.radius > max(_SMALLEST_SUBJECT, 1e-14 * away):
+        return bounds
+    return bounds.grown(max(1e-6 * away, 0.5))
+
+
+def _number(value: Any) -> float | None:
+    """A finite number as float; None for all else."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return None
+    try:
+        return float(value) if math.isfinite(value) else None
+    except OverflowError:  # of hundreds of digits
+        return None
+
+
+def _three_numbers(name: str, values: Any) -> Vector:
+    numbers = [_number(v) for v in values] if isinstance(values, (tuple, list, np.ndarray)) else []
+    found = [n for n in numbers if n is not None and abs(n) <= _LARGEST]
+    if len(found) != 3 or len(numbers) != 3:
+        raise InputError(
+            f"the camera's {name} is {shortened(values)}, expected three finite numbers up to {_LARGEST:g}"
+        )
+    return found[0], found[1], found[2]
+
+
+def _length(name: str, value: Any) -> float:
+    number = _number(value)
+    if number is None or not _SMALLEST <= number <= _LARGEST:
+        what = f"the camera's {name} is {shortened(value)}, expected a positive number"
+        raise InputError(f"{what}, {_SMALLEST:g} to {_LARGEST:g}")
+    return number
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:

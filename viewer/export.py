@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, explained
-from .files import whole_file
+from .files import open_plain, whole_file
 from .look import Look, rgba
 from .marks import Legend, marked
 
@@ -151,7 +151,11 @@ def _png_texts(path: Path) -> dict[Any, Any]:
     """Without decoding the picture: ours stand before it."""
     from PIL import Image
 
-    with warnings.catch_warnings(), Image.open(path, formats=["PNG"]) as image:
+    with (
+        warnings.catch_warnings(),
+        open_plain(path) as file,
+        Image.open(file, formats=["PNG"]) as image,
+    ):
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         return dict(image.info)
 
@@ -159,7 +163,7 @@ def _png_texts(path: Path) -> dict[Any, Any]:
 def _exr_header(path: Path) -> dict[str, Any]:
     import OpenEXR
 
-    with open(path, "rb") as stream, OpenEXR.File(stream, header_only=True) as file:
+    with open_plain(path) as stream, OpenEXR.File(stream, header_only=True) as file:
         return dict(file.header())
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from .errors import InputError, explained
 
@@ -57,17 +58,25 @@ def open_plain(path: Path | str) -> Iterator[BinaryIO]:
     waiting = getattr(os, "O_NONBLOCK", 0)  # without it, opening a pipe waits for a writer
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | waiting)) as stream:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-            raise OSError(errno.EINVAL, "Is not a plain file", str(path))
+            raise OSError(errno.EINVAL, "is no plain file", str(path))
         yield stream
 
 
 def read_text(path: Path | str, most_bytes: int) -> str:
-    """The text of a plain file in UTF-8, at most so many bytes of it. Raises OSError, UnicodeDecodeError."""
+    """The text of a plain file in UTF-8 of at most so many bytes. Raises OSError, UnicodeDecodeError."""
     with open_plain(path) as stream:
         data = stream.read(most_bytes + 1)
     if len(data) > most_bytes:
-        raise OSError(errno.EFBIG, f"Is longer than {most_bytes:,} bytes", str(path))
+        raise OSError(errno.EINVAL, f"is longer than {most_bytes:,} bytes", str(path))
     return data.decode("utf-8")
+
+
+def parsed_json(text: str) -> Any:
+    """The value of a JSON text, NaN and infinities among them. Raises ValueError, whatever is wrong."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
 
 
 def user_folder() -> Path:

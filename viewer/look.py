@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, unknown_name
+from .errors import InputError, shortened, unknown_name
 from .geometry import AXES
 from .params import param
 from .scan.points import PointCloud
@@ -101,13 +101,9 @@ def wants_normals(look: Look) -> bool:
 
 def rgba(text: str, name: str = "colour") -> tuple[int, int, int, int]:
     """The bytes of '#rrggbb' or '#rrggbbaa'; raises InputError."""
-    digits = text.removeprefix("#")
-    if len(digits) not in (6, 8) or not text.startswith("#"):
-        raise InputError(f"'{text}' is no colour", name, "Use #rrggbb or #rrggbbaa")
-    try:
-        values = bytes.fromhex(digits)
-    except ValueError:
-        raise InputError(f"'{text}' is no colour", name, "Use #rrggbb or #rrggbbaa") from None
+    if not re.fullmatch("#([0-9a-fA-F]{6}|[0-9a-fA-F]{8})", text):
+        raise InputError(f"'{shortened(text)}' is no colour", name, "Use #rrggbb or #rrggbbaa")
+    values = bytes.fromhex(text[1:])
     return values[0], values[1], values[2], values[3] if len(values) == 4 else 255
 
 

@@ -7,15 +7,15 @@ in the docs, the tests and the benchmark's sweep.
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from .errors import InputError, unknown_name
+from .errors import InputError, shortened, unknown_name
 
 T = TypeVar("T")
 AFFECTS = ("draw", "derive", "shader", "target")
+_LARGEST = 3.4e38  # of a float32
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
@@ -43,23 +43,13 @@ class Parameter:
         """The value of this parameter from text or a plain value; raises InputError."""
         if self.optional and (value is None or value == "auto"):
             return None
-        if self.type is bool:
-            result: Any = _parse_bool(value)
-        elif self.type is str:
-            result = value if isinstance(value, str) else None
-        else:
-            try:
-                result = self.type(value)
-            except (TypeError, ValueError, OverflowError):
-                result = None
-            if result is not None and self.type is float and not math.isfinite(result):
-                result = None
+        result = _READERS[self.type](value)
         if result is None:
-            raise InputError(f"'{value}' is no {self.type.__name__}", self.name, self.help)
+            raise InputError(f"'{shortened(value)}' is no {self.type.__name__}", self.name, self.help)
         if self.choices and result not in self.choices:
             raise unknown_name(self.name, result, self.choices)
         if (self.low is not None and result < self.low) or (self.high is not None and result > self.high):
-            raise InputError(f"{result} is outside {self.low} to {self.high}", self.name)
+            raise InputError(f"{shortened(result)} is outside {self.low} to {self.high}", self.name)
         return result
 
     def to_json(self) -> dict[str, Any]:
@@ -114,8 +104,35 @@ def parse(cls: type[T], values: Mapping[str, object], kind: str = "parameter") -
     return cls(**{name: declared[name].parse(value) for name, value in values.items()})
 
 
-def _parse_bool(value: object) -> bool | None:
+def _bool(value: object) -> bool | None:
     if isinstance(value, bool):
         return value
-    word = str(value).lower()
+    word = value.lower() if isinstance(value, str) else "1" if value == 1 else "0" if value == 0 else ""
     return True if word in _TRUE else False if word in _FALSE else None
+
+
+def _int(value: object) -> int | None:
+    if isinstance(value, (str, int)) and not isinstance(value, bool):
+        try:
+            return int(value)
+        except ValueError:
+            return None
+    return int(value) if isinstance(value, float) and value.is_integer() else None
+
+
+def _float(value: object) -> float | None:
+    """Only those that shaders can hold."""
+    if not isinstance(value, (str, int, float)) or isinstance(value, bool):
+        return None
+    try:
+        number = float(value)
+    except (ValueError, OverflowError):
+        return None
+    return number if abs(number) <= _LARGEST else None
+
+
+def _str(value: object) -> str | None:
+    return value if isinstance(value, str) else None
+
+
+_READERS: dict[type, Callable[[object], Any]] = {bool: _bool, int: _int, float: _float, str: _str}

@@ -31,7 +31,7 @@ from . import __version__
 from .anonymous import anonymous_unit
 from .backends import backend as find_backend
 from .camera import Camera
-from .errors import InputError, unknown_name
+from .errors import InputError, shortened, unknown_name
 from .export import read_description
 from .files import whole_file
 from .frame import Request
@@ -39,7 +39,7 @@ from .look import Look
 from .marks import Legend, Marks
 from .params import parse
 from .recording_json import DAMAGED, checked, placed, read_json
-from .scan.open import DEMO
+from .scan.open import DEMO, searches_folders
 from .scan.pose import Pose
 from .scan.timeline import Timeline
 
@@ -273,13 +273,24 @@ def is_recording(path: Path) -> bool:
 
 
 def places_of(scan: str, recording: Path) -> list[str]:
-    """Where to look for a scan that a recording names: beside the recording, then as it is named."""
+    """Where a scan may be that a recording names: beside the recording, then as it is named."""
     return [DEMO] if scan == DEMO else list(dict.fromkeys([str(recording.parent / scan), scan]))
 
 
+def places_to_open(scan: str, recording: Path) -> list[str]:
+    """The same places, to open what is there.
+
+    Raises InputError where that would search through folders for whoever wrote the recording.
+    """
+    if searches_folders(scan):
+        hint = "If it is the right one, open it first, or name it: scan4d render SCAN --replay ..."
+        raise InputError(f"names its scan as '{shortened(scan)}', all over the folders", recording, hint)
+    return places_of(scan, recording)
+
+
 def place_of(scan: str, recording: Path) -> str:
-    """The first of these places where something is, else the last one."""
-    places = places_of(scan, recording)
+    """The first of these places where something is, else the last one. Raises InputError likewise."""
+    places = places_to_open(scan, recording)
     return next((place for place in places if os.path.exists(place)), places[-1])
 
 

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
 from ..frame import Request
 from ..marks import Legend, marks_of
-from ..recording import Entry, Recording, fingerprint, fingerprint_as, new_salt, places_of
+from ..recording import Entry, Recording, fingerprint, fingerprint_as, new_salt, places_to_open
 from ..scan.open import DEMO, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS
@@ -174,7 +174,7 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
 
     Raises InputError where it is in neither place, or unusable.
     """
-    for place in places_of(scan, path):
+    for place in places_to_open(scan, path):
         try:
             return place, open_scan(place)
         except InputError as error:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...recording import Entry, Recording, place_of, places_of
+from ...errors import InputError
+from ...recording import Entry, Recording, fingerprint_as, place_of, places_of
 from ..session import known_as
 
 if TYPE_CHECKING:
@@ -60,10 +63,10 @@ class Replaying:
         if entry.pose in timeline.broken or entry.pose >= len(timeline):
             app.note(f"Frame {entry.pose + 1} cannot be shown; it is left out.")
             self._next += 1
-        elif timeline.ready(entry.pose) is None:
+        elif (pose := timeline.ready(entry.pose)) is None:
             timeline.request(entry.pose)
         else:
-            app.show(entry)
+            app.show(entry, pose)
             self._next, self._since = self._next + 1, None
         return True
 
@@ -74,13 +77,23 @@ class Replaying:
         scan = app.session.scan
         here = known_as(scan)
         if entry.scan is not None and here not in map(known_as, places_of(entry.scan, self.path)):
-            place = place_of(entry.scan, self.path)
+            try:
+                place = place_of(entry.scan, self.path)
+            except InputError as error:
+                app.note(str(error))
+                return False
             if self._asked != place:  # else it could not be opened, and that was told
                 self._asked = place
                 app.open(place)
             return False
         if self._compared != here:
             self._compared = here
-            if None not in (entry.hash, app.hash) and entry.hash != app.hash:
-                app.note(f"{scan} is not as it was when {self.path.name} was made; pictures may differ.")
+            if entry.hash is not None:
+                app.capture.tell_later(partial(self._changed, scan, entry.hash, app.playback.timeline.files))
         return True
+
+    def _changed(self, scan: str, hash: str, files: Sequence[Path]) -> str:
+        """What to tell of a scan whose hash was that one; nothing where it is the same."""
+        if fingerprint_as(hash, files) in (hash, None):
+            return ""
+        return f"{scan} is not as it was when {self.path.name} was made; pictures may differ."
