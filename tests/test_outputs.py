@@ -303,6 +303,8 @@ def test_times_of_names_that_are_no_utf_8(odd: str, run: Run) -> None:
 def test_meshes_of_names_that_are_no_utf_8(odd: str, run: Run, folder: Path) -> None:
     Path(f"{odd}.obj").write_bytes((folder / "mesh.obj").read_bytes())
     assert run("simulate", f"{odd}.obj", "-o", f"{odd}_.exr", *SMALL).code == 0
+    assert run("info", f"{odd}_.exr").code == 0
+    assert run("convert", f"{odd}_.exr", f"{odd}_.ply").code == 0
     assert run("simulate", f"{odd}.obj", "-o", f"{odd}_.pcd", *SMALL).code == 0
 
 

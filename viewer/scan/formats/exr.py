@@ -13,12 +13,14 @@ A part has the pod's name, the channels `Z` (float, view-space depth in scan uni
 
 from __future__ import annotations
 
+import math
+import operator
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 from threading import Lock, get_ident
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +28,15 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, memory_of_merging
-from ._admission import admit, opened, size_of
+from ._admission import admit, opened, read_exactly, size_of
 
 TITLE = "EXR"
 SUFFIXES = (".exr",)
 
 _PINHOLE = ("fx", "fy", "cx", "cy")
 _FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
-_SAMPLE_BYTES = 4  # of a channel, at most
+_MAGIC_BYTES, _CHANNEL_BYTES = 8, 16  # in front of the headers; behind the name of a channel in a header
+_TYPE_BYTES = {1: 2}  # of a sample of a half; other types have 4
 _VIEW_BYTES = 7  # of a pixel: mask and colour
 _decoding = Lock()
 
@@ -49,7 +52,7 @@ def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
         headers = _headers(path)
         for number, header in enumerate(headers):
             _check_form(header, _name(header, number))
-        admit(size_of(stream), sum(_memory(header) for header in headers))
+        admit(size_of(stream), _memory(headers, _pixel_bytes(stream)))
         images = _decoded(path, len(headers))
         views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
         admit(size_of(stream), memory_of_merging(views))
@@ -62,7 +65,12 @@ def _decoded(path: Path, parts: int) -> list[dict[str, NDArray]]:
 
     # OpenEXR leaves damaged parts out and prints that to standard output, where results go.
     muted = redirect_stdout(_OfOthers(sys.stdout))
-    with _decoding, muted, OpenEXR.File(str(path), separate_channels=True) as file:
+    with (
+        _decoding,
+        muted,
+        open(path, "rb") as stream,  # of names, OpenEXR takes UTF-8 alone
+        OpenEXR.File(stream, separate_channels=True) as file,
+    ):
         if len(file.parts) != parts:
             raise InputError(f"only {len(file.parts)} of its {parts} parts can be decoded")
         return [{name: channel.pixels for name, channel in part.channels.items()} for part in file.parts]
@@ -101,7 +109,7 @@ def write_views(path: Path, views: Sequence[RangeView]) -> None:
 def _headers(path: Path) -> list[dict[str, Any]]:
     import OpenEXR
 
-    with OpenEXR.File(str(path), header_only=True) as file:
+    with open(path, "rb") as stream, OpenEXR.File(stream, header_only=True) as file:
         return [dict(part.header) for part in file.parts]  # the file takes the headers back
 
 
@@ -128,11 +136,46 @@ def _check_form(header: dict[str, Any], name: str) -> None:
         raise InputError(f"'{name}' is no range view, it lacks: {', '.join(missing)}", hint=_FORM)
 
 
-def _memory(header: dict[str, Any]) -> int:
-    """Bytes that a part takes at most at a time, decoded and as a view."""
-    low, high = (corner.astype(int) for corner in header["dataWindow"])
-    width, height = (high - low + 1).tolist()
-    return max(width, 0) * max(height, 0) * (_SAMPLE_BYTES * len(header["channels"]) + _VIEW_BYTES)
+def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int]) -> int:
+    """Bytes that parts take at most at a time, decoded and as views. samples: bytes of a pixel of each part."""
+    pixels = []
+    for header in headers:
+        low, high = (corner.astype(int) for corner in header["dataWindow"])
+        pixels.append(math.prod(np.maximum(high - low + 1, 0).tolist()))
+    return sum(map(operator.mul, pixels, samples)) + max(pixels) * _VIEW_BYTES
+
+
+def _pixel_bytes(stream: BinaryIO) -> list[int]:
+    """How many bytes a pixel of each part takes, from the headers, since OpenEXR tells it when it has decoded."""
+    stream.seek(_MAGIC_BYTES)
+    found: list[int] = []
+    while name := _word(stream):
+        found.append(0)
+        while name:
+            kind, size = _word(stream), int.from_bytes(read_exactly(stream, 4), "little")
+            if kind != b"chlist":
+                stream.seek(size, 1)
+            else:
+                found[-1] = sum(
+                    _TYPE_BYTES.get(type_, 4) for type_ in _channel_types(read_exactly(stream, size))
+                )
+            name = _word(stream)
+    return found
+
+
+def _word(stream: BinaryIO) -> bytes:
+    """A name in a header, up to the zero behind it."""
+    word = bytearray()
+    while (byte := read_exactly(stream, 1)) != b"\0":
+        word += byte
+    return bytes(word)
+
+
+def _channel_types(channels: bytes) -> Iterator[int]:
+    at = 0
+    while (end := channels.find(b"\0", at)) > at:
+        yield int.from_bytes(channels[end + 1 : end + 5], "little")
+        at = end + 1 + _CHANNEL_BYTES
 
 
 def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> RangeView:
