@@ -2,9 +2,11 @@
 
 PYTHON := .venv/bin/python
 QUICK := --quick
+MINUTES := 5
+SEED := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all bench lint wheel clean
+.PHONY: help setup run test test-all fuzz bench lint wheel clean
 
 help: ## print this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -20,6 +22,9 @@ test: setup ## the tests, without the slow ones
 
 test-all: setup ## all tests
 	$(PYTHON) -m pytest
+
+fuzz: setup ## damaged files by the thousand: make fuzz MINUTES=60 SEED=7
+	$(PYTHON) tests/fuzz/campaign.py --minutes $(MINUTES) --seed $(SEED)
 
 bench: setup ## run time against error, in two minutes: out/bench/report.html; all of it: make bench QUICK=
 	.venv/bin/scan4d bench $(QUICK) -o out/bench --force

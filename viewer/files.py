@@ -65,7 +65,8 @@ def open_plain(path: Path | str) -> Iterator[BinaryIO]:
 def read_text(path: Path | str, most_bytes: int) -> str:
     """The text of a plain file in UTF-8 of at most so many bytes. Raises OSError, UnicodeDecodeError."""
     with open_plain(path) as stream:
-        data = stream.read(most_bytes + 1)
+        held = os.fstat(stream.fileno()).st_size  # Python takes memory for all that it is asked for
+        data = stream.read(min(held, most_bytes) + 1)
     if len(data) > most_bytes:
         raise OSError(errno.EINVAL, f"is longer than {most_bytes:,} bytes", str(path))
     return data.decode("utf-8")

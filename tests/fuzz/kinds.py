@@ -1,0 +1,247 @@
+"""What is fuzzed: for each kind of file some that are whole, and what the project does with one."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lzf
+import numpy as np
+
+from viewer.app import keys, settings
+from viewer.app.session import Bookmark, Left
+from viewer.backends import backend, backends
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.export import write_png
+from viewer.frame import Request, render_frame, shared_renderer
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.recording import Entry, Recording
+from viewer.scan import formats
+from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.scan.range_view import RangeView, merge
+from viewer.scan.times import TIMES_FILE
+
+MOST_SEED = 20_000  # bytes of a real file that is worth damaging
+SIZE = (48, 32)
+_PCD = (
+    "FIELDS x y z rgb n\nSIZE 4 4 4 4 2\nTYPE F F F F U\nCOUNT 1 1 1 1 2\nWIDTH 3\nHEIGHT 4\nPOINTS 12\nDATA "
+)
+_PLY = "ply\nformat ascii 1.0\nelement vertex 3\n" + "".join(f"property float {name}\n" for name in "xyz")
+_TEXTS = {
+    "list.ply": f"{_PLY}property list uchar int seen_by\nend_header\n1 2 3 2 0 1\n4 5 6 0\n7 8 9 1 5\n",
+    "mesh.ply": f"{_PLY}element face 1\nproperty list uchar int vertex_index\nend_header\n"
+    "1 2 3\n4 5 6\n7 8 9\n3 0 1 2\n",
+    "ascii.pcd": f"{_PCD}ascii\n{'1 2 3 1e-38 7 8' * 12}\n",
+    "mesh.obj": "v 0 0 1 1 0 0\nv 1 2 3 0 1 0\nvn 0 0 1\nf 1//1 2//1 1//1\nf 1/2/1 -1//-1 2//1\n",
+    "plain.xyz": "1 2 3 4 5 6\n7 8 9 1 2 3\n",
+    "commas.xyz": "# x y z\n1,2,3\n4,5,6\n",
+    "named.csv": '"x";"y";"z";"GPS Time"\r\n1;2;3;4\r\n5;6;7;8\r\n',
+    "tabs.txt": "X\tY\tZ\tR\tG\tB\n1\t2\t3\t4\t5\t6\n",
+    "count.pts": "2\n1 2 3 4 5 6 7\n8 9 1 2 3 4 5\n",
+}
+
+
+def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
+    """Kind -> whole files: made here, and small real ones where they are at hand.
+
+    Kinds are the suffixes of scans, and the names of other files that the project reads: "camera.json",
+    "recording.json", "recording.png", "times.csv", "settings.json", "keys.toml".
+    """
+    for name, text in _TEXTS.items():
+        (folder / name).write_text(text)
+    packed = lzf.compress(bytes(240))
+    sizes = np.array([len(packed), 240], "<u4").tobytes()
+    (folder / "packed.pcd").write_bytes(f"{_PCD}binary_compressed\n".encode() + sizes + packed)
+    _write_scans(folder)
+    _write_choices(folder)
+    found: dict[str, list[bytes]] = {}
+    for path in sorted(folder.iterdir()):
+        found.setdefault(kind_of(path.name), []).append(path.read_bytes())
+    for path in sorted((data_dir / "odd").rglob("*")) if data_dir else ():
+        if path.suffix in formats.known_suffixes() and path.stat().st_size < MOST_SEED:
+            found[path.suffix].append(path.read_bytes())
+    return found
+
+
+def _write_scans(folder: Path) -> None:
+    rng = np.random.default_rng(7)
+    normals = rng.normal(size=(60, 3))
+    cloud = PointCloud.from_arrays(
+        rng.random((60, 3)) * 2,
+        normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
+        colors=rng.integers(0, 256, (60, 4), np.uint8),
+        radii=rng.random(60),
+        axes=rng.random((60, 4)),
+        scalars={"intensity": rng.random(60, np.float32), "gps_time": rng.random(60) + 1e9},
+    )
+    for suffix in formats.writable_suffixes():
+        formats.write(folder / f"full{suffix}", cloud)
+    poses = [Pose(index, index / 25, "", cloud) for index in range(3)]
+    formats.write_poses(folder / "scan.svo", poses, "mm")
+    sequence = np.ones((3, 8, 3), np.float32)
+    np.save(folder / "sequence.npy", sequence)
+    np.save(folder / "columns.npy", np.asfortranarray(sequence[0].astype(">f8")))
+    np.savez(
+        folder / "radii.npz", positions=sequence, radii=np.ones(8), origin=np.ones(3), times=np.arange(3)
+    )
+    np.savez_compressed(folder / "packed.npz", positions=sequence, label=np.ones((3, 8), np.int8))
+    depth = rng.random((7, 9), np.float32) + 1
+    to_camera = np.eye(4)
+    views = [
+        RangeView(
+            depth=depth, mask=depth < 1.9, color=rng.random((7, 9, 3)).astype(np.float16), confidence=depth,
+            fx=10.0, fy=10.0, cx=4.5, cy=3.5, world_to_camera=to_camera, name=name, unit="mm",
+        )
+        for name in ("left", "right")
+    ]  # fmt: skip
+    formats.write(folder / "views.exr", merge(views), views)
+
+
+def _write_choices(folder: Path) -> None:
+    """What belongs to scans: cameras, recordings, choices of the user."""
+    camera = Camera(eye=(1.0, 1.0, 5.0), target=(1.0, 1.0, 1.0))
+    camera.save(folder / "camera.json")
+    entry = Entry("scan.npz", None, 0, 0.0, SIZE, camera, "points", backend("points").params(), Look())
+    later = Entry(
+        "scan.npz", None, 0, 0.0, SIZE, camera, "surfels", backend("surfels").params(), Look(), at=0.5
+    )
+    Recording((entry, later), 1.0).save(folder / "recording.json")
+    write_png(np.zeros((2, 2, 4), np.uint8), folder / "recording.png", entry.description())
+    (folder / TIMES_FILE).write_text("file,time\nf0.ply,0\nf1.ply,0.04\n")
+    left = Left(3, camera, "mm", (Bookmark("front", camera),))
+    kept = settings.Settings(look=Look(light="head"), recent=("demo",), places={"demo": left})
+    (folder / "settings.json").write_text(json.dumps(kept.to_json()))
+    keys.write_template(folder / "keys.toml")
+    text = (folder / "keys.toml").read_text()
+    (folder / "keys.toml").write_text(text.replace("\n# ", "\n").split("[keys]")[1].join(["[keys]", ""]))
+
+
+# --- what is done with a file -------------------------------------------------------------------
+
+
+def _open(path: Path) -> None:
+    """As every command does: open it, and read its first and its last frame."""
+    with open_scan(path) as timeline:
+        for index in {0, len(timeline) - 1}:
+            cloud = timeline.pose(index).cloud
+            assert len(cloud) > 0
+            assert np.isfinite(cloud.positions).all()
+            assert all(len(values) == len(cloud) for values in cloud.scalars.values())
+
+
+def _draw(path: Path) -> None:
+    """Draw its first frame with each renderer, as small as can be."""
+    renderer = shared_renderer()
+    with open_scan(path) as timeline:
+        pose = timeline.pose(0)
+        camera = Camera.orbit(pose.cloud.bounds(), aspect=SIZE[0] / SIZE[1])
+        surface = Surface(renderer.gpu, SIZE)
+        for name in backends():
+            look = Look(color_by=next(iter(pose.cloud.scalars), "auto").replace("auto", "depth"))
+            while render_frame(renderer, Request(pose, camera, name, None, look), surface):
+                pass
+            depth = surface.depth
+            assert not np.isnan(depth).any(), f"{name}: a depth that is none"
+            assert (depth > 0).all(), f"{name}: a depth behind the eye"
+        surface.release()
+
+
+def _recorded(path: Path) -> None:
+    for entry in Recording.load(path).entries:
+        entry.description()
+
+
+def _times(path: Path) -> None:
+    for name in ("f0.ply", "f1.ply"):
+        (path.parent / name).write_text(_TEXTS["mesh.ply"])
+    with open_scan(path.parent / "f*.ply") as timeline:
+        timeline.pose(1)
+
+
+def _settings(path: Path) -> None:
+    settings.save(settings.load(path)[0], path)
+
+
+def _planted(path: Path) -> None:
+    """What goes wrong on purpose, to see that it is found."""
+    match path.read_text():
+        case "raises":
+            raise ValueError("planted")
+        case "hides":
+            try:
+                [].pop()
+            except IndexError as error:
+                raise InputError("cannot be read", path) from error
+        case "takes memory":
+            bytearray(1 << 30)
+        case "hangs":
+            time.sleep(3600)
+        case "dies":
+            os.abort()
+        case "warns":
+            warnings.warn("planted", stacklevel=1)
+        case "writes":
+            os.write(2, b"planted")
+
+
+_CHOICES: dict[str, Callable[[Path], Any]] = {
+    "camera.json": Camera.load,
+    "recording.json": _recorded,
+    "recording.png": _recorded,
+    "times.csv": _times,
+    "settings.json": _settings,
+    "keys.toml": keys.load,
+    "planted.txt": _planted,
+}
+
+
+def use(kind: str, drawn: bool) -> Callable[[Path], Any]:
+    """What the project does with a file of a kind. drawn: scans are drawn, too."""
+    return _CHOICES.get(kind, _draw if drawn else _open)
+
+
+def file_name(kind: str) -> str:
+    """What a file of a kind is called."""
+    return kind if kind in _CHOICES else f"input{kind}"
+
+
+def kind_of(name: str) -> str:
+    """The kind of a file of the corpus: `camera_1.json` is a camera, `1.npy` a scan."""
+    word, suffix = Path(name).stem.split("_")[0], Path(name).suffix
+    return f"{word}{suffix}" if f"{word}{suffix}" in _CHOICES else suffix
+
+
+def corpus(folder: Path) -> Callable[[int], tuple[str, bytes, bool]]:
+    """The files of a folder by number, those that end in .gz unpacked: kind, bytes, whether it is drawn."""
+    files = corpus_files(folder)
+
+    def of(number: int) -> tuple[str, bytes, bool]:
+        path = files[number]
+        data = path.read_bytes()
+        if path.suffix == ".gz":
+            path, data = path.with_suffix(""), gzip.decompress(data)
+        return kind_of(path.name), data, True
+
+    return of
+
+
+def corpus_files(folder: Path) -> list[Path]:
+    """The files of a corpus, in order."""
+    return sorted(folder.iterdir())
+
+
+def data_folder() -> Path | None:
+    """The folder of real scans, where there is one: as the fixture `data_dir` finds it."""
+    beside = Path(__file__).resolve().parents[3] / "shared" / "data"
+    folder = Path(os.environ.get("SCAN4D_DATA", beside))
+    return folder if folder.is_dir() else None
