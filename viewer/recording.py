@@ -236,7 +236,7 @@ def fingerprint(files: Sequence[Path], salt: str | None = None) -> str | None:
         listed = "\n".join(f"{os.path.getsize(file)} {file.name}" for file in files)
     except OSError:
         return None
-    return f"files:{hashlib.sha256(listed.encode()).hexdigest()[:16]}" if files else None
+    return f"files:{hashlib.sha256(os.fsencode(listed)).hexdigest()[:16]}" if files else None
 
 
 def new_salt() -> str:
