@@ -14,7 +14,7 @@ from ..task import checkpoint
 
 T = TypeVar("T")
 
-_CHUNK = 1 << 20  # points converted at a time, so that float64 copies stay small
+_CHUNK = 1 << 18  # points converted at a time, so that float64 copies stay small
 _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
 _SMALLEST = 1e-18  # lengths whose squares it can hold
 _SAMPLE = 1 << 13  # points that robust statistics look at
@@ -291,13 +291,14 @@ def _ellipses(
 
 def _rgba8(colors: NDArray) -> NDArray[np.uint8]:
     rgba = np.full((len(colors), 4), 255, np.uint8)
-    if colors.dtype.kind == "f":
-        scaled = np.nan_to_num(colors.astype(np.float32)) * np.float32(255)
-        colors = np.clip(np.rint(scaled), 0, 255)
-    elif colors.dtype == np.uint16:
-        colors = colors >> 8
-    elif colors.dtype != np.uint8:
-        colors = np.clip(colors, 0, 255)
-    for channel in range(colors.shape[1]):  # by columns: numpy is slow along the short axis
-        rgba[:, channel] = colors[:, channel]
+    for start in range(0, len(colors), _CHUNK):
+        part = colors[start : start + _CHUNK]
+        if part.dtype.kind == "f":
+            part = np.clip(np.rint(np.nan_to_num(part.astype(np.float32)) * np.float32(255)), 0, 255)
+        elif part.dtype == np.uint16:
+            part = part >> 8
+        elif part.dtype != np.uint8:
+            part = np.clip(part, 0, 255)
+        for channel in range(part.shape[1]):  # by columns: numpy is slow along the short axis
+            rgba[start : start + _CHUNK, channel] = part[:, channel]
     return rgba

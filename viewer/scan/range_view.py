@@ -14,7 +14,7 @@ from .points import UNKNOWN_UNIT, PointCloud
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _AT_ONCE = 1 << 17  # pixels worked on together
-_MERGING_BYTES = 100  # that `merge` takes for a point
+_MERGED_BYTES, _MERGING_BYTES = 52, 20 << 20  # that `merge` takes for a point, and beside all points
 _STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
 
 
@@ -167,7 +167,8 @@ def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
 def memory_of_merging(views: Sequence[RangeView]) -> int:
     """Bytes that views and what `merge` makes of them take at most at a time, without normals."""
     points = sum(int(np.count_nonzero(view.valid())) for view in views)
-    return sum(view.nbytes + view.mask.size for view in views) + points * _MERGING_BYTES
+    images = sum(view.nbytes + view.mask.size for view in views)
+    return images + points * _MERGED_BYTES + _MERGING_BYTES
 
 
 def _is_rigid(matrix: NDArray[np.float64]) -> bool:

@@ -52,7 +52,7 @@ def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
         headers = _headers(path)
         for number, header in enumerate(headers):
             _check_form(header, _name(header, number))
-        admit(size_of(stream), _memory(headers, _pixel_bytes(stream)))
+        admit(size_of(stream), _memory(headers, _pixel_bytes(stream, len(headers))))
         images = _decoded(path, len(headers))
         views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
         admit(size_of(stream), memory_of_merging(views))
@@ -137,7 +137,7 @@ def _check_form(header: dict[str, Any], name: str) -> None:
 
 
 def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int]) -> int:
-    """Bytes that parts take at most at a time, decoded and as views. samples: bytes of a pixel of each part."""
+    """Bytes that parts take at a time, decoded and as views. samples: bytes of a pixel of each part."""
     pixels = []
     for header in headers:
         low, high = (corner.astype(int) for corner in header["dataWindow"])
@@ -145,21 +145,18 @@ def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int]) -> int:
     return sum(map(operator.mul, pixels, samples)) + max(pixels) * _VIEW_BYTES
 
 
-def _pixel_bytes(stream: BinaryIO) -> list[int]:
-    """How many bytes a pixel of each part takes, from the headers, since OpenEXR tells it when it has decoded."""
+def _pixel_bytes(stream: BinaryIO, parts: int) -> list[int]:
+    """Bytes of a pixel of each part, as the headers say; OpenEXR tells when it has decoded them."""
     stream.seek(_MAGIC_BYTES)
-    found: list[int] = []
-    while name := _word(stream):
-        found.append(0)
-        while name:
+    found = [0] * parts
+    for part in range(parts):
+        while _word(stream):  # the name of an attribute
             kind, size = _word(stream), int.from_bytes(read_exactly(stream, 4), "little")
-            if kind != b"chlist":
-                stream.seek(size, 1)
+            if kind == b"chlist":
+                types = _channel_types(read_exactly(stream, size))
+                found[part] = sum(_TYPE_BYTES.get(type_, 4) for type_ in types)
             else:
-                found[-1] = sum(
-                    _TYPE_BYTES.get(type_, 4) for type_ in _channel_types(read_exactly(stream, size))
-                )
-            name = _word(stream)
+                stream.seek(size, 1)
     return found
 
 
