@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -297,6 +298,14 @@ def test_dropped_points_are_reported(run: Run, tmp_path: Path) -> None:
     assert (facts["points"], facts["dropped"]) == (2, 1)
 
 
+def test_a_scan_may_follow_parameters(run: Run, scans: Path, tmp_path: Path) -> None:
+    ball, out = scans / "ball.npz", ("-o", tmp_path / "a.npz", *SMALL, "--backend", "points", "--force")
+    assert run("render", ball, *out, "--set", "point_size=3", "--look", "light=flat", "up=+z").code == 0
+    before = stored(tmp_path / "a.npz")
+    assert run("render", *out, "--look", "light=flat", "up=+z", "--set", "point_size=3", ball).code == 0
+    assert all(np.array_equal(bits(before[name]), bits(stored(tmp_path / "a.npz")[name])) for name in before)
+
+
 # --- stats ----------------------------------------------------------------------------------
 
 
@@ -395,8 +404,18 @@ def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
         (["--up", "+w"], ["'+w'", "+x"]),
         (["--fps", "0"], ["frame rate"]),
         (["--fps", "fast"], ["--fps", "'fast'"]),
-        (["--nope"], ["--nope"]),
-        (["--bac", "points"], ["--bac"]),
+        (["--nope"], ["unknown option '--nope'", "'scan4d render --help'"]),
+        (["--bac", "points"], ["unknown option '--bac'", "'--backend'"]),
+        (["--bakend=points"], ["'--bakend'. Did you mean '--backend'?"]),
+        (["--backend", "pionts"], ["Did you mean 'points'?"]),
+        (["--backend", "points", "--set", "pointsize=2"], ["Did you mean 'point_size'?"]),
+        (["--look", "colour_by=depth"], ["Did you mean 'color_by' or 'color_map'?"]),
+        (["--look", "color_by=hight"], ["Did you mean 'height'?"]),
+        (["--marks", "stmp"], ["--marks 'stmp'. Did you mean 'stamp'?"]),
+        (["b.npz", "c.npz"], ["'b.npz', 'c.npz'", "quote it", "'scan4d render --help'"]),
+        (["--unit", "m" * 5000], ["--unit", "no unit"]),
+        (["--unit", "\x1b[31m"], [r"'\x1b[31m' is no unit"]),
+        (["--backend", "\x1b]0;p\x07\n\u202e"], [r"'\x1b]0;p\x07\n\u202e'"]),
     ],
 )
 def test_unusable_arguments_are_one_message(
@@ -412,7 +431,9 @@ def test_unusable_arguments_are_one_message(
 
 def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, scans: Path) -> None:
     message = refused("rendre", "x")
-    assert all(name in message for name in ("'rendre'", *cli.COMMANDS))
+    assert all(name in message for name in ("'rendre'. Did you mean 'render'?", *cli.COMMANDS))
+    assert "'scan4d --help'" in refused("--bogus")
+    assert "Write it after" in refused("-q", "info", scans / "ball.npz")
     assert "-o" in refused("render", scans / "ball.npz")
     assert "SCAN" in refused("info")
     done = run()
@@ -435,6 +456,20 @@ def test_an_unexpected_error_is_one_message(
     err = capsys.readouterr().err
     assert err.startswith("Traceback")
     assert err.endswith(done.err)
+
+
+def test_errors_that_follow_an_interrupt_are_the_interrupt(
+    run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ImportError("it failed to import") from None
+
+    monkeypatch.setattr(drawing, "shots", fail)
+    done = run("render", scans / "ball.npz", "-o", tmp_path / "a.png")
+    assert done == (1, "", "scan4d: stopped\n")
 
 
 def test_debug_shows_the_traceback_of_an_error(capsys: pytest.CaptureFixture[str]) -> None:
@@ -484,6 +519,96 @@ def test_a_reader_that_goes_away_is_no_error(scans: Path) -> None:
     assert running.stderr.read() == ""
     assert running.wait() == 1
     running.stderr.close()
+
+
+IMPORTED_NEXT = """
+import os, signal, sys
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == {name!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+from viewer.cli import main
+sys.argv[1:] = {argv!r}
+sys.exit(main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no such signals")
+@pytest.mark.parametrize(
+    "name",
+    ["viewer.commands.line", "argparse", "numpy", "numpy._core._multiarray_umath", "moderngl", "PIL", "cmap"],
+)
+def test_an_interrupt_while_libraries_are_imported_is_quiet(name: str, scans: Path, tmp_path: Path) -> None:
+    argv = [
+        "render",
+        str(scans / "ball.npz"),
+        "-o",
+        str(tmp_path / "a.png"),
+        *SMALL,
+        "--look",
+        "color_by=height",
+    ]
+    code = IMPORTED_NEXT.format(name=name, argv=argv)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stderr) in ((-signal.SIGINT, ""), (1, "scan4d: stopped\n"))
+    assert names(tmp_path) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no /dev/full")
+@pytest.mark.parametrize("where", [">&-", "> /dev/full"])
+@pytest.mark.parametrize(
+    "words", ["info demo", "backends --json", "--help", "render demo -o {}/a.png --size 9x9"]
+)
+def test_output_that_cannot_be_written_is_told(where: str, words: str, tmp_path: Path) -> None:
+    line = f"{sys.executable} -m viewer.cli {words.format(tmp_path)} {where}"
+    done = subprocess.run(line, shell=True, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 1
+    assert re.fullmatch(r"scan4d: standard output: cannot be written: [^\n]+\n", done.stderr), done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no /dev/full")
+@pytest.mark.parametrize("where", ["2>&-", "2> /dev/full", "<&- 2>&-"])
+def test_messages_that_nobody_can_read_are_lost(where: str, scans: Path, tmp_path: Path) -> None:
+    line = (
+        f"{sys.executable} -m viewer.cli render {scans}/broken --all -o {tmp_path}/p%d.png --size 9x9 {where}"
+    )
+    done = subprocess.run(line, shell=True, capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stdout) == (0, f"{tmp_path}/p%d.png\n")
+    assert (
+        subprocess.run(f"{sys.executable} -m viewer.cli info no.ply {where}", shell=True, cwd=ROOT).returncode
+        == 2
+    )
+
+
+def test_what_a_terminal_cannot_show_is_escaped() -> None:
+    done = finish(process("render", "--help", PYTHONIOENCODING="ascii"))
+    assert (done.code, done.err) == (0, "")
+    assert r"--up \xb1x|\xb1y|\xb1z" in done.out
+
+
+def test_control_characters_of_files_do_nothing(run: Run, tmp_path: Path) -> None:
+    name = "\x1b[31mred\x1b]0;p\x07"
+    rows = "property float x\nproperty float y\nproperty float z\n"
+    header = f"ply\nformat ascii 1.0\nelement vertex 2\n{rows}property float {name}\nend_header\n"
+    (tmp_path / "a\x1b[2J.ply").write_text(header + "1 2 3 4\nnan 2 3 4\n")
+    done = run("info", tmp_path / "a\x1b[2J.ply")
+    assert done.code == 0
+    assert r"\x1b[31mred\x1b]0;p\x07  float32" in done.out
+    assert r"a\x1b[2J.ply" in done.err, "it warns of the point that is dropped"
+    assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", done.out + done.err)
+    assert json.loads(run("info", tmp_path / "a\x1b[2J.ply", "--json").out)["attributes"].keys() == {name}
+
+
+def test_quiet_says_nothing_but_errors(run: Run, scans: Path, tmp_path: Path) -> None:
+    assert run("render", scans / "broken", "-o", tmp_path / "p%d.png", *SMALL, "--all", "-q") == (0, "", "")
+    assert run("convert", scans / "broken", tmp_path / "p%d.ply", "--quiet") == (0, "", "")
+    assert run("info", scans / "nowhere", "-q").err.startswith("scan4d: ")
+    assert "points" in run("info", scans / "ball.npz", "-q").out
+
+
+def test_the_version(run: Run) -> None:
+    assert run("--version") == (0, f"scan4d {viewer.__version__}\n", "")
 
 
 # --- info, convert, backends, doctor ----------------------------------------------------------
@@ -660,6 +785,57 @@ def test_doctor_without_opengl() -> None:
     assert "lists the devices" in done.out
 
 
+@pytest.mark.usefixtures("mesa")
+def test_an_older_opengl_is_named(tmp_path: Path) -> None:
+    older = {"MESA_GL_VERSION_OVERRIDE": "3.3", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
+    done = finish(process("render", "demo", "-o", tmp_path / "a.png", **older))
+    assert done.code == 3
+    assert re.fullmatch(r"scan4d: OpenGL 3\.3 on [^\n]* is not enough\. [^\n]* 4\.3 [^\n]*\n", done.err), (
+        done.err
+    )
+    done = finish(process("doctor", **older))
+    assert done.code == 3
+    assert "OpenGL 3.3 on " in done.out
+
+
+@pytest.fixture
+def mesa(renderer: Renderer) -> None:
+    if "Mesa" not in renderer.gpu.driver:
+        pytest.skip("these environment variables are Mesa's")
+
+
+@pytest.fixture
+def full_disk(tmp_path: Path) -> Iterator[Path]:
+    """The folder of a file system of its own that has no room."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("a file system cannot be mounted here")
+    try:
+        (folder / "full").write_bytes(bytes(60_000))
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.usefixtures("mesa")
+def test_a_full_disk_under_the_shader_cache_is_no_harm(full_disk: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    caches = {
+        str(full_disk): "the disk is full",
+        str(tmp_path / "file"): "a part of its path is no folder",
+        str(tmp_path / "new"): str(tmp_path / "new" / "mesa_shader_cache") + "\n",
+    }
+    for cache, words in caches.items():
+        done = finish(process("doctor", MESA_SHADER_CACHE_DIR=cache))
+        assert (done.code, done.err) == (0, "")
+        assert re.search(rf"shader cache +.*{re.escape(words)}", done.out), done.out
+    picture = ("render", "demo", "-o", tmp_path / "a.png", *SMALL)
+    done = finish(process(*picture, MESA_SHADER_CACHE_DIR=str(full_disk)))
+    assert done == (0, f"{tmp_path / 'a.png'}\n", "")
+
+
 # --- view -----------------------------------------------------------------------------------
 
 
@@ -780,7 +956,7 @@ def test_progress_is_for_terminals_alone(
 def test_help(command: str, run: Run) -> None:
     done = run(command, "--help")
     assert (done.code, done.err) == (0, "")
-    for flag in ("--device N", "--unit U", "--fps F", "--up ±x|±y|±z", "--debug"):
+    for flag in ("--device N", "--unit U", "--fps F", "--up ±x|±y|±z", "-q, --quiet", "--debug"):
         assert flag in done.out
 
 

@@ -44,7 +44,7 @@ class NoOpenGLError(Scan4DError):
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name that is not one of `known`; it tells which are close to it, and lists them all."""
-    known = sorted(known)
+    known = sorted(set(known))
     hint = f"{did_you_mean(name, known)}Known: {', '.join(known)}"
     return InputError(f"unknown {kind} '{shortened(name)}'", hint=hint)
 

@@ -21,6 +21,8 @@ from moderngl_window.context.glfw.window import Window as GlfwWindow
 
 from ..errors import NoOpenGLError
 from ..gpu import gl
+from ..gpu.context import obstacle
+from ..gpu.shader_cache import shader_cache
 from . import theme
 from .place import Place, reachable
 
@@ -53,11 +55,13 @@ class Window(GlfwWindow):
         try:
             if not glfw.init():
                 raise ValueError("no display")
+            shader_cache()
             super().__init__(title=title, gl_version=_GL, size=_initial_size(), vsync=True, visible=False)
         except Exception as error:  # moderngl and moderngl-window raise bare Exceptions
             glfw.terminate()
+            problems += filter(None, (str(error), obstacle()))
             raise NoOpenGLError(
-                f"no window can be opened ({'; '.join([*problems, str(error)])})",
+                f"no window can be opened ({'; '.join(problems)})",
                 hint="It needs a display and OpenGL 4.3. 'scan4d render' makes pictures without a window; "
                 "'scan4d doctor' tells more",
             ) from error

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from .. import __version__
 from ..errors import NoOpenGLError
 from ..gpu.context import REQUIRED_EXTENSIONS, Attempts, Gpu, headless
+from ..gpu.shader_cache import shader_cache
 
 # What decides how large pictures and poses may be, and how work is cut up.
 _LIMITS = (
@@ -87,6 +88,7 @@ def _driver(gpu: Gpu) -> list[tuple[str, str]]:
         ("pass timer", gpu.timers.kind),
         ("largest picture", f"{gpu.max_pixels:,} pixels"),
         ("largest pose", f"{gpu.max_points:,} points"),
+        *([("shader cache", cache)] if (cache := shader_cache()) else []),
         *limits,
     ]
 

@@ -6,6 +6,7 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
@@ -14,10 +15,12 @@ import moderngl
 from ..errors import InputError, NoOpenGLError
 from . import gl
 from .shader import Source, shader_error
+from .shader_cache import shader_cache
 from .timers import Timers
 
 T = TypeVar("T")
 REQUIRED_VERSION = 430
+_OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
 GROUP = 256  # invocations of a work group (common/item.glsl)
@@ -167,17 +170,22 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
             options.append(("GLX, hidden window", {}))
     else:
         options.append(("hidden window", {}))
+    shader_cache()
     for how, settings in options:
         try:
             ctx = moderngl.create_context(standalone=True, require=REQUIRED_VERSION, **settings)
             gpu = Gpu(ctx, headless=True)
         except NoOpenGLError as error:
-            attempts.log.append((how, str(error)))
+            attempts.log.append((how, error.what))
         except Exception as error:  # moderngl and glcontext raise bare Exceptions
             attempts.log.append((how, str(error) or type(error).__name__))
         else:
             attempts.log.append((how, f"{gpu.device}, OpenGL {gpu.driver}"))
             return gpu
+    how, settings = options[0]
+    if (too_old := _too_old(settings)) is not None:
+        attempts.log.append((f"{how}, any version", too_old.what))
+        raise too_old
     if device:
         raise NoOpenGLError(
             f"no usable OpenGL on device {device} ({attempts})",
@@ -188,6 +196,28 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
         hint="Install a graphics driver, or Mesa's software OpenGL (Debian: apt-get install libegl1 "
         "libgl1 libgl1-mesa-dri libegl-mesa0); 'scan4d doctor' tells more",
     )
+
+
+def obstacle() -> str | None:
+    """Why nothing can be drawn on this machine, with a window or without; None where it can."""
+    try:
+        headless(0).ctx.release()  # a device, so that no display is asked, which may have failed before
+    except NoOpenGLError as error:
+        return error.what
+    return None
+
+
+def _too_old(settings: Mapping[str, Any]) -> NoOpenGLError | None:
+    """What keeps an older OpenGL than the one that is needed from being enough, where there is one."""
+    with suppress(Exception):
+        ctx = moderngl.create_context(standalone=True, require=_OLDEST_VERSION, **settings)
+        try:
+            Gpu(ctx)
+        except NoOpenGLError as error:
+            return error
+        finally:
+            ctx.release()
+    return None
 
 
 def device_from_environment() -> int | None:
