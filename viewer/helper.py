@@ -35,8 +35,11 @@ def start_python(code: str, *arguments: str, nice: int, **streams: Any) -> subpr
     nice: how much it steps back for others, where the system knows that. streams: `stdin`, `stderr`.
     Raises OSError.
     """
-    # The same modules as here, whatever lies in the working directory.
-    begin = f"import os, sys; sys.path[:] = {sys.path!r}; hasattr(os, 'nice') and os.nice({nice})"
+    # The same modules as here, whatever lies in the working directory. Ctrl-C, which reaches it too, ends it.
+    begin = (
+        "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); "
+        f"sys.path[:] = {sys.path!r}; hasattr(os, 'nice') and os.nice({nice})"
+    )
     begin += f"\nfrom {__name__} import end_with; end_with({os.getpid()})"
     return subprocess.Popen(
         [sys.executable, "-c", f"{begin}\n{code}", *arguments],

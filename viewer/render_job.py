@@ -110,7 +110,7 @@ def _run(task: Task, arguments: list[str], said: Path, told_once: Path) -> tuple
     said: a file for what it says on standard error. told_once: what it reads at first, deleted then, as it
     names the scan. Returns the device that drew, the exit code, and what was said. Raises Cancelled.
     """
-    code = "import sys; from viewer.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from viewer.cli import main; sys.exit(main())"
     with (
         open(said, "wb") as stream,
         start_python(code, *arguments, nice=_NICE, stdin=subprocess.DEVNULL, stderr=stream) as process,
