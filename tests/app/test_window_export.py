@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from range_scenes import sphere_view
 from scenes import sphere
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 from written import film
@@ -21,6 +22,7 @@ from viewer.look import color_table
 from viewer.marks import INK
 from viewer.recording import Recording
 from viewer.scan import formats
+from viewer.scan.formats.exr import write_views
 
 SIZE = (1280, 720)
 COUNT = 6  # frames
@@ -248,6 +250,29 @@ def test_a_cancelled_export_leaves_nothing_and_closing_asks(app: RunningApp, fol
     assert app.process.wait(30) == 0
     assert listed(folder) == before
     assert not re.search("Traceback", app.log())
+
+
+def test_an_export_never_replaces_the_scan(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    scan, config = tmp_path / "range.exr", tmp_path / "config" / "scan4d"
+    write_views(scan, [sphere_view((0, 0, 4))])
+    config.mkdir(parents=True)
+    export = {"format": "exr", "folder": str(tmp_path)}
+    (config / "settings.json").write_text(json.dumps({"format": 1, "export": export}))
+    before = scan.read_bytes()
+    with (
+        virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
+        running_app(screen, tmp_path, scan) as app,
+    ):
+        dialog = Dialog(app)
+        dialog.enter(9, "range")
+        for lines in (10, 10.8):  # the second a line of text below
+            dialog.export(lines)
+            app.settle()
+        assert "exporting" not in app.log()
+        dialog.enter(9, "other")
+        dialog.export(10)
+        app.expect(r"Saved .*other.exr")
+    assert scan.read_bytes() == before
 
 
 @pytest.mark.slow

@@ -15,7 +15,11 @@ import numpy as np
 import pytest
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 
+from viewer import cli
+from viewer.export import read_description
 from viewer.recording import Entry, Recording
+from viewer.scan import formats
+from viewer.scan.points import PointCloud
 
 SIZE = (960, 640)
 
@@ -39,7 +43,8 @@ def recorded(app: RunningApp) -> tuple[Path, tuple[Entry, ...]]:
 def viewed(app: RunningApp, path: Path) -> Iterator[str]:
     """The title of another window, which `scan4d view` opens on a file."""
     command = [sys.executable, "-m", "viewer.cli", "view", str(path)]
-    env = {**app.screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(path.parent / "other")}
+    home = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_STATE_HOME"), str(path.parent / "other"))
+    env = {**app.screen.env, "PYTHONPATH": str(ROOT), **home}
     windows = set(app.screen.do("search", "--name", "Scan4D").split())
     with subprocess.Popen(command, env=env) as process:
         try:
@@ -105,3 +110,31 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         press(app, "shift", "r")
         app.expect("is not JSON")
         assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_an_anonymous_picture_is_shown_where_the_scan_stands(tmp_path: Path) -> None:
+    scan, picture = tmp_path / "far.npz", tmp_path / "anonymous.png"
+    points = np.random.default_rng(0).random((300, 3)) + np.array([5000, 100, 7])
+    formats.write(scan, PointCloud.from_arrays(points, scalars={"q": np.arange(300, dtype=np.float32)}))
+    with virtual_screen(tmp_path, SIZE) as screen, running_app(screen, tmp_path, scan) as app:
+        press(app, "r")
+        app.expect("Recording")
+        path, (shown,) = recorded(app)
+        look = replace(shown.look, color_by="q", light="flat")
+        wanted = replace(shown, camera=shown.camera.orbited(40, 0), look=look)
+        Recording((wanted,)).save(path)
+        assert cli.main(["render", "--replay", str(path), "--anonymous", "-o", str(picture)]) == 0
+        assert Recording.load(picture).entries[0].camera != wanted.camera
+        path.write_text(read_description(picture))
+        press(app, "shift", "r")
+        app.expect("replays frame 0")
+        app.settle()
+        press(app, "p")
+        (again,) = Recording.load(Path(app.expect(r"Saved (.+\.png)")[1])).entries
+        assert np.allclose(again.camera.eye, wanted.camera.eye, atol=1e-6)
+        assert again.look == wanted.look
+        assert "is not as it was" not in app.log(), "its hash is another one, of the same scan"
+        formats.write(scan, PointCloud.from_arrays(points[:200]))
+        press(app, "shift", "r")
+        app.expect("far.npz is not as it was")

@@ -10,11 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..anonymous import raised
 from ..errors import InputError, Scan4DError
 from ..files import user_folder
 from ..gpu.context import Gpu
+from ..look import drawable, value_source
 from ..recording import Entry
 from ..scan.open import open_scan
+from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
 from . import keys, settings, theme
@@ -227,11 +230,17 @@ class App:
         """Tells whether the scan is still the same, None where it has no files (see `fingerprint`)."""
         return self._hash.result()
 
-    def show(self, entry: Entry) -> None:
-        """Show what an entry of a recording does, whose scan is open and whose pose has been read."""
-        session = self.session
+    def show(self, entry: Entry, pose: Pose) -> None:
+        """Show what an entry of a recording does. pose: of the scan, which is open."""
+        session, camera, look = self.session, entry.camera, entry.look
+        if entry.anonymous:  # of a scan that stands at the origin, and whose scalars have numbers for names
+            origin = pose.cloud.origin
+            camera, look = camera.moved(origin), raised(look, origin)
+            look = replace(
+                look, color_by=value_source(drawable(look, pose.cloud), pose.cloud) or look.color_by
+            )
         self.seek(entry.pose)
-        session.camera, session.pivot, session.look = entry.camera, None, entry.look
+        session.camera, session.pivot, session.look = camera, None, look
         session.backend, session.params[entry.backend] = entry.backend, entry.params
         self.picture.rest()
         self.window.touch()

@@ -10,7 +10,7 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from ..backends import backend, backends
 from ..camera import PROJECTIONS
 from ..files import printable
-from ..look import COLOR_BY
+from ..look import COLOR_BY, drawable
 from . import widgets
 from .files.scans import title
 from .scene import counting
@@ -94,9 +94,12 @@ def _draw_renderer(app: App, pose: Pose) -> None:
 def _colors(app: App, pose: Pose) -> dict[str, str]:
     """What can give colours, and the title of each: also what is chosen although the frame lacks it."""
     there = [*COLOR_BY, *pose.cloud.scalars]
-    chosen = app.session.look.color_by
-    missing = {} if chosen in there else {chosen: f"{printable(chosen)} (not here)"}
-    return {name: printable(name) for name in there} | missing
+    look = app.session.look
+    titles = {name: printable(name) for name in there}
+    if look.color_by in there:
+        return titles
+    is_here = drawable(look, pose.cloud) == look  # as the scalar's number
+    return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not here)")}
 
 
 def _draw_projection(app: App) -> None:

@@ -39,7 +39,7 @@ class Capture:
         self.replaying: Replaying | None = None
         self.last: Path | None = None
         self._journal: Journal | None = None  # of what is recorded
-        self._saving: list[Future[tuple[Path | None, str]]] = []  # pictures, in the order of their names
+        self._words: list[Future[str]] = []  # that there will be to tell, in their order
         self._naming = Lock()  # one free name at a time
 
     def shown(self) -> Entry | None:
@@ -59,7 +59,7 @@ class Capture:
             return
         image, text = surface.image(), entry.description()
         work = partial(self._saved, ".png", lambda path: write_png(image, path, text))
-        self._saving.append(in_background(Task("Saving"), work))
+        self.tell_later(lambda: work()[1])
 
     # --- recording --------------------------------------------------------------------
 
@@ -111,7 +111,7 @@ class Capture:
     def find_unfinished(self) -> None:
         """Save what processes have recorded that were killed meanwhile."""
         for journal in journals():
-            self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
+            self.tell_later(partial(_saved_late, journal))
 
     def _saved(self, suffix: str, write: Callable[[Path], None]) -> tuple[Path | None, str]:
         """Write a file under the next free name; returns it, None where that fails, and what to tell."""
@@ -123,11 +123,14 @@ class Capture:
                 return None, in_words(f"Saving {path}", error)
         return path, f"Saved {path}"
 
-    def _tell_saved(self) -> None:
-        """Tell of the pictures that have been written."""
-        while self._saving and self._saving[0].done():
-            _, words = self._saving.pop(0).result()
-            if words:
+    def tell_later(self, work: Callable[[], str]) -> None:
+        """Do some work beside the window, and tell what comes of it; empty: nothing."""
+        self._words.append(in_background(Task("Saving"), work))
+
+    def _tell(self) -> None:
+        """Tell of the work that is done."""
+        while self._words and self._words[0].done():
+            if words := self._words.pop(0).result():
                 self._app.note(words)
 
     # --- replaying --------------------------------------------------------------------
@@ -153,12 +156,12 @@ class Capture:
 
     def until_next(self, now: float) -> float:
         """Seconds until there is something to do; infinite where there is nothing."""
-        soon = _LOOK if self._saving else math.inf
+        soon = _LOOK if self._words else math.inf
         return soon if self.replaying is None else min(soon, self.replaying.until_next(now))
 
     def advance(self, now: float) -> None:
         """Let the replay go on. The user's own moves end it."""
-        self._tell_saved()
+        self._tell()
         if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
             self.stop_replaying()
 
@@ -166,14 +169,14 @@ class Capture:
         """Save what is being recorded, and wait for pictures that are being written."""
         if self.recorder is not None:
             self.toggle_recording()
-        wait(self._saving)
-        self._tell_saved()
+        wait(self._words)
+        self._tell()
 
 
-def _saved_late(journal: Path) -> tuple[Path | None, str]:
-    """The recording that a journal becomes, None where none does; and what to tell."""
+def _saved_late(journal: Path) -> str:
+    """What to tell of the recording that a journal becomes; nothing where none does."""
     try:
         path = saved(journal)
     except InputError as error:
-        return None, str(error)
-    return path, f"Saved a recording that was not finished: {path}" if path else ""
+        return str(error)
+    return f"Saved a recording that was not finished: {path}" if path else ""
