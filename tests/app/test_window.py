@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -406,3 +407,11 @@ def test_without_a_display_it_says_so(tmp_path: Path) -> None:
     message = run_without_display(tmp_path / "points.npy")
     assert message.startswith("NoOpenGLError no window can be opened")
     assert "DISPLAY" in message
+
+
+def test_an_opengl_that_is_too_old_is_named(screen: Screen) -> None:
+    older = {**screen.env, "MESA_GL_VERSION_OVERRIDE": "3.3"}
+    command = [sys.executable, "-m", "viewer.cli", "view", "demo"]
+    done = subprocess.run(command, env=older, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 3
+    assert re.fullmatch(r"scan4d: no window can be opened \([^\n]*OpenGL 3\.3 on [^\n]*\n", done.stderr)

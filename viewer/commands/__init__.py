@@ -6,6 +6,6 @@ A command module has
     add_arguments(parser)   its own arguments
     run(args) -> int        does it and returns the exit code
 
-`viewer/cli.py` names them in the order of the help; it adds the arguments that all have
-in common, and turns errors into messages and exit codes.
+`viewer/cli.py` names them in the order of the help; `parsing.py` adds the arguments that all have in common,
+and `line.py` turns errors into messages and exit codes.
 """
