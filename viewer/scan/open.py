@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import formats
@@ -18,6 +19,7 @@ from .points import UNKNOWN_UNIT
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import Notice, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
+from .units import checked_unit
 
 DEMO = "demo"
 NOTES = {".txt", ".csv"}  # beside frames of another kind these are notes, not frames
@@ -36,16 +38,22 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     """
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise InputError(f"a frame rate of {fps} is not usable", hint="Give frames per second above 0")
+    unit = unit and checked_unit(unit)
     source = find_source(path)
     recorded = source.times()
     measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
     if recorded is None or (fps is not None and not measured):
-        labels = [source.label(index) for index in range(len(source))]
-        recorded = paced_times(labels, DEFAULT_FPS if fps is None else fps)
+        recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
     timeline = Timeline(source, recorded, unit or source.unit or UNKNOWN_UNIT)
     if measured and fps is not None:
         timeline.messages.append(Notice("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used"))
     return timeline
+
+
+def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
+    if isinstance(source, FileSequence):
+        return paced_times([source.label(index) for index in range(len(source))], fps)
+    return np.arange(len(source)) / fps  # perhaps a million, whose labels tell nothing more
 
 
 def find_source(path: str | os.PathLike[str]) -> FrameSource:

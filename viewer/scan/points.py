@@ -17,6 +17,7 @@ T = TypeVar("T")
 _CHUNK = 1 << 18  # points converted at a time, so that float64 copies stay small
 _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
 _SMALLEST = 1e-18  # lengths whose squares it can hold
+_LONGEST_SPLAT = 1e6  # extents of the points: float32 cannot intersect a ray with much longer ones
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
@@ -71,6 +72,7 @@ class PointCloud:
     scalars:   name -> (N,) array of any real type
     ids:       (N,) uint32, increasing, the index in the file before anything was dropped; None: 0..N-1
     dropped:   how many points were dropped because a coordinate was NaN or infinite
+    shortened: how many splats were, to a million times the extent of the points
     topology:  names the faces between the points: clouds with the same one hold the same points of the
                subject under the same ids; None where the scan does not tell
     """
@@ -84,6 +86,7 @@ class PointCloud:
     scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     ids: NDArray[np.uint32] | None = None
     dropped: int = 0
+    shortened: int = 0
     topology: str | None = None
     _facts: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -131,7 +134,11 @@ class PointCloud:
         if keep is not None:
             points = points[keep]
         radii_ = None if radii_ is None else np.ascontiguousarray(radii_, np.float32)
-        radii_, axes_ = (radii_, None) if axes_ is None else _ellipses(radii_, axes_)
+        shortened = 0
+        if radii_ is not None or axes_ is not None:
+            radii_, axes_, shortened = _splats(
+                radii_, axes_, _LONGEST_SPLAT * (_robust_extent(points) or 1.0)
+            )
         base = choose_origin(points) if origin is None else np.array(origin, np.float64)
         return cls(
             positions=_relative(points, base),
@@ -144,6 +151,7 @@ class PointCloud:
                      for name, values in (scalars or {}).items()},
             ids=None if keep is None else np.flatnonzero(keep).astype(np.uint32),
             dropped=count - kept,
+            shortened=shortened,
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -243,8 +251,7 @@ def choose_origin(points: NDArray) -> NDArray[np.float64]:
     """
     if not len(points):
         return np.zeros(3)
-    low, high = _quantile_box(points)
-    extent = float((high - low).max())
+    extent = _robust_extent(points)
     median = np.median(_sample(points), axis=0)
     if extent <= 0 or not np.isfinite(extent):
         return median if np.abs(median).max() > 0 else np.zeros(3)
@@ -254,6 +261,12 @@ def choose_origin(points: NDArray) -> NDArray[np.float64]:
 
 def _sample(points: NDArray) -> NDArray[np.float64]:
     return np.asarray(points[:: max(1, len(points) // _SAMPLE)], np.float64)
+
+
+def _robust_extent(points: NDArray) -> float:
+    """The longest edge of the box that holds most of the points, 0 where there is none."""
+    low, high = _quantile_box(points) if len(points) else (np.zeros(3), np.zeros(3))
+    return float((high - low).max())
 
 
 def _quantile_box(points: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -272,21 +285,32 @@ def _relative(points: NDArray, origin: NDArray[np.float64]) -> NDArray[np.float3
     return offsets
 
 
-def _ellipses(
-    radii: NDArray[np.float32] | None, axes: NDArray
-) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
-    """Radii and half-axes as a PointCloud holds them; as they were given where no row has two lengths."""
+def _splats(
+    radii: NDArray[np.float32] | None, axes: NDArray | None, longest: float
+) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None, int]:
+    """Radii and half-axes as a PointCloud holds them, and how many are `longest` now and were longer.
+
+    Both are as they were given where no row of the half-axes has two lengths.
+    """
+    shortened = 0
+    if radii is not None and (too_long := (radii > longest) & np.isfinite(radii)).any():
+        radii, shortened = np.where(too_long, np.float32(longest), radii), int(too_long.sum())
+    if axes is None:
+        return radii, None, shortened
     mean = np.zeros(len(axes), np.float32) if radii is None else radii.copy()
-    kept = np.zeros(axes.shape, np.float32)
+    kept, shorter = np.zeros(axes.shape, np.float32), 0
     for start in range(0, len(axes), _CHUNK):
         checkpoint()
         part = axes[start : start + _CHUNK].astype(np.float64)
         with np.errstate(over="ignore", invalid="ignore"):
             lengths = np.stack([np.linalg.norm(part[:, :3], axis=1), part[:, 3]])
         rows = np.flatnonzero(((lengths > _SMALLEST) & (lengths < _LARGEST)).all(axis=0))
-        kept[start + rows] = part[rows]
-        mean[start + rows] = np.sqrt(lengths[:, rows].prod(axis=0))
-    return (mean, kept) if kept.any() else (radii, None)
+        factors = np.minimum(1, longest / lengths[:, rows])
+        kept[start + rows, :3] = part[rows, :3] * factors[0][:, None]
+        kept[start + rows, 3] = part[rows, 3] * factors[1]
+        mean[start + rows] = np.sqrt((lengths[:, rows] * factors).prod(axis=0))
+        shorter += int((factors < 1).any(axis=0).sum())
+    return (mean, kept, shorter) if kept.any() else (radii, None, shortened)
 
 
 def _rgba8(colors: NDArray) -> NDArray[np.uint8]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .colors import srgb8_from_linear
 from .points import UNKNOWN_UNIT, PointCloud
+from .units import conversion
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _AT_ONCE = 1 << 17  # pixels worked on together
@@ -106,6 +107,13 @@ class RangeView:
         normals[sides == 0] = -away[sides == 0]
         return (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)
 
+    def scaled(self, factor: float, unit: str) -> RangeView:
+        """The same view with all lengths times a factor, which makes them lengths in this unit."""
+        to_camera = self.world_to_camera.copy()
+        to_camera[:3, 3] *= factor
+        depth = (self.depth * np.float64(factor)).astype(np.float32)
+        return replace(self, depth=depth, world_to_camera=to_camera, unit=unit)
+
     def points(self, normals: bool = False) -> PointCloud:
         """The points of this view alone; see `merge`."""
         return merge([self], normals)
@@ -162,6 +170,15 @@ def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
     if not len(cloud):
         raise InputError("holds no points: no pixel inside the masks has a depth")
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
+
+
+def in_one_unit(views: Sequence[RangeView], unit: str) -> tuple[RangeView, ...]:
+    """The views with their lengths in a unit, where both are known lengths; the others as they are."""
+    factors = [conversion(view.unit, unit) for view in views]
+    return tuple(
+        view if factor is None or view.unit == unit else view.scaled(factor, unit)
+        for view, factor in zip(views, factors, strict=True)
+    )
 
 
 def memory_of_merging(views: Sequence[RangeView]) -> int:

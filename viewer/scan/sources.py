@@ -58,7 +58,7 @@ class FileSequence:
         self.files = tuple(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))
 
-    @property
+    @cached_property
     def unit(self) -> str | None:
         """As the first file tells, where its format knows units."""
         try:
@@ -118,7 +118,7 @@ class MultiFrameFile:
         self._count = count
         self._read = formats.frames(path)
 
-    @property
+    @cached_property
     def unit(self) -> str | None:
         return formats.read_unit(self._path)
 

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..task import Cancelled, Task
 from .cache import PoseCache, default_budget
-from .points import UNKNOWN_UNIT
+from .points import UNKNOWN_UNIT, PointCloud
 from .pose import Pose
+from .range_view import RangeView, in_one_unit
 from .sources import FrameSource
 
 _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
@@ -31,10 +32,11 @@ class Notice:
     """Something about a scan that its user should know.
 
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
-    coordinate were left out) or "times". index: the frame; None where it concerns all.
+    coordinate were left out), "shortened" (splats far larger than the scan were), "unit" (lengths in
+    another unit than the scan's) or "times". index: the frame; None where it concerns all.
     """
 
-    kind: Literal["broken", "dropped", "times"]
+    kind: Literal["broken", "dropped", "shortened", "unit", "times"]
     text: str
     index: int | None = None
 
@@ -313,6 +315,9 @@ class Timeline:
             if pose.cloud.dropped and index not in self._sizes:
                 what = f"{pose.label}: {pose.cloud.dropped} points without finite coordinates are left out"
                 self.messages.append(Notice("dropped", what, index))
+            if pose.cloud.shortened and index not in self._sizes:
+                what = f"{pose.label}: {pose.cloud.shortened} splats far larger than the scan are shortened"
+                self.messages.append(Notice("shortened", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
             self._topologies[index] = pose.cloud.topology
             if not self._closed:
@@ -325,13 +330,32 @@ class Timeline:
     def _read(self, index: int) -> Pose:
         label = self._source.label(index)
         try:
-            return Pose.of(index, float(self.times[index]), label, self._source.load(index))
+            with np.errstate(all="ignore"):  # odd numbers in a file are data
+                scanned = self._source.load(index)
+                if not isinstance(scanned, PointCloud):
+                    scanned = self._in_unit(index, scanned)
+                return Pose.of(index, float(self.times[index]), label, scanned)
         except InputError as error:
             if error.where is None:
                 error.where = label
             raise
         except Exception as error:  # whatever a damaged file does to a reader, playing goes on
             raise InputError(f"cannot be read ({type(error).__name__}: {error})", label) from error
+
+    def _in_unit(self, index: int, views: tuple[RangeView, ...]) -> tuple[RangeView, ...]:
+        """The views in the unit that the scan tells, where they have another one; told once."""
+        unit = self._source.unit or UNKNOWN_UNIT
+        converted = in_one_unit(views, unit)
+        others = [before.unit for before in views if before.unit != unit]
+        if others:
+            done = "converted" if all(view.unit == unit for view in converted) else "taken as they are"
+            what = (
+                f"{self._source.label(index)} is in {others[0]}, the scan in {unit}: other units are {done}"
+            )
+            with self._state:
+                if not any(notice.kind == "unit" for notice in self.messages):
+                    self.messages.append(Notice("unit", what, index))
+        return converted
 
 
 def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]:

@@ -6,12 +6,14 @@ import csv
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from io import TextIOWrapper
 from pathlib import Path, PurePath
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..files import open_plain
 
 TIMES_FILE = "times.csv"
 DEFAULT_FPS = 25.0
@@ -64,14 +66,15 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> NDArray[np.float64]:
     Raises InputError, with the line, where a row cannot be understood, and where a frame has
     no time or two, or not a later one than the frame before it.
     """
-    rows = list(_csv_rows(path))
+    rows = _csv_rows(path)
     frame_column, time_column = 0, 1
-    if rows and "time" in (names := [cell.lower() for cell in rows[0][1]]):
-        frame_column, time_column = _columns(path, rows.pop(0)[0], names)
+    first = list(itertools.islice(rows, 1))
+    if first and "time" in (names := [cell.lower() for cell in first[0][1]]):
+        frame_column, time_column = _columns(path, first.pop()[0], names)
     times = np.full(len(labels), np.nan)
     lines = [0] * len(labels)
     places = {label: index for index, label in enumerate(labels)}
-    for line, cells in rows:
+    for line, cells in itertools.chain(first, rows):
         if len(cells) <= max(frame_column, time_column):
             raise _bad_row(path, line, "a column is missing")
         time = _number(path, line, cells[time_column])
@@ -98,8 +101,8 @@ def _split(name: str) -> list[str | int]:
 def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """The rows that are not blank, each with the line it ends on."""
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
+        with open_plain(path) as file:
+            reader = csv.reader(TextIOWrapper(file, "utf-8-sig", newline=""))
             for row in reader:
                 cells = [cell.strip() for cell in row]
                 if any(cells):

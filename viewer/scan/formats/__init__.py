@@ -33,7 +33,8 @@ from ...errors import InputError, Scan4DError, explained, unknown_name
 from ...files import whole_file
 from ..points import PointCloud
 from ..pose import Pose, Scanned
-from ..range_view import RangeView, merge
+from ..range_view import RangeView, in_one_unit, merge
+from ..units import usable_unit
 
 _LONGEST_MESSAGE = 400  # characters
 
@@ -73,11 +74,14 @@ def read_times(path: Path | str) -> NDArray[np.float64] | None:
 
 
 def read_unit(path: Path | str) -> str | None:
-    """The name of the unit of length that the file tells, or None. Raises InputError."""
+    """The name of the unit of length that the file tells, or None where it tells none that can be shown.
+
+    Raises InputError.
+    """
     path = Path(path)
     module = _readable(path)
     with _one_message(path, f"cannot be read as {module.TITLE}"):
-        return module.read_unit(path) if hasattr(module, "read_unit") else None
+        return usable_unit(module.read_unit(path)) if hasattr(module, "read_unit") else None
 
 
 def read(path: Path | str, frame: int = 0) -> Scanned:
@@ -121,12 +125,15 @@ def _with_points(scanned: Scanned) -> Scanned:
 
 
 def read_points(path: Path | str, frame: int = 0) -> PointCloud:
-    """The points of one moment of a file; those of range views merged. Raises InputError as `read`."""
+    """The points of one moment of a file; those of range views merged, in the unit of the first of them.
+
+    Raises InputError as `read`.
+    """
     scanned = read(path, frame)
     if isinstance(scanned, PointCloud):
         return scanned
     with _one_message(path, "cannot be turned into points"):
-        return merge(scanned)
+        return merge(in_one_unit(scanned, scanned[0].unit))
 
 
 def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) -> None:

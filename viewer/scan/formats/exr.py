@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, memory_of_merging
+from ..units import usable_unit
 from ._admission import admit, opened, read_exactly, size_of
 
 TITLE = "EXR"
@@ -118,7 +119,7 @@ def _name(header: dict[str, Any], number: int) -> str:
 
 
 def _unit(header: dict[str, Any]) -> str | None:
-    return str(header["unit"]) if "unit" in header else None
+    return usable_unit(str(header["unit"])) if "unit" in header else None
 
 
 def _check_form(header: dict[str, Any], name: str) -> None:

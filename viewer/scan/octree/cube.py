@@ -12,6 +12,7 @@ from ...errors import InputError
 from ..points import PointCloud
 from .octree import DEEPEST
 
+_LEAST = 1e-60  # an extent: less than float32 can hold, and a step of it is no denormal number
 _STEP_BITS = 20  # a cell of level 21 is so many bits of steps, see `Grid`
 
 
@@ -28,7 +29,8 @@ class Cube(NamedTuple):
         Lowest corner and edge are numbers of few bits, so that borders between cells are exact.
         """
         farthest = float(np.abs([low, high]).max())
-        extent = float((high - low).max()) or farthest / 2**20 or 1.0
+        extents = float((high - low).max()), farthest / 2**20, 1.0
+        extent = next(extent for extent in extents if extent > _LEAST)
         grid = max(_step(extent), 2.0 ** (math.frexp(farthest)[1] - 52))
         low = np.floor(low / grid) * grid
         extent = max(extent, float((high - low).max()))
@@ -92,4 +94,5 @@ def _sum_below(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.flo
     total = a + b
     part = total - a
     error = (a - (total - part)) + (b - part)
-    return np.where(error < 0, np.nextafter(total, -np.inf), total)
+    with np.errstate(under="ignore"):  # the number below 0 is one that underflows
+        return np.where(error < 0, np.nextafter(total, -np.inf), total)

@@ -1,0 +1,35 @@
+"""Units of length: the names that scans and users give them, and which of these are known lengths."""
+
+from __future__ import annotations
+
+from ..errors import InputError
+
+LONGEST_NAME = 40  # characters
+
+_METRES = {
+    "nm": 1e-9, "µm": 1e-6, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3,
+    "in": 0.0254, "ft": 0.3048,
+}  # fmt: skip
+
+
+def checked_unit(name: str) -> str:
+    """The name of a unit as a user gives it. Raises InputError where it is none that can be shown."""
+    if usable_unit(name) is None:
+        shown = name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "..."
+        hint = f"Use up to {LONGEST_NAME} printable characters, for example mm"
+        raise InputError(f"{shown!r} is no name of a unit", hint=hint)
+    return name
+
+
+def usable_unit(name: str | None) -> str | None:
+    """The name of a unit as a file tells it; None where it is none that can be shown."""
+    fits = name is not None and name.strip() and name.isprintable() and len(name) <= LONGEST_NAME
+    return name if fits else None
+
+
+def conversion(given: str, wanted: str) -> float | None:
+    """What lengths in one unit are to be multiplied with; None where one of the two is no known length."""
+    if given == wanted:
+        return 1.0
+    from_metres, to_metres = (_METRES.get(name.strip().replace("\u03bc", "µ")) for name in (given, wanted))
+    return None if from_metres is None or to_metres is None else from_metres / to_metres
