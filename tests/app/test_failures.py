@@ -31,6 +31,7 @@ def told(notes: list[str]) -> Failures:
 def context() -> Iterator[None]:
     context = imgui.create_context()
     io = imgui.get_io()
+    io.set_ini_filename("")
     io.display_size = ImVec2(800, 600)
     io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
     yield

@@ -18,7 +18,7 @@ import numpy as np
 from ..backends import backend
 from ..camera import Camera
 from ..errors import InputError
-from ..files import read_text, whole_file
+from ..files import parsed_json, read_text, whole_file
 from ..geometry import up_vector
 from ..look import COLOR_BY, Look
 from ..marks import Marks
@@ -108,14 +108,14 @@ def load(path: Path) -> tuple[Settings, list[str]]:
     A file that is damaged or of another version is put aside, and all starts anew.
     """
     try:
-        data = json.loads(read_text(path, _MOST_BYTES))
+        data = parsed_json(read_text(path, _MOST_BYTES))
     except FileNotFoundError:
         return Settings(), []
     except OSError as error:
-        if error.errno == errno.EFBIG:
-            return Settings(), [_put_aside(path, "is too large")]
+        if error.errno == errno.EINVAL:  # too long, or no plain file
+            return Settings(), [_put_aside(path, error.strerror)]
         return Settings(), [str(InputError(f"cannot be read ({error.strerror})", path, "All starts anew"))]
-    except (ValueError, RecursionError):  # of encoding as well
+    except ValueError:  # of encoding as well
         return Settings(), [_put_aside(path, "is damaged")]
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         return Settings(), [_put_aside(path, "is of another version of Scan4D")]
