@@ -113,7 +113,7 @@ def load(path: Path) -> tuple[Settings, list[str]]:
         return Settings(), []
     except OSError as error:
         if error.errno == errno.EINVAL:  # too long, or no plain file
-            return Settings(), [_put_aside(path, error.strerror)]
+            return Settings(), [_put_aside(path, error.strerror or str(error))]
         return Settings(), [str(InputError(f"cannot be read ({error.strerror})", path, "All starts anew"))]
     except ValueError:  # of encoding as well
         return Settings(), [_put_aside(path, "is damaged")]
