@@ -22,6 +22,7 @@ from viewer.scan.range_view import merge
 
 HEAD = 600  # bytes of a file that hold its header
 MOST_SEED = 6000  # bytes of a real file that is worth damaging
+MOST_RATIO = 10  # of the memory that reading takes to the size of the file
 SPARE = 20_000_000  # bytes that any file may take, however small
 
 OUR_OWN_FAULT = (AttributeError, NameError, LookupError, RecursionError)  # and no library's
@@ -168,7 +169,7 @@ def test_damage_does_no_harm(
     error = read_or_refuse(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 50 * len(content) + SPARE
+    assert peak < MOST_RATIO * len(content) + SPARE
     if error is not None:
         assert str(error).startswith(str(path))
         assert error.hint
