@@ -23,6 +23,7 @@ LAYERS = (
         "marks",
         "task",
         "helper",
+        "native",
         "signals",
         "unfinished",
         "scan",

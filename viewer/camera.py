@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, explained, shortened, unknown_name
-from .files import parsed_json, read_text
+from .files import parsed_json, read_text, whole_file
 from .geometry import Vector, front_vector, up_vector
 from .scan.points import Bounds
 
@@ -134,8 +134,9 @@ class Camera:
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
     def save(self, path: str | Path) -> None:
-        """Write `to_json` as a file."""
-        Path(path).write_text(json.dumps(self.to_json(), indent=2) + "\n", encoding="utf-8")
+        """Write `to_json` as a file. Raises InputError where it cannot be written."""
+        with whole_file(path) as temporary:
+            temporary.write_text(json.dumps(self.to_json(), indent=2) + "\n", encoding="utf-8")
 
     # --- reading it -------------------------------------------------------------------
 

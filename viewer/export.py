@@ -26,6 +26,7 @@ from .errors import InputError, explained
 from .files import open_plain, whole_file
 from .look import Look, rgba
 from .marks import Legend, marked
+from .native import OPENEXR, unsaid
 
 if TYPE_CHECKING:
     from .gpu.surface import Surface
@@ -151,11 +152,7 @@ def _png_texts(path: Path) -> dict[Any, Any]:
     """Without decoding the picture: ours stand before it."""
     from PIL import Image
 
-    with (
-        warnings.catch_warnings(),
-        open_plain(path) as file,
-        Image.open(file, formats=["PNG"]) as image,
-    ):
+    with warnings.catch_warnings(), open_plain(path) as file, Image.open(file, formats=["PNG"]) as image:
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         return dict(image.info)
 
@@ -163,7 +160,7 @@ def _png_texts(path: Path) -> dict[Any, Any]:
 def _exr_header(path: Path) -> dict[str, Any]:
     import OpenEXR
 
-    with open_plain(path) as stream, OpenEXR.File(stream, header_only=True) as file:
+    with unsaid(OPENEXR), open_plain(path) as stream, OpenEXR.File(stream, header_only=True) as file:
         return dict(file.header())
 
 

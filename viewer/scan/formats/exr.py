@@ -19,13 +19,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
-from threading import Lock, get_ident
+from threading import get_ident
 from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...native import OPENEXR, unsaid
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, memory_of_merging
 from ..units import usable_unit
@@ -39,7 +40,6 @@ _FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, i
 _MAGIC_BYTES, _CHANNEL_BYTES = 8, 16  # in front of the headers; behind the name of a channel in a header
 _TYPE_BYTES = {1: 2}  # of a sample of a half; other types have 4
 _VIEW_BYTES = 7  # of a pixel: mask and colour
-_decoding = Lock()
 
 
 def read_unit(path: Path) -> str | None:
@@ -67,7 +67,7 @@ def _decoded(path: Path, parts: int) -> list[dict[str, NDArray]]:
     # OpenEXR leaves damaged parts out and prints that to standard output, where results go.
     muted = redirect_stdout(_OfOthers(sys.stdout))
     with (
-        _decoding,
+        unsaid(OPENEXR),
         muted,
         open(path, "rb") as stream,  # of names, OpenEXR takes UTF-8 alone
         OpenEXR.File(stream, separate_channels=True) as file,
@@ -110,7 +110,7 @@ def write_views(path: Path, views: Sequence[RangeView]) -> None:
 def _headers(path: Path) -> list[dict[str, Any]]:
     import OpenEXR
 
-    with open(path, "rb") as stream, OpenEXR.File(stream, header_only=True) as file:
+    with unsaid(OPENEXR), open(path, "rb") as stream, OpenEXR.File(stream, header_only=True) as file:
         return [dict(part.header) for part in file.parts]  # the file takes the headers back
 
 

@@ -1,0 +1,40 @@
+"""What libraries in C write on standard error by themselves, below Python."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+
+OPENEXR = re.compile(rb".*\(EXR_ERR_\w+\)|\s*$")  # the lines of OpenEXR, and empty ones
+_STDERR = 2
+_turn = Lock()  # there is one standard error
+
+
+@contextmanager
+def unsaid(lines: re.Pattern[bytes]) -> Iterator[None]:
+    """Leave out the lines that a library writes on standard error meanwhile.
+
+    lines: what theirs match. What others write there comes afterwards. One thread at a time.
+    """
+    with _turn:
+        try:
+            before, kept = os.dup(_STDERR), tempfile.TemporaryFile()  # noqa: SIM115
+        except OSError:  # it is closed, or there is no room: then they are not left out
+            yield
+            return
+        with kept:
+            try:
+                os.dup2(kept.fileno(), _STDERR)
+                yield
+            finally:
+                os.dup2(before, _STDERR)
+                os.close(before)
+                kept.seek(0)
+                others = b"".join(line for line in kept if not lines.match(line))
+                if others and sys.stderr is not None:
+                    sys.stderr.write(others.decode(errors="replace"))
