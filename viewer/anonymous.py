@@ -18,8 +18,7 @@ from .look import Look, unnamed
 from .scan.points import UNKNOWN_UNIT
 from .scan.pose import Pose
 from .scan.range_view import RangeView
-
-_UNITS = frozenset(("nm", "µm", "um", "mm", "cm", "dm", "m", "km", "in", "ft", "px", UNKNOWN_UNIT))
+from .scan.units import is_length
 
 
 def anonymous_request(request: Request, start: float) -> Request:
@@ -44,7 +43,7 @@ def anonymous_pose(pose: Pose, start: float) -> Pose:
 
 def anonymous_unit(unit: str) -> str:
     """The unit of length where it is a common one: others may tell anything."""
-    return unit if unit in _UNITS else UNKNOWN_UNIT
+    return unit if is_length(unit) else UNKNOWN_UNIT
 
 
 def raised(look: Look, by: NDArray[np.float64]) -> Look:

@@ -11,7 +11,7 @@ from typing import Any
 from .errors import InputError, explained, shortened
 from .export import read_description
 from .files import parsed_json, read_text
-from .scan.points import checked_unit
+from .scan.units import checked_unit
 
 DAMAGED = "It is damaged, or no recording of Scan4D; record it again"
 _MOST_BYTES = 256 * 2**20

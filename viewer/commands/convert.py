@@ -14,11 +14,12 @@ from typing import Any
 from ..errors import InputError
 from ..export import check_output, is_pattern
 from ..scan import formats
+from ..scan.inputs import scan_inputs
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from .console import progress, tell
-from .outputs import add_force_argument, claim, scan_inputs
+from .outputs import add_force_argument, claim
 from .scans import (
     SCAN_HELP,
     add_pose_arguments,

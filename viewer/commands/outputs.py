@@ -6,13 +6,10 @@ import os
 import sys
 from argparse import ArgumentParser
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError, explained
-from ..scan.sources import FACES_FILE
-from ..scan.timeline import Timeline
-from ..scan.times import TIMES_FILE
+from ..scan.inputs import found_among
 from ..unfinished import remove_leftovers
 from .console import plain
 
@@ -30,31 +27,12 @@ def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
     have left behind is removed on the way.
     """
     remove_leftovers()
-    read = {identity for path in inputs if (identity := _identity(path)) is not None}
-    there = []
-    for path in outputs:
-        if _identity(path) in read:
-            raise InputError("is read by this command, and is not replaced", path, "Write to another file")
-        if _is_there(path):
-            there.append(path)
+    for path in found_among(outputs, inputs):
+        raise InputError("is read by this command, and is not replaced", path, "Write to another file")
+    there = [path for path in outputs if _is_there(path)]
     if there and not force and not _agreed(there):
         hint = "--force replaces it" if len(there) == 1 else "--force replaces them"
         raise InputError(f"is there already{_and_more(there)}", there[0], hint)
-
-
-def scan_inputs(timeline: Timeline) -> list[Path]:
-    """The files that a scan may be read from: its frames, and what stands beside them."""
-    folders = {file.parent for file in timeline.files}
-    folders |= {folder.parent for folder in folders if folder.name == "frames"}
-    return [*timeline.files, *(folder / name for folder in folders for name in (TIMES_FILE, FACES_FILE))]
-
-
-def _identity(path: Path) -> tuple[int, int] | None:
-    """What file a path leads to; None where there is none."""
-    with suppress(OSError):
-        status = os.stat(path)
-        return status.st_dev, status.st_ino
-    return None
 
 
 def _is_there(path: Path) -> bool:

@@ -27,13 +27,14 @@ from ..look import Look, drawable
 from ..marks import MARKS, Legend, marks_of
 from ..params import parse
 from ..recording import Entry, fingerprint, new_salt
+from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
 from . import arguments, drawing, replay, stats
 from .console import progress, say, tell, warn
 from .drawing import Plan, Shot
-from .outputs import add_force_argument, claim, scan_inputs
+from .outputs import add_force_argument, claim
 from .scans import (
     SCAN_HELP,
     add_pose_arguments,

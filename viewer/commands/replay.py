@@ -15,13 +15,14 @@ from ..export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
 from ..frame import Request
 from ..marks import Legend, marks_of
 from ..recording import Entry, Recording, fingerprint, fingerprint_as, new_salt, places_to_open
+from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS
 from . import drawing
 from .console import warn
 from .drawing import Plan
-from .outputs import claim, scan_inputs
+from .outputs import claim
 from .scans import check_color_source
 
 # What the recording tells, by the names of arguments.

@@ -17,12 +17,13 @@ from ..bench.truth.mesh import Faces, Mesh, read_faces
 from ..errors import InputError
 from ..export import check_output
 from ..scan import formats
+from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.range_view import merge
 from ..scan.timeline import Timeline
 from . import arguments
 from .console import progress, tell
-from .outputs import add_force_argument, claim, scan_inputs
+from .outputs import add_force_argument, claim
 from .scans import (
     add_pose_arguments,
     chosen_poses,

@@ -16,6 +16,7 @@ from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
 from ..look import Look
 from ..recording import Recording, is_recording, place_of
+from ..scan.inputs import scan_inputs
 from ..scan.listing import named_scans
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
@@ -24,7 +25,7 @@ from ..unfinished import remove_leftovers
 from . import drawing
 from .console import progress, tell, warn
 from .doctor import display
-from .outputs import add_force_argument, claim, scan_inputs
+from .outputs import add_force_argument, claim
 from .scans import SCAN_HELP, framing, open_timeline, read_poses
 
 _SIZE = (1200, 800)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, shortened
+from ..errors import InputError
 from ..task import checkpoint
 
 T = TypeVar("T")
@@ -21,14 +21,6 @@ _LONGEST_SPLAT = 1e6  # extents of the points: float32 cannot intersect a ray wi
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
-_LONGEST_UNIT = 40  # characters
-
-
-def checked_unit(unit: str, where: object = None) -> str:
-    """The name of a unit of length. Raises InputError where it is too long for one, or cannot be shown."""
-    if len(unit) > _LONGEST_UNIT or not unit.isprintable():
-        raise InputError(f"'{shortened(unit)}' is no unit of length", where, "Use a short name such as mm")
-    return unit
 
 
 @dataclass(frozen=True)

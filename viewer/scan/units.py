@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 
 LONGEST_NAME = 40  # characters
 
@@ -12,12 +12,10 @@ _METRES = {
 }  # fmt: skip
 
 
-def checked_unit(name: str) -> str:
+def checked_unit(name: str, where: object = None) -> str:
     """The name of a unit as a user gives it. Raises InputError where it is none that can be shown."""
     if usable_unit(name) is None:
-        shown = name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "..."
-        hint = f"Use up to {LONGEST_NAME} printable characters, for example mm"
-        raise InputError(f"{shown!r} is no name of a unit", hint=hint)
+        raise InputError(f"'{shortened(name)}' is no unit of length", where, "Use a short name such as mm")
     return name
 
 
@@ -25,6 +23,11 @@ def usable_unit(name: str | None) -> str | None:
     """The name of a unit as a file tells it; None where it is none that can be shown."""
     fits = name is not None and name.strip() and name.isprintable() and len(name) <= LONGEST_NAME
     return name if fits else None
+
+
+def is_length(name: str) -> bool:
+    """Whether it is a known length."""
+    return name in _METRES
 
 
 def conversion(given: str, wanted: str) -> float | None:

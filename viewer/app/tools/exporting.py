@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from ...files import working_folder
 from ...marks import Marks
 from ...render_job import Made, make
+from ...scan.inputs import found_among, scan_inputs
 from ...task import Cancelled, Task, in_background
-from ..files.inputs import inputs_among
 from . import export_plan
 from .export_plan import Choices, free_name
 
@@ -90,7 +90,7 @@ class Exporting:
         """Export, unless that would replace files that the user was not asked about; closes the dialog."""
         there = export_plan.present(self.choices, self.count)
         shown, choices, app = self._app.capture.shown(), self.choices, self._app
-        self.refused = inputs_among(there, app.playback.timeline)
+        self.refused = found_among(there, scan_inputs(app.playback.timeline))
         if self.refused or there != self.replaced or shown is None:
             self.replaced = [] if self.refused else there
             return

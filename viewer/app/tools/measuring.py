@@ -15,7 +15,7 @@ from ...errors import InputError
 from ...files import absolute, free_file, working_folder
 from ...measurement import End, Measurements, Reading, in_words, read, save, table, to_text
 from ...pick import before_gap, is_seen, pick
-from ..files.inputs import inputs_among
+from ...scan.inputs import found_among, scan_inputs
 from ..session import known_as
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ class Measuring:
         assert self.saving is not None
         try:
             file = csv_file(self.saving)
-            if inputs_among([file], self.app.playback.timeline):
+            if found_among([file], scan_inputs(self.app.playback.timeline)):
                 raise InputError("is a file of the scan, and is not replaced", file, "Use another name")
             save(file, self._table())
         except InputError as error:

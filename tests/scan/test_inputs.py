@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.app.files.inputs import inputs_among
+from viewer.scan.inputs import found_among, scan_inputs
 from viewer.scan.open import open_scan
 
 
@@ -22,7 +22,7 @@ def test_files_of_the_scan_are_found_under_other_names_too(tmp_path: Path) -> No
     other.write_bytes((frames / "1.npy").read_bytes())
     with open_scan(str(frames)) as timeline:
         paths = [other, linked, times, tmp_path / "none.npy", frames / "0.npy"]
-        assert inputs_among(paths, timeline) == [linked, times, frames / "0.npy"]
-        assert inputs_among([], timeline) == []
+        assert found_among(paths, scan_inputs(timeline)) == [linked, times, frames / "0.npy"]
+        assert found_among([], scan_inputs(timeline)) == []
     with open_scan("demo") as timeline:
-        assert inputs_among(paths, timeline) == []
+        assert found_among(paths, scan_inputs(timeline)) == []

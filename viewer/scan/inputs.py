@@ -1,0 +1,34 @@
+"""The files that a scan is read from, which nothing that is written may replace."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from .sources import FACES_FILE
+from .timeline import Timeline
+from .times import TIMES_FILE
+
+
+def scan_inputs(timeline: Timeline) -> list[Path]:
+    """The files that a scan may be read from: its frames, and what may stand beside them or their folder."""
+    folders = {file.parent for file in timeline.files}
+    folders |= {folder.parent for folder in folders if folder.name == "frames"}
+    return [*timeline.files, *(folder / name for folder in folders for name in (TIMES_FILE, FACES_FILE))]
+
+
+def found_among(paths: Iterable[Path], inputs: Iterable[Path]) -> list[Path]:
+    """Those of the paths that lead to one of the inputs, under whatever name: links as well."""
+    there = [(path, identity) for path in paths if (identity := _identity(path)) is not None]
+    read = {_identity(path) for path in inputs} if there else set()
+    return [path for path, identity in there if identity in read]
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from all others; None where there is none."""
+    with suppress(OSError):
+        status = os.stat(path)
+        return status.st_dev, status.st_ino
+    return None
