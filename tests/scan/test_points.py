@@ -57,3 +57,32 @@ def test_poses_of_a_sequence_share_an_origin() -> None:
     body = np.random.default_rng(0).normal(size=(5000, 3)) + np.array([4e6, 5e6, 101])
     origins = {tuple(PointCloud.from_arrays(body + 0.001 * i).origin) for i in range(10)}
     assert len(origins) == 1
+
+
+@pytest.mark.parametrize("length", [1e7, 1e15, 1e17])
+def test_splats_far_larger_than_the_scan_are_shortened_and_counted(length: float) -> None:
+    rng = np.random.default_rng(0)
+    points, normals = rng.random((50, 3)), rng.normal(size=(50, 3))
+    axes = np.column_stack([np.cross(normals, (0, 0, 1)), np.full(50, 0.5)])
+    axes[3, :3] *= length / np.linalg.norm(axes[3, :3])
+    axes[9, 3] = length
+    cloud = PointCloud.from_arrays(points, normals=normals, axes=axes)
+    assert cloud.shortened == 2
+    extent = np.ptp(points, axis=0).max()
+    assert 0.5e6 * extent < cloud.splat_reach().max() < 1e6
+    kept = np.delete(np.arange(50), [3, 9])
+    np.testing.assert_array_equal(cloud.axes[kept], axes[kept].astype(np.float32))
+    depth = viewer.render(cloud, backend="surfels", size=(40, 30)).depth
+    assert not np.isnan(depth).any()
+
+    radii = np.full(50, 0.1, np.float32)
+    radii[7] = length
+    cloud = PointCloud.from_arrays(points, normals=normals, radii=radii)
+    assert cloud.shortened == 1
+    assert 0.5e6 * extent < cloud.radii[7] < 1e6
+    assert radii[7] == np.float32(length), "what was given stays"
+
+
+def test_a_splat_of_a_single_point_keeps_its_size() -> None:
+    cloud = PointCloud.from_arrays(np.ones((1, 3)), radii=np.array([5.0]))
+    assert (cloud.radii[0], cloud.shortened) == (5, 0)

@@ -563,3 +563,11 @@ def test_playing_far_more_than_the_cache_holds_keeps_memory_bounded(
             assert scan._cache.nbytes <= 50 << 20
             peak = max(peak, resident_bytes())
         assert peak - before < 350 << 20
+
+
+def test_shortened_splats_are_reported(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).random((9, 3))
+    np.savez(tmp_path / "scan.npz", positions=points, radii=np.full(9, 1e15))
+    with open_scan(tmp_path / "scan.npz") as scan:
+        assert scan.pose(0).cloud.shortened == 9
+        assert scan.messages[0].text == "scan.npz: 9 splats far larger than the scan are shortened"

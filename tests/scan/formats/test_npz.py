@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import tracemalloc
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.formats import frame_count, read, read_times, write
+from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 
 RNG = np.random.default_rng(11)
@@ -180,3 +182,48 @@ def test_arrays_that_cannot_be_used(arrays: dict[str, np.ndarray], reason: str, 
     np.savez(path, **arrays)
     with pytest.raises(InputError, match=reason):
         read(path)
+
+
+@pytest.mark.parametrize(
+    ("shape", "descr", "reason"),
+    [
+        ((10**9, 1, 3), "<f4", "promises 12000000000 bytes and holds 12"),
+        ((10**18, 0, 3), "<f4", "holds no points"),
+        ((10**18, 1, 3), "<U0", "is of type <U0, expected numbers"),
+        ((-1, 1, 3), "<f4", "promises -12 bytes and holds 12"),
+        ((2**63, 1, 3), "<f4", "promises"),
+    ],
+)
+def test_frames_that_the_file_cannot_hold_are_refused_before_they_are_counted(
+    shape: tuple[int, ...], descr: str, reason: str, tmp_path: Path
+) -> None:
+    (tmp_path / "scan.npy").write_bytes(header(shape, descr) + bytes(12))
+    with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
+        archive.writestr("positions.npy", header(shape, descr) + bytes(12))
+    for name in ("scan.npy", "scan.npz"):
+        with pytest.raises(InputError, match=reason):
+            frame_count(tmp_path / name)
+
+
+def test_a_million_frames_open_and_more_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.npy"
+    np.save(path, np.ones((1 << 20, 1, 3), np.int8))
+    timeline = open_scan(path)
+    assert len(timeline) == 1 << 20
+    assert timeline.times[-1] == pytest.approx(((1 << 20) - 1) / 25)
+    np.save(path, np.ones(((1 << 20) + 1, 1, 3), np.int8))
+    with pytest.raises(InputError, match="has 1,048,577 frames, more than"):
+        open_scan(path)
+
+
+def test_a_long_header_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "scan.npy").write_bytes(b"\x93NUMPY\x02\x00" + (10**9).to_bytes(4, "little") + bytes(100))
+    with pytest.raises(InputError, match="has a header of 1,000,000,000 bytes"):
+        read(tmp_path / "scan.npy")
+
+
+def test_a_header_of_python_2_is_read_without_a_warning(tmp_path: Path) -> None:
+    old = header((2, 3)).replace(b"(2, 3)", b"(2L,3)")
+    (tmp_path / "scan.npy").write_bytes(old + bytes(24))
+    with warnings.catch_warnings(action="error"):
+        assert len(read(tmp_path / "scan.npy")) == 2

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from viewer.errors import InputError
-from viewer.scan.formats import read
+from viewer.scan.formats import obj, read
 
 VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
@@ -68,3 +69,23 @@ def test_files_that_cannot_be_used(text: str, reason: str, path: Path) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=reason):
         read(path)
+
+
+def test_lines_without_numbers_are_passed_over_without_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "scan.obj"
+    path.write_text("v 1 2 3\nv 2 3 4\nvn #\nv # nothing\nvn // nothing\n")
+    with warnings.catch_warnings(action="error"):
+        cloud = read(path)
+    assert len(cloud) == 2
+    assert cloud.normals is None
+
+
+def test_corners_in_several_parts_tell_the_same_normals(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "scan.obj"
+    faces = "f 1//2 2//1 3//2\nf -1//1 2//2 1//-1\n" * 20
+    path.write_text("v 1 2 3\nv 2 3 4\nv 5 5 5\nvn 0 0 1\nvn 1 0 0\n" + faces)
+    whole = read(path).normals
+    monkeypatch.setattr(obj, "_CORNERS_AT_ONCE", 7)
+    np.testing.assert_array_equal(read(path).normals, whole)

@@ -168,3 +168,17 @@ def test_other_programs_can_read_what_is_written(tmp_path: Path) -> None:
     np.testing.assert_array_equal(other["normals"].numpy(), cloud.normals)
     np.testing.assert_array_equal(other["colors"].numpy(), cloud.colors[:, :3])
     np.testing.assert_array_equal(other["intensity"].numpy()[:, 0], cloud.scalars["intensity"])
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
+def test_a_field_that_is_there_twice(encoding: str, path: Path) -> None:
+    with pytest.raises(InputError, match="two columns are called 'X'"):
+        read(save(path, encoding, FIELDS="x y z rgba moment X"))
+    twice = read(save(path, encoding, FIELDS="x y z n moment n")).scalars
+    assert twice["n"].tolist() == [0x80FF2010, 2]
+    assert twice["n_2"].tolist() == [7, -9]
+
+
+def test_a_field_of_millions_of_values_is_refused(path: Path) -> None:
+    with pytest.raises(InputError, match="has 4,000,005 values a point, more than the 4,096"):
+        read(save(path, COUNT="1 1 1 1 4000000 1"))

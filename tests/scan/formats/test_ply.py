@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -188,3 +189,68 @@ def test_other_programs_can_read_what_is_written(full_cloud: PointCloud, path: P
     np.testing.assert_allclose(vertices["x"], full_cloud.world()[:, 0], rtol=0, atol=1e-6)
     np.testing.assert_array_equal(vertices["alpha"], full_cloud.colors[:, 3])
     np.testing.assert_array_equal(vertices["ring"], full_cloud.scalars["ring"])
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("columns", ["x y z x", "x y z X", "x y z red green blue Red"])
+def test_two_columns_of_one_meaning_are_refused(columns: str, encoding: str, path: Path) -> None:
+    names = columns.split()
+    header = "element vertex 1\n" + "".join(f"property float {name}\n" for name in names)
+    body = " ".join("1" * len(names)) if encoding == "ascii" else bytes(4 * len(names))
+    with pytest.raises(InputError, match=f"two columns are called '{names[-1]}'. Rename one"):
+        read(save(path, header, body, encoding))
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian"])
+def test_scalars_of_one_name_are_numbered(encoding: str, path: Path) -> None:
+    header = "element vertex 1\n" + XYZ + "property float q\nproperty float Q\nproperty float q\n"
+    body = "1 2 3 4 5 6\n" if encoding == "ascii" else np.arange(1, 7, dtype="<f4").tobytes()
+    scalars = read(save(path, header, body, encoding)).scalars
+    assert {name: values.tolist() for name, values in scalars.items()} == {"q": [4], "Q": [5], "q_2": [6]}
+
+
+@pytest.mark.parametrize("lengths", ["constant", "of all kinds"])
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_lists_among_the_numbers_of_many_vertices(encoding: str, lengths: str, path: Path) -> None:
+    """A row at a time in Python would take a minute for these in binary."""
+    count = 2_000 if encoding == "ascii" else 400_000
+    long = np.full(count, 2) if lengths == "constant" else np.arange(count) % 4
+    points = np.random.default_rng(0).integers(-99, 99, (count, 3))
+    header = (
+        f"element camera 2\nproperty list uchar short ids\nproperty double fov\nelement vertex {count}\n"
+        "property float x\nproperty list ushort uchar seen_by\nproperty float y\nproperty float z\n"
+    )
+    if encoding == "ascii":
+        rows = [f"{x} {n} {'5 ' * n}{y} {z}\n" for (x, y, z), n in zip(points, long, strict=True)]
+        body: bytes | str = "2 7 8 0.5\n0 1.5\n" + "".join(rows)
+    else:
+        order = ">" if "big" in encoding else "<"
+        row = [struct.Struct(f"{order}fH{n}xff") for n in range(4)]
+        cameras = struct.pack(f"{order}BhhdBd", 2, 7, 8, 0.5, 0, 1.5)
+        body = cameras + b"".join(
+            row[n].pack(x, n, y, z) for (x, y, z), n in zip(points.tolist(), long, strict=True)
+        )
+    np.testing.assert_array_equal(read(save(path, header, body, encoding)).world(), points)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian"])
+@pytest.mark.parametrize("end", [2, 9])
+def test_lists_that_end_early_are_refused(encoding: str, end: int, path: Path) -> None:
+    header = "element vertex 2\n" + XYZ + "property list uint uchar i\n"
+    binary = (struct.pack("<3fI", 1, 2, 3, 2) + bytes(2)) * 2
+    body = "1 2 3 2 0 0\n1 2 3 2 0 0\n"[:-end] if encoding == "ascii" else binary[:-end]
+    with pytest.raises(InputError, match=r"row 1 of vertex ends|holds 1 of the 2 vertices"):
+        read(save(path, header, body, encoding))
+    huge = struct.pack("<3fI", 1, 2, 3, 2**32 - 1) + bytes(30)
+    with pytest.raises(InputError, match="holds 0 of the 2 vertices"):
+        read(save(path, header, huge, "binary_little_endian"))
+
+
+def test_headers_of_very_many_or_long_names(path: Path) -> None:
+    many = "".join(f"property uchar c{i}\n" for i in range(4097))
+    with pytest.raises(InputError, match="has 4,097 properties of an element, more than the 4,096"):
+        read(save(path, "element vertex 1\n" + many, ""))
+    long = "".join(f"property uchar {'n' * 5000}{i}\n" for i in range(100))
+    with pytest.raises(InputError, match=r"no x, y and z among the columns: nnnn.*and 88 more") as caught:
+        read(save(path, "element vertex 1\n" + long, ""))
+    assert len(str(caught.value)) < 1000

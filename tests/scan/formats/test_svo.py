@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.formats import svo
 from viewer.scan.octree.build import Stop
-from viewer.scan.octree.storage import read_header
+from viewer.scan.octree.octree import Octree
+from viewer.scan.octree.storage import read_header, to_bytes
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -269,3 +271,27 @@ def test_a_failed_write_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="disk is full"):
         formats.write_poses(tmp_path / "a.svo", poses(), "mm")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["former"]
+
+
+def test_a_tree_of_far_more_leaves_than_its_bytes_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    """Full masks, one bit a leaf: 2.4 MB that would become 17 million points."""
+    masks = tuple(np.full(8**level, 255, np.uint8) for level in range(8))
+    tree = Octree(np.zeros(3), 1.0, masks, 8**8, 8**8)
+    path = tmp_path / "full.svo"
+    path.write_bytes(to_bytes(tree, packed=False))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="would take 1,141 MB, which is too much for its size"):
+        formats.read(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000
+
+
+def test_octrees_in_two_units_are_refused(tmp_path: Path, full_cloud: PointCloud) -> None:
+    parts = []
+    for unit in ("mm", "m"):
+        formats.write_poses(tmp_path / f"{unit}.svo", [Pose(0, 0.0, "", full_cloud)], unit)
+        parts.append((tmp_path / f"{unit}.svo").read_bytes())
+    (tmp_path / "both.svo").write_bytes(b"".join(parts))
+    with pytest.raises(InputError, match="octree 1 has another unit of length than the first"):
+        formats.frame_count(tmp_path / "both.svo")

@@ -129,3 +129,102 @@ def test_tables_longer_than_what_is_parsed_at_once(tmp_path: Path) -> None:
         file.write("property float z\nend_header\n" + "".join(lines[:16384]) + "1 2 3 4\n" * 23_616)
     with pytest.raises(InputError, match=r"the number of columns changed from 3 to 4 at row 16385 of the"):
         read(tmp_path / "scan.ply")
+
+
+def test_a_row_of_very_many_columns_is_refused(tmp_path: Path) -> None:
+    """Guessing the names of half a million columns would take hours if it looked at all for each."""
+    with pytest.raises(InputError, match="has 500,000 columns, more than the 4,096"):
+        read(save(tmp_path / "scan.xyz", "1 " * 500_000 + "\n"))
+    wide = read(save(tmp_path / "scan.xyz", "1 2 3 " + "700 " * 4093 + "\n"))
+    assert list(wide.scalars)[-1] == "column_4096"
+
+
+def test_names_are_guessed_in_one_pass() -> None:
+    looked_at = 0
+
+    class Counting(np.ndarray):
+        def __getitem__(self, key: object) -> object:
+            nonlocal looked_at
+            looked_at += isinstance(key, tuple)
+            return super().__getitem__(key)
+
+    names = guess_names(np.full((2, 3000), 7.5).view(Counting))
+    assert len(names) == 3000
+    assert looked_at < 3 * 3000
+
+
+@pytest.mark.parametrize("suffix", [".xyz", ".obj", ".ply", ".pcd"])
+def test_a_line_without_an_end_is_refused(suffix: str, tmp_path: Path) -> None:
+    head = {
+        ".ply": "ply\nformat ascii 1.0\nelement vertex 1\n" + "".join(f"property float {n}\n" for n in "xyz"),
+        ".pcd": "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n",
+    }.get(suffix, "")
+    head += "end_header\n" if suffix == ".ply" else "v " if suffix == ".obj" else ""
+    with pytest.raises(InputError, match="line 1 has more than 1,048,576 characters"):
+        read(save(tmp_path / f"scan{suffix}", head + "1 " * 600_000))
+
+
+def test_names_that_stand_twice_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="line 1 names 'x' twice, and not x, y and z"):
+        read(save(tmp_path / "scan.txt", "X,Y,X\n1,2,3\n"))
+    with pytest.raises(InputError, match="two columns are called 'x'"):
+        read(save(tmp_path / "scan.csv", "X,Y,Z,x\n1,2,3,4\n"))
+
+
+# --- camera matrices ----------------------------------------------------------------------
+
+POSE = """\
+ 0.9093129 0.2726223 -0.3142243 -0.3404563
+-0.2724862 0.9610498  0.0452796  0.0164698
+ 0.3143393 0.0444496  0.9482094  0.2965692
+"""
+LAST = "0 0 0 1\n"
+INTRINSICS = "585 0 320\n0 585 240\n0 0 1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (POSE + LAST, r"a camera pose \(4 x 4\)"),
+        ((POSE + LAST) * 5, r"5 camera poses \(4 x 4 each\)"),
+        (POSE, r"a camera pose \(3 x 4\)"),
+        ((POSE + "\n") * 3, r"3 camera poses \(3 x 4 each\)"),
+        ("1 0 0 0\n0 1 0 0\n0 0 1 0\n" + LAST, r"a camera pose \(4 x 4\)"),
+        (POSE.replace("\n", " ") + "\n", r"a camera pose \(3 x 4\)"),
+        (INTRINSICS, r"a matrix of camera intrinsics \(3 x 3\)"),
+        (INTRINSICS * 2, r"2 matrices of camera intrinsics \(3 x 3 each\)"),
+        (INTRINSICS.replace("\n", " 0\n") + LAST, r"a matrix of camera intrinsics \(4 x 4\)"),
+    ],
+)
+def test_camera_matrices_are_no_points(text: str, what: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"looks like {what}, not like points. Where they are points"):
+        read(save(tmp_path / "frame.pose.txt", text))
+    named = "x y z a b c d e f g h i\n" if text.count("\n") == 1 else "x y z w\n"
+    if len(text.split()) % 4 == 0:
+        assert len(read(save(tmp_path / "frame.pose.txt", named + text)))  # who says so means points
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 0 0\n1 0 0\n0 1 0\n",
+        "1 0 0\n0 1 0\n0 0 1\n",
+        "1 0 0 5\n0 1 0 6\n0 0 1 7\n",
+        "0 0 0\n1 0 0\n0 1 0\n0 0 1\n",
+        "0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 0 1\n",
+        "585.1 0.3 320\n0.2 585 240\n0 0 1\n",
+        "0.12 0.34 0.5 17\n0.13 0.36 0.5 18\n0.2 0.31 0.52 16\n",
+        "-40 12 3\n12 -50 3\n0 0 1\n",
+        "1 2 3 4 5 6 7 8 9 10 11 12\n",
+    ],
+)
+def test_a_few_points_are_points(text: str, tmp_path: Path) -> None:
+    assert len(read(save(tmp_path / "scan.txt", text))) == text.count("\n")
+
+
+def test_the_matrices_beside_real_range_scans(data_dir: Path) -> None:
+    files = sorted((data_dir / "range" / "sevenscenes_kinect_31").glob("*.txt"))
+    assert len(files) == 32
+    for file in files:
+        with pytest.raises(InputError, match=r"looks like a (camera pose|matrix of camera intrinsics)"):
+            read(file)

@@ -344,3 +344,12 @@ def test_every_leaf_holds_a_point_and_every_point_lies_in_a_leaf() -> None:
 def test_a_rule_out_of_range_is_refused(values: dict) -> None:
     with pytest.raises(InputError):
         replace(Stop(), **values)
+
+
+@pytest.mark.parametrize("least", [5e-324, 1e-320, 1e-300, 1e-62])
+def test_extents_that_float32_cannot_hold_are_those_of_one_place(least: float) -> None:
+    points = np.array([[0, 0, 0], [0, 0, least], [least, 0, 0]])
+    tree = build(PointCloud.from_arrays(points))
+    assert (tree.points, tree.leaves) == (3, 1)
+    low, high = np.zeros(3), np.full(3, least)
+    assert 0 < Cube.around(low, high).edge < 4

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from viewer.scan.octree.build import Stop, build
 from viewer.scan.octree.leaves import leaf_points
+from viewer.scan.octree.neighbors import Neighbors
 from viewer.scan.octree.octree import Octree
 from viewer.scan.points import PointCloud
 
@@ -103,3 +104,24 @@ def test_what_lies_apart_does_not_become_a_large_disc() -> None:
 
 def test_a_tree_without_points_has_no_leaves() -> None:
     assert len(leaf_points(build(PointCloud.from_arrays(np.empty((0, 3)))))) == 0
+
+
+def test_centers_of_some_nodes_are_those_of_all() -> None:
+    points = np.random.default_rng(5).normal((665187.5, 5648349.25, 241.5), size=(200_000, 3))
+    octree = build(PointCloud.from_arrays(points), Stop("occupancy", occupancy=2))
+    for level in (0, 3, octree.depth):
+        centers = octree.centers(level)
+        np.testing.assert_array_equal(centers, octree.low + (octree.cells(level) + 0.5) * octree.size(level))
+        origin = octree.low + 0.25
+        near = octree.centers_of(octree.codes(level)[::3], level, origin)
+        assert near.dtype == np.float32
+        np.testing.assert_array_equal(near, (centers[::3] - origin).astype(np.float32))
+
+
+def test_what_is_around_below_is_what_is_around_there() -> None:
+    octree = build(PointCloud.from_arrays(np.random.default_rng(5).normal(size=(100_000, 3))))
+    neighbors = Neighbors(1)
+    for masks in octree.masks:
+        _, around = neighbors.around_below(masks)
+        neighbors.descend(masks)
+        np.testing.assert_array_equal(around, neighbors.around())

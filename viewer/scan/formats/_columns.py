@@ -66,7 +66,7 @@ def first_repeated(names: Iterable[str]) -> str | None:
     return None
 
 
-def listed(names: Iterable[str], most: int = 12, longest: int = 40) -> str:
+def listed(names: Iterable[str], most: int = 12, longest: int = 24) -> str:
     """Names of a file for a message: some of them, shortened where they are long."""
     names = list(names)
     shown = [name if len(name) <= longest else name[:longest] + "..." for name in names[:most]]
