@@ -102,7 +102,7 @@ class GpuPose:
     def _values(self, name: str) -> NDArray:
         if name.startswith("scalar:"):
             scalar = name.removeprefix("scalar:")
-            return (self.scalar(scalar) - self.scalar_zero(scalar)).astype(np.float32)
+            return as_float32(self.scalar(scalar), self.scalar_zero(scalar))
         values: NDArray | None = getattr(self.cloud, name)
         if values is None:
             hint = (
@@ -178,6 +178,12 @@ class _Upload:
 
 def _strided(values: NDArray) -> NDArray:
     return values[:: max(1, len(values) // _SAMPLE)]
+
+
+def as_float32(values: NDArray, zero: float = 0.0) -> NDArray[np.float32]:
+    """Numbers relative to `zero` as the GPU holds them; those beyond its range are infinite there."""
+    with np.errstate(over="ignore"):
+        return (values - zero).astype(np.float32)
 
 
 def robust_range(values: NDArray) -> tuple[float, float]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..geometry import up_vector
 from ..look import Look, color_table, rgba, value_source
 from . import gl
@@ -14,6 +16,7 @@ from .surface import Surface
 # How shade.comp names where a colour, a number and the light come from.
 _COLOR_CODES = {"plain": 0, "own": 1, "normal": 2, "value": 3, "id": 4}
 _VALUE_CODES = {"depth": 0, "height": 1, "scalar": 2}
+_MOST = float(np.finfo(np.float32).max)
 _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
 
 
@@ -23,7 +26,7 @@ def shade(surface: Surface, look: Look) -> None:
     cloud = pose.cloud
     source = value_source(look, cloud)
     value = source if source in (None, "depth", "height") else "scalar"
-    color = "value" if source else "own" if look.color_by == "auto" else look.color_by
+    color = "value" if source is not None else "own" if look.color_by == "auto" else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("colors"):
         color = "plain"
     light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
@@ -40,9 +43,9 @@ def shade(surface: Surface, look: Look) -> None:
             "OWN_NORMALS": int(surface.is_own("normals")),
         },
     )
-    surface.color_range = value_range(surface, look) if source else None
+    surface.color_range = None if source is None else value_range(surface, look)
     low, high = surface.color_range or (0.0, 1.0)
-    zero = _stored_zero(surface, look, source) if source else 0.0
+    zero = 0.0 if source is None else _stored_zero(surface, look, source)
     surface.bind_view()
     covered = surface.list_covered()
     with gpu.timers.measure("shade"):
@@ -66,7 +69,7 @@ def shade(surface: Surface, look: Look) -> None:
             program,
             plain=tuple(c / 255 for c in rgba(look.plain)[:3]),
             background=tuple(c / 255 for c in rgba(look.background)),
-            value_range=(low - zero, high - zero),
+            value_range=tuple(np.clip([low - zero, high - zero], -_MOST, _MOST).tolist()),
             height_axis=up_vector(look.up),
             light=_direction(look.azimuth, look.elevation),
             phong=(look.ambient, look.diffuse, look.specular, look.shininess),

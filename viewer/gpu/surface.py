@@ -18,7 +18,7 @@ from . import gl
 from .compact import IndexList, list_covered
 from .context import Gpu, Resource
 from .counts import NOTHING, count_points
-from .pose import FORMATS, GpuPose
+from .pose import FORMATS, GpuPose, as_float32
 from .sample import sample_of
 from .view import View
 
@@ -322,7 +322,7 @@ class Surface:
         if source == "depth":
             return np.where(self.row == NOTHING, np.float32(np.nan), self.depth)
         values = cloud.world() @ up_vector(self.look.up) if source == "height" else cloud.scalars[source]
-        return self._fetch(values.astype(np.float32), np.nan)
+        return self._fetch(as_float32(values), np.nan)
 
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""

@@ -245,8 +245,9 @@ def choose_origin(points: NDArray) -> NDArray[np.float64]:
         return np.zeros(3)
     extent = _robust_extent(points)
     median = np.median(_sample(points), axis=0)
-    if extent <= 0 or not np.isfinite(extent):
-        return median if np.abs(median).max() > 0 else np.zeros(3)
+    largest = float(np.abs(median).max())
+    if extent <= np.finfo(np.float64).eps * largest or not np.isfinite(extent):  # the grid would be too fine
+        return median if largest > 0 else np.zeros(3)
     grid = 2.0 ** np.ceil(np.log2(extent))
     return np.round(median / grid) * grid + 0.0  # + 0.0: no negative zero
 

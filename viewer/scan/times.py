@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from ..files import open_plain
 
 TIMES_FILE = "times.csv"
@@ -125,7 +125,7 @@ def _number(path: Path, line: int, text: str) -> float:
     except ValueError:
         number = np.nan
     if not np.isfinite(number):
-        raise _bad_row(path, line, f"time '{text}' is not a number")
+        raise _bad_row(path, line, f"time '{shortened(text)}' is not a number")
     return number
 
 
@@ -134,7 +134,7 @@ def _frame_index(path: Path, line: int, frame: str, places: dict[str, int]) -> i
     index = places.get(frame, places.get(PurePath(frame).name))
     if index is None and frame.isdecimal():
         if len(frame) > 9 or int(frame) >= len(places):
-            raise _bad_row(path, line, f"index {frame} is outside 0..{len(places) - 1}")
+            raise _bad_row(path, line, f"index {shortened(frame)} is outside 0..{len(places) - 1}")
         index = int(frame)
     return index
 
