@@ -295,3 +295,18 @@ def test_octrees_in_two_units_are_refused(tmp_path: Path, full_cloud: PointCloud
     (tmp_path / "both.svo").write_bytes(b"".join(parts))
     with pytest.raises(InputError, match="octree 1 has another unit of length than the first"):
         formats.frame_count(tmp_path / "both.svo")
+
+
+def test_a_file_that_has_changed_is_looked_at_again(tmp_path: Path, full_cloud: PointCloud) -> None:
+    path = tmp_path / "scan.svo"
+    for count in (2, 3):
+        formats.write_poses(path, [Pose(i, float(i), "", full_cloud) for i in range(count)], "mm")
+        assert formats.frame_count(path) == count
+
+
+def test_files_of_very_many_octrees_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tree = Octree(np.zeros(3), 1.0, (), 1, 1)
+    (tmp_path / "scan.svo").write_bytes(b"".join(to_bytes(tree, time=float(i)) for i in range(6)))
+    monkeypatch.setattr(svo, "_MOST_POSES", 5)
+    with pytest.raises(InputError, match="has 6 octrees, more than the 5 that are read"):
+        formats.frame_count(tmp_path / "scan.svo")

@@ -171,6 +171,13 @@ def test_names_that_stand_twice_are_refused(tmp_path: Path) -> None:
         read(save(tmp_path / "scan.csv", "X,Y,Z,x\n1,2,3,4\n"))
 
 
+@pytest.mark.parametrize("line", ["\n", "# x y z\n", ",,,\n"])
+def test_rows_far_below_are_not_looked_for(line: str, tmp_path: Path) -> None:
+    assert len(read(save(tmp_path / "scan.csv", line * 60_000 + "1,2,3\n"))) == 1
+    with pytest.raises(InputError, match="holds no rows of numbers in its first 65,536 lines"):
+        read(save(tmp_path / "scan.csv", line * 70_000 + "1,2,3\n"))
+
+
 # --- camera matrices ----------------------------------------------------------------------
 
 POSE = """\

@@ -23,7 +23,7 @@ from ..cache import megabytes
 READ_VARIABLE = "SCAN4D_READ_MB"
 MOST_COLUMNS = 4096  # the longest descriptors of points in use have 1344 values
 MOST_FRAMES = 1 << 20  # of one file: nine hours at 30 a second
-MOST_MEMBERS = 1024  # of an archive
+MOST_MEMBERS = 1024  # arrays of an archive, parts of a picture
 LONGEST_LINE = 1 << 20  # characters of text
 
 _RATIO = 10  # of the memory that reading takes to the size of the file

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from itertools import chain, count, islice
 from typing import IO, AnyStr, BinaryIO
 
@@ -144,7 +143,7 @@ def text_lines(stream: BinaryIO) -> Iterator[str]:
 
 def bounded_lines(stream: IO[AnyStr]) -> Iterator[AnyStr]:
     """The lines of a stream. Raises InputError where one is longer than any row of numbers."""
-    for number, line in enumerate(iter(partial(stream.readline, LONGEST_LINE + 1), stream.read(0)), 1):
+    for number, line in enumerate(stream, 1):
         if len(line) > LONGEST_LINE:
             raise InputError(f"line {number} has more than {LONGEST_LINE:,} characters")
         yield line

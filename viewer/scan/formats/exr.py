@@ -30,7 +30,7 @@ from ...native import OPENEXR, unsaid
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, memory_of_merging
 from ..units import usable_unit
-from ._admission import admit, opened, read_exactly, size_of
+from ._admission import MOST_MEMBERS, admit, check_count, opened, read_exactly, size_of
 
 TITLE = "EXR"
 SUFFIXES = (".exr",)
@@ -51,6 +51,7 @@ def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
     """The views in the order of the parts. Raises InputError where a part is damaged or no range view."""
     with opened(path) as stream:
         headers = _headers(path)
+        check_count(len(headers), MOST_MEMBERS, "parts")
         for number, header in enumerate(headers):
             _check_form(header, _name(header, number))
         admit(size_of(stream), _memory(headers, _pixel_bytes(stream, len(headers))))

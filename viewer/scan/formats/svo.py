@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock
@@ -25,11 +26,12 @@ from ..octree.octree import Octree
 from ..octree.storage import LARGEST_HEADER, Header, from_bytes, read_header, to_bytes
 from ..points import PointCloud
 from ..pose import Pose
-from ._admission import MOST_FRAMES, admit, check_count, opened, read_exactly, size_of
+from ._admission import admit, check_count, opened, read_exactly, size_of
 
 TITLE = "SVO"
 SUFFIXES = (".svo",)
 
+_MOST_POSES = 1 << 17  # an hour at 30 a second
 _LONGEST = 8  # octrees read for one pose
 _MARGIN = 1 / 8  # around the pose that a cube is made for, of its extent
 _NODE_BYTES = 68  # that decoding takes for a node of the largest level, beside attributes
@@ -137,22 +139,29 @@ class _Place(NamedTuple):
 
 def _places(path: Path) -> list[_Place]:
     """All octrees of a file. Raises InputError where there is something else, or a chain has no beginning."""
+    status = path.stat()
+    return _found(path, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=2)  # opening a scan asks for them several times
+def _found(path: Path, size: int, changed: int) -> list[_Place]:
+    """`_places` of a file of this size that was last changed then."""
     places: list[_Place] = []
     with opened(path) as file:
         offset, end = 0, size_of(file)
         while offset < end:
             file.seek(offset)
             try:
-                header, size = read_header(file.read(LARGEST_HEADER))
+                header, taken = read_header(file.read(LARGEST_HEADER))
             except InputError as error:
                 error.what = f"octree {len(places)}, at byte {offset}: {error.what}"
                 raise
-            size += header.stored
-            check_count(len(places), MOST_FRAMES, "octrees")
+            taken += header.stored
+            check_count(len(places) + 1, _MOST_POSES, "octrees")
             if places and header.unit != places[0].header.unit:
                 raise InputError(f"octree {len(places)} has another unit of length than the first")
-            places.append(_Place(offset, min(size, end - offset), header))
-            offset += size
+            places.append(_Place(offset, min(taken, end - offset), header))
+            offset += taken
     counts = [0, *(place.header.before for place in places)]
     for index, (above, here) in enumerate(pairwise(counts)):
         if here not in (0, above + 1) or here > index:

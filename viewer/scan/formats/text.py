@@ -25,6 +25,7 @@ TITLE = "a text table"
 SUFFIXES = (".xyz", ".csv", ".txt", ".pts")
 
 _ENCODING = "utf-8-sig"
+_MOST_ABOVE = 1 << 16  # lines above the rows
 _NAMES_HELP = "Where they are points, put a line of names above them, such as: x y z"
 
 
@@ -92,7 +93,9 @@ def _look(lines: Iterable[str]) -> _Layout:
     names: list[str] | None = None
     remark: list[str] = []
     promised = None
-    for number, line in enumerate(lines):
+    for number, line in enumerate(islice(lines, _MOST_ABOVE)):
+        if line.isspace():
+            continue
         comment = line.lstrip().startswith(("#", "//"))
         words, delimiter = _split(line.lstrip("#/ \t") if comment else line)
         check_count(0 if comment else len(words), MOST_COLUMNS, "columns")
@@ -114,7 +117,7 @@ def _look(lines: Iterable[str]) -> _Layout:
                 raise InputError(f"line {number + 1} has fewer than three numbers")
             chosen = None if names is None else [names[i] for i in columns]
             return _Layout(number, columns, chosen, delimiter, promised)
-    raise InputError("holds no rows of numbers")
+    raise InputError(f"holds no rows of numbers in its first {_MOST_ABOVE:,} lines")
 
 
 def _split(line: str) -> tuple[list[str], str | None]:
