@@ -178,6 +178,10 @@ def test_rows_far_below_are_not_looked_for(line: str, tmp_path: Path) -> None:
         read(save(tmp_path / "scan.csv", line * 70_000 + "1,2,3\n"))
 
 
+def test_a_column_without_a_name_is_called_by_its_place(tmp_path: Path) -> None:
+    assert set(read(save(tmp_path / "scan.csv", 'x;y;z;"";q\n1;2;3;4;5\n')).scalars) == {"column_4", "q"}
+
+
 # --- camera matrices ----------------------------------------------------------------------
 
 POSE = """\

@@ -38,13 +38,16 @@ _GEOMETRY = {"rgb", "rgba", *chain(*_POSITIONS, *_NORMALS, *_COLORS, *_RADII, _E
 
 
 def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
-    """Columns by name. Of several scalars of one name the second is called `name_2`, and so on.
+    """Columns by name; the fourth is called `column_4` where it has none.
+
+    Of several scalars of one name the second is called `name_2`, and so on.
 
     Raises InputError where two columns have a name of geometry, in any case: nobody knows which counts.
     """
     columns: dict[str, NDArray] = {}
     seen: dict[str, int] = {}
-    for name, column in pairs:
+    for place, (name, column) in enumerate(pairs, 1):
+        name = name or f"column_{place}"
         key = name.lower() if name.lower() in _GEOMETRY else name
         seen[key] = seen.get(key, 0) + 1
         if seen[key] > 1:
