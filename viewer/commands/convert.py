@@ -18,7 +18,7 @@ from ..scan.inputs import scan_inputs
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from .console import progress, tell
+from .console import progress, tell, warn
 from .outputs import add_force_argument, claim
 from .scans import (
     SCAN_HELP,
@@ -87,6 +87,10 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
                 tick()
 
         formats.write_poses(out, poses(), timeline.unit, stop=stop)
+    try:
+        formats.check(out)
+    except InputError as problem:  # all is there, but not everybody can read it
+        warn(str(problem))
 
 
 def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> None:

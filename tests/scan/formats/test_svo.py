@@ -310,3 +310,19 @@ def test_files_of_very_many_octrees_are_refused(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(svo, "_MOST_POSES", 5)
     with pytest.raises(InputError, match="has 6 octrees, more than the 5 that are read"):
         formats.frame_count(tmp_path / "scan.svo")
+
+
+def test_convert_tells_of_a_file_that_takes_too_much_to_be_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = np.random.default_rng(4).random((30_000, 3))
+    np.save(tmp_path / "points.npy", points.astype(np.float32))
+    words = ["convert", str(tmp_path / "points.npy"), str(tmp_path / "a.svo"), "--force"]
+    assert cli.main(words) == 0
+    assert capsys.readouterr().err == ""
+    assert len(formats.read_points(tmp_path / "a.svo")) > 20_000
+    monkeypatch.setenv("SCAN4D_READ_MB", "1")
+    assert cli.main([*words[:1], "demo", "--pose", "0", str(tmp_path / "b.svo")]) == 0
+    assert "set SCAN4D_READ_MB=" in capsys.readouterr().err
+    with pytest.raises(InputError, match="too much for its size"):
+        formats.read_points(tmp_path / "b.svo")

@@ -9,7 +9,7 @@ A format module declares
 - where frames are told by others: `Frames(path)`, whose `read(frame)` keeps what the next one needs;
 - where it tells the unit of length: `read_unit(path) -> str`, from the header alone;
 - where it can be written: `write(path, cloud)`, or `write_views(path, views)`, or, all poses in one file,
-  `write_poses(path, poses, unit, **options)`.
+  `write_poses(path, poses, unit, **options)` and `check(path)`, which says whether it can be read again.
 
 A module may raise any exception: the functions below turn it into one InputError that names the file.
 Modules whose name starts with an underscore are helpers.
@@ -168,6 +168,14 @@ def write_poses(path: Path | str, poses: Iterable[Pose], unit: str, **options: A
     module = _formats()[path.suffix.lower()]
     with _writing(path, module) as temporary:
         module.write_poses(temporary, poses, unit, **options)
+
+
+def check(path: Path | str) -> None:
+    """Raise InputError where a file of `write_poses` takes more memory to be read than readers may take."""
+    path = Path(path)
+    module = _readable(path)
+    with _one_message(path, f"cannot be read as {module.TITLE}"):
+        module.check(path)
 
 
 @contextmanager

@@ -2,7 +2,8 @@
 fails.
 
 Reading may take 10 times the bytes of the file and 180 MiB more, and never more than half of the machine's
-memory. The variable SCAN4D_READ_MB replaces both by a number of megabytes.
+memory. Formats that pack honest scans far better may take more for each byte. The variable SCAN4D_READ_MB
+replaces all that by a number of megabytes.
 """
 
 from __future__ import annotations
@@ -49,10 +50,10 @@ def size_of(stream: BinaryIO) -> int:
     return os.fstat(stream.fileno()).st_size
 
 
-def most_memory(held: int) -> int:
+def most_memory(held: int, ratio: int = _RATIO) -> int:
     """Bytes that reading a file of `held` bytes may take at a time. Raises InputError for a bad variable."""
     told = megabytes(READ_VARIABLE)
-    return min(_RATIO * held + _FREE, _half_of_memory()) if told is None else told
+    return min(ratio * held + _FREE, _half_of_memory()) if told is None else told
 
 
 def _half_of_memory() -> int:
@@ -61,12 +62,13 @@ def _half_of_memory() -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 
 
-def admit(held: int, needed: int) -> None:
+def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
     """Raise InputError, before anything is allocated, where a file would take more memory than it may.
 
-    held: the bytes of the file. needed: those that reading it takes at most at a time.
+    held: the bytes of the file. needed: those that reading it takes at most at a time. ratio: what it may
+    take for each byte.
     """
-    if needed > most_memory(held):
+    if needed > most_memory(held, ratio):
         what = f"reading its {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
         hint = f"Where you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"
         raise InputError(what, hint=hint)

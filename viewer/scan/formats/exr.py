@@ -39,6 +39,7 @@ _PINHOLE = ("fx", "fy", "cx", "cy")
 _FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
 _MAGIC_BYTES, _CHANNEL_BYTES = 8, 16  # in front of the headers; behind the name of a channel in a header
 _TYPE_BYTES = {1: 2}  # of a sample of a half; other types have 4
+_MOST_RATIO = 40  # of memory to the file: masks leave little of most pictures
 _VIEW_BYTES = 7  # of a pixel: mask and colour
 
 
@@ -54,10 +55,10 @@ def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
         check_count(len(headers), MOST_MEMBERS, "parts")
         for number, header in enumerate(headers):
             _check_form(header, _name(header, number))
-        admit(size_of(stream), _memory(headers, _pixel_bytes(stream, len(headers))))
+        admit(size_of(stream), _memory(headers, _pixel_bytes(stream, len(headers))), _MOST_RATIO)
         images = _decoded(path, len(headers))
         views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
-        admit(size_of(stream), memory_of_merging(views))
+        admit(size_of(stream), memory_of_merging(views), _MOST_RATIO)
     return views
 
 

@@ -36,6 +36,7 @@ _LONGEST = 8  # octrees read for one pose
 _MARGIN = 1 / 8  # around the pose that a cube is made for, of its extent
 _NODE_BYTES = 68  # that decoding takes for a node of the largest level, beside attributes
 _LEAF_BYTES = 60  # that points take for a leaf
+_MOST_RATIO = 100  # of memory to the file: leaves of surfaces take 6 bits and more each
 _TOO_LARGE = 2.5  # a cube, for a pose of less extent by this factor
 
 
@@ -53,6 +54,14 @@ def read_unit(path: Path) -> str:
     """The unit of the first octree."""
     with opened(path) as file:
         return read_header(file.read(LARGEST_HEADER))[0].unit
+
+
+def check(path: Path) -> None:
+    """Raise InputError where a pose is too large to be read again, by the headers alone."""
+    for place in _places(path):
+        leaves = place.header.levels[-1].nodes
+        needed = max(place.memory, leaves * (_LEAF_BYTES + place.header.width))
+        admit(path.stat().st_size, needed, _MOST_RATIO)
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
@@ -83,11 +92,11 @@ class Frames:
             for index in range(start, frame + 1):
                 checkpoint()
                 file.seek(self._places[index].offset)
-                admit(size_of(file), self._places[index].memory)
+                admit(size_of(file), self._places[index].memory, _MOST_RATIO)
                 data = read_exactly(file, self._places[index].size)
                 previous = from_bytes(data, previous, attributes=index == frame, leaves_only=True)
             assert previous is not None, "there is the one asked for"
-            admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES)
+            admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES, _MOST_RATIO)
             self._last = frame, replace(previous, attributes=())
         return leaf_points(previous)
 
