@@ -16,7 +16,7 @@ from PIL import Image
 from range_scenes import sphere_view
 from scenes import sphere
 
-from viewer.anonymous import anonymous_request, anonymous_unit
+from viewer.anonymous import anonymous_request, anonymous_unit, middle_of
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.export import read_description
@@ -176,9 +176,35 @@ def test_range_views_stand_at_the_origin_without_their_names() -> None:
     request = Request(pose, Camera(eye=tuple(PLACE + np.array([0, 0, 5])), target=tuple(PLACE)), "points")
     made = anonymous_request(request, START).pose
     assert (made.views[0].name, made.label, made.time) == ("pod 0", "frame 0", 0.0)
-    assert not made.cloud.origin.any()
-    moved = made.views[0].positions() + pose.cloud.origin
+    assert np.abs(made.cloud.bounds().center).max() < 0.1
+    moved = made.views[0].positions() + middle_of(pose)
     assert np.allclose(moved, view.positions(), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("origin", [(0, 0, 0), (691_000, 0, 0)])
+def test_an_origin_that_a_file_tells_hides_nothing_and_nothing_is_left(
+    origin: tuple[float, ...], run: Run, folder: Path
+) -> None:
+    positions = sphere(500).positions + PLACE - origin
+    np.savez(FILE, positions=positions, origin=np.array(origin, float))
+    look = ("--look", "color_by=height")
+    for out in ("a.png", "a.npz"):
+        assert run("render", FILE, *SMALL, "--anonymous", *look, "-o", out).code == 0
+        assert_tells_nothing(Path(out), folder)
+    assert max(map(abs, numbers(json.loads(read_description(Path("a.png")))))) < FAR
+    assert_near_zero(dict(np.load("a.npz")))
+
+
+def test_the_height_of_a_wide_flat_scan_is_not_told(run: Run) -> None:
+    """Its origin is no grid step away from zero, so that its coordinates stay as they are."""
+    place = np.random.default_rng(1).random((3000, 3)) * (2000, 6, 2000) + (0, 512, 0)
+    np.save("terrain.npy", place.astype(np.float32))
+    look = ("--look", "color_by=height")
+    assert run("render", "terrain.npy", *SMALL, "--anonymous", *look, "-o", "a.png").code == 0
+    assert run("render", "terrain.npy", *SMALL, "--anonymous", *look, "-o", "a.npz").code == 0
+    camera = json.loads(read_description(Path("a.png")))["camera"]
+    assert abs(camera["target"][1]) < 10
+    assert np.nanmax(np.abs(np.load("a.npz")["value"])) < 20
 
 
 def test_hashes_cannot_be_matched_and_do_not_tell_names(tmp_path: Path) -> None:

@@ -8,9 +8,10 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from itertools import count
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from .errors import InputError, explained
 
@@ -50,7 +51,7 @@ def _store(path: Path) -> None:
 
 
 @contextmanager
-def open_plain(path: Path | str) -> Iterator[BinaryIO]:
+def open_plain(path: Path | str) -> Iterator[BufferedReader]:
     """A file, open for reading bytes. Raises OSError, also where it is a folder, a device or a pipe.
 
     None of these is waited for or read from.

@@ -34,7 +34,7 @@ class Journal:
         """folder: where the recording is to go, which names of scans start from."""
         from filelock import FileLock
 
-        journals = _folder()
+        journals = journal_folder()
         journals.mkdir(parents=True, exist_ok=True)
         self._path = journals / f"{os.getpid()}_{secrets.token_hex(4)}{_SUFFIX}"
         self._lock = FileLock(
@@ -48,9 +48,18 @@ class Journal:
         """Note an entry, as `Recorder.note` gives it."""
         self._stream.write(json.dumps(change).encode() + b"\n")
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether nothing can be added any more."""
+        return self._stream.closed
+
+    def close(self) -> None:
+        """Write no more; it stays that of this process until `remove` or `leave`."""
+        self._stream.close()
+
     def leave(self) -> None:
         """Write no more; what is there is saved at the next start."""
-        self._stream.close()
+        self.close()
         self._lock.release()
 
     def remove(self) -> None:
@@ -62,7 +71,7 @@ class Journal:
 def journals() -> list[Path]:
     """The journals of this user, also those of processes that still record."""
     with suppress(OSError):
-        return sorted(path for path in _folder().iterdir() if path.suffix == _SUFFIX)
+        return sorted(path for path in journal_folder().iterdir() if path.suffix == _SUFFIX)
     return []
 
 
@@ -101,7 +110,7 @@ def _saved(journal: Path) -> Path | None:
         recording = Recording.from_json(head | {"entries": changes}, journal)
     except InputError as error:
         raise _put_aside(journal, error.what) from error
-    return _written(recording, Path(folder))
+    return written(recording, Path(folder))
 
 
 def _lines(text: str) -> list[dict[str, Any]]:
@@ -118,7 +127,11 @@ def _lines(text: str) -> list[dict[str, Any]]:
     return objects
 
 
-def _written(recording: Recording, folder: Path) -> Path:
+def written(recording: Recording, folder: Path) -> Path:
+    """Save a recording under a free name in this folder, or in the user's documents or home where that fails.
+
+    Raises InputError where none of them takes it.
+    """
     for place in _places(folder):
         path = free_file(place, ".json")
         try:
@@ -163,7 +176,8 @@ def _delete(journal: Path) -> None:
             path.unlink()
 
 
-def _folder() -> Path:
+def journal_folder() -> Path:
+    """Where journals are kept for this user; it need not be there yet."""
     import platformdirs
 
     return platformdirs.user_state_path("scan4d", appauthor=False) / "recordings"

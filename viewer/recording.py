@@ -33,7 +33,7 @@ from .backends import backend as find_backend
 from .camera import Camera
 from .errors import InputError, shortened, unknown_name
 from .export import read_description
-from .files import whole_file
+from .files import open_plain, whole_file
 from .frame import Request
 from .look import Look
 from .marks import Legend, Marks
@@ -231,7 +231,7 @@ def fingerprint(files: Sequence[Path], salt: str | None = None) -> str | None:
         if salt is not None:
             return _salted(files, salt) if files else None
         if len(files) == 1 and os.path.getsize(files[0]) <= _HASHED_BYTES:
-            with open(files[0], "rb") as stream:
+            with open_plain(files[0]) as stream:
                 return f"sha256:{hashlib.file_digest(stream, 'sha256').hexdigest()[:16]}"
         listed = "\n".join(f"{os.path.getsize(file)} {file.name}" for file in files)
     except OSError:
@@ -254,7 +254,7 @@ def _salted(files: Sequence[Path], salt: str) -> str:
     digest = hashlib.sha256(salt.encode())
     most = _HASHED_BYTES // len(files) // 2  # at either end
     for file in files:
-        with open(file, "rb") as stream:
+        with open_plain(file) as stream:
             size = os.fstat(stream.fileno()).st_size
             digest.update(f"{size} ".encode() + stream.read(most))
             stream.seek(max(size - most, stream.tell()))

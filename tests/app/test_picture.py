@@ -133,7 +133,7 @@ def test_whatever_fails_is_a_problem_and_the_image_before_stays(
     before = shown(picture)[0]
     monkeypatch.setattr(picture_module, step, failing)
     assert picture.draw(turned(REQUEST), SIZE)
-    assert str(picture.problem).startswith("Drawing failed (ValueError: of a library)")
+    assert str(picture.problem).startswith("Drawing frame 1 failed (ValueError: of a library)")
     assert not picture.is_there
     assert picture.is_visible
     np.testing.assert_array_equal(shown(picture)[0], before)

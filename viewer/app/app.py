@@ -10,11 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..anonymous import raised
+from ..anonymous import in_place
 from ..errors import InputError, Scan4DError
 from ..files import user_folder
 from ..gpu.context import Gpu
-from ..look import drawable, value_source
 from ..recording import Entry
 from ..scan.open import open_scan
 from ..scan.pose import Pose
@@ -233,12 +232,8 @@ class App:
     def show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""
         session, camera, look = self.session, entry.camera, entry.look
-        if entry.anonymous:  # of a scan that stands at the origin, and whose scalars have numbers for names
-            origin = pose.cloud.origin
-            camera, look = camera.moved(origin), raised(look, origin)
-            look = replace(
-                look, color_by=value_source(drawable(look, pose.cloud), pose.cloud) or look.color_by
-            )
+        if entry.anonymous:
+            camera, look = in_place(camera, look, pose)
         self.seek(entry.pose)
         session.camera, session.pivot, session.look = camera, None, look
         session.backend, session.params[entry.backend] = entry.backend, entry.params
@@ -324,8 +319,9 @@ class App:
     def close(self) -> None:
         """Save what is being recorded and what is to come back, and let go of everything but the window."""
         for name, end in (
-            ("Saving", self.capture.close),
+            ("Saving", self.capture.end_recording),
             ("Keeping settings", self._keep_at_last),
+            ("Saving pictures", self.capture.close),
             ("Counting", self.counting.cancel),
             ("Exporting", self.exporting.close),
             ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop

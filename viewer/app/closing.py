@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import signal
+import time
 from types import FrameType, TracebackType
 from typing import Any
 
+_PATIENCE = 5.0  # seconds that closing may take
 _CLOSING = [
     getattr(signal, name)
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -16,11 +18,13 @@ _CLOSING = [
 class Signals:
     """While it is entered, signals are only noted; those that were ignored (nohup) stay ignored.
 
-    came: whether one did. From then on they stay noted, so that a second one does not break the closing.
+    came: whether one did. From then on they stay noted, so that a second one does not break the closing; one
+    that comes much later ends the process, which does not close then.
     """
 
     def __init__(self) -> None:
         self.came = False
+        self._since = 0.0  # by the clock, when the first one came
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Signals:
@@ -37,4 +41,9 @@ class Signals:
                 signal.signal(number, handler)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        self.came = True
+        now = time.monotonic()
+        if not self.came:
+            self.came, self._since = True, now
+        elif now - self._since > _PATIENCE:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)

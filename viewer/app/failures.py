@@ -43,7 +43,7 @@ class Failures:
         now, self.count = time.monotonic(), self.count + 1
         before, self._last[what] = self._last.get(what, -math.inf), now
         if now - before > _PAUSE:
-            log.debug("%s failed", what, exc_info=error)
+            log.error("%s failed", what, exc_info=error)
             self._note(in_words(what, error))
 
 

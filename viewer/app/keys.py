@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import imgui
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, did_you_mean, shortened, unknown_name
 from ..files import read_text, whole_file
 from .commands import COMMANDS
 
@@ -88,7 +88,8 @@ def load(path: Path) -> tuple[Keys, list[str]]:
     except FileNotFoundError:
         return Keys(), []
     except (OSError, ValueError, RecursionError) as error:  # of encoding and of TOML as well
-        what = getattr(error, "strerror", None) or error
+        nested = isinstance(error, RecursionError)
+        what = "it is nested too deeply" if nested else getattr(error, "strerror", None) or error
         return Keys(), [str(InputError(f"cannot be read ({what})", path, "The usual keys hold"))]
     changes, problems = _checked(given)
     told = [str(InputError(problem.what, path, problem.hint)) for problem in problems[:_MOST_TOLD]]
@@ -107,7 +108,8 @@ def _checked(given: Mapping[str, Any]) -> tuple[dict[str, str], list[InputError]
     for name, text in table.items():
         try:
             if name not in COMMANDS:
-                raise unknown_name("command", name, list(COMMANDS))
+                hint = f"{did_you_mean(name, COMMANDS)}F1 lists them"
+                raise InputError(f"unknown command '{shortened(name)}'", hint=hint)
             if not isinstance(text, str):
                 raise InputError(f"the keys of '{name}' are not text", hint=f'Write {name} = "Ctrl+K"')
             if text:

@@ -45,7 +45,7 @@ class Loop:
 
     def _turn(self) -> None:
         patience = _WATCH
-        with self._app.failures.told("The window"):
+        with self._app.failures.told("The window"):  # the turn goes on without it
             patience = self._patience(time.monotonic())
         self._turns.add("late", 1e3 * self._app.window.wait(patience))
         with self._turns.part("advance"):

@@ -89,7 +89,7 @@ class Picture:
             self.surface = surface = self._surface_of(self._level)
             refinable = render_frame(self.renderer, request, surface, wait=False, share=self._level.share)
         except Exception as error:  # whatever a scan brings, the window stays
-            self._drawn, self.request, self.problem = wanted, request, _problem(error)
+            self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
             return True
         self._note_drawn(request, surface, refinable)
@@ -228,10 +228,10 @@ class Picture:
         self.renderer.release()
 
 
-def _problem(error: Exception) -> Scan4DError:
+def _problem(request: Request, error: Exception) -> Scan4DError:
     """Why there is no picture, as users read it."""
     if isinstance(error, Scan4DError):
         return error
-    problem = Scan4DError(in_words("Drawing", error))
+    problem = Scan4DError(in_words(f"Drawing frame {request.pose.index + 1}", error))
     problem.__cause__ = error
     return problem

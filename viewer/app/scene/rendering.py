@@ -18,16 +18,18 @@ class Rendering:
 
     def __init__(self, app: App) -> None:
         self._app = app
-        self._missed: tuple[str, str] | None = None  # scan and scalar, told last
+        self._missed: set[tuple[str, str]] = set()  # scan and scalar, which were told
 
     def tell_missing(self, pose: Pose) -> None:
         """Tell, once a scan, that a frame has not the scalar that the user chose to colour by."""
         session = self._app.session
         missed = session.scan, session.look.color_by
-        if missed != self._missed and drawable(session.look, pose.cloud) != session.look:
-            self._missed = missed
+        if missed not in self._missed and drawable(session.look, pose.cloud) != session.look:
+            self._missed.add(missed)
+            chosen = missed[1]
+            name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"
             self._app.note(
-                f"Frame {pose.index + 1} has no '{missed[1]}' to colour by: "
+                f"Frame {pose.index + 1} has no {name} to colour by: "
                 "other colours are shown until a frame has it."
             )
 

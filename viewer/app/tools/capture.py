@@ -11,11 +11,14 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...errors import InputError, explained
 from ...export import write_png
 from ...files import free_file, working_folder
-from ...journal import Journal, journals, saved
-from ...recording import Entry, Recorder
+from ...journal import Journal, journal_folder, journals, saved, written
+from ...recording import Entry, Recorder, Recording
 from ...task import Task, in_background
 from ..failures import in_words
 from .replaying import Replaying
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from ..app import App
 
 _LOOK = 0.02  # seconds between looks at whether a picture has been written
+_PATIENCE = 10.0  # seconds that closing waits for pictures
 
 
 class Capture:
@@ -39,7 +43,8 @@ class Capture:
         self.replaying: Replaying | None = None
         self.last: Path | None = None
         self._journal: Journal | None = None  # of what is recorded
-        self._words: list[Future[str]] = []  # that there will be to tell, in their order
+        self._saving: list[Future[str]] = []  # files; each brings what is to be told
+        self._looking: list[Future[str]] = []  # the same of what writes nothing
         self._naming = Lock()  # one free name at a time
 
     def shown(self) -> Entry | None:
@@ -58,8 +63,7 @@ class Capture:
             self._app.note("There is no picture to save.")
             return
         image, text = surface.image(), entry.description()
-        work = partial(self._saved, ".png", lambda path: write_png(image, path, text))
-        self.tell_later(lambda: work()[1])
+        self._saving.append(in_background(Task("Saving"), partial(self._save_picture, image, text)))
 
     # --- recording --------------------------------------------------------------------
 
@@ -73,22 +77,38 @@ class Capture:
             self.note_shown()
             return
         recorder, self.recorder = self.recorder, None
-        path, words = None, "Nothing was shown while recording."
+        journal, self._journal = self._journal, None
         if len(recorder):
-            path, words = self._saved(".json", recorder.finish(now).save)
-            self.last = path or self.last
-        self._end_journal(is_needed=len(recorder) > 0 and path is None)
-        self._app.note(words)
+            self._app.note(self._save_recording(recorder.finish(now), journal))
+        else:
+            self._app.note("Nothing was shown while recording.")
+            if journal is not None:
+                journal.remove()
+
+    def _save_recording(self, recording: Recording, journal: Journal | None) -> str:
+        """What to tell of it. journal: what is there of it already."""
+        try:
+            self.last = written(recording, working_folder())
+        except Exception as error:  # whatever a folder brings, the window stays
+            words = in_words("Saving the recording", error)
+            if journal is None:
+                return words
+            journal.leave()
+            return f"{words} What was recorded until then is kept, and saved at the next start."
+        if journal is not None:
+            journal.remove()
+        return f"Saved {self.last}"
 
     def note_shown(self) -> None:
         """Take down what is shown where that is being recorded."""
         if self.recorder is None or (entry := self.shown()) is None:
             return
         change = self.recorder.note(entry, time.monotonic())
-        if change is not None and self._journal is not None:
+        if change is not None and self._journal is not None and not self._journal.is_closed:
             try:
                 self._journal.add(change)
             except OSError as error:
+                self._journal.close()  # it goes when the recording is saved
                 self._tell_unsafe(error)
 
     def _begin_journal(self) -> None:
@@ -98,39 +118,38 @@ class Capture:
             self._tell_unsafe(error)
 
     def _tell_unsafe(self, error: OSError) -> None:
-        self._end_journal(is_needed=True)
         what, _ = explained(error)
-        self._app.note(f"The recording is kept in memory alone until you stop it: {what}.")
-
-    def _end_journal(self, is_needed: bool) -> None:
-        """is_needed: to save what is in it at the next start."""
-        journal, self._journal = self._journal, None
-        if journal is not None:
-            (journal.leave if is_needed else journal.remove)()
+        self._app.note(
+            f"The recording is kept in memory alone until you stop it ({journal_folder()}: {what})."
+        )
 
     def find_unfinished(self) -> None:
         """Save what processes have recorded that were killed meanwhile."""
         for journal in journals():
-            self.tell_later(partial(_saved_late, journal))
+            self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
 
-    def _saved(self, suffix: str, write: Callable[[Path], None]) -> tuple[Path | None, str]:
-        """Write a file under the next free name; returns it, None where that fails, and what to tell."""
+    def _save_picture(self, image: NDArray[np.uint8], text: str) -> str:
+        """Write it under the next free name; returns what to tell."""
         with self._naming:
-            path = free_file(working_folder(), suffix)
+            path = free_file(working_folder(), ".png")
             try:
-                write(path)
+                write_png(image, path, text)
             except Exception as error:  # whatever a folder brings, the window stays
-                return None, in_words(f"Saving {path}", error)
-        return path, f"Saved {path}"
+                return in_words(f"Saving {path}", error)
+        return f"Saved {path}"
 
-    def tell_later(self, work: Callable[[], str]) -> None:
-        """Do some work beside the window, and tell what comes of it; empty: nothing."""
-        self._words.append(in_background(Task("Saving"), work))
+    def tell_later(self, look: Callable[[], str]) -> None:
+        """Find something out beside the window, and tell what comes of it; empty: nothing."""
+        self._looking.append(in_background(Task("Looking"), look))
 
     def _tell(self) -> None:
-        """Tell of the work that is done."""
-        while self._words and self._words[0].done():
-            if words := self._words.pop(0).result():
+        """Tell of the work that is done: of files in the order of their names."""
+        done = [work for work in self._looking if work.done()]
+        self._looking = [work for work in self._looking if work not in done]
+        while self._saving and self._saving[0].done():
+            done.append(self._saving.pop(0))
+        for words in [work.result() for work in done]:
+            if words:
                 self._app.note(words)
 
     # --- replaying --------------------------------------------------------------------
@@ -156,7 +175,7 @@ class Capture:
 
     def until_next(self, now: float) -> float:
         """Seconds until there is something to do; infinite where there is nothing."""
-        soon = _LOOK if self._words else math.inf
+        soon = _LOOK if self._saving or self._looking else math.inf
         return soon if self.replaying is None else min(soon, self.replaying.until_next(now))
 
     def advance(self, now: float) -> None:
@@ -165,11 +184,14 @@ class Capture:
         if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
             self.stop_replaying()
 
-    def close(self) -> None:
-        """Save what is being recorded, and wait for pictures that are being written."""
+    def end_recording(self) -> None:
+        """Save what is being recorded."""
         if self.recorder is not None:
             self.toggle_recording()
-        wait(self._words)
+
+    def close(self) -> None:
+        """Wait for pictures that are being written, but not for a disk that does not answer."""
+        wait(self._saving, _PATIENCE)
         self._tell()
 
 

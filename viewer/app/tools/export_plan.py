@@ -42,7 +42,7 @@ class Choices:
     )  # fmt: skip
     width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
     height: int = param(1080, "Pixels", low=1, high=_MOST_PIXELS)
-    anonymous: bool = param(False, "Pictures tell the hash of their scan, neither its name nor its path")
+    anonymous: bool = param(False, "Pictures do not tell which scan they show, where it was and when")
     folder: str = param("", "Where the files go")
     name: str = param("", "Of the file; several are numbered")
 

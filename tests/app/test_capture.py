@@ -1,0 +1,121 @@
+"""Recordings and pictures of the window where disks fail; the whole window is in test_window_signals.py."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from scenes import sphere
+
+from viewer.app.tools.capture import Capture
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.frame import Request
+from viewer.journal import Journal, journals, saved
+from viewer.look import Look
+from viewer.recording import Recording, fingerprint
+from viewer.scan.pose import Pose
+
+POSE = Pose(0, 0.0, "ball", sphere(100))
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    home = tmp_path / "home"
+    for name in ("HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(name, str(home))
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    return home
+
+
+@pytest.fixture
+def app() -> Any:
+    """What Capture knows of the app, with a picture. told: the notes."""
+    told: list[str] = []
+    request = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "points", backend("points").params(), Look())
+    picture = SimpleNamespace(request=request, is_there=True, size=(64, 48))
+    session = SimpleNamespace(scan="ball.npz")
+    return SimpleNamespace(
+        told=told, note=told.append, picture=picture, session=session, hash=None, unit="mm"
+    )
+
+
+def turn(app: Any) -> None:
+    """Show another picture."""
+    request = app.picture.request
+    app.picture.request = Request(
+        POSE, request.camera.orbited(10, 0), request.backend, request.params, request.look
+    )
+
+
+def test_a_journal_that_failed_goes_when_the_recording_is_saved(
+    app: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capture = Capture(app)
+    capture.toggle_recording()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "no room")
+
+    monkeypatch.setattr(Journal, "add", full)
+    for _ in range(3):
+        turn(app)
+        capture.note_shown()
+    assert sum("kept in memory alone" in words for words in app.told) == 1
+    assert "the disk is full" in app.told[-1]
+    (journal,) = journals()
+    assert saved(journal) is None  # nobody else takes a recording that goes on
+    capture.toggle_recording()
+    assert capture.last is not None
+    assert len(Recording.load(capture.last).entries) == 4
+    assert journals() == []
+
+
+def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Path) -> None:
+    capture = Capture(app)
+    capture.toggle_recording()
+    (tmp_path / "work").rmdir()  # then the working folder is the user's own
+    capture.toggle_recording()
+    assert capture.last is not None
+    assert capture.last.parent == home
+    assert journals() == []
+
+
+def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
+    app: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capture = Capture(app)
+    capture.toggle_recording()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "no room")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Recording, "save", full)
+        capture.toggle_recording()
+    assert "saved at the next start" in app.told[-1]
+    (journal,) = journals()
+    path = saved(journal)
+    assert path is not None
+    assert len(Recording.load(path).entries) == 1
+
+
+def test_closing_waits_for_no_question(app: Any) -> None:
+    capture = Capture(app)
+    answered = threading.Event()
+    capture.tell_later(lambda: str(answered.wait()))
+    capture.close()  # or else for ever
+    assert app.told == []
+    answered.set()
+
+
+def test_a_pipe_in_place_of_a_scan_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "scan.npz")
+    assert fingerprint([tmp_path / "scan.npz"]) is None
+    assert fingerprint([tmp_path / "scan.npz"], "00" * 8) is None
