@@ -22,7 +22,7 @@ _FIT_MARGIN = 1.04
 _STEEPEST = 89.5  # elevation in degrees that orbiting reaches
 _LARGEST, _SMALLEST = 1e24, 1e-24  # lengths whose squares, sums and ratios stay finite
 _SMALLEST_SUBJECT = 1e-18  # whose distances float32 can square
-_NARROWEST, _WIDEST = 1e-4, 179.9  # fields of view that a picture can be drawn with, degrees
+_NARROWEST, _WIDEST = 1e-6, 179.9  # fields of view that a picture can be drawn with, degrees
 _MOST_BYTES = 2**20  # of a file; ours have some 300
 
 
