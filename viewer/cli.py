@@ -25,9 +25,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         _end_quietly_when_interrupted()
     from .commands import line  # not before: it imports for a tenth of a second and more
 
-    if argv is None:
-        line.prepare_streams()
-    return line.run(sys.argv[1:] if argv is None else list(argv), COMMANDS)
+    if argv is not None:
+        return line.run(list(argv), COMMANDS)
+    line.prepare_streams()
+    return line.run(sys.argv[1:], COMMANDS, then_ends=True)
 
 
 def _end_quietly_when_interrupted() -> None:

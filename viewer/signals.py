@@ -22,6 +22,13 @@ def ending_as_interrupts() -> Iterator[None]:
         yield
 
 
+def ignore_from_now_on() -> None:
+    """None of these signals does anything any more: for a process that ends, and only says so yet."""
+    if threading.current_thread() is threading.main_thread():
+        for number in _ENDING:
+            signal.signal(number, signal.SIG_IGN)
+
+
 class Interrupts:
     """Interrupts that are raised where they are let in, and wait elsewhere."""
 

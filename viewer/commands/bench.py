@@ -13,15 +13,17 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib.util import find_spec
-from itertools import chain, count
+from itertools import chain, count, product
 from pathlib import Path
 
 from ..backends import backend, backends
 from ..bench import numerics, octree_sizes, octrees, slomp
 from ..bench.forecast import forecast
 from ..bench.plan import Group, plan
+from ..bench.report.octree_tables import NAME as OCTREE_TABLES
 from ..bench.report.octree_tables import write_octree_tables
 from ..bench.report.page import PAGE, write_report
+from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
     NOTES,
     NUMERICS,
@@ -33,6 +35,7 @@ from ..bench.report.results import (
     read_rows,
     write_row,
 )
+from ..bench.report.table_two import NAME as TABLE_TWO
 from ..bench.report.table_two import write_table_two
 from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
@@ -44,7 +47,10 @@ from .console import progress, tell, warn
 from .outputs import add_force_argument, claim
 
 _SUITES = ("scenes", "numerics", "slomp", "octrees")
-_OF_THE_PAPER = {"slomp": (slomp.groups, write_table_two), "octrees": (octrees.groups, write_octree_tables)}
+_OF_THE_PAPER = {
+    "slomp": (slomp.groups, write_table_two, TABLE_TWO),
+    "octrees": (octrees.groups, write_octree_tables, OCTREE_TABLES),
+}
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -68,17 +74,25 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     add_force_argument(parser)
     parser.add_argument(
-        "--backend", nargs="+", metavar="NAME", help="default: all; gl-points and mesh are always in"
+        "--backend",
+        nargs="+",
+        action="extend",
+        metavar="NAME",
+        help="default: all; gl-points and mesh are always in",
     )
     parser.add_argument(
         "--scene",
         nargs="+",
+        action="extend",
         metavar="NAME|FILE",
         help="scenes by name, or meshes (PLY, OBJ); default: all there are",
     )
     parser.add_argument("--suite", choices=_SUITES, help="only this part; default: scenes and numerics")
     parser.add_argument(
         "--quick", action="store_true", help="few scenes, few views, small pictures: two minutes"
+    )
+    parser.add_argument(
+        "--report", action="store_true", help="measure nothing: make the page of the rows that are in DIR"
     )
     parser.add_argument(
         "--data", type=Path, metavar="DIR",
@@ -97,8 +111,15 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Measure, report, compare. 1 where Ctrl-C stopped it."""
+    """Measure, report, compare, or only report. 1 where Ctrl-C stopped it."""
     _check_libraries(args.suite)
+    if args.report:
+        if args.compare or args.backend or args.scene:
+            hint = "Leave out --compare, --backend and --scene"
+            raise InputError("measures nothing, and tells all that is there", "--report", hint)
+        claim(_report_files(args), [], args.force)
+        _report(args)
+        return 0
     if args.compare and args.suite == "numerics":
         raise InputError("--compare is for the scenes", "--suite numerics")
     if args.suite in _OF_THE_PAPER and (args.backend or args.scene):
@@ -113,42 +134,66 @@ def run(args: Namespace) -> int:
     groups, missing = _groups(args, settings, names)
     tested = names if args.suite in (None, "numerics") else []
     bench = Bench(drawing.renderer(args.device), settings, args.out)
-    _claim(args, groups, bool(tested))
+    _claim(args, settings, groups, bool(tested))
     _make_folder(args.out)
     for name in missing:
         warn(name)
 
     _foretell(bench, groups, tested)
     steps = sum(map(bench.steps, groups))
-    with held_interrupts() as bench.interrupts:  # rows that are measured are written whatever happens
-        measured = [
-            _write(args.out / RESULTS, bench, steps, _measured(bench, groups)),
-            _write(args.out / NUMERICS, bench, _lines(tested), bench.until_stopped(bench.numerics(tested))),
-        ]
-        if args.suite == "octrees":
-            measured += _octrees(args.out, bench)
-    if not any(measured):
-        if bench.stopped:
-            raise KeyboardInterrupt
-        raise InputError("; ".join(bench.notes) or "there is nothing to measure")
-    stopped = ["Stopped before the end."] if bench.stopped else []
-    _write_notes(args.out, [*missing, *bench.notes, *stopped])
-    tell(write_report(args.out))
-    if args.suite in _OF_THE_PAPER:
-        _, write_page = _OF_THE_PAPER[args.suite]
-        tell(write_page(args.out))
+    measured: list[bool] = []
+    try:
+        with held_interrupts() as bench.interrupts:  # rows that are measured are written whatever happens
+            measured += [_write(args.out / RESULTS, bench, steps, _measured(bench, groups))]
+            lines = bench.until_stopped(bench.numerics(tested))
+            measured += [_write(args.out / NUMERICS, bench, _lines(tested), lines)]
+            if args.suite == "octrees":
+                measured += _octrees(args.out, bench)
+        if not any(measured):
+            if bench.stopped:
+                raise KeyboardInterrupt
+            raise InputError("; ".join(bench.notes) or "there is nothing to measure")
+        stopped = ["Stopped before the end."] if bench.stopped else []
+        _write_notes(args.out, [*missing, *bench.notes, *stopped])
+        _report(args)
+    except KeyboardInterrupt:
+        if any(measured):
+            warn(f"{args.out}: the rows are kept. With --report, 'scan4d bench' makes the page of them")
+        raise
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
     return int(bench.stopped)
 
 
-def _claim(args: Namespace, groups: Sequence[Group], numerics: bool) -> None:
+def _report(args: Namespace) -> None:
+    """Make the pages of the rows in the folder, and say what is there."""
+    tell(write_report(args.out))
+    if args.suite in _OF_THE_PAPER:
+        _, write_page, _ = _OF_THE_PAPER[args.suite]
+        tell(write_page(args.out))
+
+
+def _report_files(args: Namespace) -> list[Path]:
+    """What `_report` writes, and the plots that it replaces by its own."""
+    names = [PAGE]
+    if args.suite in _OF_THE_PAPER:
+        *_, name = _OF_THE_PAPER[args.suite]
+        names += [f"{name}.md", f"{name}.json"]
+    return [*(args.out / name for name in names), *sorted((args.out / "plots").glob("*.png"))]
+
+
+def _claim(args: Namespace, settings: Settings, groups: Sequence[Group], numerics: bool) -> None:
     """Raise InputError where the folder has results that are not to be replaced."""
-    names = [*([RESULTS] if groups else []), *([NUMERICS] if numerics else []), PAGE]
+    names = [*([RESULTS] if groups else []), *([NUMERICS] if numerics else []), NOTES]
     if args.suite == "octrees":
         names += [OCTREES, OCTREE_SIZES]
+    judged = [group for group in groups if group.judged and not group.sweep]
+    scenes = dict.fromkeys(settings.subject(group).name for group in judged)
+    drawn = dict.fromkeys(contender.backend for group in judged for contender in group.contenders)
+    outputs = [*(args.out / name for name in names), *_report_files(args)]
+    outputs += [picture_path(args.out, scene, name) for scene, name in product(scenes, drawn)]
     compared = [args.compare, args.compare / RESULTS] if args.compare else []
-    claim([args.out / name for name in names], [*compared, *map(Path, args.scene or ())], args.force)
+    claim(outputs, [*compared, *map(Path, args.scene or ())], args.force)
 
 
 def _measured(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
@@ -243,7 +288,7 @@ def _groups(args: Namespace, settings: Settings, names: Sequence[str]) -> tuple[
         return [], []
     missing = {name: reason for name, reason in catalog.names(settings.data).items() if reason}
     if args.suite in _OF_THE_PAPER:
-        make_groups, _ = _OF_THE_PAPER[args.suite]
+        make_groups, *_ = _OF_THE_PAPER[args.suite]
         groups = make_groups()
         lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
         return [group for group in groups if group.scene not in lacking], _left_out(lacking)

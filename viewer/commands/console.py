@@ -1,10 +1,13 @@
 """What a command says while it works: results on standard output; warnings and progress on standard error.
 
-Control characters that files and names bring are shown as \\x1b, and do nothing to a terminal.
+Control characters that files and names bring are shown as \\x1b, and do nothing to a terminal. What was
+written is named as it is where a program reads that.
 """
 
 from __future__ import annotations
 
+import codecs
+import errno
 import json
 import os
 import re
@@ -12,6 +15,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
+from pathlib import Path
 from typing import Any, TextIO
 
 from ..errors import Scan4DError, explained
@@ -19,6 +23,8 @@ from ..errors import Scan4DError, explained
 # What ends lines or moves, colours or turns round what stands there; and surrogates, which nothing can show.
 _CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 _is_quiet = False
+# How a stream treats what is no text: the bytes of names stay, all else is escaped.
+NAMES_AS_THEY_ARE = "scan4d.names"
 
 
 def plain(text: str, keep: str = "") -> str:
@@ -43,9 +49,17 @@ def complain(text: str) -> None:
 
 
 def tell(*lines: object) -> None:
-    """Lines on standard output, at once: what was written, or will take how long. None under --quiet."""
+    """Lines on standard output, at once: what was written, or will take how long. None under --quiet.
+
+    A Path is the name of a file, for programs to open.
+    """
     if not _is_quiet:
-        print(*lines, sep="\n", flush=True)
+        for line in lines:
+            if isinstance(line, Path) and isinstance(sys.stdout, PlainOutput):
+                sys.stdout.write_name(line)
+            else:
+                print(line)
+        sys.stdout.flush()
 
 
 def say(**values: object) -> None:
@@ -90,6 +104,7 @@ class ReaderGone(Exception):
 class PlainOutput:
     """Standard output as commands print to it: with control characters escaped.
 
+    Names of files are not where the stream treats errors as NAMES_AS_THEY_ARE.
     Where it cannot be written it raises Scan4DError or ReaderGone, once; later output goes nowhere, so that
     Python does not complain of it at its end.
     """
@@ -100,6 +115,11 @@ class PlainOutput:
     def write(self, text: str) -> int:
         """As of a stream."""
         return self._do(lambda: self._stream.write(plain(text, keep="\n")))
+
+    def write_name(self, path: Path) -> None:
+        """The name of a file, on a line of its own."""
+        is_exact = self._stream.errors == NAMES_AS_THEY_ARE
+        self._do(lambda: self._stream.write(f"{path if is_exact else plain(str(path))}\n"))
 
     def flush(self) -> None:
         """As of a stream."""
@@ -113,8 +133,24 @@ class PlainOutput:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
             if isinstance(error, BrokenPipeError):
                 raise ReaderGone from error
-            what, hint = explained(error)
+            is_closed = error.errno == errno.EBADF
+            what, hint = ("it is closed", None) if is_closed else explained(error)
             raise Scan4DError(f"cannot be written: {what}", "standard output", hint) from error
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+
+def _bytes_of_names(error: UnicodeError) -> tuple[bytes, int]:
+    """What is written for characters that are no text: the bytes that they stand for in names, or escapes."""
+    assert isinstance(error, UnicodeEncodeError)
+    letters = error.object[error.start : error.end]
+    return b"".join(map(_byte_or_escape, letters)), error.end
+
+
+def _byte_or_escape(letter: str) -> bytes:
+    is_byte = "\udc80" <= letter <= "\udcff"  # as `os.fsdecode` has it
+    return bytes([ord(letter) - 0xDC00]) if is_byte else letter.encode("ascii", "backslashreplace")
+
+
+codecs.register_error(NAMES_AS_THEY_ARE, _bytes_of_names)

@@ -96,7 +96,7 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
 def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> None:
     known = sorted([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
     check_output(args.out, known, several=len(indices) > 1)
-    claim(frame_outputs(args.out, indices), scan_inputs(timeline), args.force)
+    claim(frame_outputs(args.out, indices, timeline), scan_inputs(timeline), args.force)
     with frame_files(args.out) as file_of, progress(len(indices)) as tick:
         for pose in read_poses(timeline, indices):
             formats.write(file_of(pose), pose.cloud, pose.views)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
+import os
 import re
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+import shlex
+from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from importlib import import_module
+from itertools import takewhile
 from typing import Any, NoReturn
 
 from .. import __version__
@@ -15,43 +17,111 @@ from ..geometry import up_vector
 
 _SIGNED_OPTIONS = ("--orbit", "--up")
 _SIGNED_VALUE = re.compile(r"-([xyz]$|[0-9.])")
-_ASSIGNING_OPTIONS = ("--set", "--look")
-_OPTION = re.compile(r"(?<![\w-])(--[a-z][a-z-]*|-[a-z])\b")
 _MOST_NAMED = 3  # of words that are too many
 
 
 def parsed(words: Sequence[str], commands: Sequence[str]) -> Namespace:
     """The arguments, with the command's `run`. Raises InputError; SystemExit after --help and --version."""
-    named = [word for word in words[:1] if not word.startswith("-")]
-    if named and named[0] not in commands:
-        raise unknown_name("command", named[0], commands)
+    named = [word for word in words[:1] if word in commands]
+    if not named and words and words[0] not in ("--version", "--help", "-h"):
+        raise _no_command(words, commands)
     # A command's module brings what it works with: only what is named is imported, and all for the help.
-    parser = _parser([] if words[:1] == ["--version"] else named or commands)
-    args, unknown = parser.parse_known_args(_assigned_singly(_signed_values_joined(words)))
-    if unknown:
-        raise _not_understood(unknown, args)
-    if args.command is None:
+    parser, parsers = _parsers([] if words[:1] == ["--version"] else named or commands)
+    if not named:
+        parser.parse_args(words[:1])  # ends with what they ask for
         parser.print_help()
         raise SystemExit
+    words = _signed_values_joined(words[1:])
+    parsers[named[0]].check_words(words)
+    args, unknown = parser.parse_known_args([*named, *parsers[named[0]].said_singly(words)])
+    if unknown:
+        raise _too_many(unknown, args.parser)
     return args
 
 
 class _Parser(ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise InputError(message, hint=f"See '{self.prog} --help'")
+    """A parser whose errors are InputErrors."""
 
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
+    def error(self, message: str) -> NoReturn:
+        raise InputError(message, hint=self.see)
+
+    def _check_value(self, action: Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             raise unknown_name(f"value of {'/'.join(action.option_strings)}", value, map(str, action.choices))
 
+    @property
+    def see(self) -> str:
+        """Where more is told."""
+        return f"See '{self.prog} --help'"
 
-def _parser(commands: Sequence[str]) -> ArgumentParser:
-    """The parser of these commands."""
+    @property
+    def takes(self) -> str:
+        """The names that are given without an option."""
+        return " ".join(str(action.metavar) for action in self._get_positional_actions())
+
+    @property
+    def options(self) -> dict[str, Action]:
+        """What each option does."""
+        return {name: action for action in self._actions for name in action.option_strings}
+
+    def check_words(self, words: Sequence[str]) -> None:
+        """Raise InputError for unknown options and empty names, before any of those that are missing."""
+        options = self.options
+        for word in takewhile(lambda word: word != "--", words):
+            name = word.partition("=")[0]
+            joined = "" if word.startswith("--") else word[:2]  # a short one with its value right behind it
+            if _is_option(word) and name not in options and joined not in options:
+                hint = did_you_mean(name, options)
+                raise InputError(f"unknown option '{shortened(name)}'", hint=hint + self.see)
+        for before, word in zip([self.prog, *words], words, strict=False):
+            if not word or (word[-1] == "=" and word[:-1] in options):
+                hint = f"Perhaps a variable of the shell is not set. {self.see}"
+                raise InputError(f"the name after '{word or shortened(before)}' is empty", hint=hint)
+
+    def said_singly(self, words: Sequence[str]) -> list[str]:
+        """--set a=1 b=2 SCAN as --set=a=1 --set=b=2 SCAN, as argparse would take SCAN for a value as well.
+
+        The same for all options of several words: the first one that cannot be meant for it ends it.
+        """
+        single: list[str] = []
+        option = None  # that the word before belongs to
+        for word in words:
+            action = self.options.get(option or "")
+            is_first = single[-1:] == [option]  # which is told to be wrong, where it is
+            if action and not _is_option(word) and (is_first or _is_meant(word, action)):
+                if is_first:
+                    single.pop()
+                single.append(f"{option}={word}")
+            else:
+                single.append(word)
+                own = self.options.get(word)
+                option = word if own and own.nargs == "+" and "--" not in single else None
+        return single
+
+
+def _is_option(word: str) -> bool:
+    """Whether argparse takes a word for an option: not "-", nor -30, nor where a blank is in it."""
+    return word.startswith("-") and word[1:2] not in {"", ".", *"0123456789"} and " " not in word
+
+
+def _is_meant(word: str, action: Action) -> bool:
+    """Whether a word can be a value of an option, or one that is spelt wrong."""
+    try:
+        value = action.type(word) if callable(action.type) else word
+    except (ArgumentTypeError, ValueError):
+        return False
+    if action.choices is None or value in action.choices:
+        return True
+    return not os.path.exists(word) and bool(did_you_mean(word, map(str, action.choices)))
+
+
+def _parsers(commands: Sequence[str]) -> tuple[_Parser, dict[str, _Parser]]:
+    """The parser of these commands, and that of each of them."""
     parser = _Parser(
         prog="scan4d", description="Viewer and headless renderer for 4D scans.", allow_abbrev=False
     )
     parser.add_argument("--version", action="version", version=f"scan4d {__version__}")
-    parser.set_defaults(parser=parser)
+    parsers: dict[str, _Parser] = {}
     its_commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     common = _common_arguments()
     for name in commands:
@@ -67,7 +137,8 @@ def _parser(commands: Sequence[str]) -> ArgumentParser:
         )
         module.add_arguments(command)
         command.set_defaults(run=module.run, parser=command)
-    return parser
+        parsers[name] = command
+    return parser, parsers
 
 
 def _common_arguments() -> _Parser:
@@ -84,7 +155,7 @@ def _common_arguments() -> _Parser:
     group.add_argument(
         "-q", "--quiet", action="store_true", help="no progress, no warnings, no names of what was written"
     )
-    group.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    group.add_argument("--debug", action="store_true", help="show the tracebacks of errors")
     return parser
 
 
@@ -110,32 +181,28 @@ def _signed_values_joined(words: Sequence[str]) -> list[str]:
     return joined
 
 
-def _assigned_singly(words: Sequence[str]) -> list[str]:
-    """--set a=1 b=2 SCAN as --set=a=1 --set=b=2 SCAN, which argparse would take for a value as well."""
-    single: list[str] = []
-    option = None  # that the word before belongs to
-    for word in words:
-        if option and "=" in word and not word.startswith("-"):
-            if single[-1] == option:
-                single.pop()
-            single.append(f"{option}={word}")
-        else:
-            option = word if word in _ASSIGNING_OPTIONS else None
-            single.append(word)
-    return single
+def _no_command(words: Sequence[str], commands: Sequence[str]) -> InputError:
+    """The error for words that do not begin with a command."""
+    see = f"Known: {', '.join(commands)}. See 'scan4d --help'"
+    first = shortened(words[0])
+    if later := [word for word in words if word in commands]:
+        hint = f"Write it after '{later[0]}'. See 'scan4d {later[0]} --help'"
+        return InputError(f"'{first}' stands before the command", hint=hint)
+    if files := [word for word in words if os.path.exists(word)]:
+        name = shlex.quote(files[0])
+        hint = f"'scan4d view {name}' shows it, 'scan4d render {name} -o picture.png' draws it. {see}"
+        return InputError("a command is missing", hint=hint)
+    if first and not first.startswith("-"):
+        return unknown_name("command", words[0], commands)
+    return InputError(f"a command is missing before '{first}'", hint=see)
 
 
-def _not_understood(unknown: Sequence[str], args: Namespace) -> InputError:
+def _too_many(words: Sequence[str], parser: _Parser) -> InputError:
     """The error for words that the command has no place for."""
-    see = f"See '{args.parser.prog} --help'"
-    options = [word.partition("=")[0] for word in unknown if word.startswith("-") and word != "-"]
-    if options:
-        known = sorted(set(_OPTION.findall(args.parser.format_help())))
-        if options[0] in known:
-            return InputError(f"'{options[0]}' stands before the command", hint=f"Write it after. {see}")
-        hint = did_you_mean(options[0], known)
-        return InputError(f"unknown option '{shortened(options[0])}'", hint=hint + see)
-    more = ", ".join(f"'{shortened(word)}'" for word in unknown[:_MOST_NAMED])
-    what = f"{more}{', ...' if len(unknown) > _MOST_NAMED else ''}: one scan is named, and this is too much"
-    hint = f"If the shell has put files in the place of a pattern, quote it: 'frame*.ply'. {see}"
+    more = ", ".join(f"'{shortened(word)}'" for word in words[:_MOST_NAMED])
+    rest = ", ..." if len(words) > _MOST_NAMED else ""
+    what = f"{more}{rest}: too much, as '{parser.prog}' takes {parser.takes or 'options alone'}"
+    if not parser.takes:
+        return InputError(what, hint=parser.see)
+    hint = f"If the shell has put files in the place of a pattern, quote it: 'frame*.ply'. {parser.see}"
     return InputError(what, hint=hint)

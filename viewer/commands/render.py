@@ -83,7 +83,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="lighting, colours and background",
     )  # fmt: skip
     picture.add_argument(
-        "--marks", choices=MARKS, nargs="+", metavar="MARK",
+        "--marks", choices=MARKS, nargs="+", action="extend", metavar="MARK",
         help=f"draw over .png and .mp4: {', '.join(MARKS)}",
     )  # fmt: skip
     camera = parser.add_argument_group("from where").add_mutually_exclusive_group()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 import re
 from argparse import ArgumentParser, Namespace
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,9 +16,10 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..export import is_pattern, numbered
-from ..files import printable, whole_file
+from ..files import absolute, printable, whole_file
 from ..look import COLOR_BY, Look, drawable
-from ..scan.open import open_scan
+from ..scan import formats
+from ..scan.open import entries, open_scan
 from ..scan.points import Bounds
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -156,13 +159,17 @@ def _report(timeline: Timeline, said: int) -> int:
     return said + len(messages)
 
 
-def frame_outputs(out: Path, indices: Sequence[int]) -> list[Path]:
-    """All that `frame_files` leads to. Raises InputError where a times.csv tells the times of other files."""
+def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list[Path]:
+    """All that `frame_files` leads to, of these poses of a scan.
+
+    Raises InputError where a times.csv tells the times of other files, or would be one to other frames.
+    """
     files = [numbered(out, index) for index in indices]
     if not is_pattern(out):
         return files
     times_file = out.with_name(TIMES_FILE)
     _check_times_file(times_file, {printable(file.name) for file in files})
+    _check_other_frames(out, {file.name for file in files}, timeline)
     return [*files, times_file]
 
 
@@ -194,3 +201,35 @@ def _check_times_file(path: Path, names: set[str]) -> None:
         told = {"?"}
     if told - names - {"file"}:
         raise InputError("tells the times of other files", path, "Write into a folder of its own")
+
+
+def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
+    """Raise InputError where a times.csv beside these outputs would have to tell when other frames are.
+
+    These are files of the same kind, and several of another one: a single file needs no times. Those in a
+    folder `frames` as well, and those of the scan itself that are in several folders.
+    """
+    folder = out.parent
+    found = [file for file in _scan_files(folder) if file.name not in names]
+    found += _scan_files(folder / "frames")
+    if len(timeline.files) > 1 and os.path.samefile(_common_folder(timeline.files), folder):
+        found += [file for file in timeline.files if file.parent != folder]
+    kinds = Counter(file.suffix.lower() for file in found)
+    if kinds[out.suffix.lower()] or any(count > 1 for count in kinds.values()):
+        what = f"holds other frames, such as {found[0].name}, whose times its {TIMES_FILE} would not tell"
+        raise InputError(what, folder, "Write into a folder of its own")
+
+
+def _scan_files(folder: Path) -> list[Path]:
+    """The files in a folder that can be frames, if it is there."""
+    if not os.path.isdir(folder):
+        return []
+    known = set(formats.known_suffixes())
+    there = [entry for entry in sorted(entries(folder)) if not entry.name.startswith(".")]
+    return [
+        file for file in there if file.suffix.lower() in known and file.name != TIMES_FILE and file.is_file()
+    ]
+
+
+def _common_folder(files: Sequence[Path]) -> Path:
+    return Path(os.path.commonpath([absolute(file.parent) for file in files]))

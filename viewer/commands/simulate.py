@@ -56,7 +56,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     places.add_argument(
         "--pods", type=int, default=2, metavar="N", help="1 to 8; default 2, left and right of the front"
     )
-    places.add_argument("--azimuths", type=float, nargs="+", metavar="A", help="of each pod, degrees")
+    places.add_argument(
+        "--azimuths", type=float, nargs="+", action="extend", metavar="A", help="of each pod, degrees"
+    )
     pods.add_argument("--elevation", type=float, default=0.0, metavar="E", help="of all pods, degrees")
     pods.add_argument(
         "--size",
@@ -95,7 +97,7 @@ def run(args: Namespace) -> int:
         check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
         shared = args.faces or _faces_beside(Path(args.scan))
         inputs = [*scan_inputs(timeline), *([shared] if shared else [])]
-        claim(frame_outputs(args.out, indices), inputs, args.force)
+        claim(frame_outputs(args.out, indices, timeline), inputs, args.force)
         faces_of = _faces_reader(timeline, shared)
         faces_of(indices[0])  # told before all frames are looked at
         aspect = args.size[0] / args.size[1]

@@ -134,4 +134,4 @@ def _play(args: Namespace, scan: str, prefix: str) -> None:
                     thumbnails.append(thumbnail(image))
                 tick()
     contact_sheet(thumbnails, f"{name}_contact_sheet.png")
-    tell(f"{name}_%04d.png\n{name}_contact_sheet.png\n{name}.mp4")
+    tell(*(Path(f"{name}{end}") for end in ("_%04d.png", "_contact_sheet.png", ".mp4")))
