@@ -191,6 +191,31 @@ def test_ctrl_c_before_the_first_row_leaves_former_results(
     assert not (tmp_path / "report.html").exists()
 
 
+def test_rows_of_a_run_that_was_stopped_before_its_report_make_one_later(
+    run: Run, refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(folder: Path) -> Path:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as context:
+        context.setattr(bench, "write_report", interrupted)
+        done = run("bench", "--suite", "numerics", "--backend", "points", "-o", tmp_path)
+    assert done.code == 1
+    kept, stopped = done.err.splitlines()
+    assert "the rows are kept. With --report" in kept
+    assert stopped == "scan4d: stopped"
+    assert not (tmp_path / "report.html").exists()
+
+    rows = (tmp_path / "numerics.jsonl").read_bytes()
+    done = run("bench", "-o", tmp_path, "--report")
+    assert done == (0, f"{tmp_path / 'report.html'}\n", "")
+    assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert (tmp_path / "numerics.jsonl").read_bytes() == rows
+    assert "report.html: is there already" in refused("bench", "-o", tmp_path, "--report")
+    assert "--report" in refused("bench", "-o", tmp_path, "--report", "--scene", "sphere")
+    assert "no results" in refused("bench", "-o", tmp_path / "nowhere", "--report")
+
+
 def test_points_without_faces_are_no_scene(refused: Refused, tmp_path: Path) -> None:
     path = write_ply(tmp_path / "points.ply", faces=False)
     assert "faces" in refused("bench", "--scene", path, "-o", tmp_path / "out")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import shutil
@@ -306,6 +307,18 @@ def test_a_scan_may_follow_parameters(run: Run, scans: Path, tmp_path: Path) -> 
     assert all(np.array_equal(bits(before[name]), bits(stored(tmp_path / "a.npz")[name])) for name in before)
 
 
+def test_a_scan_may_follow_options_of_several_words(run: Run, scans: Path, tmp_path: Path) -> None:
+    ball = scans / "ball.npz"
+    marks = ("--marks", "stamp", "scale_bar")
+    assert run("render", *marks, ball, "-o", tmp_path / "a.png", *SMALL).code == 0
+    assert run("render", ball, "-o", tmp_path / "b.png", *SMALL, *marks).code == 0
+    assert np.array_equal(picture(tmp_path / "a.png"), picture(tmp_path / "b.png"))
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    pods = ("simulate", "--azimuths", -30, "10.5", tmp_path / "mesh.obj", "-o", tmp_path / "a.exr")
+    assert run(*pods, "--size", "9x9").code == 0
+    assert len(json.loads(run("info", tmp_path / "a.exr", "--json").out)["views"]) == 2
+
+
 # --- stats ----------------------------------------------------------------------------------
 
 
@@ -412,7 +425,11 @@ def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
         (["--look", "colour_by=depth"], ["Did you mean 'color_by' or 'color_map'?"]),
         (["--look", "color_by=hight"], ["Did you mean 'height'?"]),
         (["--marks", "stmp"], ["--marks 'stmp'. Did you mean 'stamp'?"]),
-        (["b.npz", "c.npz"], ["'b.npz', 'c.npz'", "quote it", "'scan4d render --help'"]),
+        (["b.npz", "c.npz"], ["'b.npz', 'c.npz'", "takes SCAN", "quote it", "'scan4d render --help'"]),
+        (["--marks", "stamp", "colr_bar"], ["--marks 'colr_bar'. Did you mean 'color_bar'"]),
+        (["--camera", ""], ["after '--camera' is empty"]),
+        (["--output="], ["after '--output=' is empty"]),
+        (["-y"], ["unknown option '-y'"]),
         (["--unit", "m" * 5000], ["--unit", "no unit"]),
         (["--unit", "\x1b[31m"], [r"'\x1b[31m' is no unit"]),
         (["--backend", "\x1b]0;p\x07\n\u202e"], [r"'\x1b]0;p\x07\n\u202e'"]),
@@ -433,8 +450,20 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     message = refused("rendre", "x")
     assert all(name in message for name in ("'rendre'. Did you mean 'render'?", *cli.COMMANDS))
     assert "'scan4d --help'" in refused("--bogus")
-    assert "Write it after" in refused("-q", "info", scans / "ball.npz")
+    assert "Write it after 'info'" in refused("-q", "info", scans / "ball.npz")
     assert "-o" in refused("render", scans / "ball.npz")
+    assert "'--outptu'. Did you mean '--output'" in refused("render", "demo", "--outptu", "x.png")
+    for words in (["--set", "a=1", scans / "ball.npz"], [scans / "ball.npz"]):
+        message = refused(*words)
+        assert f"a command is missing. 'scan4d view {scans / 'ball.npz'}' shows it" in message
+        assert all(name in message for name in cli.COMMANDS)
+    assert "a command is missing before '--set'" in refused("--set", "a=1", "nowhere.ply")
+    for command in ("doctor", "backends"):
+        message = refused(command, "extra")
+        assert f"'extra': too much, as 'scan4d {command}' takes options alone" in message
+        assert "quote" not in message
+    assert "'c': too much, as 'scan4d convert' takes SCAN OUT" in refused("convert", "a", "b", "c")
+    assert "the name after 'scan4d info' is empty" in refused("info", "")
     assert "SCAN" in refused("info")
     done = run()
     assert (done.code, done.err) == (0, "")
@@ -475,6 +504,34 @@ def test_errors_that_follow_an_interrupt_are_the_interrupt(
 def test_debug_shows_the_traceback_of_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["info", "nowhere.ply", "--debug"]) == 2
     assert capsys.readouterr().err.startswith("Traceback")
+
+
+@pytest.mark.parametrize("debug", [False, True])
+def test_debug_shows_what_fails_in_the_window(
+    debug: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from viewer import app
+
+    def fail(*_: object, **__: object) -> int:
+        log = logging.getLogger("viewer.app.failures")
+        try:
+            raise ZeroDivisionError("by \x1bnought")
+        except ZeroDivisionError as error:
+            log.error("%s failed", "A frame", exc_info=error)
+        log.debug("all else")
+        return 0
+
+    monkeypatch.setattr(app, "run", fail)
+    monkeypatch.setenv("DISPLAY", ":7")
+    before = list(logging.getLogger("viewer").handlers)
+    assert cli.main(["view", "demo", *(["--debug"] if debug else [])]) == 0
+    err = capsys.readouterr().err
+    if debug:
+        assert err.startswith("scan4d: A frame failed\nTraceback")
+        assert err.endswith("ZeroDivisionError: by \\x1bnought\n")
+    else:
+        assert err == ""
+    assert logging.getLogger("viewer").handlers == before
 
 
 def test_no_opengl_is_code_3(run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -564,7 +621,27 @@ def test_output_that_cannot_be_written_is_told(where: str, words: str, tmp_path:
     line = f"{sys.executable} -m viewer.cli {words.format(tmp_path)} {where}"
     done = subprocess.run(line, shell=True, capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 1
-    assert re.fullmatch(r"scan4d: standard output: cannot be written: [^\n]+\n", done.stderr), done.stderr
+    why = "it is closed" if where == ">&-" else "the disk is full. Make room, or use another disk"
+    assert done.stderr == f"scan4d: standard output: cannot be written: {why}\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text elsewhere")
+@pytest.mark.parametrize("in_terminal", [False, True])
+def test_what_was_written_is_named_byte_by_byte_for_programs(in_terminal: bool, tmp_path: Path) -> None:
+    name = b"a\xff\x1b\n\xe2\x82\xac.ply"
+    shown = b"a\\udcff\\x1b\\n\xe2\x82\xac.ply" if in_terminal else name
+    path = tmp_path / os.fsdecode(name)
+    words = [sys.executable, "-m", "viewer.cli", "convert", "demo", "--pose", "0", path]
+    environment = {**os.environ, "PYTHONIOENCODING": "utf-8"}
+    keyboard, terminal = os.openpty()
+    done = subprocess.run(
+        words, stdout=terminal if in_terminal else subprocess.PIPE, cwd=ROOT, env=environment, check=True
+    )
+    os.close(terminal)
+    out = os.read(keyboard, 1000).replace(b"\r\n", b"\n") if in_terminal else done.stdout
+    os.close(keyboard)
+    assert out == os.fsencode(tmp_path) + b"/" + shown + b"\n"
+    assert path.exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="has no /dev/full")

@@ -156,9 +156,77 @@ def test_what_is_there_is_replaced_by_force_alone(
     assert all(Path(name).read_bytes() != b"former" for name in there)
 
 
+@pytest.mark.parametrize(
+    ("out", "there"),
+    [
+        ("seq2/g%d.ply", "f0.ply"),
+        ("seq2/g%d.npz", "f0.ply"),
+        ("one/w%d.ply", "k0.ply"),
+        ("whole/x%d.npz", "f0.ply"),
+        ("several/o%d.npz", "f0.ply"),
+    ],
+)
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_other_frames_do_not_lose_their_times(
+    out: str, there: str, force: tuple[str, ...], refused: Refused, run: Run, folder: Path
+) -> None:
+    for name in ("seq2", "one", "whole/frames", "several/a", "several/b"):
+        Path(name).mkdir(parents=True)
+    formats.write("one/k0.ply", cloud())
+    for place in ("seq2", "whole/frames"):
+        for number in range(3):
+            formats.write(f"{place}/f{number}.ply", cloud())
+    for number, place in enumerate(("several/a", "several/b")):
+        formats.write(f"{place}/f{number}.ply", cloud())
+    scan = "several/*/f*.ply" if "several" in out else "seq2"
+    before = contents(folder)
+    message = refused("convert", scan, out, *force)
+    assert there in message
+    assert "Write into a folder of its own" in message
+    assert contents(folder) == before
+    for name in ("seq2", "seq2/f%d.ply", "one", "whole", "several/*/f*.ply"):
+        assert run("info", name).code == 0
+
+
+def test_frames_are_written_again_and_beside_files_that_need_no_times(run: Run, refused: Refused) -> None:
+    assert run("convert", "seq", "b%d.npz").code == 0  # a.ply, a.svo and mesh.obj are single files
+    assert run("convert", "seq", "b%d.npz", "--force").code == 0
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("mine")
+    assert run("convert", "seq", "out/b%d.ply", "--poses", "0:2").code == 0
+    assert "times of other files" in refused("convert", "seq", "out/b%d.ply", "--poses", "2:3")
+    assert run("convert", "seq", "out/b%d.ply", "--force").code == 0
+    with open_scan("out") as timeline:
+        assert timeline.times.tolist() == [0, 1, 2]
+
+
 def test_a_link_that_leads_nowhere_is_there(refused: Refused, folder: Path) -> None:
     os.symlink("nowhere", folder / "b.ply")
     assert "is there already" in refused("convert", "a.ply", "b.ply")
+
+
+@pytest.mark.parametrize(
+    ("there", "suite"),
+    [
+        ("notes.txt", "numerics"),
+        ("plots/mine.png", "numerics"),
+        ("pictures/sphere--points.png", "scenes"),
+        ("table-two.md", "slomp"),
+        ("octree-tables.json", "octrees"),
+    ],
+)
+def test_a_benchmark_replaces_nothing_that_is_not_told(
+    there: str, suite: str, run: Run, folder: Path
+) -> None:
+    path = folder / "results" / there
+    path.parent.mkdir(parents=True)
+    path.write_text("mine")
+    Path("data").mkdir()
+    scenes = ("--scene", "sphere", "--backend", "points") if suite == "scenes" else ()
+    done = run("bench", "--suite", suite, *scenes, "--quick", "--data", "data", "-o", "results")
+    assert done.code == 2
+    assert f"{there}: is there already" in done.err
+    assert [file.read_text() for file in folder.glob("results/**/*") if file.is_file()] == ["mine"]
 
 
 def test_a_benchmark_keeps_former_results_whatever_their_number(run: Run, folder: Path) -> None:
@@ -178,10 +246,10 @@ def test_in_a_terminal_it_is_asked_for_once(answer: str, code: int, folder: Path
     import pty
 
     for number in (0, 2):
-        Path(f"b{number}.ply").write_text("former")
+        Path(f"b{number}.pcd").write_text("former")
     keyboard, terminal = pty.openpty()
     with subprocess.Popen(
-        [sys.executable, "-m", "viewer.cli", "convert", "seq", "b%d.ply"],
+        [sys.executable, "-m", "viewer.cli", "convert", "seq", "b%d.pcd"],
         stdin=terminal, stdout=subprocess.PIPE, stderr=terminal, env={**os.environ, "PYTHONPATH": str(ROOT)},
     ) as process:  # fmt: skip
         os.close(terminal)
@@ -191,8 +259,8 @@ def test_in_a_terminal_it_is_asked_for_once(answer: str, code: int, folder: Path
         os.write(keyboard, f"{answer}\n".encode())
         assert process.wait() == code
     os.close(keyboard)
-    assert b"b0.ply: is there already, and 1 more. Replace? [y/N] " in shown
-    assert (Path("b2.ply").read_bytes() == b"former") == bool(code)
+    assert b"b0.pcd: is there already, and 1 more. Replace? [y/N] " in shown
+    assert (Path("b2.pcd").read_bytes() == b"former") == bool(code)
 
 
 # --- frames that lack a scalar ----------------------------------------------------------------

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +14,7 @@ from viewer.signals import ending_as_interrupts, held_interrupts
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
 ENDING = [signal.SIGTERM, signal.SIGHUP] if sys.platform != "win32" else []
+ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.mark.parametrize("number", ENDING)
@@ -66,3 +69,33 @@ def test_a_second_interrupt_waits_until_all_is_kept() -> None:
             signal.raise_signal(signal.SIGINT)
         kept = True
     assert kept
+
+
+STOPPED_AGAIN = """
+import atexit, signal, sys
+from viewer import cli
+from viewer.commands import info, line
+
+def stop(*_):
+    signal.raise_signal(signal.{first})
+
+def told(text, complain=line.complain):
+    again()
+    complain(text)
+
+def again():
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.raise_signal(number)
+
+info.describe, line.complain = stop, told
+atexit.register(again)
+sys.argv[1:] = ["info", "demo"]
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.parametrize("first", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_who_says_that_it_is_stopped_ends_with_its_code(first: str) -> None:
+    code = STOPPED_AGAIN.format(first=first)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "scan4d: stopped\n")
