@@ -124,6 +124,61 @@ def test_what_unpacks_to_too_much_is_refused_and_can_be_allowed(
     assert formats.read(path)
 
 
+def columns_of(count: int, dropped: bool) -> dict[str, np.ndarray]:
+    """Of points that pack well, a third of which have no place where `dropped`."""
+    x = np.full(count, 3, np.float32)
+    x[::3] = np.nan if dropped else 3
+    zeros = np.zeros(count, np.float32)
+    return dict(
+        zip(
+            ["x", "y", "z", "nx", "ny", "nz", "q"], [x, zeros, zeros, zeros, zeros, zeros, zeros], strict=True
+        )
+    )
+
+
+def npz_of_columns(path: Path, dropped: bool) -> None:
+    columns = columns_of(4_500_000, dropped)
+    positions, normals = (
+        np.stack([columns[name] for name in names.split()], 1) for names in ("x y z", "nx ny nz")
+    )
+    colors = np.zeros((len(positions), 3), np.uint8)
+    np.savez_compressed(path, positions=positions, normals=normals, colors=colors, q=columns["q"])
+
+
+def pcd_of_columns(path: Path, dropped: bool) -> None:
+    columns = columns_of(3_500_000, dropped) | {"rgb": np.full(3_500_000, 0x808080, np.uint32)}
+    data = b"".join(column.tobytes() for column in columns.values())
+    packed = lzf.compress(data)
+    head = f"FIELDS {' '.join(columns)}\nSIZE{' 4' * 8}\nTYPE{' F' * 7} U\nCOUNT{' 1' * 8}\nPOINTS 3500000\n"
+    path.write_bytes(
+        f"{head}DATA binary_compressed\n".encode() + struct.pack("<II", len(packed), len(data)) + packed
+    )
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="peaks are read from /proc")
+@pytest.mark.parametrize("dropped", [False, True])
+@pytest.mark.parametrize(("make", "suffix"), [(npz_of_columns, ".npz"), (pcd_of_columns, ".pcd")])
+def test_what_reading_is_said_to_take_is_what_it_takes(
+    make: Callable[[Path, bool], None],
+    suffix: str,
+    dropped: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is refused below its peak, and not any more above 1.3 times that."""
+    path = tmp_path / f"scan{suffix}"
+    make(path, dropped)
+    monkeypatch.setenv(READ_VARIABLE, "4000")
+    peak, said = peak_of_reading(path)
+    assert peak > 180_000_000
+    assert not said
+    monkeypatch.setenv(READ_VARIABLE, str(peak >> 20))
+    with pytest.raises(InputError, match=r"reading its .* bytes would take"):
+        formats.read(path)
+    monkeypatch.setenv(READ_VARIABLE, str(int(1.3 * peak) >> 20))
+    assert len(formats.read(path))
+
+
 def test_the_memory_that_may_be_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(READ_VARIABLE, raising=False)
     assert most_memory(1 << 20) == (180 + 10) << 20

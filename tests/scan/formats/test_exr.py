@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import tracemalloc
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 import OpenEXR
@@ -15,6 +17,7 @@ from range_scenes import sphere_view
 from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.colors import linear_from_srgb8
+from viewer.scan.formats import exr
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import RangeView, merge
@@ -167,6 +170,30 @@ def test_damaged_parts_are_refused_and_standard_output_stays_clean(
     assert capsys.readouterr().out == ""
 
 
+@pytest.mark.parametrize("content", [b"", b"no picture", b"v/1\1" + bytes(200)])
+def test_what_is_no_exr_is_told_in_our_words(content: bytes, tmp_path: Path) -> None:
+    path = save(tmp_path / "f.exr", pods())
+    path.write_bytes(path.read_bytes()[: 0 if content else 60] + content)
+    for call in (formats.read, formats.read_unit):
+        with pytest.raises(InputError, match=r"f\.exr: is no EXR file, or damaged\. Check"):
+            call(path)
+
+
+def test_reading_opens_the_path_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the length is checked of the file that is read, also where another one takes its name."""
+    path, other = save(tmp_path / "f.exr", pods()), tmp_path / "other.exr"
+    other.write_bytes(b"another file")
+    look = exr._headers
+
+    def replaced(stream: BinaryIO) -> list[dict[str, Any]]:
+        headers = look(stream)
+        os.replace(other, path)
+        return headers
+
+    monkeypatch.setattr(exr, "_headers", replaced)
+    assert len(exr.read(path)) == 2
+
+
 def test_a_huge_window_is_refused_before_it_is_allocated(tmp_path: Path) -> None:
     path = save(tmp_path / "f.exr", pods())
     window, huge = struct.pack("<4i", 0, 0, 47, 39), struct.pack("<4i", 0, 0, 99_999, 99_999)
@@ -223,7 +250,7 @@ def test_a_sequence_opens_with_its_unit(tmp_path: Path) -> None:
         ("odd/exr/AllHalfValues.exr", "lacks: channel Z, attribute worldToCamera, attribute fx"),
         ("odd/exr/WideFloatRange.exr", "lacks: channel Z, attribute worldToCamera, attribute fx"),
         ("odd/exr/damaged_asan_561_c28c.exr", "lacks: channel Z"),
-        ("odd/exr/damaged_fuzz_5936.exr", "cannot be read as EXR"),
+        ("odd/exr/damaged_fuzz_5936.exr", "is no EXR file, or damaged"),
         ("range/openexr_beachball/singlepart.0001.exr", "'rgba' is no range view, it lacks: attribute world"),
         ("range/openexr_beachball/multipart.0001.exr", "'rgba_right' is no range view, it lacks: channel Z"),
         ("range/openexr_deep/LowResLeftView_Balls.exr", "'rgba.left' is a deep image"),

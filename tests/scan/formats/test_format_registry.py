@@ -68,6 +68,12 @@ def test_unknown_suffix_lists_the_known(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"unknown file suffix '\.stl'") as caught:
             call(tmp_path / "scan.stl")
         assert all(suffix in str(caught.value) for suffix in formats.known_suffixes())
+    for suffix in (".json", ".ptx"):  # near to one that is another format
+        path = tmp_path / f"scan{suffix}"
+        path.write_text("{}")
+        with pytest.raises(InputError, match=r"unknown file suffix '\..*'\. Known: \.csv, ") as caught:
+            formats.read(path)
+        assert "Did you mean" not in str(caught.value)
     with pytest.raises(InputError, match=r"cannot write '\.obj' files.*\.npz, \.pcd, \.ply"):
         formats.write(tmp_path / "scan.obj", PointCloud.from_arrays(np.eye(3)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 import tracemalloc
 import warnings
 import zipfile
@@ -14,7 +15,7 @@ import pytest
 from viewer.errors import InputError
 from viewer.scan.formats import frame_count, read, read_times, write
 from viewer.scan.open import open_scan
-from viewer.scan.points import PointCloud
+from viewer.scan.points import PointCloud, choose_origin
 
 RNG = np.random.default_rng(11)
 SEQUENCE = RNG.random((4, 30, 3), np.float32) - 0.5
@@ -86,6 +87,33 @@ def test_an_origin_is_kept_and_added(path: Path) -> None:
     np.testing.assert_array_equal(cloud.positions, SEQUENCE[0])
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("given", [(0, 0, 0), (500_000.25, 0, 0)])
+def test_an_origin_far_from_the_points_is_chosen_anew(
+    given: tuple[float, float, float], dtype: type, path: Path
+) -> None:
+    place = np.array([500_000, 5_400_000, 100.0])
+    points = np.random.default_rng(3).random((1000, 3)).round(3) + place
+    stored = (points - given).astype(dtype)
+    np.savez(path, positions=stored, origin=np.array(given))
+    cloud = read(path)
+    world = stored.astype(np.float64) + given
+    np.testing.assert_array_equal(cloud.origin, choose_origin(world))
+    np.testing.assert_allclose(cloud.world(), world, rtol=0, atol=1e-6)
+    np.testing.assert_array_less(np.abs(cloud.positions), 2)
+
+
+@pytest.mark.parametrize("scale", [1, 1e-3, 1e5])
+def test_an_origin_that_is_written_comes_back_bit_for_bit(scale: float, path: Path) -> None:
+    rng = np.random.default_rng(5)
+    for place in rng.normal(0, 1e6, (8, 3)):
+        cloud = PointCloud.from_arrays(rng.normal(0, scale, (200, 3)) + place)
+        write(path, cloud)
+        back = read(path)
+        assert back.positions.tobytes() == cloud.positions.tobytes()
+        assert back.origin.tobytes() == cloud.origin.tobytes()
+
+
 def test_a_round_trip_is_exact(full_cloud: PointCloud, path: Path) -> None:
     write(path, full_cloud)
     back = read(path)
@@ -154,6 +182,57 @@ def test_a_zip_bomb_is_refused_before_it_unpacks(path: Path) -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1_000_000
+
+
+def end_of_archive(entry: bytes, count: int, told: int, large: bool) -> bytes:
+    """A directory of so many members and the records behind it, which tell of `told`."""
+    directory = entry * count
+    small = (0xFFFF, 0xFFFFFFFF) if large else (told, len(directory))
+    records = b""
+    if large:
+        records += struct.pack("<4sQ2H2L4Q", b"PK\6\6", 44, 45, 45, 0, 0, told, told, len(directory), 0)
+        records += struct.pack("<4sLQL", b"PK\6\7", 0, len(directory), 1)
+    records += struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, small[0], *small, 0, 0)
+    return directory + records
+
+
+@pytest.mark.parametrize(
+    ("told", "large", "reason"),
+    [
+        (60_000, True, "has 60,000 members, more than the 4,096 that are read"),
+        (60_000, False, "has 60,000 members, more than"),
+        (1, True, "has 2,820,000 bytes of names, more than"),
+        (1, False, "has 2,820,000 bytes of names, more than"),
+    ],
+)
+def test_a_directory_of_very_many_members_is_refused_before_it_is_read(
+    told: int, large: bool, reason: str, path: Path
+) -> None:
+    entry = struct.pack("<4s4B4HL2L5H2L", b"PK\1\2", 20, 0, 20, *[0] * 8, 1, *[0] * 6) + b"a"
+    path.write_bytes(end_of_archive(entry, 60_000, told, large))
+    tracemalloc.start()
+    with pytest.raises(InputError, match=reason):
+        read(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2_000_000
+
+
+def test_an_archive_may_end_with_a_remark_and_hold_other_members(path: Path) -> None:
+    np.savez(path, positions=SEQUENCE[0])
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.comment = b"PK" * 20_000
+        for number in range(2000):
+            archive.writestr(f"{number}.txt", "")
+    assert len(read(path)) == len(SEQUENCE[0])
+
+
+def test_an_array_that_is_damaged_is_told(path: Path) -> None:
+    """Arrays are read when the cloud is made, and what goes wrong then is one message too."""
+    np.savez(path, positions=SEQUENCE[0], heat=np.full(len(SEQUENCE[0]), 7.25))
+    path.write_bytes(path.read_bytes().replace(struct.pack("<d", 7.25), struct.pack("<d", 7.5), 1))
+    with pytest.raises(InputError, match=r"Bad CRC-32 for file 'heat\.npy'"):
+        read(path)
 
 
 def test_constant_arrays_of_modest_size_are_no_bomb(path: Path) -> None:

@@ -144,6 +144,33 @@ def test_huge_promises_in_rare_forms_allocate_nothing(
         read(path)
 
 
+@pytest.mark.parametrize("length_type", ["char", "short", "int32"])
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_a_list_of_a_negative_length_is_refused(length_type: str, encoding: str, path: Path) -> None:
+    header = f"element vertex 2\n{XYZ}property list {length_type} uchar q\n"
+    order = ">" if encoding == "binary_big_endian" else "<"
+    row = np.dtype(
+        [("p", order + "f4", 3), ("k", order + {"char": "i1", "short": "i2", "int32": "i4"}[length_type])]
+    )
+    rows = np.zeros(2, row)
+    rows["k"][1] = -5
+    body = "1 2 3 0\n1 2 3 -5 7\n" if encoding == "ascii" else rows.tobytes() + bytes(9)
+    with pytest.raises(InputError, match="row 1 of vertex has a list of a negative length"):
+        read(save(path, header, body, encoding))
+    unsigned = {"char": "uchar", "short": "ushort", "int32": "uint32"}[length_type]
+    with pytest.raises(InputError, match=r"negative|holds 1 of the 2 vertices"):
+        read(save(path, header.replace(length_type, unsigned, 1), body, encoding))
+
+
+@pytest.mark.parametrize("length", ["9" * 5000, "three", "1.5"])
+def test_lengths_that_are_no_number_are_told_in_our_words(length: str, path: Path) -> None:
+    header = f"element vertex 1\n{XYZ}property list int int q\n"
+    told = "the length of q in row 0 of vertex is '.*', which is no whole number that can be used"
+    with pytest.raises(InputError, match=told) as caught:
+        read(save(path, header, f"1 2 3 {length}\n"))
+    assert len(str(caught.value)) < 400
+
+
 def test_faces_are_not_taken_for_missing_vertices(path: Path) -> None:
     header = "element vertex 3\n" + XYZ + "element face 2\nproperty list uchar int vertex_indices\n"
     save(path, header, "0 0 0\n1 0 0\n3 0 1 1\n3 0 1 1\n")

@@ -239,3 +239,10 @@ def test_the_matrices_beside_real_range_scans(data_dir: Path) -> None:
     for file in files:
         with pytest.raises(InputError, match=r"looks like a (camera pose|matrix of camera intrinsics)"):
             read(file)
+
+
+def test_a_count_of_very_many_digits_is_told_in_our_words(tmp_path: Path) -> None:
+    path = tmp_path / "scan.pts"
+    path.write_text("9" * 5000 + "\n1 2 3\n")
+    with pytest.raises(InputError, match=r"the count of its points is '9+\.{3}', which is no whole number"):
+        read(path)

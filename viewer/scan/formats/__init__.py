@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, Scan4DError, explained, unknown_name
+from ...errors import InputError, Scan4DError, explained, shortened
 from ...files import whole_file
 from ..points import PointCloud
 from ..pose import Pose, Scanned
@@ -208,8 +208,8 @@ def _readable(path: Path) -> ModuleType:
         raise InputError("is a device or a pipe, not a file", path, "Copy what it gives into a file")
     suffix = path.suffix.lower()
     if suffix not in _formats():
-        unknown = unknown_name("file suffix", suffix, known_suffixes())
-        raise InputError(unknown.what, path, unknown.hint)
+        hint = f"Known: {', '.join(known_suffixes())}"  # one that is close is another format
+        raise InputError(f"unknown file suffix '{shortened(suffix)}'", path, hint)
     if status.st_size == 0:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")
     return _formats()[suffix]

@@ -9,6 +9,7 @@ replaces all that by a number of megabytes.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, shortened
 from ...files import open_plain
 from ..cache import megabytes
 
@@ -27,6 +28,7 @@ MOST_FRAMES = 1 << 20  # of one file: nine hours at 30 a second
 MOST_MEMBERS = 1024  # arrays of an archive, parts of a picture
 LONGEST_LINE = 1 << 20  # characters of text
 
+_MOST_DIGITS = 40  # of a number that counts something
 _RATIO = 10  # of the memory that reading takes to the size of the file
 _FREE = 180 << 20  # bytes that reading any file may take
 _CHUNK = 1 << 20  # bytes passed on at a time
@@ -78,6 +80,13 @@ def check_count(number: int, most: int, what: str) -> None:
     """Raise InputError where a file has more of something than any scan; what: for example "columns"."""
     if number > most:
         raise InputError(f"has {number:,} {what}, more than the {most:,} that are read")
+
+
+def whole_number(word: str, what: str) -> int:
+    """A number of a file's text; what: for example "the length of 'faces'". Raises InputError."""
+    if not re.fullmatch(rf"[+-]?[0-9]{{1,{_MOST_DIGITS}}}", word):
+        raise InputError(f"{what} is {shortened(word)!r}, which is no whole number that can be used")
+    return int(word)
 
 
 def read_exactly(stream: BinaryIO, size: int) -> bytes:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain, count, islice
 from typing import IO, AnyStr, BinaryIO
 
@@ -16,10 +17,11 @@ from ...errors import InputError
 from ...task import checkpoint
 from ..points import PointCloud
 from ._admission import LONGEST_LINE
+from ._deferred import Deferred, cloud_of
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
 _ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
-Columns = Mapping[str, NDArray]  # name -> (N,)
+Columns = dict[str, NDArray]  # name -> (N,)
 
 # What the columns of a file may be called, in lower case; the first set that is complete is taken.
 _POSITIONS = [("x", "y", "z")]
@@ -75,33 +77,48 @@ def listed(names: Iterable[str], most: int = 12, longest: int = 24) -> str:
     return ", ".join([*shown, f"and {len(names) - most} more"] if len(names) > most else shown) or "none"
 
 
-def cloud_from_columns(columns: Columns) -> PointCloud:
+def cloud_from_columns(columns: Columns, held: int | None = None) -> PointCloud:
     """Points from named columns; names count in any case, what is not geometry becomes a scalar.
 
-    columns: name -> (N,) of any real type and byte order. Raises InputError where x, y or z is missing.
+    columns: name -> (N,) of any real type and byte order; emptied, so that each may go when it is used.
+    held: bytes of the file, where the columns were packed in it.
+    Raises InputError where x, y or z is missing, and where all that takes too much memory.
     """
-    rest = dict(columns)
     names = {name.lower(): name for name in columns}
 
-    def take(choices: Sequence[Sequence[str]]) -> NDArray | None:
-        for choice in choices:
-            if all(name in names for name in choice):
-                return _joined([rest.pop(names[name]) for name in choice])
-        return None
+    def found(choices: Sequence[Sequence[str]]) -> list[str]:
+        complete = (choice for choice in choices if all(name in names for name in choice))
+        return [names[name] for name in next(complete, ())]
 
-    positions = take(_POSITIONS)
-    if positions is None:
+    def take(chosen: Sequence[str]) -> NDArray:
+        return _joined([columns.pop(name) for name in chosen])
+
+    def native(name: str) -> NDArray:
+        column = columns.pop(name)
+        return column.astype(column.dtype.newbyteorder("="), copy=False)
+
+    chosen = found(_POSITIONS)
+    if not chosen:
         raise InputError(f"no x, y and z among the columns: {listed(columns)}")
-    normals, colors, radii, ellipses = take(_NORMALS), take(_COLORS), take(_RADII), take([_ELLIPSES])
-    axes, mean = (None, None) if ellipses is None else _half_axes(ellipses)
-    return PointCloud.from_arrays(
-        positions,
-        normals=normals,
-        colors=None if colors is None else _bytes_or_units(colors),
-        radii=mean if radii is None else radii[:, 0],
-        axes=axes,
-        scalars={name: column.astype(column.dtype.newbyteorder("=")) for name, column in rest.items()},
+    normals, colors, radii, ellipses = (
+        found(choices) for choices in (_NORMALS, _COLORS, _RADII, [_ELLIPSES])
     )
+    attributes: dict[str, Deferred] = {}
+    if normals:
+        attributes["normals"] = Deferred(lambda: take(normals), columns[normals[0]].dtype, 3)
+    if colors:
+        kind = columns[colors[0]].dtype
+        attributes["colors"] = Deferred(lambda: _bytes_or_units(take(colors)), kind, len(colors))
+    if radii:
+        attributes["radii"] = Deferred(lambda: take(radii)[:, 0], columns[radii[0]].dtype)
+    positions = [take(chosen)]
+    if ellipses:
+        axes, mean = _half_axes(take(ellipses))
+        attributes.setdefault("radii", Deferred(lambda: mean, mean.dtype))
+        attributes["axes"] = Deferred(lambda: axes, axes.dtype, 4)
+    rest = columns.keys() - {*normals, *colors, *radii}
+    scalars = {name: Deferred(partial(native, name), columns[name].dtype) for name in columns if name in rest}
+    return cloud_of(positions, attributes, scalars, held=held, at_hand=True)
 
 
 def columns_from_cloud(

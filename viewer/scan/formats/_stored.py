@@ -18,7 +18,6 @@ from ._admission import MOST_FRAMES, check_count
 
 _CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
 _LONGEST_HEADER = 10_000  # bytes, as numpy has it
-_CONVERTED = 6  # bytes that a PointCloud makes of a number, beside two copies of it
 _quietly = Lock()
 
 
@@ -80,10 +79,9 @@ class StoredArray:
         return self.shape[:-2]
 
     def memory(self, frame: int | None = None) -> int:
-        """Bytes that `read` and a PointCloud made of it take at most at a time."""
+        """Bytes that `read` takes."""
         is_part = frame is not None and not self.column_order
-        values = math.prod(self.shape[1:] if is_part else self.shape)
-        return values * (2 * self.dtype.itemsize + _CONVERTED)
+        return math.prod(self.shape[1:] if is_part else self.shape) * self.dtype.itemsize
 
     def read(self, frame: int | None = None) -> NDArray:
         """The whole array, or one entry along its first axis. To be called once.
@@ -94,7 +92,7 @@ class StoredArray:
         if frame is None:
             return self._values(self.shape)
         if self.column_order:
-            return self._values(self.shape)[frame]
+            return self._values(self.shape)[frame].copy()
         shape = self.shape[1:]
         self.stream.seek(frame * math.prod(shape) * self.dtype.itemsize, 1)
         return self._values(shape)

@@ -17,7 +17,7 @@ import math
 import operator
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import redirect_stdout
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from threading import get_ident
 from typing import Any, BinaryIO, TextIO
@@ -45,35 +45,28 @@ _VIEW_BYTES = 7  # of a pixel: mask and colour
 
 def read_unit(path: Path) -> str | None:
     """The unit of the first part, or None."""
-    return _unit(_headers(path)[0])
+    with opened(path) as stream:
+        return _unit(_headers(stream)[0])
 
 
 def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
     """The views in the order of the parts. Raises InputError where a part is damaged or no range view."""
     with opened(path) as stream:
-        headers = _headers(path)
+        headers = _headers(stream)
         check_count(len(headers), MOST_MEMBERS, "parts")
         for number, header in enumerate(headers):
             _check_form(header, _name(header, number))
         admit(size_of(stream), _memory(headers, _pixel_bytes(stream, len(headers))), _MOST_RATIO)
-        images = _decoded(path, len(headers))
+        images = _decoded(stream, len(headers))
         views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
         admit(size_of(stream), memory_of_merging(views), _MOST_RATIO)
     return views
 
 
-def _decoded(path: Path, parts: int) -> list[dict[str, NDArray]]:
+def _decoded(stream: BinaryIO, parts: int) -> list[dict[str, NDArray]]:
     """The channels of every part by name, (H, W) each."""
-    import OpenEXR
-
     # OpenEXR leaves damaged parts out and prints that to standard output, where results go.
-    muted = redirect_stdout(_OfOthers(sys.stdout))
-    with (
-        unsaid(OPENEXR),
-        muted,
-        open(path, "rb") as stream,  # of names, OpenEXR takes UTF-8 alone
-        OpenEXR.File(stream, separate_channels=True) as file,
-    ):
+    with redirect_stdout(_OfOthers(sys.stdout)), _file(stream, separate_channels=True) as file:
         if len(file.parts) != parts:
             raise InputError(f"only {len(file.parts)} of its {parts} parts can be decoded")
         return [{name: channel.pixels for name, channel in part.channels.items()} for part in file.parts]
@@ -109,11 +102,24 @@ def write_views(path: Path, views: Sequence[RangeView]) -> None:
         OpenEXR.File(parts).write(stream)
 
 
-def _headers(path: Path) -> list[dict[str, Any]]:
+def _headers(stream: BinaryIO) -> list[dict[str, Any]]:
+    with _file(stream, header_only=True) as file:
+        return [dict(part.header) for part in file.parts]  # the file takes the headers back
+
+
+@contextmanager
+def _file(stream: BinaryIO, **how: bool) -> Iterator[Any]:
+    """What OpenEXR reads from the beginning of a stream; of names, it would take UTF-8 alone."""
     import OpenEXR
 
-    with unsaid(OPENEXR), open(path, "rb") as stream, OpenEXR.File(stream, header_only=True) as file:
-        return [dict(part.header) for part in file.parts]  # the file takes the headers back
+    stream.seek(0)
+    with unsaid(OPENEXR):
+        try:
+            file = OpenEXR.File(stream, **how)
+        except RuntimeError as error:  # whose words are of a buffer in Python
+            raise InputError("is no EXR file, or damaged") from error
+        with file:
+            yield file
 
 
 def _name(header: dict[str, Any], number: int) -> str:

@@ -8,6 +8,7 @@ from typing import BinaryIO
 
 from ..points import PointCloud
 from ._admission import admit, opened, size_of
+from ._deferred import cloud_of
 from ._stored import StoredArray
 
 TITLE = "NPY"
@@ -26,7 +27,7 @@ def read(path: Path, frame: int = 0) -> PointCloud:
         positions = _positions(stream)
         share = frame if positions.sequence else None
         admit(size_of(stream), positions.memory(share))
-        return PointCloud.from_arrays(positions.read(share))
+        return cloud_of([positions.read(share)], {}, {}, held=size_of(stream))
 
 
 def _positions(stream: BinaryIO) -> StoredArray:

@@ -10,9 +10,11 @@ share them. Arrays of other shapes are left alone.
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
@@ -22,9 +24,10 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..points import PointCloud
+from ..points import PointCloud, choose_origin
 from ._admission import MOST_MEMBERS, admit, check_count, opened, size_of
 from ._columns import first_repeated
+from ._deferred import Deferred, cloud_of
 from ._faces import with_faces
 from ._stored import StoredArray
 
@@ -42,6 +45,13 @@ _OF_ALL = {"origin", "times"}
 _SAVE_ANEW = "Save it with numpy.savez"
 _MOST_RATIO, _FREE = 64, 180 << 20  # bytes to unpack for those packed, and beyond: scans pack to a tenth
 _ENCRYPTED = 1  # a bit of a member's flags
+_MOST_IN_DIRECTORY = 4 * MOST_MEMBERS  # there may be others beside the arrays
+_LONGEST_DIRECTORY = 1 << 20  # bytes
+# Of the record at the end of an archive, and of that of large ones: how many members, bytes of their names.
+_END, _END_64, _LOCATOR_BYTES = struct.Struct("<10xHI6x"), struct.Struct("<32xQQ8x"), 20
+_LONGEST_END = (1 << 16) + _END.size + _LOCATOR_BYTES + _END_64.size  # bytes, with a remark
+_SAMPLE = 1 << 13  # positions looked at
+_FAR = 16  # radii of the points from their origin, where float32 still tells a millionth of one
 
 
 def frame_count(path: Path) -> int:
@@ -62,19 +72,42 @@ def read(path: Path, frame: int = 0) -> PointCloud:
     with opened(path) as stream, _arrays(stream) as arrays:
         shares = _shares(arrays, frame)
         faces = _faces(arrays)
-        needed = [arrays[name].memory(share) for name, share in shares.items()]
-        admit(size_of(stream), sum(needed) + (faces.memory() if faces else 0))
-        values = {name: arrays[name].read(share) for name, share in shares.items()}
-        cloud = PointCloud.from_arrays(
-            values.pop("positions"),
-            **{name: values.pop(name, None) for name in ("normals", "colors", "radii", "axes")},
-            scalars=values,
-            origin=np.zeros(3) if "origin" in arrays else None,
-        )
-        del values
+        share, held = shares.pop("positions"), size_of(stream)
+        admit(held, arrays["positions"].memory(share))
+        positions = [arrays["positions"].read(share)]
+        shift, origin = None, None
         if "origin" in arrays:
-            cloud = replace(cloud, origin=_vector(arrays["origin"], 3))
+            stored = _vector(arrays["origin"], 3)
+            shift, origin = _shifted(positions[0], stored)
+        values = {
+            name: Deferred(partial(array.read, share), array.dtype, width)
+            for name, share in shares.items()
+            for array in [arrays[name]]
+            for width in [array.memory(share) // (len(positions[0]) * array.dtype.itemsize)]
+        }
+        attributes = {name: values.pop(name) for name in _OF_POINTS if name in values}
+        cloud = cloud_of(positions, attributes, values, shift, held)
+        if origin is not None:
+            cloud = replace(cloud, origin=origin)
+        if faces:
+            admit(held, cloud.nbytes + faces.memory() * (2 if faces.column_order else 1))
         return with_faces(cloud, [np.ascontiguousarray(faces.read()).data] if faces else [])
+
+
+def _shifted(
+    positions: NDArray, stored: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """By how much, (3,), the stored origin is moved, so that float32 holds offsets from it, and where to.
+
+    One that the positions are near to stays as it is.
+    """
+    sample = PointCloud.from_arrays(positions[:: max(1, len(positions) // _SAMPLE)])
+    if len(sample):
+        bounds = sample.bounds()
+        if np.abs(bounds.center).max() > _FAR * bounds.radius:
+            origin = choose_origin(sample.world() + stored)
+            return origin - stored, origin
+    return np.zeros(3), stored
 
 
 def write(path: Path, cloud: PointCloud) -> None:
@@ -97,6 +130,7 @@ def write(path: Path, cloud: PointCloud) -> None:
 @contextmanager
 def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
     """All arrays of the archive by name, open as long as the context lasts."""
+    _check_directory(stream)
     with ZipFile(stream) as archive, ExitStack() as members:
         infos = [info for info in archive.infolist() if info.filename.endswith(".npy")]
         _check_members(infos, size_of(stream))
@@ -105,6 +139,25 @@ def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
             for info in infos
             for name in [info.filename.removesuffix(".npy")]
         }
+
+
+def _check_directory(stream: BinaryIO) -> None:
+    """Raise InputError where an archive promises far more members than arrays, before any is looked at.
+
+    The bytes of the directory count too, since they tell where reading it ends.
+    """
+    stream.seek(max(0, size_of(stream) - _LONGEST_END))
+    end = stream.read()
+    at = end.rfind(b"PK\5\6")
+    if at < 0 or len(end) - at < _END.size:
+        return  # no archive, as ZipFile says
+    counts = [_END.unpack_from(end, at)]
+    locator = at - _LOCATOR_BYTES
+    if locator >= _END_64.size and end[locator:].startswith(b"PK\6\7"):
+        counts.append(_END_64.unpack_from(end, locator - _END_64.size))
+    members, directory = counts[-1]
+    check_count(members, _MOST_IN_DIRECTORY, "members")
+    check_count(directory, _LONGEST_DIRECTORY, "bytes of names")
 
 
 def _check_members(infos: Sequence[ZipInfo], held: int) -> None:

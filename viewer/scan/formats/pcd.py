@@ -27,6 +27,7 @@ from ._admission import (
     read_records,
     size_of,
     too_few,
+    whole_number,
 )
 from ._columns import (
     Columns,
@@ -46,7 +47,6 @@ _HEADER_LIMIT = 1 << 16  # bytes looked at for the header
 _TYPES = {"F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8"}
 _PADDING = "_"
 _LONGEST_WORD = 40  # of a file, in a message
-_COPIES = 3  # of unpacked data, in memory at a time
 _LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
 
 
@@ -82,7 +82,8 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             raise unknown_name("PCD encoding", header.encoding[:_LONGEST_WORD], list(_ENCODINGS))
         stream.seek(header.size)
         columns = _ENCODINGS[header.encoding](stream, header)
-    return cloud_from_columns(columns)
+        packed = header.encoding == "binary_compressed"
+        return cloud_from_columns(columns, held=size_of(stream) if packed else None)
 
 
 def write(path: Path, cloud: PointCloud) -> None:
@@ -121,14 +122,14 @@ def _read_header(head: bytes) -> _Header:
             raise InputError(f"the PCD header has no {key} line")
     names = words["FIELDS"]
     sizes, types = words.get("SIZE", []), words.get("TYPE", [])
-    counts = [int(count) for count in words.get("COUNT", ["1"] * len(names))]
+    counts = [whole_number(count, "a COUNT") for count in words.get("COUNT", ["1"] * len(names))]
     if not len(names) == len(sizes) == len(types) == len(counts):
         raise InputError("FIELDS, SIZE, TYPE and COUNT of the PCD header differ in length")
     for code in (type_ + size for type_, size in zip(types, sizes, strict=True)):
         if code not in _TYPES:
             raise unknown_name("PCD type and size", code[:_LONGEST_WORD], list(_TYPES))
     sides = words["POINTS"] if "POINTS" in words else words["WIDTH"] + words["HEIGHT"]
-    points = math.prod(map(int, sides))
+    points = math.prod(whole_number(side, "the number of points") for side in sides)
     if points < 1 or min(counts) < 1:
         raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
     check_count(sum(counts), MOST_COLUMNS, "values a point")
@@ -172,14 +173,14 @@ def _read_compressed(stream: BinaryIO, header: _Header) -> Columns:
         raise InputError(f"holds {held} of its {packed} bytes of compressed data")
     if unpacked > packed * _LZF_MAX_RATIO:
         raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked}")
-    admit(size_of(stream), packed + _COPIES * unpacked)
+    admit(size_of(stream), packed + 2 * unpacked)  # the library has two, and so have the fields
     data = lzf.decompress(read_exactly(stream, packed), unpacked)
     if data is None or len(data) != unpacked:
         raise InputError("its compressed data are damaged")
     blocks, start = [], 0
     for f in header.fields:
         block = np.frombuffer(data, f"<{f.type}", header.points * f.count, start)
-        blocks.append(block.reshape(header.points, f.count))
+        blocks.append(block.reshape(header.points, f.count).copy())  # so that each may go by itself
         start += block.nbytes
     return _unpacked(_columns(header, blocks))
 

@@ -30,6 +30,7 @@ from ._admission import (
     read_rest,
     size_of,
     too_few,
+    whole_number,
 )
 from ._columns import (
     Columns,
@@ -213,7 +214,10 @@ def _walk_lines(lines: Iterable[str], element: _Element) -> NDArray[np.float64]:
             if at >= len(words):
                 raise InputError(f"row {row} of {element.name} ends before its {p.name}")
             if p.length_type:
-                at += 1 + max(0, int(words[at]))
+                length = whole_number(words[at], f"the length of {p.name} in row {row} of {element.name}")
+                if length < 0:
+                    raise _negative(row, element)
+                at += 1 + length
             else:
                 values.append(float(words[at]))
                 at += 1
@@ -221,6 +225,10 @@ def _walk_lines(lines: Iterable[str], element: _Element) -> NDArray[np.float64]:
             raise InputError(f"row {row} of {element.name} ends within a list")
         rows += 1
     return np.frombuffer(values, np.float64).reshape(rows, len(element.numbers))
+
+
+def _negative(row: int, element: _Element) -> InputError:
+    return InputError(f"row {row} of {element.name} has a list of a negative length")
 
 
 def _read_binary(stream: BinaryIO, element: _Element, encoding: str) -> Columns:
@@ -248,7 +256,10 @@ def _walk_bytes(stream: BinaryIO, element: _Element, encoding: str, what: str) -
         raise too_few(held // least, element.count, what)
     data = np.frombuffer(read_exactly(stream, held), np.uint8)
     packed = np.empty((element.count, int(sizes[lengths == 0].sum())), np.uint8)
-    rows, size = pack_rows(data, sizes, lengths, encoding == "binary_big_endian", packed)
+    signed = np.array([_TYPES[p.length_type or p.type][0] == "i" for p in element.properties])
+    rows, size, is_negative = pack_rows(data, sizes, lengths, signed, encoding == "binary_big_endian", packed)
+    if is_negative:
+        raise _negative(rows, element)
     if rows < element.count:
         raise too_few(rows, element.count, what)
     stream.seek(start + size)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..points import PointCloud
-from ._admission import MOST_COLUMNS, check_count, opened
+from ._admission import MOST_COLUMNS, check_count, opened, whole_number
 from ._columns import bounded_lines, cloud_from_columns, first_repeated, named, parse_table
 from ._matrices import camera_matrices
 
@@ -108,7 +108,7 @@ def _look(lines: Iterable[str]) -> _Layout:
                 raise InputError(_not_names(number + 1, line, words))
             names = words
         elif len(words) == 1 and words[0].isdecimal() and promised is None:
-            promised = int(words[0])
+            promised = whole_number(words[0], "the count of its points")
         else:
             if names is None and len(remark) == len(words):
                 names = remark

@@ -1,0 +1,90 @@
+"""Points from arrays that are made one after the other, so that few are held beside what they become."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..points import PointCloud, choose_origin, finite_rows
+from ._admission import admit
+
+_FINAL = {"normals": 12, "colors": 4, "radii": 4}  # bytes of a point in a PointCloud
+_WORK = 20 << 20  # bytes of the points that are worked on together
+_SPLAT = 20  # bytes of a half-axis and its radius
+_IDS, _ID = 12, 4  # bytes of a point's number while it is found, and then
+
+
+class Deferred:
+    """An array that is made when numpy asks for it, once.
+
+    dtype: of its values as they are read, width: how many a point has.
+    """
+
+    def __init__(self, make: Callable[[], NDArray], dtype: np.dtype, width: int = 1) -> None:
+        self._make = make
+        self.dtype = dtype
+        self.size = dtype.itemsize * width  # bytes of a point
+
+    def __array__(self, dtype: object = None, copy: object = None) -> NDArray:
+        return self._make()
+
+
+def cloud_of(
+    positions: list[NDArray],
+    attributes: Mapping[str, Deferred],
+    scalars: Mapping[str, Deferred],
+    origin: NDArray[np.float64] | None = None,
+    held: int | None = None,
+    at_hand: bool = False,
+) -> PointCloud:
+    """`PointCloud.from_arrays` of deferred arrays.
+
+    positions: (N, 3), alone in a list that gives it away. held: bytes of the file, which has to admit what
+    that takes; None: its rows are not packed. at_hand: whether what the others are made of is in memory.
+    Raises InputError.
+    """
+    if held is not None:
+        admit(held, _memory(positions[0], attributes, scalars, origin, at_hand))
+    points = Deferred(positions.pop, positions[0].dtype, 3)
+    return PointCloud.from_arrays(points, **attributes, scalars=scalars, origin=origin)
+
+
+def _memory(
+    points: NDArray,
+    attributes: Mapping[str, Deferred],
+    scalars: Mapping[str, Deferred],
+    origin: NDArray[np.float64] | None,
+    at_hand: bool,
+) -> int:
+    """Bytes that are held at most at a time, step by step as `PointCloud.from_arrays` goes."""
+    rows, keep = len(points), finite_rows(points)
+    kept = rows if keep is None else int(np.count_nonzero(keep))
+    moved = points.dtype != np.float32 or (
+        keep is not None or bool(choose_origin(points).any()) if origin is None else bool(origin.any())
+    )
+
+    def taken(array: Deferred) -> tuple[int, int]:
+        made, freed = rows * array.size, rows * array.size if at_hand else 0
+        return (made, made - freed) if keep is None else (made + kept * array.size, kept * array.size - freed)
+
+    steps = [taken(array) for array in attributes.values()]  # bytes meanwhile, and then
+    if keep is not None:
+        steps.append((kept * points.itemsize * 3, (kept - rows) * points.itemsize * 3))
+    if "axes" in attributes:
+        steps.append((kept * _SPLAT, kept * _SPLAT))
+    steps.append((kept * 12 * moved,) * 2)
+    for name, size in _FINAL.items():
+        if name in attributes and (name == "colors" or attributes[name].dtype != np.float32):
+            steps.append((kept * size,) * 2)
+    steps += [taken(array) for array in scalars.values()]
+    if keep is not None:
+        steps.append((kept * _IDS, kept * _ID))
+    held = points.nbytes + (0 if keep is None else rows)
+    if at_hand:
+        held += rows * sum(array.size for array in [*attributes.values(), *scalars.values()])
+    peak = held
+    for meanwhile, then in steps:
+        peak, held = max(peak, held + meanwhile), held + then
+    return peak + _WORK
