@@ -16,7 +16,7 @@ uniform ivec2 tiles;
 
 float best[ROWS];  // reversed depth-buffer values
 uint shown[ROWS];
-bool closed[ROWS];  // FILL: pixels that stay as they are
+uint closed;       // FILL: pixels that stay as they are, a bit each: zink fails on bool[] (docs/surfels.md)
 ivec2 pixel;       // the first of this invocation's
 
 // -1: none, at the end of the last work group; its pixels are outside the picture.
@@ -63,6 +63,8 @@ float form_at(Column c, float y) {
     return form;
 }
 
+bool is_closed(int k) { return (closed >> k & 1u) != 0u; }
+
 void take_nearest(ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
         uint row = texelFetch(listed, i).r;
@@ -72,7 +74,7 @@ void take_nearest(ivec2 part) {
             bool inside = form_at(c, y) <= (PERSPECTIVE != 0 ? here * here : 1.0);
             bool better = inside && (here > best[k] || (here == best[k] && row < shown[k]));
 #if FILL
-            better = better && !closed[k];
+            better = better && !is_closed(k);
 #endif
             best[k] = better ? here : best[k];
             shown[k] = better ? row : shown[k];
@@ -92,20 +94,21 @@ layout(binding = 10) uniform sampler2D large_depths;  // negative, as surfels/pa
 // FOUND: the Surface holds something already. FILL: only where it does not, this is to change; LARGE: the
 // rasteriser filled some of that.
 void begin_pixels() {
+    closed = 0u;
     for (int k = 0; k < ROWS; ++k) {
         best[k] = view_perspective ? view_near / view_far : 0.0;
         shown[k] = NONE;
-        closed[k] = !in_picture(k);
+        if (!in_picture(k)) closed |= 1u << k;
 #if FOUND
         if (in_picture(k) && rows[index_of(k)] != NONE) {
             shown[k] = rows[index_of(k)];
             best[k] = stored_depth(uintBitsToFloat(depths[index_of(k)]));
-            closed[k] = true;
+            closed |= 1u << k;
         }
 #endif
 #if LARGE
         ivec2 at = pixel + ivec2(0, k);
-        if (!closed[k] && texelFetch(large_rows, at, 0).r != NONE) {
+        if (!is_closed(k) && texelFetch(large_rows, at, 0).r != NONE) {
             shown[k] = texelFetch(large_rows, at, 0).r;
             best[k] = stored_depth(-texelFetch(large_depths, at, 0).r);
         }
