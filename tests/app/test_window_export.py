@@ -252,6 +252,7 @@ def test_a_cancelled_export_leaves_nothing_and_closing_asks(app: RunningApp, fol
     assert not re.search("Traceback", app.log())
 
 
+@pytest.mark.slow
 def test_an_export_never_replaces_the_scan(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     scan, config = tmp_path / "range.exr", tmp_path / "config" / "scan4d"
     write_views(scan, [sphere_view((0, 0, 4))])

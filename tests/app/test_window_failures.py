@@ -157,6 +157,7 @@ def test_whatever_fails_in_each_frame_is_told_once_and_the_window_goes_on(
         assert json.loads((tmp_path / "config" / "scan4d" / "settings.json").read_text())["window"]
 
 
+@pytest.mark.slow
 def test_folders_and_files_that_are_no_utf_8(screen: Screen, tmp_path: Path) -> None:
     """The working directory, the scan and its folder; a picture, a recording, its replay, the dialogs."""
     folder = tmp_path / os.fsdecode(b"caf\xe9")

@@ -94,6 +94,7 @@ def test_settings_are_kept_while_a_scan_plays(screen: Screen, tmp_path: Path, sc
         app.expect("drew frame")
 
 
+@pytest.mark.slow
 def test_what_a_killed_window_had_recorded_is_saved_at_the_next_start(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:

@@ -75,7 +75,7 @@ def _events(
         command = [sys.executable, WORKER, place, source, first, count, *kinds]
         process = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         begun: dict[str, Any] | None = None
-        ready = False
+        ready = silent = False
         try:
             for line in _lines(process):
                 told = json.loads(line) if line else {}
@@ -88,11 +88,11 @@ def _events(
                     if time.monotonic() > until:
                         return
                 elif not line:
-                    break
+                    silent = True
             if not ready:
                 raise RuntimeError(f"no worker begins:\n{(Path(place) / 'output').read_text()[-2000:]}")
             if begun is not None:
-                wrong = "hangs" if process.poll() is None else f"dies: {process.wait()}"
+                wrong = "hangs" if silent else f"dies: {process.wait()}"
                 yield {**begun, "outcome": "failed", "wrong": wrong}
         finally:
             process.kill()

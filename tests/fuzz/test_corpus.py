@@ -9,7 +9,7 @@ from campaign import campaign, report
 from kinds import corpus_files
 
 CORPUS = Path(__file__).with_name("corpus")
-INPUTS = 5000
+INPUTS = 3000
 
 
 def test_files_that_once_did_harm(tmp_path: Path) -> None:
