@@ -241,7 +241,12 @@ def test_ctrl_c_keeps_what_was_measured(mesh: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "viewer.cli", "bench", "--scene", str(mesh), "--suite", "scenes",
                "--quick", "--size", "96x64", "--views", "400", "-o", str(tmp_path / "out")]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        while process.poll() is None and not list(tmp_path.glob("out/pictures/*--surfels.png")):
+        assert process.stdout is not None
+        process.stdout.readline()  # until then it draws to foretell how long it takes
+        began = time.time()
+        while process.poll() is None and not any(
+            path.stat().st_mtime > began for path in tmp_path.glob("out/pictures/*--surfels.png")
+        ):
             time.sleep(0.2)
         time.sleep(1)  # into the views after the first
         process.send_signal(signal.SIGINT)

@@ -159,6 +159,8 @@ def test_a_benchmark_that_is_stopped_twice_keeps_its_rows(number: signal.Signals
         before = Path("bench") / RESULTS
         former = before.read_bytes() if before.exists() else None
         with start(*command) as process:
+            assert process.stdout is not None
+            process.stdout.readline()  # until then it draws to foretell how long it takes
             began = time.time()
             while process.poll() is None and not any(
                 path.stat().st_mtime > began for path in Path("bench").glob("pictures/*--points.png")
