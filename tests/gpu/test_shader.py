@@ -45,5 +45,6 @@ def test_places_of_every_vendor_are_understood(shaders: Path, log: str) -> None:
 
 
 def test_programs_are_built_once(renderer: Renderer) -> None:
+    renderer.gpu.activate()  # other tests leave contexts of their own current
     one = renderer.gpu.compute("compact/covered.comp")
     assert renderer.gpu.compute("compact/covered.comp") is one
