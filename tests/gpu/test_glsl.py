@@ -1,0 +1,152 @@
+"""Shaders as they reach the driver: every file of them, in the variants that pictures take."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from scenes import sphere, sphere_mesh
+
+from viewer.backends import Backend, backend
+from viewer.bench import baselines
+from viewer.camera import Camera
+from viewer.frame import Request, render_frame
+from viewer.gpu.amplify import FEEDS
+from viewer.gpu.context import headless
+from viewer.gpu.present import Presenter
+from viewer.gpu.shader import Source
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.resources import resource_path
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+SIZE = (96, 64)
+PASSES = ("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted")
+CAMERA = {"azimuth": 30.0, "elevation": 20.0, "aspect": SIZE[0] / SIZE[1]}
+LOOKS = [
+    *(Look(color_by=color) for color in ("plain", "normal", "depth", "height", "height_of", "id")),
+    *(Look(light=light, eye_dome=dome) for light, dome in product(("flat", "head", "fixed"), (False, True))),
+]
+
+
+def clouds() -> Iterator[PointCloud]:
+    """Points with all that a scan may have, a splat being large; the same with half-axes; and with little."""
+    cloud = sphere(1500)
+    assert cloud.normals is not None
+    assert cloud.radii is not None
+    positions, radii = cloud.positions.copy(), cloud.radii.copy()
+    positions[-1] = np.nan  # left out: those that stay have ids of their own
+    eye = Camera.orbit(cloud.bounds(), **CAMERA).eye
+    radii[np.argmin(np.abs(cloud.normals @ eye))] = 100.0  # on edge, so that it hides little
+    axes = np.column_stack([np.cross(cloud.normals, [0.0, 0.6, 0.8]) * radii[:, None], 0.5 * radii])
+    numbers = {"height_of": cloud.normals[:, 1]}
+    for some_axes in (None, axes):
+        yield PointCloud.from_arrays(
+            positions,
+            normals=cloud.normals,
+            colors=cloud.colors,
+            radii=radii,
+            axes=some_axes,
+            scalars=numbers,
+        )
+    yield PointCloud.from_arrays(cloud.positions, normals=cloud.normals, scalars=numbers)
+
+
+def draw_all(renderer: Renderer) -> None:
+    """A picture of each kind, so that each program is built."""
+    surface = Surface(renderer.gpu, SIZE)
+
+    def draw(
+        cloud: PointCloud,
+        which: str | Backend,
+        look: Look = LOOKS[0],
+        projection: str = "perspective",
+        share: float = 1.0,
+        **params: object,
+    ) -> None:
+        camera = Camera.orbit(cloud.bounds(), projection=projection, **CAMERA)
+        given = backend(which).params(params) if isinstance(which, str) else None
+        pose = Pose(0, 0.0, "test", cloud)
+        render_frame(renderer, Request(pose, camera, which, given, look), surface, share=share)
+
+    for cloud in clouds():
+        for instancing, passes, share in product(("tiles", *FEEDS), ("one", "two"), (1.0, 0.5)):
+            draw(cloud, "surfels", instancing=instancing, passes=passes, share=share)
+        for instancing, passes in product(("tiles", "gs"), PASSES):
+            draw(cloud, "surfels", projection="orthographic", instancing=instancing, passes=passes)
+            draw(cloud, "surfels", instancing=instancing, passes=passes, cull_back=True)
+        for passes, projection in product(("one", "two"), ("perspective", "orthographic")):
+            with pytest.MonkeyPatch.context() as patched:
+                patched.setattr(renderer.gpu, "software", False)  # how tiles are shared out on hardware
+                draw(cloud, "surfels", projection=projection, instancing="tiles", passes=passes)
+        draw(cloud, "surfels", radius="uniform", radius_scale=0.01)  # of about a pixel
+        for size, share in product((1, 3), (1.0, 0.5)):
+            draw(cloud, "points", share=share, point_size=size)
+        for scatter, instancing, normals in product((True, False), FEEDS, ("smooth", "flat")):
+            draw(cloud, "voxels", scatter=scatter, instancing=instancing, normals=normals)
+        for look in LOOKS:
+            draw(cloud, "points", look)
+            draw(cloud, "surfels", look, passes="two")
+        draw(cloud, baselines.gl_points())
+    draw(sphere(1500), "surfels", radius_scale=0.01)
+    mesh = sphere_mesh(16)
+    draw(mesh.points, baselines.mesh(mesh))
+    Presenter(renderer.gpu).release()
+
+
+@pytest.fixture(scope="module")
+def programs() -> list[list[Source]]:
+    """The stages of each program that pictures take."""
+    renderer = Renderer(headless())
+    draw_all(renderer)
+    renderer.release()
+    built = moderngl.Program | moderngl.ComputeShader
+    keys = [key for key, kept in renderer.gpu._kept.items() if isinstance(kept, built)]
+    return [[Source(name, dict(defines), dict(parts)) for name in names] for names, defines, parts in keys]
+
+
+def test_every_shader_file_is_built_for_some_picture(programs: list[list[Source]]) -> None:
+    folder = Path(str(resource_path("shaders")))
+    files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert {file for program in programs for stage in program for file in stage.files} == files
+
+
+def test_the_reference_compiler_takes_every_program(programs: list[list[Source]], tmp_path: Path) -> None:
+    validator = shutil.which("glslangValidator")
+    if validator is None:
+        pytest.skip("no glslangValidator; Debian has it in glslang-tools")
+    stages: dict[str, Source] = {}
+    alone, linked = [], []  # arguments
+    for number, program in enumerate(programs):
+        paths = [str(tmp_path / f"{number}{Path(stage.name).suffix}") for stage in program]
+        for path, stage in zip(paths, program, strict=True):
+            Path(path).write_text(stage.text, encoding="utf-8")
+            stages[path] = stage
+        if len(program) == 1:
+            alone += paths
+        else:
+            linked.append(["-l", *paths])
+    complaints = set()
+    for arguments in (alone, *linked):
+        done = subprocess.run([validator, *arguments], capture_output=True, text=True, check=False)
+        assert done.returncode == 0 or done.stdout, done.stderr
+        for line in done.stdout.splitlines():
+            stage = stages.get(line, stage)  # it names a file, then tells of it
+            if line.startswith(("ERROR", "WARNING")):
+                complaints.add(f"{stage.name}: {stage.explain(line)}")
+    assert not complaints
+
+
+def test_no_shader_has_an_array_of_bool(programs: list[list[Source]]) -> None:
+    """Mesa's Zink reads them as integers of one bit, which SPIR-V lacks: tests/drivers/zink_bool_array.py."""
+    texts = "".join({stage.text for program in programs for stage in program})
+    assert not re.findall(r"^\s*bool\s+\w+\s*\[.*$", texts, re.MULTILINE)
