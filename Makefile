@@ -6,10 +6,10 @@ MINUTES := 5
 SEED := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all fuzz bench lint wheel clean
+.PHONY: help setup run test test-all test-drivers fuzz bench lint wheel clean
 
 help: ## print this list
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
 setup: ## system libraries, and .venv with all dependencies; what is there is left alone
 	@tools/setup.sh
@@ -22,6 +22,9 @@ test: setup ## the tests, without the slow ones
 
 test-all: setup ## all tests
 	$(PYTHON) -m pytest
+
+test-drivers: setup ## backends and numerics on a second driver (Zink), shaders through glslangValidator
+	$(PYTHON) tests/drivers/zink.py tests/gpu tests/backends tests/numerics -m "not slow"
 
 fuzz: setup ## damaged files by the thousand: make fuzz MINUTES=60 SEED=7
 	$(PYTHON) tests/fuzz/campaign.py --minutes $(MINUTES) --seed $(SEED)

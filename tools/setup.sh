@@ -6,8 +6,8 @@ cd "$(dirname "$0")/.."
 
 # OpenGL with a software driver, X11 for the window, USB because open3d links to it.
 needed=(libegl1 libgl1 libgles2 libgl1-mesa-dri libglx-mesa0 libegl-mesa0 libx11-6 libxext6 libusb-1.0-0)
-# A display without a screen, keys and mouse: for the window tests alone.
-for_tests=(xvfb xdotool)
+# A display without a screen, keys and mouse, for the window tests alone; a second driver, and a compiler of shaders.
+for_tests=(xvfb xdotool mesa-vulkan-drivers glslang-tools)
 
 # Prints the first interpreter that pyproject.toml's requires-python accepts.
 find_python() {
