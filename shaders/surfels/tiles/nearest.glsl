@@ -14,9 +14,12 @@ layout(std430, binding = 1) buffer Rows { uint rows[]; };
 
 uniform ivec2 tiles;
 
+// FILL: the best of pixels that stay as they are: nothing is better. No array of bool says which they are, as
+// Mesa's Zink cannot read one (docs/surfels.md).
+#define CLOSED uintBitsToFloat(0x7F800000u)  // +inf
+
 float best[ROWS];  // reversed depth-buffer values
 uint shown[ROWS];
-uint closed;       // FILL: pixels that stay as they are, a bit each: zink fails on bool[] (docs/surfels.md)
 ivec2 pixel;       // the first of this invocation's
 
 // -1: none, at the end of the last work group; its pixels are outside the picture.
@@ -63,8 +66,6 @@ float form_at(Column c, float y) {
     return form;
 }
 
-bool is_closed(int k) { return (closed >> k & 1u) != 0u; }
-
 void take_nearest(ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
         uint row = texelFetch(listed, i).r;
@@ -73,9 +74,6 @@ void take_nearest(ivec2 part) {
             float y = down_at(c, k), here = key_at(c, y);
             bool inside = form_at(c, y) <= (PERSPECTIVE != 0 ? here * here : 1.0);
             bool better = inside && (here > best[k] || (here == best[k] && row < shown[k]));
-#if FILL
-            better = better && !is_closed(k);
-#endif
             best[k] = better ? here : best[k];
             shown[k] = better ? row : shown[k];
         }
@@ -86,7 +84,7 @@ bool in_picture(int k) { return pixel.x < view_size.x && pixel.y + k < view_size
 
 int index_of(int k) { return (pixel.y + k) * view_size.x + pixel.x; }
 
-#if LARGE
+#if FILL && LARGE
 layout(binding = 9) uniform usampler2D large_rows;
 layout(binding = 10) uniform sampler2D large_depths;  // negative, as surfels/passes/fill.frag has it
 #endif
@@ -94,21 +92,21 @@ layout(binding = 10) uniform sampler2D large_depths;  // negative, as surfels/pa
 // FOUND: the Surface holds something already. FILL: only where it does not, this is to change; LARGE: the
 // rasteriser filled some of that.
 void begin_pixels() {
-    closed = 0u;
     for (int k = 0; k < ROWS; ++k) {
         best[k] = view_perspective ? view_near / view_far : 0.0;
         shown[k] = NONE;
-        if (!in_picture(k)) closed |= 1u << k;
+#if FILL
+        if (!in_picture(k)) best[k] = CLOSED;
+#endif
 #if FOUND
         if (in_picture(k) && rows[index_of(k)] != NONE) {
             shown[k] = rows[index_of(k)];
-            best[k] = stored_depth(uintBitsToFloat(depths[index_of(k)]));
-            closed |= 1u << k;
+            best[k] = FILL != 0 ? CLOSED : stored_depth(uintBitsToFloat(depths[index_of(k)]));
         }
 #endif
-#if LARGE
+#if FILL && LARGE
         ivec2 at = pixel + ivec2(0, k);
-        if (!is_closed(k) && texelFetch(large_rows, at, 0).r != NONE) {
+        if (best[k] != CLOSED && texelFetch(large_rows, at, 0).r != NONE) {
             shown[k] = texelFetch(large_rows, at, 0).r;
             best[k] = stored_depth(-texelFetch(large_depths, at, 0).r);
         }

@@ -14,13 +14,15 @@ void main() {
     begin_pixels();
     ivec2 part = part_of(tile);
 #if FILL
-    if (closed == (1u << ROWS) - 1u) part = ivec2(0);
+    bool all_closed = true;
+    for (int k = 0; k < ROWS; ++k) all_closed = all_closed && best[k] == CLOSED;
+    if (all_closed) part = ivec2(0);
 #endif
     take_nearest(part);
     if (tile < 0) return;
 #if FILL
     for (int k = 0; k < ROWS; ++k)
-        if (!is_closed(k) && shown[k] != NONE) {
+        if (best[k] != CLOSED && shown[k] != NONE) {
             depths[index_of(k)] = floatBitsToUint(-linear_depth(best[k]));
             rows[index_of(k)] = shown[k];
             list[reserve(1u)] = uint(index_of(k));
