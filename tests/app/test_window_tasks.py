@@ -75,7 +75,6 @@ def test_opening_is_cancelled_replaced_and_done(app: RunningApp) -> None:
     app.expect("drew frame 0 with points, .* 3000000 points")
 
 
-@pytest.mark.slow
 def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningApp) -> None:
     app.screen.do("key", "Next")
     app.expect(r"opened \S+2_bare.npz")
