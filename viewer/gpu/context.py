@@ -101,6 +101,7 @@ class Gpu:
 
     def _compile(self, sources: list[Source]) -> Any:
         texts = {s.name.rsplit(".", 1)[-1]: s.text for s in sources}
+        self.activate()  # a program belongs to the context that is current
         try:
             if "comp" in texts:
                 return self.ctx.compute_shader(texts["comp"])
