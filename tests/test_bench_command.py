@@ -86,6 +86,7 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
     assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_feeds_are_timed_and_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
     """Without the sequences the demo alone."""
     (tmp_path / "data").mkdir()
@@ -102,6 +103,7 @@ def test_the_feeds_are_timed_and_stand_beside_the_papers(run: Run, tmp_path: Pat
     assert f"| `demo` | {rows[0]['n']:,} |".replace(",", "\N{NARROW NO-BREAK SPACE}") in text
 
 
+@pytest.mark.slow
 def test_octrees_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
     """Without the sequences the demo alone."""
     (tmp_path / "data").mkdir()
@@ -155,6 +157,7 @@ def test_two_files_of_one_name_are_refused(refused: Refused, tmp_path: Path) -> 
     assert "ball.ply" in refused("bench", "--scene", *files, "-o", tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_a_damaged_scene_is_left_out_and_the_others_are_measured(run: Run, tmp_path: Path) -> None:
     models = tmp_path / "data" / "models"
     models.mkdir(parents=True)

@@ -229,6 +229,7 @@ def test_the_line_under_the_timeline_says_what_is_seen(hands: RunningApp) -> Non
     hands.expect(r"under the mouse: \n")
 
 
+@pytest.mark.slow
 def test_a_double_click_sets_the_point_that_the_view_turns_about(hands: RunningApp) -> None:
     hands.screen.do("key", "f", "mousemove", *(v - 1 for v in SIZE))
     hands.settle()

@@ -72,6 +72,7 @@ def back(camera: Camera) -> list[float]:
     return camera.rotation()[2].tolist()
 
 
+@pytest.mark.slow
 def test_the_cube_is_clicked_and_dragged_and_keeps_the_mouse_from_the_view(app: RunningApp) -> None:
     start = Screenshot(app).camera
     corner = 3**-0.5
@@ -93,6 +94,7 @@ def test_the_cube_is_clicked_and_dragged_and_keeps_the_mouse_from_the_view(app: 
     app.settle()
 
 
+@pytest.mark.slow
 def test_bookmarks_come_back_by_key(app: RunningApp) -> None:
     cameras = []
     for side in ("2", "5"):

@@ -256,6 +256,7 @@ def test_the_page_has_every_part(folder: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_same_rows_give_the_same_bytes(folder: Path) -> None:
     first = write_report(folder).read_bytes()
     assert write_report(folder).read_bytes() == first

@@ -225,7 +225,9 @@ def test_the_moments_of_a_simulated_sequence(data_dir: Path) -> None:
     assert subject.carry(3, 4, trace(first.truth, camera, (30, 20))) is not None
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize(
+    "name", ["dragon-scans", "bunny-scans", pytest.param("truedepth-head", marks=pytest.mark.slow)]
+)
 def test_real_scans_lie_on_their_truth(name: str, data_dir: Path) -> None:
     subject = catalog.subject(name, data_dir)
     for index in {0, subject.moments - 1}:

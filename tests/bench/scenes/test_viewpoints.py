@@ -22,7 +22,7 @@ WITH_DATA = [
     "crane",
     "horse-gallop",
     "owlii",
-    "truedepth-head",
+    pytest.param("truedepth-head", marks=pytest.mark.slow),
 ]
 
 
