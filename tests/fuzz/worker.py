@@ -101,7 +101,9 @@ def _run(each: Input, folder: Path) -> tuple[str, str | None]:
     try:
         use(each.kind, each.drawn)(path)
     except Scan4DError as error:
-        return "refused", _wrong_refusal(error)
+        names = str(path), path.name
+        is_told = not each.kind.startswith(".") or (str(error).startswith(names) and error.hint)
+        return "refused", _wrong_refusal(error) if is_told else f"message: no place or hint: {error}"
     except MemoryError as error:
         return "failed", f"allocation: {_place(error)}"
     except BaseException as error:
