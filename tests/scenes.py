@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.backends import backends
-from viewer.bench.truth.mesh import Mesh
 from viewer.camera import Camera
-from viewer.gpu.view import View
+from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
+from viewer.view import View
 
 NOTHING = 0xFFFFFFFF
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.geometry import up_vector
-from viewer.gpu.view import View
 from viewer.scan.points import Bounds
+from viewer.view import View
 
 BOX = Bounds(np.array([-1.0, -2, -3]), np.array([3.0, 2, 1]))
 

@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 from viewer.backends import backends
-from viewer.bench.report import octree_tables, table_two
+from viewer.bench.papers.slomp_2014 import octree_tables, table_two
 from viewer.look import Look
 from viewer.params import Parameter, describe
 

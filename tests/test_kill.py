@@ -19,7 +19,7 @@ from scenes import sphere
 from written import film, picture
 
 from viewer.bench.report.results import RESULTS, read_rows
-from viewer.recording import Recording
+from viewer.document.recording import Recording
 from viewer.scan import formats
 
 ROOT = Path(__file__).resolve().parents[1]

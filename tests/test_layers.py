@@ -13,28 +13,18 @@ PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 # A part of the package may import its own layer and those before it.
 LAYERS = (
     {
-        "errors",
-        "files",
-        "geometry",
-        "params",
-        "resources",
-        "camera",
-        "look",
-        "marks",
-        "task",
-        "helper",
-        "native",
-        "signals",
-        "unfinished",
-        "scan",
+        "errors", "files", "geometry", "params", "resources", "camera", "look", "view", "task", "helper",
+        "native", "signals", "unfinished", "scan",
     },
-    {"gpu"},
+    {"mesh", "gpu"},
     {"backends"},
-    {"renderer", "frame", "timing", "export", "pick", "measurement", "anonymous"},
-    {"journal", "recording", "recording_json", "render_job", "__init__"},
+    {"renderer", "frame", "timing"},
+    {"analysis"},
+    {"output"},
+    {"document", "__init__"},
     {"app", "bench"},
     {"cli", "commands"},
-)
+)  # fmt: skip
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}
 
 WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}

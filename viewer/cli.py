@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is None:
         _end_quietly_when_interrupted()
-    from .commands import line  # not before: it imports for a tenth of a second and more
+    from .commands import _line as line  # not before: it imports for a tenth of a second and more
 
     if argv is not None:
         return line.run(list(argv), COMMANDS)

@@ -13,11 +13,11 @@ from .backends import backend as find_backend
 from .camera import Camera
 from .gpu.shade import shade
 from .gpu.surface import Surface
-from .gpu.view import View
 from .look import Look
 from .renderer import Renderer
 from .scan.points import PointCloud
 from .scan.pose import Pose
+from .view import View
 
 FALLBACK = "points"
 _BUDGET_MS = 15.0  # of a frame for what a backend can go on with in the next

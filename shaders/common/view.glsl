@@ -1,4 +1,4 @@
-// The camera as shaders see it: viewer/gpu/view.py fills this block.
+// The camera as shaders see it: viewer/view.py fills this block.
 layout(std140, binding = 0) uniform View {
     mat4 world_to_view;  // from positions relative to the pose's origin
     float view_scale;    // pixels per unit of x / depth, or of x

@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 from scenes import sphere
 
-from viewer.app.tools.capture import Capture
+from viewer.app.output.capture import Capture
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.document.journal import Journal, journals, saved
+from viewer.document.recording import Recording, fingerprint
 from viewer.frame import Request
-from viewer.journal import Journal, journals, saved
 from viewer.look import Look
-from viewer.recording import Recording, fingerprint
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "ball", sphere(100))

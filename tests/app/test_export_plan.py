@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.app.tools.export_plan import Choices, free_name, present, problems, recording
+from viewer.app.output.export_plan import Choices, free_name, present, problems, recording
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.document.recording import Entry
 from viewer.look import Look
-from viewer.marks import Marks
-from viewer.recording import Entry
+from viewer.output.marks import Marks
 
 TIMES: NDArray[np.float64] = np.arange(10, dtype=np.float64) * 0.04
 SHOWN = Entry(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
-from viewer.app.tools.labels import Box, free_place, usual_place
+from viewer.app.scene.labels import Box, free_place, usual_place
 
 AREA, SIZE, GAP = Box(ImVec2(0, 40), ImVec2(600, 400)), ImVec2(90, 30), 8
 LINE = ImVec2(200, 200), ImVec2(400, 200)

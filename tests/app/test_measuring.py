@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from imgui_bundle import ImVec2
 
+from viewer.analysis.measure import End, Measurement, Reading
 from viewer.app.tools.measuring import csv_file, snap_words
 from viewer.app.tools.measuring_view import ViewPlace
 from viewer.camera import Camera
 from viewer.errors import InputError
-from viewer.measurement import End, Measurement, Reading
 
 PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from viewer.app.scene import navigation
 from viewer.camera import Camera
 from viewer.geometry import up_vector
-from viewer.gpu.view import View
 from viewer.scan.points import Bounds
+from viewer.view import View
 
 SIZE = (300, 200)
 BOUNDS = Bounds(np.array([-1.0, -1, -1]), np.array([1.0, 1, 1]))

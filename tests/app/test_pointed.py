@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from viewer.analysis.pick import Picked
 from viewer.app.scene.pointed import describe
-from viewer.pick import Picked
 
 
 def test_it_says_where_what_and_how_it_was_seen() -> None:

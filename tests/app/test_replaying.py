@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewer.app.tools.replaying import Replaying
+from viewer.app.output.replaying import Replaying
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.document.recording import Entry, Recording
 from viewer.look import Look
-from viewer.recording import Entry, Recording
 
 
 def test_waiting_for_a_picture_takes_no_processor_time(tmp_path: Path) -> None:

@@ -15,16 +15,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewer.app import settings
+from viewer.app.output.export_plan import Choices
 from viewer.app.place import Place, reachable
 from viewer.app.playing.player import Pace
 from viewer.app.session import Bookmark, Left, Session, known_as
 from viewer.app.settings import Keeper, Settings, load, save
-from viewer.app.tools.export_plan import Choices
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.look import Look
-from viewer.marks import Marks
+from viewer.output.marks import Marks
 
 CAMERA = Camera(eye=(1, 2, 3), target=(0.5, 0, 0), fov_y=25)
 FULL = Settings(

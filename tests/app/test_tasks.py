@@ -12,9 +12,9 @@ import pytest
 from test_window import Screenshot, on_screen, shown
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 
+from viewer.analysis.pick import pick
 from viewer.app.scene import navigation
 from viewer.gpu.surface import Surface
-from viewer.pick import pick
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 

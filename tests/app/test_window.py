@@ -20,14 +20,14 @@ from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virt
 from written import picture
 
 from viewer import cli
+from viewer.analysis.pick import pick
 from viewer.camera import Camera
+from viewer.document.recording import Recording
 from viewer.frame import render_frame, shared_renderer
 from viewer.gpu.surface import Surface
-from viewer.gpu.view import View
-from viewer.pick import pick
-from viewer.recording import Recording
 from viewer.scan.open import open_scan
 from viewer.scan.points import Bounds
+from viewer.view import View
 
 SIZE = (1280, 720)
 

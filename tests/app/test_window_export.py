@@ -18,9 +18,9 @@ from scenes import sphere
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 from written import film
 
+from viewer.document.recording import Recording
 from viewer.look import color_table
-from viewer.marks import INK
-from viewer.recording import Recording
+from viewer.output.marks import INK
 from viewer.scan import formats
 from viewer.scan.formats.exr import write_views
 

@@ -14,7 +14,7 @@ import pytest
 from scenes import sphere
 from virtual_screen import PATIENCE, RunningApp, Screen, running_app, virtual_screen
 
-from viewer.recording import Recording
+from viewer.document.recording import Recording
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from virtual_screen import RunningApp, Screen, running_app, virtual_screen
 from written import write_mesh
 
+from viewer.analysis.measure import in_words
 from viewer.camera import Camera
-from viewer.gpu.view import View
-from viewer.measurement import in_words
 from viewer.scan.points import PointCloud
+from viewer.view import View
 
 SIZE = (1280, 720)
 FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates

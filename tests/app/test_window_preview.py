@@ -13,7 +13,7 @@ from virtual_screen import RunningApp, running_app, virtual_screen
 from written import picture
 
 from viewer import cli
-from viewer.recording import Recording
+from viewer.document.recording import Recording
 from viewer.scan import formats
 
 SIZE = (1280, 720)

@@ -16,8 +16,8 @@ import pytest
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 
 from viewer import cli
-from viewer.export import read_description
-from viewer.recording import Entry, Recording
+from viewer.document.recording import Entry, Recording
+from viewer.output.export import read_description
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 

@@ -16,7 +16,7 @@ import pytest
 from scenes import sphere
 from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
 
-from viewer.recording import Recording
+from viewer.document.recording import Recording
 from viewer.scan import formats
 
 SIZE = (1280, 720)

@@ -14,8 +14,8 @@ from test_instancing import BUFFERS, CAMERAS, CLOUD, SIZE, assert_agree, assert_
 from viewer.camera import Camera
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
-from viewer.gpu.view import View
 from viewer.scan.points import PointCloud
+from viewer.view import View
 
 Draw = Callable[..., Surface]
 WAYS = ("tiles", *FEEDS)

@@ -13,8 +13,8 @@ from test_elliptical import rays
 
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
-from viewer.gpu.view import View
 from viewer.scan.points import PointCloud
+from viewer.view import View
 
 Draw = Callable[..., Surface]
 SIZE = (320, 240)

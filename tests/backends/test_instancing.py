@@ -10,12 +10,12 @@ import pytest
 from scenes import NOTHING, sphere
 
 from viewer.backends import backend
+from viewer.backends.surfels import tiles
+from viewer.backends.surfels.tiles import TileLists
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu import tiles
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
-from viewer.gpu.tiles import TileLists
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -15,12 +15,12 @@ from viewer.bench.judge import Judge, Walk
 from viewer.bench.scenes.scanner import Faults, around, capture, rig
 from viewer.bench.truth import tessellation
 from viewer.bench.truth.reference import Reference, footprint, trace, visible
-from viewer.bench.truth.scene import Scene
 from viewer.bench.truth.shapes import Shapes, Sphere
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.mesh.scene import Scene
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

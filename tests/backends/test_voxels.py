@@ -12,6 +12,7 @@ from scenes import NOTHING, looking_down_z, sphere
 from scipy.ndimage import distance_transform_edt
 from test_instancing import assert_agree
 
+from viewer.analysis.pick import pick
 from viewer.backends import backend
 from viewer.backends.voxels import Params, derive
 from viewer.bench.scenes.catalog import subject
@@ -21,7 +22,6 @@ from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.look import Look
-from viewer.pick import pick
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

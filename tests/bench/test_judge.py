@@ -12,12 +12,12 @@ import pytest
 from scenes import plane, sphere_mesh
 
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.truth.mesh import Mesh, read_mesh, vertex_normals
 from viewer.bench.truth.reference import trace
-from viewer.bench.truth.scene import Scene
 from viewer.bench.truth.shapes import Plane, Shapes, Sphere
 from viewer.camera import Camera
 from viewer.look import Look, rgba
+from viewer.mesh.scene import Scene
+from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
 
 if TYPE_CHECKING:

@@ -18,12 +18,12 @@ from viewer.app import keys, settings
 from viewer.app.session import Bookmark, Left
 from viewer.backends import backend, backends
 from viewer.camera import Camera
+from viewer.document.recording import Entry, Recording
 from viewer.errors import InputError
-from viewer.export import write_png
 from viewer.frame import Request, render_frame, shared_renderer
 from viewer.gpu.surface import Surface
 from viewer.look import Look
-from viewer.recording import Entry, Recording
+from viewer.output.export import write_png
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.bench import slomp
+from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.bench.scenes import samples
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera

@@ -20,11 +20,11 @@ import numpy as np
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
-from viewer.gpu.view import View
 from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.view import View
 
 VERTEX = """#version 430
 layout(location = 0) in vec3 position; layout(location = 1) in vec4 color;

@@ -20,9 +20,9 @@ from viewer.backends import FrameView, backend
 from viewer.camera import Camera
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
-from viewer.gpu.view import View
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
+from viewer.view import View
 
 SURFELS = backend("surfels")
 WAYS = next(p.choices for p in SURFELS.parameters if p.name == "instancing")

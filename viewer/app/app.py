@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..anonymous import in_place
+from ..document.anonymous import in_place
+from ..document.recording import Entry
 from ..errors import InputError, Scan4DError
 from ..files import user_folder
 from ..gpu.context import Gpu
-from ..recording import Entry
 from ..scan.open import open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -26,6 +26,8 @@ from .files.opening import Opened, Opening, begin
 from .files.scans import Scans, title
 from .help import Help
 from .notices import Notices
+from .output.capture import Capture
+from .output.exporting import Exporting
 from .playing.playback import Playback
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
@@ -36,8 +38,6 @@ from .scene.rendering import Rendering
 from .scene.steering import Steering
 from .session import Left, known_as
 from .settings import Keeper, Settings
-from .tools.capture import Capture
-from .tools.exporting import Exporting
 from .tools.measuring import Measuring
 from .window import Window
 

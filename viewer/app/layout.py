@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 
 from . import escape, help, menu, panel, tasks
+from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
-from .tools import export_dialog, measuring_panel
+from .tools import measuring_panel
 
 if TYPE_CHECKING:
     from .app import App

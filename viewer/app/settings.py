@@ -21,14 +21,14 @@ from ..errors import InputError
 from ..files import parsed_json, read_text, whole_file
 from ..geometry import up_vector
 from ..look import COLOR_BY, Look
-from ..marks import Marks
+from ..output.marks import Marks
 from ..params import describe
 from . import theme
+from .output.export_plan import Choices
 from .place import Place
 from .playing.player import Pace
 from .scene import legend, turntable
 from .session import Bookmark, Left, Session
-from .tools.export_plan import Choices
 
 T = TypeVar("T")
 FORMAT = 1

@@ -33,9 +33,9 @@ from ..errors import unknown_name
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
-from ..gpu.view import View
 from ..params import Parameter, describe, parse
 from ..scan.points import PointCloud
+from ..view import View
 
 
 class Derived(Protocol):

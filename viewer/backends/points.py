@@ -15,10 +15,10 @@ import numpy as np
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import scatter
 from ..gpu.surface import Surface
-from ..gpu.view import View
 from ..params import param
 from ..scan.points import PointCloud
 from ..scan.spacing import spacings
+from ..view import View
 from . import FrameView
 
 TITLE = "Points"

@@ -16,8 +16,8 @@ from ..gpu import gl
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
+from ..mesh.triangles import Faces, Mesh
 from ..scan.points import PointCloud
-from .truth.mesh import Faces, Mesh
 
 FLOOR, CEILING = "gl-points", "mesh"
 

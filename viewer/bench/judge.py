@@ -14,12 +14,12 @@ from ..camera import Camera
 from ..gpu.context import Gpu
 from ..gpu.surface import Surface
 from ..look import Look
+from ..mesh.scene import Rays, Scene
 from ..scan.points import PointCloud
 from ..scan.spacing import typical_spacing
 from . import metrics
 from .metrics import Errors
 from .truth.reference import Reference, both_see, footprint, trace, visible
-from .truth.scene import Rays, Scene
 
 _PROBES = 50_000  # points of a cloud whose visibility is looked at
 _STEEPEST = 0.1  # the least cosine that counts: 84 degrees

@@ -13,7 +13,7 @@ from ..backends import backends as all_backends
 from ..errors import NoOpenGLError
 from ..params import Parameter
 from ..scan.points import PointCloud
-from . import drawing
+from . import _drawing as drawing
 
 _NO_POINTS = PointCloud.from_arrays(np.zeros((0, 3)))
 

@@ -17,11 +17,15 @@ from itertools import chain, count, product
 from pathlib import Path
 
 from ..backends import backend, backends
-from ..bench import numerics, octree_sizes, octrees, slomp
+from ..bench import numerics
 from ..bench.forecast import forecast
+from ..bench.papers.slomp_2014 import octree_sizes, octrees
+from ..bench.papers.slomp_2014 import surfels as slomp
+from ..bench.papers.slomp_2014.octree_tables import NAME as OCTREE_TABLES
+from ..bench.papers.slomp_2014.octree_tables import write_octree_tables
+from ..bench.papers.slomp_2014.table_two import NAME as TABLE_TWO
+from ..bench.papers.slomp_2014.table_two import write_table_two
 from ..bench.plan import Group, plan
-from ..bench.report.octree_tables import NAME as OCTREE_TABLES
-from ..bench.report.octree_tables import write_octree_tables
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
@@ -35,16 +39,15 @@ from ..bench.report.results import (
     read_rows,
     write_row,
 )
-from ..bench.report.table_two import NAME as TABLE_TWO
-from ..bench.report.table_two import write_table_two
 from ..bench.run import Bench, Settings
 from ..bench.scenes import catalog
 from ..errors import InputError, explained
 from ..files import whole_file
 from ..signals import held_interrupts
-from . import arguments, drawing
-from .console import progress, tell, warn
-from .outputs import add_force_argument, claim
+from . import _arguments as arguments
+from . import _drawing as drawing
+from ._console import progress, tell, warn
+from ._outputs import add_force_argument, claim
 
 _SUITES = ("scenes", "numerics", "slomp", "octrees")
 _OF_THE_PAPER = {

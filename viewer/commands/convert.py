@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..export import check_output, is_pattern
+from ..output.export import check_output, is_pattern
 from ..scan import formats
 from ..scan.inputs import scan_inputs
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from .console import progress, tell, warn
-from .outputs import add_force_argument, claim
-from .scans import (
+from ._console import progress, tell, warn
+from ._outputs import add_force_argument, claim
+from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
     chosen_poses,

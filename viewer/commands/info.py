@@ -13,8 +13,8 @@ from ..errors import shortened
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from .console import plain
-from .scans import SCAN_HELP, first_readable, open_timeline
+from ._console import plain
+from ._scans import SCAN_HELP, first_readable, open_timeline
 
 
 def add_arguments(parser: ArgumentParser) -> None:

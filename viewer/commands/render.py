@@ -16,26 +16,29 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..anonymous import anonymous_request
 from ..backends import backend as find_backend
 from ..camera import Camera
+from ..document.anonymous import anonymous_request
+from ..document.recording import Entry, fingerprint, new_salt
 from ..errors import InputError
-from ..export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..files import whole_file
 from ..frame import Request, choose
 from ..look import Look, drawable
-from ..marks import MARKS, Legend, marks_of
+from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
+from ..output.marks import MARKS, Legend, marks_of
 from ..params import parse
-from ..recording import Entry, fingerprint, new_salt
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
-from . import arguments, drawing, replay, stats
-from .console import progress, say, tell, warn
-from .drawing import Plan, Shot
-from .outputs import add_force_argument, claim
-from .scans import (
+from . import _arguments as arguments
+from . import _drawing as drawing
+from . import _replay as replay
+from . import _stats as stats
+from ._console import progress, say, tell, warn
+from ._drawing import Plan, Shot
+from ._outputs import add_force_argument, claim
+from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
     check_color_source,

@@ -13,18 +13,18 @@ from functools import cache
 from pathlib import Path
 
 from ..bench.scenes.scanner import Faults, around, capture, rig
-from ..bench.truth.mesh import Faces, Mesh, read_faces
 from ..errors import InputError
-from ..export import check_output
+from ..mesh.triangles import Faces, Mesh, read_faces
+from ..output.export import check_output
 from ..scan import formats
 from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.range_view import merge
 from ..scan.timeline import Timeline
-from . import arguments
-from .console import progress, tell
-from .outputs import add_force_argument, claim
-from .scans import (
+from . import _arguments as arguments
+from ._console import progress, tell
+from ._outputs import add_force_argument, claim
+from ._scans import (
     add_pose_arguments,
     chosen_poses,
     frame_files,

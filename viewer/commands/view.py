@@ -11,22 +11,22 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from ..camera import Camera
+from ..document.recording import Recording, is_recording, place_of
 from ..errors import InputError, NoOpenGLError, explained
-from ..export import contact_sheet, film, thumbnail, write_png
 from ..frame import Request
 from ..look import Look
-from ..recording import Recording, is_recording, place_of
+from ..output.export import contact_sheet, film, thumbnail, write_png
 from ..scan.inputs import scan_inputs
 from ..scan.listing import named_scans
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
 from ..unfinished import remove_leftovers
-from . import drawing
-from .console import progress, tell, warn
+from . import _drawing as drawing
+from ._console import progress, tell, warn
+from ._outputs import add_force_argument, claim
+from ._scans import SCAN_HELP, framing, open_timeline, read_poses
 from .doctor import display
-from .outputs import add_force_argument, claim
-from .scans import SCAN_HELP, framing, open_timeline, read_poses
 
 _SIZE = (1200, 800)
 _SHEET_PICTURES = 25  # at most, on a contact sheet

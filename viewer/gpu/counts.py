@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ..scan.points import PointCloud
 from ..task import checkpoint
+from ..view import View
 from .sample import is_sampled
-from .view import View
 
 NOTHING = 0xFFFFFFFF
 _CHUNK = 1 << 20  # points counted at a time

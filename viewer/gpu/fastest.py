@@ -14,10 +14,10 @@ from ..camera import Camera
 from ..errors import InputError, Scan4DError
 from ..files import cache_folder, whole_file
 from ..scan.points import PointCloud
+from ..view import View
 from .context import Gpu
 from .pose import GpuPose
 from .surface import Surface
-from .view import View
 
 _TURNS = 3
 _TRIAL_POINTS, _TRIAL_SIZE = 100_000, (1920, 1280)

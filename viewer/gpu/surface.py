@@ -14,13 +14,13 @@ from ..errors import InputError
 from ..geometry import up_vector
 from ..look import Look, rgba, value_source
 from ..scan.points import PointCloud
+from ..view import View
 from . import gl
 from .compact import IndexList, list_covered
 from .context import Gpu, Resource
 from .counts import NOTHING, count_points
 from .pose import FORMATS, GpuPose, as_float32
 from .sample import sample_of
-from .view import View
 
 _NO_DEPTH = 0x7F800000  # +inf as float bits
 EMPTY = 255  # the level of a pixel that shows nothing

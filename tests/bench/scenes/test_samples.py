@@ -7,8 +7,8 @@ import pytest
 
 from viewer.bench.scenes import samples
 from viewer.bench.truth import tessellation
-from viewer.bench.truth.mesh import Mesh
 from viewer.bench.truth.shapes import Box, Plane, Shape, Sphere, Torus
+from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 
 SHAPES = [

@@ -13,11 +13,11 @@ from scenes import sphere_hits, sphere_mesh
 
 from viewer import cli
 from viewer.bench.scenes.scanner import Faults, around, capture, rig
-from viewer.bench.truth.mesh import Mesh, face_normals, read_faces, read_mesh
 from viewer.bench.truth.reference import trace
 from viewer.bench.truth.shapes import Shapes, Sphere
 from viewer.camera import Camera
 from viewer.errors import InputError
+from viewer.mesh.triangles import Mesh, face_normals, read_faces, read_mesh
 from viewer.scan.formats import exr, read, read_points
 from viewer.scan.points import Bounds
 from viewer.scan.range_view import RangeView, merge

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.bench.truth.isosurface import grid_values, isosurface
-from viewer.bench.truth.mesh import Mesh
+from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 
 # Uneven lines, finer near the middle of x.

@@ -12,13 +12,13 @@ import pytest
 from scenes import sphere, sphere_mesh
 
 from viewer.bench import metrics
-from viewer.bench.truth.mesh import Mesh, read_faces, read_mesh, vertex_normals
 from viewer.bench.truth.reference import both_see, footprint, trace, visible
-from viewer.bench.truth.scene import to_linear, to_srgb
 from viewer.bench.truth.shapes import Plane, Shapes, Sphere
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.look import Look
+from viewer.mesh.scene import to_linear, to_srgb
+from viewer.mesh.triangles import Mesh, read_faces, read_mesh, vertex_normals
 from viewer.scan.formats import read
 from viewer.scan.points import PointCloud
 from viewer.scan.spacing import typical_spacing

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.bench import slomp
+from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.scan.octree.build import Stop, build
 from viewer.scan.points import PointCloud
 

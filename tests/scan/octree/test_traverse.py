@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from viewer.camera import Camera
-from viewer.gpu.view import View
 from viewer.scan.octree import traverse
 from viewer.scan.octree.build import Stop, build
 from viewer.scan.octree.octree import DEEPEST, Octree
 from viewer.scan.octree.traverse import Cut, Sight, Traversal
 from viewer.scan.points import PointCloud
+from viewer.view import View
 
 SIZE = (240, 160)
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
+from ...document.recording import is_recording
 from ...files import absolute, printable, working_folder
-from ...recording import is_recording
 from ...scan.listing import Listed, list_folder
 from ...scan.open import DEMO
 from ...task import Task, in_background

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...recording import is_recording
+from ...document.recording import is_recording
 from ...scan.listing import as_one_scan
 
 if TYPE_CHECKING:

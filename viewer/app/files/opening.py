@@ -7,8 +7,8 @@ from collections.abc import Callable
 from concurrent.futures import Future, wait
 from typing import NamedTuple
 
+from ...document.recording import fingerprint
 from ...errors import InputError, Scan4DError
-from ...recording import fingerprint
 from ...scan.pose import Pose
 from ...scan.spacing import spacings
 from ...scan.timeline import Timeline

@@ -9,8 +9,8 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from numpy.typing import NDArray
 
-from ... import marks
-from ...marks import Box, Color, Legend, Marks
+from ...output import marks
+from ...output.marks import Box, Color, Legend, Marks
 
 if TYPE_CHECKING:
     from ..app import App

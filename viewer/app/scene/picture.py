@@ -9,12 +9,12 @@ from collections import defaultdict, deque
 from dataclasses import replace
 from typing import Any
 
+from ...analysis.pick import Picked, before_gap, pick
 from ...errors import Scan4DError
 from ...frame import Request, bring, fallback, is_prepared, render_frame
 from ...gpu.context import Gpu
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
-from ...pick import Picked, before_gap, pick
 from ...renderer import Renderer
 from ...scan.points import Bounds
 from ...scan.pose import Pose

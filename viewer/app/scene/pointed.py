@@ -6,7 +6,7 @@ import logging
 import math
 from typing import TYPE_CHECKING
 
-from ...pick import Picked
+from ...analysis.pick import Picked
 
 if TYPE_CHECKING:
     from ..app import App

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
+from ...analysis.measure import End, Measurements, Reading, in_words, read, save, table, to_text
+from ...analysis.pick import before_gap, is_seen, pick
 from ...errors import InputError
 from ...files import absolute, free_file, working_folder
-from ...measurement import End, Measurements, Reading, in_words, read, save, table, to_text
-from ...pick import before_gap, is_seen, pick
 from ...scan.inputs import found_among, scan_inputs
 from ..session import known_as
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
+from ...analysis.measure import End, Reading
 from ...camera import Camera
 from ...geometry import Vector
-from ...measurement import End, Reading
 from .. import notices, theme
 from ..scene import navigation
-from .labels import Box, Line, free_place, usual_place
+from ..scene.labels import Box, Line, free_place, usual_place
 from .measuring import distance_words
 
 if TYPE_CHECKING:

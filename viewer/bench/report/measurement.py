@@ -12,7 +12,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import whole_file
-from .. import slomp
+from ..papers.slomp_2014 import surfels as slomp
 from .results import Row
 
 Measurement = dict[str, Any]

@@ -11,13 +11,13 @@ from typing import Literal
 import numpy as np
 
 from ...errors import InputError, unknown_name
+from ...mesh.triangles import Mesh, read_faces, read_mesh
 from ...scan.demo import DemoSource
 from ...scan.open import find_source
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
-from ..truth.mesh import Mesh, read_faces, read_mesh
 from ..truth.shapes import Box, Plane, Shape, Shapes, Sphere, Torus
 from . import samples
 from .real_scans import DepthFrames, placed_scans

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...mesh.scene import Rays, to_linear, to_srgb
+from ...mesh.triangles import Mesh
 from ...scan.formats import read
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.range_view import RangeView
 from ...scan.times import natural_key
 from ..truth.isosurface import isosurface
-from ..truth.mesh import Mesh
-from ..truth.scene import Rays, to_linear, to_srgb
 from .registration import Target, register
 from .subjects import Moment
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..truth.scene import Rays
+from ...mesh.scene import Rays
 
 _STEPS = 60  # at each reach
 _STILL = 1e-6  # a step that moves nothing any more: radians, and scan units

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mesh.scene import to_linear, to_srgb
+from ...mesh.triangles import Mesh
 from ...scan.points import PointCloud
-from ..truth.mesh import Mesh
-from ..truth.scene import to_linear, to_srgb
 
 Arrays = dict[str, NDArray]
 Sampler = Callable[[int, slice], Arrays]  # some rows of a number of points

@@ -12,12 +12,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mesh.triangles import Faces, Mesh
 from ...scan.demo import colors, head
 from ...scan.demo.motion import move
 from ...scan.demo.sampling import Solid, projected
 from ...scan.points import PointCloud
 from .isosurface import grid_values, isosurface
-from .mesh import Faces, Mesh
 
 _Runs = tuple[tuple[tuple[float, float], ...], ...]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .mesh import Faces
-from .scene import Rays
+from ...mesh.scene import Rays
+from ...mesh.triangles import Faces
 
 _SKIPPED = 4  # lines from one of the coarse grid to the next
 

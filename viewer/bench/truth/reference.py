@@ -13,10 +13,10 @@ from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...gpu.shade import shade
 from ...gpu.surface import Surface
-from ...gpu.view import View
 from ...look import Look
+from ...mesh.scene import NOTHING, Hits, Rays, Scene, distance_to_ball, to_srgb
 from ...scan.points import PointCloud
-from .scene import NOTHING, Hits, Rays, Scene, distance_to_ball, to_srgb
+from ...view import View
 
 _CHUNK = 1 << 18  # rays cast at a time
 # A hit may come before its own point by so many steps of float32 at the size of the scene: the ray's

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mesh.scene import Rays
+from ...mesh.triangles import Mesh
 from ...scan.points import PointCloud
-from .mesh import Mesh
-from .scene import Rays
 
 # Around and across a curved shape: the middles of its triangles are within 3e-5 of its size of the surface.
 _FINE = (512, 256)

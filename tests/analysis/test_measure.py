@@ -1,0 +1,298 @@
+"""Measured distances, on scenes whose points are where they are known to be."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scenes import looking_down_z, plane
+
+from viewer.analysis.measure import (
+    COLUMNS,
+    End,
+    Measurement,
+    Measurements,
+    in_words,
+    read,
+    save,
+    table,
+    to_text,
+)
+from viewer.analysis.pick import Picked, pick
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.gpu.surface import NOTHING, Surface, Texel
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+Draw = Callable[..., Surface]
+SIZE = (60, 40)
+FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates
+
+
+def looking_from(eye: NDArray[np.float64], **fields: object) -> Camera:
+    return Camera(**{**looking_down_z(**fields).to_json(), "eye": eye, "target": eye - np.array([0, 0, 1])})
+
+
+def clicked(surface: Surface, camera: Camera, point: NDArray[np.float64]) -> End:
+    """The end that a click on the pixel of a point sets."""
+    offsets = (point - surface.pose.cloud.origin)[None]
+    x, y = surface.view.project(offsets)[0][0]
+    picked = pick(surface, int(x), int(y))
+    assert picked is not None
+    return End.of(picked, Pose(0, 0.0, "", surface.pose.cloud))
+
+
+def end(position: tuple[float, float, float], spacing: float | None = 0.1, **fields: object) -> End:
+    return End(**{"frame": 0, "time": 0.0, "position": position, "snapped": "point", "id": 0,
+                  "spacing": spacing, "level": 0} | fields)  # fmt: skip
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("offset", [np.zeros(3), FAR], ids=["near", "far"])
+def test_snapped_distances_are_exact(draw: Draw, projection: str, offset: NDArray[np.float64]) -> None:
+    rng = np.random.default_rng(5)
+    # In steps of 2^-10, so that float64 holds them exactly at either place.
+    points = np.round(rng.uniform([-1, -0.7, -5], [1, 0.7, -4], (12, 3)) * 1024) / 1024 + offset
+    fields = {"projection": projection, "height": 2.0} if projection == "orthographic" else {"fov_y": 29}
+    camera = looking_from(offset, **fields)
+    surface = draw(PointCloud.from_arrays(points), camera, SIZE)
+    seen = sorted(set(surface.id[surface.id != NOTHING].tolist()))
+    assert len(seen) > 9
+    for a, b in itertools.pairwise(seen):
+        ends = [clicked(surface, camera, points[i]) for i in (a, b)]
+        for made, i in zip(ends, (a, b), strict=True):
+            assert (made.id, made.snapped, made.level) == (i, "point", 0)
+            assert made.position == tuple(points[i])
+        assert Measurement(*ends).distance == math.dist(points[a], points[b])
+
+
+def test_points_of_a_float64_file_are_exact_to_the_step_of_float32_within_the_scan(draw: Draw) -> None:
+    points = np.random.default_rng(6).uniform([-1, -0.7, -5], [1, 0.7, -4], (12, 3)) + FAR
+    camera = looking_from(FAR)
+    surface = draw(PointCloud.from_arrays(points), camera, SIZE)
+    for i in set(surface.id[surface.id != NOTHING].tolist()):
+        np.testing.assert_allclose(
+            clicked(surface, camera, points[i]).position, points[i], atol=2**-22, rtol=0
+        )
+
+
+def test_an_end_has_the_spacing_around_its_point_and_the_frame_of_its_pose(draw: Draw) -> None:
+    surface = draw(plane(100, depth=4.0), looking_down_z(), SIZE, "surfels")
+    picked = pick(surface, 30, 20)
+    assert picked is not None
+    made = End.of(picked, Pose(7, 0.28, "", surface.pose.cloud))
+    assert (made.frame, made.time, made.id) == (7, 0.28, picked.id)
+    assert made.spacing == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_filled_place_is_refused_unless_allowed(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = draw(plane(100, depth=4.0), looking_down_z(), SIZE)
+    monkeypatch.setattr(surface, "texel", lambda x, y: Texel(3.0, NOTHING, 2))
+    picked, pose = pick(surface, 30, 20), Pose(0, 0.0, "", surface.pose.cloud)
+    assert picked is not None
+    with pytest.raises(InputError, match="hole is filled"):
+        End.of(picked, pose)
+    made = End.of(picked, pose, filled=True)
+    assert (made.snapped, made.id, made.level) == ("surface", None, 2)
+    assert made.position == tuple(picked.position)
+    nearest = np.linalg.norm(plane(100, depth=4.0).positions - picked.position, axis=1).min()
+    assert made.spacing == pytest.approx(nearest, rel=1e-5), (
+        "one unit before the points, more than their spacing"
+    )
+
+
+def test_on_a_measured_surface_without_a_point_the_spacing_counts() -> None:
+    cloud = plane(40, depth=4.0)
+    made = End.of(Picked(np.array([0.01, 0.01, -4.0]), level=0), Pose(0, 0.0, "", cloud))
+    assert made.snapped == "surface"
+    assert made.spacing == pytest.approx(0.05, rel=0.2)
+
+
+def test_independent_errors_add_in_squares() -> None:
+    assert Measurement(end((0, 0, 0), 0.3), end((0, 8, 6), 0.4)).uncertainty == pytest.approx(0.5)
+    assert Measurement(end((0, 0, 0), 0.3), end((0, 8, 6), None)).uncertainty is None
+
+
+def test_the_uncertainty_is_what_ends_that_err_give() -> None:
+    """Its formula against draws: ends that deviate by a spacing (1 sigma) in each direction."""
+    rng, spacings = np.random.default_rng(1), (0.3, 0.1)
+    ends = [end((0.0, 0, 0), spacings[0]), end((20.0, 30, -10), spacings[1])]
+    drawn = [e.position + rng.normal(0, s, (100_000, 3)) for e, s in zip(ends, spacings, strict=True)]
+    deviation = np.linalg.norm(drawn[1] - drawn[0], axis=1).std()
+    assert Measurement(*ends).uncertainty == pytest.approx(deviation, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("distance", "uncertainty", "text"),
+    [
+        (12.3456, 0.4, "12.3 ± 0.4 mm"),
+        (12.3456, 0.04, "12.35 ± 0.04 mm"),
+        (12.3456, 0.149, "12.35 ± 0.15 mm"),
+        (12.3456, 0.196, "12.3 ± 0.2 mm"),
+        (12.3456, 0.97, "12.3 ± 1.0 mm"),
+        (1234.56, 30.0, "1230 ± 30 mm"),
+        (1234.56, 12.3, "1235 ± 12 mm"),
+        (0.000123456, 2e-6, "0.000123 ± 0.000002 mm"),
+        (1e-15, 2e-17, "1e-15 ± 2e-17 mm"),
+        (12.3456, None, "12.3456 mm"),
+    ],
+)
+def test_digits_follow_the_uncertainty(distance: float, uncertainty: float | None, text: str) -> None:
+    assert in_words(distance, uncertainty, "mm") == text
+
+
+# --- through time ---------------------------------------------------------------------------
+
+
+def moved(index: int) -> Pose:
+    """Four points that grow apart from frame to frame; number 1 is missing in frame 3."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * (1 + index) + FAR
+    if index == 3:
+        points[1] = np.nan
+    return Pose(index, index / 25, "", PointCloud.from_arrays(points))
+
+
+def measured(pose: Pose, *ids: int) -> Measurement:
+    world = pose.cloud.world()  # without missing points, so that rows are ids
+    return Measurement(*(end(tuple(world[id]), id=id, frame=pose.index, time=pose.time) for id in ids))
+
+
+def test_it_follows_its_points_where_the_scan_has_one_topology() -> None:
+    made = measured(moved(0), 0, 2)
+    reading = read(made, moved(4), True)
+    assert (reading.fixed, reading.motion) == (None, "follows points")
+    assert reading.measurement == measured(moved(4), 0, 2)
+    assert reading.measurement.distance == 5 * made.distance
+    assert read(reading.measurement, moved(0), True).measurement == made
+
+
+@pytest.mark.parametrize("one_topology", [False, None])
+def test_it_stays_in_space_where_the_scan_does_not_tell(one_topology: bool | None) -> None:
+    made = measured(moved(0), 0, 2)
+    reading = read(made, moved(4), one_topology)
+    assert reading.measurement == made
+    assert reading.motion == "fixed in space"
+    assert "does not tell" in str(reading.fixed)
+
+
+def test_it_stays_in_space_without_points_to_follow() -> None:
+    made = measured(moved(0), 0, 1)
+    assert read(made, moved(2), True).fixed is None
+    missing = read(made, moved(3), True)
+    assert (missing.measurement, missing.fixed) == (made, "point 1 is missing in this frame")
+    on_surface = Measurement(made.first, end((1, 2, 3), snapped="surface", id=None))
+    assert "surface" in str(read(on_surface, moved(2), True).fixed)
+    between_frames = Measurement(made.first, measured(moved(1), 0, 1).second)
+    assert "two frames" in str(read(between_frames, moved(2), True).fixed)
+
+
+# --- undo -----------------------------------------------------------------------------------
+
+
+def make(made: Measurements, measurement: Measurement) -> None:
+    for e in measurement.ends:
+        made.set_end(e)
+
+
+def test_two_ends_make_a_measurement() -> None:
+    made, wanted = Measurements(), measured(moved(0), 0, 1)
+    assert made.set_end(wanted.first) is None
+    assert (made.begun, made.all) == (wanted.first, ())
+    assert made.set_end(wanted.first) is None
+    assert (made.begun, made.all) == (wanted.first, ()), "the same place twice is no distance"
+    assert made.set_end(wanted.second) == wanted
+    assert (made.begun, made.all) == (None, (wanted,))
+
+
+def test_undo_takes_back_a_first_end_before_whole_measurements() -> None:
+    made, wanted = Measurements(), measured(moved(0), 0, 1)
+    make(made, wanted)
+    made.set_end(wanted.second)
+    made.undo()
+    assert (made.begun, made.all) == (None, (wanted,))
+    made.undo()
+    assert made.all == ()
+    made.set_end(wanted.second)
+    made.redo()
+    assert made.begun is None
+    assert made.all == (wanted,)
+
+
+def test_every_change_is_undone_and_made_again() -> None:
+    one, two = measured(moved(0), 0, 1), measured(moved(0), 0, 2)
+    made = Measurements()
+    states = [made.all]
+    for change in (lambda: make(made, one), lambda: make(made, two), lambda: made.delete(0), made.clear):
+        change()
+        states.append(made.all)
+    assert states == [(), (one,), (one, two), (two,), ()]
+    for state in states[-2::-1]:
+        made.undo()
+        assert made.all == state
+    assert not made.can_undo
+    made.undo()
+    assert made.all == ()
+    for state in states[1:]:
+        made.redo()
+        assert made.all == state
+    assert not made.can_redo
+    made.redo()
+    assert made.all == states[-1]
+
+
+def test_a_new_change_ends_what_was_undone() -> None:
+    one, two = measured(moved(0), 0, 1), measured(moved(0), 0, 2)
+    made = Measurements()
+    make(made, one)
+    made.undo()
+    make(made, two)
+    assert (made.all, made.can_redo) == ((two,), False)
+    made.undo()
+    made.clear()
+    assert made.can_redo, "clearing nothing is no change"
+
+
+# --- as a file ------------------------------------------------------------------------------
+
+
+def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
+    made = measured(moved(2), 0, 3)
+    surface = Measurement(end((0.1, 1 / 3, 2), None, snapped="surface", id=None, level=2), made.second)
+    readings = [(1, read(made, moved(2), True)), (2, read(surface, moved(2), True))]
+    file = tmp_path / "distances.csv"
+    save(file, table(readings, 'the "left", ear', "mm"))
+    assert file.read_bytes().count(b"\r\n") == 3
+    with open(file, newline="", encoding="utf-8") as stream:
+        first, second = csv.DictReader(stream)
+    assert tuple(first) == COLUMNS
+    assert (first["scan"], first["measurement"], first["unit"]) == ('the "left", ear', "1", "mm")
+    assert float(first["distance"]) == made.distance
+    assert float(first["uncertainty"]) == made.uncertainty
+    assert (first["motion"], second["motion"]) == ("follows points", "fixed in space")
+    for number, e in enumerate(made.ends, 1):
+        assert int(first[f"frame_{number}"]) == 3, "as the window counts them"
+        assert float(first[f"time_{number}"]) == e.time
+        assert int(first[f"id_{number}"]) == e.id
+        assert tuple(float(first[f"{axis}_{number}"]) for axis in "xyz") == e.position
+        assert float(first[f"spacing_{number}"]) == e.spacing
+    assert (second["id_1"], second["spacing_1"], second["uncertainty"]) == ("", "", "")
+    assert (second["snapped_1"], second["level_1"]) == ("surface", "2")
+    assert float(second["y_1"]) == 1 / 3
+
+
+def test_a_table_for_the_clipboard_has_tabs() -> None:
+    text = to_text(table([(1, read(measured(moved(0), 0, 1), moved(0), True))], "scan", "units"), "\t")
+    assert [len(line.split("\t")) for line in text.splitlines()] == [len(COLUMNS)] * 2
+
+
+def test_a_csv_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        save(tmp_path / "no folder" / "a.csv", [["a"]])
+    assert list(tmp_path.iterdir()) == []

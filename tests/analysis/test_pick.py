@@ -1,0 +1,186 @@
+"""Picking gives what the pixel shows, in scan units, on scenes with exactly known answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scenes import looking_down_z, plane, sphere, sphere_hits
+
+from viewer.analysis.pick import before_gap, is_seen, pick
+from viewer.camera import Camera
+from viewer.gpu.surface import EMPTY, NOTHING, Surface, Texel
+from viewer.scan.points import PointCloud
+from viewer.view import View
+
+Draw = Callable[..., Surface]
+SIZE = (60, 40)
+# Half the height of the picture is one unit, at depth 4 in perspective.
+CAMERAS = {
+    "perspective": looking_down_z(fov_y=2 * np.degrees(np.arctan(1 / 4))),
+    "orthographic": looking_down_z(projection="orthographic", height=2.0),
+}
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+@pytest.mark.parametrize("pixel", [(0, 0), (30, 20), (59, 39), (7, 31)])
+def test_a_plane_is_picked_at_the_pixels_centre(draw: Draw, projection: str, pixel: tuple[int, int]) -> None:
+    surface = draw(plane(100, depth=4.0), CAMERAS[projection], SIZE, "surfels")
+    picked = pick(surface, *pixel)
+    assert picked is not None
+    expected = [(pixel[0] + 0.5 - 30) / 20, (20 - pixel[1] - 0.5) / 20, -4.0]
+    np.testing.assert_allclose(picked.position, expected, rtol=0, atol=4 * 2**-22)
+    assert picked.measured
+    assert picked.spacing == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_a_sphere_is_picked_where_rays_meet_it(draw: Draw, projection: str) -> None:
+    cloud = sphere(5_000)
+    camera = Camera.orbit(cloud.bounds(), 25, 40, projection=projection)
+    surface = draw(cloud, camera, SIZE, "surfels")
+    depths, normals = sphere_hits(camera, SIZE)
+    for pixel in [(30, 20), (22, 14), (36, 25)]:
+        picked = pick(surface, *pixel)
+        assert picked is not None
+        spacing = np.sqrt(4 * np.pi / 5_000)
+        assert np.linalg.norm(picked.position) == pytest.approx(1, abs=0.5 * spacing)
+        depth = -(camera.rotation() @ (picked.position - camera.eye))[2]
+        assert depth == pytest.approx(depths[pixel[::-1]], abs=spacing)
+        assert picked.normal @ normals[pixel[::-1]] > 0.99, "never the far side"
+        np.testing.assert_array_equal(picked.point, cloud.positions[picked.row])
+        np.testing.assert_array_equal(picked.normal, cloud.normals[picked.row])
+        np.testing.assert_array_equal(picked.color, cloud.colors[picked.row])
+        assert picked.scalars == {"height": cloud.scalars["height"][picked.row]}
+        assert np.linalg.norm(picked.position - picked.point) < 2 * spacing
+        assert picked.spacing == pytest.approx(spacing, rel=0.2)
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_every_point_is_picked_at_its_own_pixel(draw: Draw, projection: str) -> None:
+    rng = np.random.default_rng(3)
+    points = rng.uniform([-1, -1, -5], [1, 1, -3], (40, 3))
+    points[[4, 5, 17]] = np.nan, np.inf, np.nan
+    cloud = PointCloud.from_arrays(points)
+    surface = draw(cloud, CAMERAS[projection], SIZE)
+    found = {}
+    for y in range(SIZE[1]):
+        for x in range(SIZE[0]):
+            if picked := pick(surface, x, y, spacing=False):
+                found[picked.id] = picked
+                assert surface.id[y, x] == picked.id
+                assert surface.depth[y, x] == pytest.approx(-picked.position[2])
+    assert len(found) > 25
+    assert {4, 5, 17}.isdisjoint(found)
+    for id_, picked in found.items():
+        np.testing.assert_allclose(picked.point, points[id_], atol=1e-6)
+        assert np.abs(picked.position - points[id_]).max() < 0.05, "within the pixel"
+        assert (picked.color, picked.normal, picked.scalars, picked.spacing) == (None, None, {}, None)
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_far_from_the_origin_nothing_is_lost(draw: Draw, projection: str) -> None:
+    far = np.array([1e7, -2e7, 1e7])
+    near = plane(100, depth=4.0)
+    positions = near.positions.astype(np.float64) + far
+    cloud = PointCloud.from_arrays(positions, normals=near.normals, radii=near.radii)
+    camera = CAMERAS[projection]
+    moved = Camera(**{**camera.to_json(), "eye": far, "target": far - np.array([0, 0, 1])})
+    picked = pick(draw(cloud, moved, SIZE, "surfels"), 7, 31)
+    assert picked is not None
+    # Half a step of float32 at depth 4, and of float64 at 2e7.
+    np.testing.assert_allclose(picked.position - far, [-1.125, -0.575, -4.0], rtol=0, atol=1e-6)
+    assert np.linalg.norm(picked.point - picked.position) < 0.075
+    assert picked.spacing == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_pixel_that_shows_nothing_gives_none(draw: Draw) -> None:
+    surface = draw(PointCloud.from_arrays([[0.0, 0, -4]]), CAMERAS["perspective"], SIZE)
+    assert pick(surface, 0, 0) is None
+    for outside in [(-1, 20), (60, 20), (30, -1), (30, 40)]:
+        assert pick(surface, *outside) is None
+    picked = pick(surface, 30, 20)
+    assert picked is not None
+    assert picked.spacing is None, "one point has no neighbours"
+
+
+def test_a_texel_is_what_the_whole_pictures_hold(draw: Draw) -> None:
+    surface = draw(sphere(3000), Camera.orbit(sphere(3000).bounds()), SIZE)
+    depth, row, level = surface.depth, surface.row, surface.level
+    assert 0 < np.count_nonzero(level == EMPTY) < level.size
+    for y, x in np.ndindex(*depth.shape):
+        assert surface.texel(x, y) == (depth[y, x], row[y, x], level[y, x])
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_what_a_gap_between_points_shows_is_not_meant_but_what_is_round_it(
+    draw: Draw, projection: str
+) -> None:
+    front = plane(6, depth=3.0, spacing=0.15)  # 3 pixels or more between points of one pixel
+    behind = plane(160, depth=4.0, spacing=0.02)
+    cloud = PointCloud.from_arrays(np.concatenate([front.world(), behind.world()]))
+    surface = draw(cloud, CAMERAS[projection], SIZE)
+    for y, x in np.ndindex(5, 5):
+        meant = before_gap(surface, 28 + x, 18 + y)
+        assert surface.depth[meant[1], meant[0]] == pytest.approx(3.0)
+        assert np.hypot(meant[0] - 28 - x, meant[1] - 18 - y) < 4, "the nearest point of the front"
+    across, down = np.flatnonzero((surface.depth < 3.5).any(axis=0)), 20
+    for x in (*range(across[0]), *range(across[-1] + 1, SIZE[0])):
+        assert before_gap(surface, int(x), down) == (x, down), "beside an edge nothing is seen through"
+    for place in [(0, 0), (SIZE[0] - 1, SIZE[1] - 1), (-1, 3), (SIZE[0], 3)]:
+        assert before_gap(surface, *place) == place
+
+
+def test_on_a_slope_every_pixel_is_meant(draw: Draw) -> None:
+    cloud = sphere(20_000)
+    surface = draw(cloud, Camera.orbit(cloud.bounds()), SIZE, "surfels")
+    for y, x in np.argwhere(surface.level == 0):
+        assert before_gap(surface, int(x), int(y)) == (x, y)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (5, 39), (59, 20), (30, 20)])
+def test_depths_round_a_pixel_are_those_of_the_picture(draw: Draw, place: tuple[int, int]) -> None:
+    surface = draw(sphere(3000), Camera.orbit(sphere(3000).bounds()), SIZE)
+    around = np.pad(surface.depth, 3, constant_values=np.inf)[place[1] :, place[0] :][:7, :7]
+    np.testing.assert_array_equal(surface.depth_around(*place, 3), around)
+
+
+def test_a_filled_pixel_has_a_place_and_no_point(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = draw(plane(100, depth=4.0), CAMERAS["perspective"], SIZE)
+    monkeypatch.setattr(surface, "texel", lambda x, y: Texel(2.0, NOTHING, 3))
+    picked = pick(surface, 30, 20)
+    assert picked is not None
+    assert (picked.level, picked.measured) == (3, False)
+    assert picked.row is picked.id is picked.point is picked.spacing is None
+    np.testing.assert_allclose(picked.position, [0.0125, -0.0125, -2.0])
+
+
+def test_what_was_picked_does_not_hold_the_scan(draw: Draw) -> None:
+    cloud = sphere(3000)
+    picked = pick(draw(cloud, Camera.orbit(cloud.bounds()), SIZE), 30, 20)
+    assert picked is not None
+    assert picked.color.base is None
+    assert picked.normal.base is None
+    assert not np.shares_memory(picked.point, cloud.positions)
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_unprojecting_undoes_projecting(projection: str) -> None:
+    cloud = sphere(100, center=(3, -2, 1))
+    camera = Camera.orbit(cloud.bounds(), 200, -30, projection=projection)
+    view = View.of(camera, SIZE, np.array([1.0, 2, 3]), cloud.bounds())
+    points = cloud.positions - np.array([1.0, 2, 3])
+    np.testing.assert_allclose(view.unproject(*view.project(points)), points, atol=1e-12)
+
+
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_a_place_is_seen_unless_something_is_before_it(draw: Draw, projection: str) -> None:
+    surface = draw(plane(30, depth=4.0), CAMERAS[projection], SIZE, "surfels")  # 1.5 wide, of 3 in view
+    assert is_seen(surface, (0.2, 0.1, -4.0), 0.01)
+    assert is_seen(surface, (0.2, 0.1, -3.0), 0.01), "before the plane"
+    assert not is_seen(surface, (0.2, 0.1, -5.0), 0.01)
+    assert is_seen(surface, (0.2, 0.1, -5.0), 1.1)
+    assert is_seen(surface, (1.3, 0, -4.0), 0.0), "beside the plane, where nothing is"
+    assert not is_seen(surface, (1.9, 0, -4.0), 0.0), "outside the picture"
+    assert not is_seen(surface, (0, 0, 2.0), 10.0), "behind the eye"

@@ -1,0 +1,264 @@
+"""Recordings come back as they were, keep their pace, and damaged ones are one message."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.document import recording
+from viewer.document.recording import FORMAT, Entry, Recorder, Recording, fingerprint
+from viewer.errors import InputError
+from viewer.frame import Request
+from viewer.look import Look
+from viewer.output.export import write_png
+from viewer.output.marks import Marks
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+POSE = Pose(3, 0.12, "three", PointCloud.from_arrays(np.eye(3)))
+FIRST = Entry(
+    scan="knot", hash="files:0123456789abcdef", pose=0, time=0.0, size=(96, 64),
+    camera=Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5), backend="points",
+    params=backend("points").params({"point_size": 5}),
+    look=Look(color_by="height", low=1e-17, eye_dome=True), marks=Marks(scale_bar=True), unit="mm",
+)  # fmt: skip
+SECOND = replace(FIRST, pose=1, time=0.04, at=0.52)
+THIRD = replace(SECOND, backend="surfels", params=backend("surfels").params(), at=1.5)
+RECORDING = Recording((FIRST, SECOND, THIRD), 2.4)
+
+
+def saved(folder: Path, shown: Recording = RECORDING) -> Path:
+    shown.save(folder / "a.json")
+    return folder / "a.json"
+
+
+# --- as it was --------------------------------------------------------------------------------
+
+
+def test_a_recording_comes_back_as_it_was(tmp_path: Path) -> None:
+    again = Recording.load(saved(tmp_path))
+    assert again == RECORDING
+    assert [entry.at for entry in again.entries] == [0, 0.52, 1.5]
+
+
+def test_a_recording_tells_only_what_has_changed_an_entry_a_line(tmp_path: Path) -> None:
+    text = saved(tmp_path).read_text()
+    data = json.loads(text)
+    assert (data["format"], data["seconds"]) == (FORMAT, 2.4)
+    assert data["entries"][1] == {"at": 0.52, "pose": 1, "time": 0.04}
+    assert list(data["entries"][2]) == ["at", "backend", "params"]
+    assert len(text.splitlines()) == 3 + 3
+
+
+def test_an_entry_holds_all_of_a_request() -> None:
+    request = Request(POSE, FIRST.camera, "points", FIRST.params, FIRST.look)
+    entry = Entry.of(request, "knot", None, (96, 64), "mm")
+    assert (entry.pose, entry.time) == (3, 0.12)
+    again = Entry.from_json(json.loads(json.dumps(entry.to_json()))).request(POSE)
+    assert vars(again) == vars(request)
+
+
+def test_what_earlier_versions_did_not_tell_has_its_default(tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    data = json.loads(path.read_text())
+    for name in ("marks", "unit"):
+        del data["entries"][0][name]
+    path.write_text(json.dumps(data))
+    assert Recording.load(path).entries[0] == replace(FIRST, marks=Marks(), unit=None)
+
+
+def test_an_anonymous_description_tells_neither_scan_nor_a_unit_of_its_own() -> None:
+    told, whole = (json.loads(entry.description()) for entry in (FIRST.without_names(), FIRST))
+    assert (whole["scan"], whole["anonymous"]) == ("knot", False)
+    assert told == whole | {"scan": None, "anonymous": True}
+    assert replace(FIRST, unit="jane").without_names().unit == "units"
+
+
+def test_the_recorder_notes_what_changes_and_when() -> None:
+    recorder = Recorder(100.0)
+    for entry, now in [(FIRST, 100.0), (FIRST, 100.2), (SECOND, 100.52), (SECOND, 101), (FIRST, 102.0004)]:
+        recorder.note(entry, now)
+    found = recorder.finish(103.25)
+    assert found == Recording((FIRST, SECOND, FIRST), 3.25)
+    assert [entry.at for entry in found.entries] == [0, 0.52, 2.0]
+
+
+# --- its pace -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("stamps", "seconds", "fps", "shown"),
+    [
+        ([0.0], 0.0, 25, [0]),
+        ([0.0, 0.52, 1.5], 2.0, 4, [0, 0, 0, 1, 1, 1, 2, 2]),
+        ([0.0, 0.04, 0.08, 0.12], 0.16, 25, [0, 1, 2, 3]),
+        ([0.0, 0.1, 0.12, 0.2], 0.3, 10, [0, 1, 3]),  # one that came and went in between is left out
+        ([0.0, 0.1, 0.21], 0.21, 10, [0, 1, 1, 2]),  # the last one is always shown
+        ([0.0, 0.001, 0.333, 0.667], 1.0, 3, [0, 2, 3]),  # rounded stamps fall on thirds
+    ],
+)
+def test_a_film_shows_what_was_shown_then(
+    stamps: list[float], seconds: float, fps: float, shown: list[int]
+) -> None:
+    entries = tuple(replace(FIRST, pose=number, at=at) for number, at in enumerate(stamps))
+    paced = Recording(entries, seconds).paced(fps)
+    assert [entry.pose for entry in paced] == shown
+
+
+# --- what is refused -----------------------------------------------------------------------------
+
+
+def changed(**changes: Any) -> Any:
+    """The JSON of the recording with other values; those of `first` in its first entry."""
+
+    def damage(data: dict[str, Any]) -> None:
+        data["entries"][0].update(changes.pop("first", {}))
+        data.update(changes)
+
+    return damage
+
+
+def without(name: str) -> Any:
+    return lambda data: data["entries"][0].pop(name)
+
+
+def second(**changes: Any) -> Any:
+    return lambda data: data["entries"][1].update(changes)
+
+
+CAMERA = FIRST.camera.to_json()
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (changed(format=2), ["format 2", "reads 1", "version"]),
+        (changed(format="1"), ["format '1'"]),
+        (lambda data: data.pop("format"), ["no recording"]),
+        (changed(entries=[]), ["no entries"]),
+        (changed(entries={}), ["no entries"]),
+        (changed(entries=[7]), ["entry 0", "JSON object"]),
+        (changed(seconds=-1), ["'seconds'"]),
+        (lambda data: data.pop("entries"), ["field 'seconds'"]),
+        (without("camera"), ["entry 0", "no 'camera'"]),
+        (without("scan"), ["entry 0", "no 'scan'"]),
+        (changed(first={"sceen": 1}), ["entry 0", "'sceen'", "scan"]),
+        (changed(first={"scan": 7}), ["'scan'", "7"]),
+        (changed(first={"scan": "a\0b"}), ["'scan'"]),
+        (changed(first={"hash": 7}), ["'hash'"]),
+        (changed(first={"pose": -1}), ["'pose'", "-1"]),
+        (changed(first={"pose": True}), ["'pose'", "True"]),
+        (changed(first={"pose": 1.5}), ["'pose'"]),
+        (changed(first={"time": None}), ["'time'"]),
+        (changed(first={"size": [96]}), ["'size'"]),
+        (changed(first={"size": [96.5, 64]}), ["'size'"]),
+        (changed(first={"backend": "nope"}), ["'nope'", "points", "surfels"]),
+        (changed(first={"backend": ["points"]}), ["'backend'"]),
+        (changed(first={"params": {"nope": 1}}), ["'nope'", "Known: point_size"]),
+        (changed(first={"params": {"point_size": 99}}), ["point_size", "0 to 32"]),
+        (changed(first={"params": {"point_size": 1e999}}), ["point_size"]),
+        (changed(first={"params": [5]}), ["'params'"]),
+        (changed(first={"look": {"nope": 1}}), ["'nope'", "color_by"]),
+        (changed(first={"marks": {"nope": True}}), ["unknown mark 'nope'", "scale_bar"]),
+        (changed(first={"marks": {"stamp": 7}}), ["'7'", "stamp"]),
+        (changed(first={"marks": ["stamp"]}), ["'marks'"]),
+        (changed(first={"unit": 7}), ["'unit'"]),
+        (changed(first={"look": {"background": "red"}}), ["'red'", "#rrggbb"]),
+        (changed(first={"camera": {"nope": 1}}), ["camera field 'nope'", "eye"]),
+        (changed(first={"camera": {**CAMERA, "eye": [1, 2]}}), ["eye", "three"]),
+        (changed(first={"camera": {**CAMERA, "eye": None}}), ["camera"]),
+        (changed(first={"camera": {**CAMERA, "fov_y": 10**400}}), ["fov_y"]),
+        (changed(first={"camera": {**CAMERA, "eye": [10**400, 0, 0]}}), ["three finite numbers"]),
+        (second(at=-0.5), ["entry 1", "'at'"]),
+        (second(at=1e300), ["entry 1", "'at'"]),
+        (second(at=2.0), ["entry 2", "earlier"]),
+        (second(backend="surfels"), ["entry 1", "point_size"]),  # the parameters are those of points
+    ],
+)
+def test_a_wrong_recording_is_one_message(damage: Any, words: list[str], tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    data = json.loads(path.read_text())
+    damage(data)
+    path.write_text(json.dumps(data))
+    with pytest.raises(InputError) as caught:
+        Recording.load(path)
+    assert all(word in str(caught.value) for word in [str(path), *words]), caught.value
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"{", b"\xff\xfe\x00", b"[" * 100_000, b'{"format": 1' + b"0" * 5000 + b"}", b"[]", b"null", b"7"],
+)
+def test_what_is_no_json_object_is_one_message(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        Recording.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_recording_cut_off_anywhere_is_one_message(tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    whole = path.read_bytes()
+    for end in range(0, len(whole.rstrip()) - 1, 37):
+        path.write_bytes(whole[:end])
+        with pytest.raises(InputError):
+            Recording.load(path)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_pictures_without_a_description_and_damaged_ones_are_refused(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a{suffix}"
+    with pytest.raises(InputError, match="no such file"):
+        Recording.load(path)
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="cannot be read as a picture"):
+        Recording.load(path)
+    if suffix == ".png":
+        write_png(np.zeros((4, 4, 4), np.uint8), path)
+    else:
+        import OpenEXR
+
+        OpenEXR.File({}, {"Z": np.zeros((4, 4), np.float32)}).write(str(path))
+    with pytest.raises(InputError, match="not a picture that tells how it was made"):
+        Recording.load(path)
+
+
+# --- hashes --------------------------------------------------------------------------------------
+
+
+def test_the_hash_of_a_file_is_that_of_its_bytes(tmp_path: Path) -> None:
+    (tmp_path / "a.ply").write_bytes(b"some points")
+    assert fingerprint([tmp_path / "a.ply"]) == f"sha256:{hashlib.sha256(b'some points').hexdigest()[:16]}"
+
+
+def test_several_and_large_files_count_by_names_and_sizes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = [tmp_path / name for name in ("a.ply", "b.ply")]
+    for file in files:
+        file.write_bytes(b"points")
+    before = fingerprint(files)
+    assert before is not None
+    assert before.startswith("files:")
+    files[0].write_bytes(b"POINTS")
+    assert fingerprint(files) == before
+    files[1].write_bytes(b"more points")
+    assert fingerprint(files) not in (before, fingerprint(files[::-1]))
+    monkeypatch.setattr(recording, "_HASHED_BYTES", 8)
+    assert str(fingerprint(files[1:])).startswith("files:")
+    assert str(fingerprint(files[:1])).startswith("sha256:")
+
+
+def test_without_files_there_is_no_hash(tmp_path: Path) -> None:
+    assert fingerprint([]) is None
+    assert fingerprint([tmp_path / "gone.ply"]) is None

@@ -1,0 +1,197 @@
+"""Marks tell the truth, stand where they should, and leave the rest of the picture alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from viewer.camera import Camera
+from viewer.look import Look
+from viewer.output.marks import (
+    INK,
+    PLATE,
+    Legend,
+    Marks,
+    marked,
+    number,
+    quantity,
+    round_length,
+    scale_bar,
+    stamp,
+)
+from viewer.scan.points import PointCloud
+
+if TYPE_CHECKING:
+    from viewer.gpu.surface import Surface
+
+FLAT = Camera(projection="orthographic", height=10.0)  # 36 pixels a unit in a picture of SIZE
+SIZE = (640, 360)
+LEGEND = Legend(Marks(), FLAT, Look(color_by="height"), "mm", 2, 64, 0.08)
+ALL = Marks(scale_bar=True, color_bar=True, stamp=True)
+VALUES = (-1.0, 3.0)
+
+
+def gray(size: tuple[int, int] = SIZE, level: int = 90, alpha: int = 255) -> NDArray[np.uint8]:
+    return np.full((size[1], size[0], 4), (level, level, level, alpha), np.uint8)
+
+
+def with_marks(size: tuple[int, int] = SIZE, camera: Camera = FLAT, **marks: bool) -> NDArray[np.uint8]:
+    return marked(gray(size), replace(LEGEND, marks=Marks(**marks), camera=camera), VALUES)
+
+
+def changed(image: NDArray[np.uint8]) -> tuple[int, int, int, int]:
+    """The box of what is no longer gray: left, top, right, bottom."""
+    rows, columns = np.nonzero((image != gray(image.shape[1::-1])).any(axis=2))
+    return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1
+
+
+def longest_run(image: NDArray[np.uint8]) -> int:
+    """Of pixels in INK that are side by side."""
+    ink = (image == INK).all(axis=2)
+    edges = np.diff(np.pad(ink, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    return int((np.nonzero(edges == -1)[1] - np.nonzero(edges == 1)[1]).max())
+
+
+# --- what they say ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("most", "length"),
+    [
+        (1, 1),
+        (1.9, 1),
+        (2, 2),
+        (4.99, 2),
+        (5, 5),
+        (9.9, 5),
+        (10, 10),
+        (0.03, 0.02),
+        (7e-9, 5e-9),
+        (3e12, 2e12),
+    ],
+)
+def test_a_scale_bar_is_1_2_or_5_times_a_power_of_ten_long(most: float, length: float) -> None:
+    assert round_length(most) == pytest.approx(length, rel=1e-12)
+
+
+def test_an_orthographic_scale_bar_is_as_long_as_it_says() -> None:
+    assert scale_bar(FLAT, SIZE) == (2, 72)  # a sixth of the width is 107 pixels, 2.96 units
+    assert scale_bar(FLAT, (1280, 720)) == (2, 144)
+    assert scale_bar(replace(FLAT, height=1e-4), SIZE)[0] == pytest.approx(2e-5)
+
+
+def test_a_perspective_scale_bar_is_right_at_the_depth_of_the_target(draw: Callable[..., Surface]) -> None:
+    camera = Camera(eye=(0, 0, 50), target=(0, 0, 10), fov_y=40)
+    length, pixels = scale_bar(camera, SIZE)
+    ends = PointCloud.from_arrays([[-length / 2, 0, 10.0], [length / 2, 0, 10]])
+    seen = draw(ends, camera, SIZE, params={"point_size": 1})
+    columns = np.nonzero(seen.level == 0)[1]
+    assert abs(np.ptp(columns) - pixels) <= 1
+
+
+@pytest.mark.parametrize(
+    ("value", "span", "text"),
+    [
+        (0.0, 5.0, "0"), (-0.001, 5.0, "0.00"), (1234.4, 250.0, "1,234"), (-12.345, 50.0, "-12.3"),
+        (0.0012345, 0.002, "0.00123"), (1.5e-9, 3e-9, "1.50e-09"), (2.5e13, 5e13, "2.50e+13"),
+        (500_000.25, 1.5, "500,000.25"), (7.0, 0.0, "7.00"), (float("nan"), 1.0, "nan"),
+    ],
+)  # fmt: skip
+def test_numbers_have_the_digits_that_matter(value: float, span: float, text: str) -> None:
+    assert number(value, span) == text
+
+
+def test_lengths_have_the_unit_and_scalars_their_name() -> None:
+    assert quantity(Look(color_by="depth"), "mm") == "Depth (mm)"
+    assert quantity(Look(color_by="temperature"), "mm") == "temperature"
+    assert stamp(LEGEND) == "Frame 3 of 64, 0.080 s"
+
+
+# --- where they are -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [SIZE, (1920, 1080), (300, 900)])
+def test_the_line_of_a_scale_bar_has_its_exact_pixels(size: tuple[int, int]) -> None:
+    image = with_marks(size, scale_bar=True)
+    assert longest_run(image) == round(scale_bar(FLAT, size)[1])
+
+
+@pytest.mark.parametrize("size", [SIZE, (3840, 2160), (96, 64), (300, 900)])
+def test_each_mark_keeps_to_its_corner(size: tuple[int, int]) -> None:
+    width, height = size
+    left, top, right, bottom = changed(with_marks(size, scale_bar=True))
+    assert 0 < left < right < width / 2 < width
+    assert height / 2 < top < bottom < height
+    left, top, right, bottom = changed(with_marks(size, color_bar=True))
+    assert width / 2 < left < right < width
+    assert height * 0.15 < top < bottom < height
+    left, top, right, bottom = changed(with_marks(size, stamp=True))
+    assert 0 < left < right < width
+    assert 0 < top < bottom < height * 0.2
+
+
+def test_long_names_are_shortened() -> None:
+    legend = replace(LEGEND, marks=ALL, unit="m" * 500, look=Look(color_by="s" * 500))
+    left, *_, bottom = changed(marked(gray(), legend, VALUES))
+    assert (left, bottom) == changed(with_marks(scale_bar=True))[::3]
+    assert (marked(gray(), legend, VALUES)[:, SIZE[0] // 2] == gray()[:, 0]).all()
+
+
+def test_the_rest_of_the_picture_is_left_alone() -> None:
+    image = np.random.default_rng(0).integers(0, 256, gray().shape, np.uint8)
+    legend = replace(LEGEND, marks=Marks(scale_bar=True))
+    found = marked(image, legend, VALUES).copy()
+    left, top, right, bottom = changed(with_marks(scale_bar=True))
+    assert (found[top:bottom, left:right] != image[top:bottom, left:right]).any()
+    found[top:bottom, left:right] = image[top:bottom, left:right]
+    assert (found == image).all()
+
+
+def test_without_marks_the_picture_is_the_same() -> None:
+    assert marked(gray(), LEGEND, VALUES) is not None
+    assert (marked(gray(), LEGEND, VALUES) == gray()).all()
+    assert (marked(gray(), replace(LEGEND, marks=Marks(color_bar=True)), None) == gray()).all()
+
+
+def test_on_a_transparent_picture_marks_are_seen() -> None:
+    image = marked(gray(alpha=0), replace(LEGEND, marks=Marks(scale_bar=True)), None)
+    assert set(np.unique(image[..., 3])) >= {0, PLATE[3], 255}
+
+
+# --- the colour bar and the picture ---------------------------------------------------------------
+
+
+def test_the_colours_of_the_bar_are_those_of_the_surface(draw: Callable[..., Surface]) -> None:
+    values = np.array([2.0, 4.0, 6.0], np.float32)
+    cloud = PointCloud.from_arrays(np.array([[-1.0, 0, 0], [0, 0, 0], [1, 0, 0]]), scalars={"heat": values})
+    look = Look(color_by="heat", light="flat", low=2, high=6)
+    surface = draw(cloud, FLAT, SIZE, look=look, params={"point_size": 1})
+    assert surface.color_range == (2, 6)
+    shown = surface.image()[surface.level == 0]
+    legend = replace(LEGEND, marks=Marks(color_bar=True), look=look)
+    bar = marked(surface.image(), legend, surface.color_range)[SIZE[1] // 2 :, SIZE[0] // 2 :]
+    stripe = next(column for column in bar.swapaxes(0, 1) if (column == shown[0]).all(axis=1).any())
+    rows = np.nonzero(np.ptp(stripe[:, :3], axis=1) > 40)[0]  # what is coloured
+    assert (stripe[rows[0]] == shown[2]).all(), "high is at the top"
+    assert (stripe[rows[-1]] == shown[0]).all()
+    nearest = np.abs(stripe[rows].astype(int) - shown[1]).sum(axis=1).argmin()
+    assert abs(nearest - len(rows) / 2) <= 1
+
+
+def test_the_range_is_the_one_that_was_shaded_with(draw: Callable[..., Surface]) -> None:
+    rng = np.random.default_rng(0)
+    cloud = PointCloud.from_arrays(rng.random((500, 3)) + np.array([0, 1e7, 0]))
+    surface = draw(cloud, Camera.orbit(cloud.bounds()), look=Look(color_by="height"))
+    assert surface.color_range is not None
+    assert 1e7 < surface.color_range[0] < 1e7 + 0.1 < 1e7 + 0.9 < surface.color_range[1] < 1e7 + 1
+    assert draw(cloud, Camera.orbit(cloud.bounds())).color_range is None
+
+
+@pytest.mark.parametrize("size", [(1, 1), (10, 8), (3, 100), (100, 3), (20, 20)])
+def test_in_the_smallest_pictures_what_has_no_pixel_is_left_out(size: tuple[int, int]) -> None:
+    assert marked(gray(size), replace(LEGEND, marks=ALL), VALUES).shape == (*size[::-1], 4)

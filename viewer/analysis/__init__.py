@@ -1,0 +1,1 @@
+"""What is computed on a scan: functions without a window."""

@@ -1,0 +1,1 @@
+"""Pictures, recordings and films that the user takes in the window."""

@@ -1,0 +1,204 @@
+"""Pictures and recordings of what is shown, and replaying them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from functools import partial
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...document.journal import Journal, journal_folder, journals, saved, written
+from ...document.recording import Entry, Recorder, Recording
+from ...errors import InputError, explained
+from ...files import free_file, working_folder
+from ...output.export import write_png
+from ...task import Task, in_background
+from ..failures import in_words
+from .replaying import Replaying
+
+if TYPE_CHECKING:
+    from ..app import App
+
+_LOOK = 0.02  # seconds between looks at whether a picture has been written
+_PATIENCE = 10.0  # seconds that closing waits for pictures
+
+
+class Capture:
+    """Saves what is shown in the working directory.
+
+    recorder: takes down what is shown, None while nothing is recorded. replaying: a recording that is
+    shown again, None while none is. last: the recording saved last.
+    """
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        self.recorder: Recorder | None = None
+        self.replaying: Replaying | None = None
+        self.last: Path | None = None
+        self._journal: Journal | None = None  # of what is recorded
+        self._saving: list[Future[str]] = []  # files; each brings what is to be told
+        self._looking: list[Future[str]] = []  # the same of what writes nothing
+        self._naming = Lock()  # one free name at a time
+
+    def shown(self) -> Entry | None:
+        """What the picture shows, None where there is none."""
+        app = self._app
+        request = app.picture.request
+        if not app.picture.is_there or request is None:
+            return None
+        return Entry.of(request, app.session.scan, app.hash, app.picture.size, app.unit)
+
+    def screenshot(self) -> None:
+        """Save the picture as it is shown, in full and without panels."""
+        self._app.picture.finish()
+        surface, entry = self._app.picture.surface, self.shown()
+        if surface is None or entry is None:
+            self._app.note("There is no picture to save.")
+            return
+        image, text = surface.image(), entry.description()
+        self._saving.append(in_background(Task("Saving"), partial(self._save_picture, image, text)))
+
+    # --- recording --------------------------------------------------------------------
+
+    def toggle_recording(self) -> None:
+        """Take down what is shown from now on; or stop, and save it."""
+        now = time.monotonic()
+        if self.recorder is None:
+            self.recorder = Recorder(now)
+            self._app.note("Recording what is shown, until you stop it.")
+            self._begin_journal()
+            self.note_shown()
+            return
+        recorder, self.recorder = self.recorder, None
+        journal, self._journal = self._journal, None
+        if len(recorder):
+            self._app.note(self._save_recording(recorder.finish(now), journal))
+        else:
+            self._app.note("Nothing was shown while recording.")
+            if journal is not None:
+                journal.remove()
+
+    def _save_recording(self, recording: Recording, journal: Journal | None) -> str:
+        """What to tell of it. journal: what is there of it already."""
+        try:
+            self.last = written(recording, working_folder())
+        except Exception as error:  # whatever a folder brings, the window stays
+            words = in_words("Saving the recording", error)
+            if journal is None:
+                return words
+            journal.leave()
+            return f"{words} What was recorded until then is kept, and saved at the next start."
+        if journal is not None:
+            journal.remove()
+        return f"Saved {self.last}"
+
+    def note_shown(self) -> None:
+        """Take down what is shown where that is being recorded."""
+        if self.recorder is None or (entry := self.shown()) is None:
+            return
+        change = self.recorder.note(entry, time.monotonic())
+        if change is not None and self._journal is not None and not self._journal.is_closed:
+            try:
+                self._journal.add(change)
+            except OSError as error:
+                self._journal.close()  # it goes when the recording is saved
+                self._tell_unsafe(error)
+
+    def _begin_journal(self) -> None:
+        try:
+            self._journal = Journal(working_folder())
+        except OSError as error:
+            self._tell_unsafe(error)
+
+    def _tell_unsafe(self, error: OSError) -> None:
+        what, _ = explained(error)
+        self._app.note(
+            f"The recording is kept in memory alone until you stop it ({journal_folder()}: {what})."
+        )
+
+    def find_unfinished(self) -> None:
+        """Save what processes have recorded that were killed meanwhile."""
+        for journal in journals():
+            self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
+
+    def _save_picture(self, image: NDArray[np.uint8], text: str) -> str:
+        """Write it under the next free name; returns what to tell."""
+        with self._naming:
+            path = free_file(working_folder(), ".png")
+            try:
+                write_png(image, path, text)
+            except Exception as error:  # whatever a folder brings, the window stays
+                return in_words(f"Saving {path}", error)
+        return f"Saved {path}"
+
+    def tell_later(self, look: Callable[[], str]) -> None:
+        """Find something out beside the window, and tell what comes of it; empty: nothing."""
+        self._looking.append(in_background(Task("Looking"), look))
+
+    def _tell(self) -> None:
+        """Tell of the work that is done: of files in the order of their names."""
+        done = [work for work in self._looking if work.done()]
+        self._looking = [work for work in self._looking if work not in done]
+        while self._saving and self._saving[0].done():
+            done.append(self._saving.pop(0))
+        for words in [work.result() for work in done]:
+            if words:
+                self._app.note(words)
+
+    # --- replaying --------------------------------------------------------------------
+
+    def replay(self, path: Path) -> None:
+        """Show a recording again, or what a picture tells of itself."""
+        try:
+            self.replaying = Replaying(path)
+        except InputError as error:
+            self._app.note(str(error))
+            return
+        self._app.playback.player.pause()
+        self._app.steering.turntable.stop()
+
+    def replay_last(self) -> None:
+        """Show the recording saved last again."""
+        if self.last is not None:
+            self.replay(self.last)
+
+    def stop_replaying(self) -> None:
+        """Stay at what is shown."""
+        self.replaying = None
+
+    def until_next(self, now: float) -> float:
+        """Seconds until there is something to do; infinite where there is nothing."""
+        soon = _LOOK if self._saving or self._looking else math.inf
+        return soon if self.replaying is None else min(soon, self.replaying.until_next(now))
+
+    def advance(self, now: float) -> None:
+        """Let the replay go on. The user's own moves end it."""
+        self._tell()
+        if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
+            self.stop_replaying()
+
+    def end_recording(self) -> None:
+        """Save what is being recorded."""
+        if self.recorder is not None:
+            self.toggle_recording()
+
+    def close(self) -> None:
+        """Wait for pictures that are being written, but not for a disk that does not answer."""
+        wait(self._saving, _PATIENCE)
+        self._tell()
+
+
+def _saved_late(journal: Path) -> str:
+    """What to tell of the recording that a journal becomes; nothing where none does."""
+    try:
+        path = saved(journal)
+    except InputError as error:
+        return str(error)
+    return f"Saved a recording that was not finished: {path}" if path else ""

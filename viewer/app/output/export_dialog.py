@@ -1,0 +1,195 @@
+"""The dialog that exports, and the one that asks before the window closes while an export runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import imgui
+
+from ...output.export import numbered
+from ...output.marks import Marks
+from ...params import describe
+from .. import widgets
+from .export_plan import EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices
+
+if TYPE_CHECKING:
+    from ..app import App
+
+_TITLE, _LEAVING = "Export", "Close Scan4D?"
+_WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Frames, one after the other"}
+_FORMATS = {PNG: "PNG pictures", EXR: "EXR: the surface behind the picture", MP4: "MP4 film"}
+_SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
+_MARKS = {"scale_bar": "Scale bar", "color_bar": "Colour bar", "stamp": "Frame and time"}
+_HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
+
+
+def draw(app: App) -> None:
+    """Declare the dialogs that are open."""
+    exporting = app.exporting
+    with widgets.modal(_TITLE, exporting.is_open) as is_drawn:
+        if is_drawn:
+            choices, problems = exporting.choices, exporting.problems()
+            choices = _edit_what(choices, exporting.count, problems)
+            choices = _edit_format(choices, choices.rate(app.playback.timeline.times), problems)
+            choices = _edit_size(choices, app.picture.size if app.picture.surface else None, problems)
+            marks = _edit_marks(exporting.marks, choices)
+            choices = _edit_place(choices, problems)
+            exporting.change(choices, marks)
+            _draw_end(app, can=not exporting.problems())
+    with widgets.modal(_LEAVING, exporting.is_leaving) as is_drawn:
+        if is_drawn:
+            _draw_leaving(app)
+
+
+# --- the fields -----------------------------------------------------------------------------
+
+
+def _edit_what(choices: Choices, count: int, problems: dict[str, str]) -> Choices:
+    widgets.label("What", "Turntable: all round, from the current view on")
+    choices = replace(choices, what=widgets.choose("what", choices.what, list(_WHAT), _WHAT))
+    if choices.what == TURNTABLE:
+        widgets.label("Pictures", _HELP["pictures"])
+        choices = replace(choices, pictures=_whole("pictures", choices.pictures))
+    if choices.what == FRAMES:
+        widgets.label("From, to, every", f"Frames, 1 to {count}")
+        width = _shares(3)
+        first = _whole("first", choices.first, width)
+        imgui.same_line()
+        shown = count if choices.last is None else choices.last
+        last = _whole("last", shown, width)
+        imgui.same_line()
+        step = _whole("step", choices.step, width)
+        last_or_auto = choices.last if last == shown else last
+        choices = replace(choices, first=first, last=last_or_auto, step=step)
+    _draw_problems(problems, "pictures", "first", "last", "step")
+    return choices
+
+
+def _edit_format(choices: Choices, rate: float, problems: dict[str, str]) -> Choices:
+    widgets.label("Format", _HELP["format"])
+    choices = replace(choices, format=widgets.choose("format", choices.format, list(_FORMATS), _FORMATS))
+    if choices.format == MP4:
+        widgets.label("Pictures a second", _HELP["fps"])
+        edited, fps = imgui.input_float("##fps", rate, 0, 0, "%.5g")
+        choices = replace(choices, fps=round(fps, 3)) if edited else choices
+    _draw_problems(problems, "format", "fps")
+    return choices
+
+
+def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict[str, str]) -> Choices:
+    titles = {f"{w}x{h}": f"{w} x {h}" for w, h in _SIZES}
+    if of_view is not None:
+        titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, as the view"
+    now = f"{choices.width}x{choices.height}"
+    widgets.label("Size", "Pixels. Another shape than the view's shows more or less at the sides")
+    chosen = widgets.choose("size", now if now in titles else "Other", list(titles), titles)
+    if chosen in titles and chosen != now:
+        width, height = (int(side) for side in chosen.split("x"))
+        choices = replace(choices, width=width, height=height)
+    widgets.label("Width, height", "Pixels")
+    share = _shares(2)
+    width = _whole("width", choices.width, share)
+    imgui.same_line()
+    height = _whole("height", choices.height, share)
+    _draw_problems(problems, "width", "height")
+    return replace(choices, width=width, height=height)
+
+
+def _edit_marks(marks: Marks, choices: Choices) -> Marks:
+    widgets.label("Over the picture", "Not over EXR, which holds the surface behind the picture")
+    imgui.begin_disabled(choices.format == EXR)
+    imgui.begin_group()
+    for name, title in _MARKS.items():
+        marks = replace(marks, **{name: imgui.checkbox(title, getattr(marks, name))[1]})
+        imgui.set_item_tooltip(_HELP[name])
+    imgui.end_group()
+    imgui.end_disabled()
+    return marks
+
+
+def _edit_place(choices: Choices, problems: dict[str, str]) -> Choices:
+    widgets.label("Leave out names, paths", _HELP["anonymous"])
+    imgui.begin_disabled(choices.format == MP4)
+    anonymous = imgui.checkbox("##anonymous", choices.anonymous)[1]
+    imgui.set_item_tooltip(
+        "A film tells nothing of its scan" if choices.format == MP4 else _HELP["anonymous"]
+    )
+    imgui.end_disabled()
+    widgets.label("Folder", _HELP["folder"])
+    folder = widgets.edit_path("##folder", choices.folder)[1]
+    _draw_problems(problems, "folder")
+    widgets.label("Name", _HELP["name"])
+    name = imgui.input_text("##name", choices.name)[1]
+    _draw_problems(problems, "name")
+    return replace(choices, anonymous=anonymous, folder=folder, name=name)
+
+
+def _whole(name: str, value: int, width: float = -1) -> int:
+    imgui.set_next_item_width(width)
+    return imgui.input_int(f"##{name}", value, 0)[1]
+
+
+def _shares(parts: int) -> float:
+    """The width of one of several fields in the rest of a row."""
+    gap = imgui.get_style().item_spacing.x
+    return (imgui.get_content_region_avail().x - gap * (parts - 1)) / parts
+
+
+def _draw_problems(problems: dict[str, str], *names: str) -> None:
+    """What is wrong with the fields of these names."""
+    for name in names:
+        if name in problems:
+            _warn(problems[name])
+
+
+def _warn(text: str) -> None:
+    imgui.text_wrapped(f"{icons.ICON_FA_EXCLAMATION_TRIANGLE}  {text}")
+
+
+# --- the end of it --------------------------------------------------------------------------
+
+
+def _draw_end(app: App, can: bool) -> None:
+    """What will be written, and the buttons."""
+    exporting = app.exporting
+    choices, numbers = exporting.choices, exporting.choices.numbers(exporting.count)
+    out = choices.out()
+    imgui.separator()
+    if can:
+        names = dict.fromkeys(numbered(out, n).name for n in (numbers[0], numbers[-1]))
+        imgui.text_wrapped(f"{len(numbers)} picture{'s' * (len(numbers) > 1)}: {' to '.join(names)}")
+    if exporting.refused:
+        _warn(f"{exporting.refused[0].name} is a file of the scan, and is not replaced.")
+    elif exporting.replaced:
+        _warn(_there_already([path.name for path in exporting.replaced]))
+    imgui.begin_disabled(not can)
+    if imgui.button("Replace" if exporting.replaced else "Export"):
+        exporting.start()
+    imgui.end_disabled()
+    imgui.same_line()
+    if imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
+        exporting.is_open = False
+    if not exporting.is_open:
+        imgui.close_current_popup()
+
+
+def _there_already(names: list[str]) -> str:
+    if len(names) == 1:
+        return f"{names[0]} is there already."
+    return f"{len(names)} of these files are there already."
+
+
+def _draw_leaving(app: App) -> None:
+    imgui.text_wrapped("An export is running. Closing the window cancels it, and nothing is left of it.")
+    leaves = imgui.button("Cancel the export and close")
+    imgui.same_line()
+    stays = imgui.button("Go on") or imgui.is_key_pressed(imgui.Key.escape)
+    task = app.exporting.task
+    if leaves and task is not None:
+        task.cancel()
+        app.quit()
+    if leaves or stays or task is None:  # it may have ended meanwhile
+        app.exporting.is_leaving = False
+        imgui.close_current_popup()

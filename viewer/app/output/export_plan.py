@@ -1,0 +1,163 @@
+"""What the export dialog makes: the user's choices, what is wrong with them, and the recording to replay."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...camera import Camera
+from ...document.recording import Entry, Recording
+from ...errors import InputError
+from ...geometry import Vector
+from ...output.export import FRAME_RATES, numbered
+from ...output.marks import Marks
+from ...params import describe, param
+from ...scan.times import DEFAULT_FPS, typical_rate
+
+VIEW, TURNTABLE, FRAMES = "view", "turntable", "frames"
+PNG, EXR, MP4 = "png", "exr", "mp4"
+_MOST_PIXELS = 16_384  # a side
+_MOST_PICTURES = 3600  # of a turn
+_LONGEST_NAME = 200  # bytes; file systems take 255, of which numbers and temporary files need some
+_DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{name}{n}" for name in ("COM", "LPT") for n in range(10))}
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user wants. Frames are counted from 1; values may be wrong (see `problems`)."""
+
+    what: str = param(VIEW, "What the pictures show", choices=(VIEW, TURNTABLE, FRAMES))
+    pictures: int = param(36, "That make a turn", low=2, high=_MOST_PICTURES)
+    first: int = param(1, "The first frame")
+    last: int | None = param(None, "The last frame; auto: the scan's", type=int)
+    step: int = param(1, "1: every frame, 2: every second one, and so on", low=1, high=100_000)
+    format: str = param(PNG, "Of the file or files", choices=(PNG, EXR, MP4))
+    fps: float | None = param(
+        None, "Pictures a second; auto: as fast as the scan's frames",
+        low=FRAME_RATES[0], high=FRAME_RATES[1], type=float,
+    )  # fmt: skip
+    width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
+    height: int = param(1080, "Pixels", low=1, high=_MOST_PIXELS)
+    anonymous: bool = param(False, "Pictures do not tell which scan they show, where it was and when")
+    folder: str = param("", "Where the files go")
+    name: str = param("", "Of the file; several are numbered")
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        return self.width, self.height
+
+    def indices(self, count: int) -> range:
+        """The frames of a scan that has so many, counted from 0; those that are not there left out."""
+        last = count if self.last is None else min(self.last, count)
+        return range(max(self.first, 1) - 1, last, max(self.step, 1))
+
+    def numbers(self, count: int) -> range:
+        """What its pictures of a scan with so many frames are numbered by: the frame, else from 1."""
+        if self.what == FRAMES:
+            indices = self.indices(count)
+            return range(indices.start + 1, indices.stop + 1, indices.step)
+        return range(1, (self.pictures if self.what == TURNTABLE else 1) + 1)
+
+    def rate(self, times: NDArray[np.float64]) -> float:
+        """Pictures a second of a film. times: (T,) of the scan's frames, seconds."""
+        if self.fps is not None:
+            return self.fps
+        if self.what != FRAMES:
+            return DEFAULT_FPS
+        low, high = FRAME_RATES
+        return min(max(typical_rate(times[np.array(self.indices(len(times)), int)]), low), high)
+
+    def out(self) -> Path:
+        """Where the pictures go, as `scan4d render -o` has it."""
+        several = self.what != VIEW and self.format != MP4
+        return _folder(self.folder) / f"{self.name}{'_%04d' if several else ''}.{self.format}"
+
+
+def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
+    """What is wrong, by the field where it is. count: frames of the scan. most_pixels: of a picture."""
+    found = {}
+    for parameter in describe(Choices):
+        try:
+            parameter.parse(getattr(choices, parameter.name))
+        except InputError as error:
+            found[parameter.name] = error.what
+    if "width" not in found and "height" not in found and choices.width * choices.height > most_pixels:
+        found["height"] = f"More than the {most_pixels:,} pixels that the driver takes"
+    if choices.what == FRAMES:
+        last = count if choices.last is None else choices.last
+        if not 1 <= choices.first <= count:
+            found["first"] = f"The first frame is one of 1 to {count}"
+        elif not choices.first <= last <= count:
+            found["last"] = f"The last frame is one of {choices.first} to {count}"
+    if choices.format == MP4 and choices.what == VIEW:
+        found["format"] = "A film shows a turntable or frames"
+    if not os.path.isdir(_folder(choices.folder)):
+        found["folder"] = "There is no such folder"
+    if problem := _problem_of_name(choices.name):
+        found["name"] = problem
+    return found
+
+
+def _problem_of_name(name: str) -> str:
+    """Why a file cannot have this name on every system; empty where it can."""
+    if not name.strip() or set(name) & set('/\\%:*?"<>|\0'):
+        return 'Give a name without / \\ % : * ? " < > |'
+    if name[-1] in " .":
+        return "A name does not end with a space or a dot"
+    if name.partition(".")[0].rstrip().upper() in _DEVICES:
+        return "Windows keeps this name for a device"
+    if len(os.fsencode(name)) > _LONGEST_NAME:
+        return f"The name is longer than {_LONGEST_NAME} bytes"
+    return ""
+
+
+def present(choices: Choices, count: int) -> list[Path]:
+    """The files that are there already and would be replaced."""
+    out = choices.out()
+    return [
+        path
+        for path in dict.fromkeys(numbered(out, n) for n in choices.numbers(count))
+        if os.path.exists(path)
+    ]
+
+
+def recording(
+    choices: Choices, shown: Entry, marks: Marks, times: NDArray[np.float64], pivot: Vector | None
+) -> Recording:
+    """The pictures to make. shown: what the view shows. times: (T,) of the scan's frames, seconds.
+
+    pivot: what a turntable turns about; None: the camera's target.
+    """
+    base = replace(shown, size=choices.size, marks=marks)
+    if choices.what == TURNTABLE:
+        angles = [360 * number / choices.pictures for number in range(choices.pictures)]
+        entries = [replace(base, camera=_turned(base.camera, angle, pivot)) for angle in angles]
+    elif choices.what == FRAMES:
+        entries = [replace(base, pose=i, time=float(times[i])) for i in choices.indices(len(times))]
+    else:
+        entries = [base]
+    if choices.format != MP4:
+        return Recording(tuple(entries))
+    rate = choices.rate(times)
+    placed = tuple(replace(entry, at=number / rate) for number, entry in enumerate(entries))
+    return Recording(placed, len(placed) / rate)
+
+
+def _turned(camera: Camera, angle: float, pivot: Vector | None) -> Camera:
+    return camera.orbited(angle, 0.0, pivot) if angle else camera
+
+
+def _folder(text: str) -> Path:
+    return Path(os.path.expanduser(text))
+
+
+def free_name(folder: Path) -> str:
+    """scan4d_0001, or the next number that no file in the folder begins with."""
+    paths = folder.glob("scan4d_[0-9][0-9][0-9][0-9]*") if os.path.isdir(folder) else ()
+    taken = {path.name[:11] for path in paths}
+    return next(name for n in range(1, len(taken) + 2) if (name := f"scan4d_{n:04d}") not in taken)

@@ -1,0 +1,143 @@
+"""Exporting from the window: what the user chose, and the work, which a process of its own does."""
+
+from __future__ import annotations
+
+import logging
+from concurrent.futures import Future
+from concurrent.futures import wait as wait_for
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...document.render_job import Made, make
+from ...files import working_folder
+from ...output.marks import Marks
+from ...scan.inputs import found_among, scan_inputs
+from ...task import Cancelled, Task, in_background
+from . import export_plan
+from .export_plan import Choices, free_name
+
+if TYPE_CHECKING:
+    from ..app import App
+
+log = logging.getLogger(__name__)
+_CANCELLING = 10.0  # seconds that closing waits for a cancelled process to be gone
+_MOST_WARNINGS = 3  # that are told
+
+
+class Exporting:
+    """The dialog's state, and one export at a time.
+
+    choices, marks: as the user left them. is_open: whether the dialog is. replaced: files that an export
+    would replace, which the dialog asks about. refused: those of them that are the scan's own. is_leaving:
+    whether to ask before the window closes.
+    task: the export that runs, None without one.
+    """
+
+    def __init__(self, app: App, choices: Choices, marks: Marks) -> None:
+        self._app = app
+        self.choices = choices
+        self.marks = marks
+        self.is_open = False
+        self.replaced: list[Path] = []
+        self.refused: list[Path] = []
+        self.is_leaving = False
+        self.task: Task | None = None
+        self._work: Future[Made] | None = None
+        self._suggested = ""
+        self._scan = ""
+
+    @property
+    def can(self) -> bool:
+        """Whether there is something to export, and nothing is being exported."""
+        return self._app.picture.is_there and self.task is None
+
+    @property
+    def kept(self) -> Choices:
+        """The choices that outlive a scan."""
+        return replace(self.choices, first=1, last=None, name="")
+
+    @property
+    def count(self) -> int:
+        """Frames of the scan."""
+        return len(self._app.playback.timeline)
+
+    def ask(self) -> None:
+        """Open the dialog; a name is suggested unless the user gave one."""
+        choices = self.choices
+        if self._scan != self._app.session.scan:
+            self._scan = self._app.session.scan
+            choices = replace(choices, first=1, last=None)
+        if not choices.folder or "folder" in self.problems():
+            choices = replace(choices, folder=str(working_folder()))
+        if choices.name in ("", self._suggested):
+            self._suggested = free_name(choices.out().parent)
+            choices = replace(choices, name=self._suggested)
+        self.change(choices, self.marks)
+        self.is_open = True
+        log.debug("export dialog opens")
+
+    def change(self, choices: Choices, marks: Marks) -> None:
+        """Take in what the user has edited."""
+        if (choices, marks) != (self.choices, self.marks):
+            self.choices, self.marks, self.replaced, self.refused = choices, marks, [], []
+
+    def problems(self) -> dict[str, str]:
+        """What is wrong with the choices, by field."""
+        return export_plan.problems(self.choices, self.count, self._app.picture.gpu.max_pixels)
+
+    def start(self) -> None:
+        """Export, unless that would replace files that the user was not asked about; closes the dialog."""
+        there = export_plan.present(self.choices, self.count)
+        shown, choices, app = self._app.capture.shown(), self.choices, self._app
+        self.refused = found_among(there, scan_inputs(app.playback.timeline))
+        if self.refused or there != self.replaced or shown is None:
+            self.replaced = [] if self.refused else there
+            return
+        self.is_open, self.replaced = False, []
+        times = app.playback.timeline.times
+        recording = export_plan.recording(choices, shown, self.marks, times, app.session.pivot)
+        out, rate, anonymous = choices.out(), choices.rate(times), choices.anonymous
+        numbers = choices.numbers(self.count)
+        task = self.task = Task(f"Exporting {choices.name}")
+        self._work = in_background(
+            task, lambda: make(task, recording, out, rate, anonymous, numbers, replaced=there)
+        )
+        log.debug("exporting %s", out)
+
+    def advance(self) -> None:
+        """Tell what came of an export that has ended."""
+        if self._work is None or not self._work.done():
+            return
+        work, self._work, self.task = self._work, None, None
+        try:
+            self._tell(work.result())
+        except Cancelled:
+            log.debug("the export is gone")
+        except Exception as error:  # whatever the process meets, the window stays
+            log.debug("cannot export", exc_info=error)
+            self._app.note(f"Cannot export: {error}")
+
+    def _tell(self, made: Made) -> None:
+        first, last = made.files[0], made.files[-1]
+        several = f"{len(made.files)} pictures, {first} to {last.name}"
+        self._app.note(f"Saved {first if len(made.files) == 1 else several}")
+        for warning in made.warnings[:_MOST_WARNINGS]:
+            self._app.note(warning)
+        if made.device != self._app.picture.gpu.device:
+            self._app.note(
+                f"It was drawn by {made.device}, not by the window's GPU: small differences may show."
+            )
+
+    def keeps_open(self) -> bool:
+        """Whether an export runs that the user has to be asked about before the window closes."""
+        self.is_leaving = self.task is not None and not self.task.cancelled
+        if self.is_leaving:
+            log.debug("asks before it closes")
+        return self.is_leaving
+
+    def close(self) -> None:
+        """Cancel what runs, and wait until it is gone."""
+        if self.task is not None and self._work is not None:
+            self.task.cancel()
+            wait_for([self._work], _CANCELLING)

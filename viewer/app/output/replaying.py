@@ -1,0 +1,99 @@
+"""Replaying in the window: a recording is shown again, picture by picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
+from ...errors import InputError
+from ..session import known_as
+
+if TYPE_CHECKING:
+    from ..app import App
+
+_LOOK = 0.015  # seconds between looks at whether what is awaited has come
+
+
+class Replaying:
+    """Shows the entries of a recording, each in full for as long as it was shown.
+
+    None is left out: where reading or drawing takes longer than then, time slips. Raises InputError for what
+    is wrong in the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.recording = Recording.load(path)
+        self._next = 0
+        self._since: float | None = None  # by the clock, when the last one was there in full
+        self._asked: str | None = None  # the scan that was to be opened
+        self._compared: str | None = None  # the scan whose hash was
+
+    def __str__(self) -> str:
+        return f"Replaying {self.path.name}: {self._next} of {len(self.recording.entries)}. Esc stops it."
+
+    def until_next(self, now: float) -> float:
+        """Seconds until another picture is due, or is to be looked for while one is awaited."""
+        left = 0.0 if self._since is None else self._left(self._since, now)
+        return left if left > 0 else _LOOK
+
+    def _left(self, since: float, now: float) -> float:
+        """Seconds for which what has been there since then is still shown; not above 0 once it is over."""
+        entries = self.recording.entries
+        until = entries[self._next].at if self._next < len(entries) else self.recording.seconds
+        return since + until - entries[self._next - 1].at - now
+
+    def advance(self, app: App, now: float) -> bool:
+        """Show the next picture if it is due and all that it needs is there; whether it goes on."""
+        if self._next:
+            if self._since is None and not app.picture.is_complete:
+                return True
+            self._since = now if self._since is None else self._since
+            if self._left(self._since, now) > 0:
+                return True
+        if self._next == len(self.recording.entries):
+            return False
+        entry = self.recording.entries[self._next]
+        if not self._has_opened(app, entry):
+            return app.opening is not None
+        timeline = app.playback.timeline
+        if entry.pose in timeline.broken or entry.pose >= len(timeline):
+            app.note(f"Frame {entry.pose + 1} cannot be shown; it is left out.")
+            self._next += 1
+        elif (pose := timeline.ready(entry.pose)) is None:
+            timeline.request(entry.pose)
+        else:
+            app.show(entry, pose)
+            self._next, self._since = self._next + 1, None
+        return True
+
+    def _has_opened(self, app: App, entry: Entry) -> bool:
+        """Whether the scan of an entry is open; it is being opened where it is not."""
+        if app.opening is not None:
+            return False
+        scan = app.session.scan
+        here = known_as(scan)
+        if entry.scan is not None and here not in map(known_as, places_of(entry.scan, self.path)):
+            try:
+                place = place_of(entry.scan, self.path)
+            except InputError as error:
+                app.note(str(error))
+                return False
+            if self._asked != place:  # else it could not be opened, and that was told
+                self._asked = place
+                app.open(place)
+            return False
+        if self._compared != here:
+            self._compared = here
+            if entry.hash is not None:
+                app.capture.tell_later(partial(self._changed, scan, entry.hash, app.playback.timeline.files))
+        return True
+
+    def _changed(self, scan: str, hash: str, files: Sequence[Path]) -> str:
+        """What to tell of a scan whose hash was that one; nothing where it is the same."""
+        if fingerprint_as(hash, files) in (hash, None):
+            return ""
+        return f"{scan} is not as it was when {self.path.name} was made; pictures may differ."

@@ -1,0 +1,206 @@
+"""Each point as a disc that lies in the surface. Closes the gaps between points.
+
+Slomp 2014, IV and V: a template quad, aligned to the normal, with a Gaussian mask that is cut
+off; in one pass, or in two that blend what overlaps. Elliptical where the scan has half-axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...gpu.amplify import FEEDS, Points, Shape, amplify
+from ...gpu.fastest import choose
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Surface
+from ...params import param
+from ...scan.points import PointCloud
+from ...scan.spacing import typical_spacing
+from .. import FrameView
+from . import passes
+from .subpixel import LEAST_RADIUS, average, splat_subpixel, subpixel_share
+from .tiles import FALLBACK, splat
+
+TITLE = "Surfels"
+
+SURFEL = Shape("surfels/surfel.glsl", corners=4)
+_WAYS = ("tiles", *FEEDS)
+_TWO = ("two", "two_large")  # values of `passes`
+# A uniform radius of 1.5 times the spacing closes the surface.
+_RADIUS_PER_SPACING = 1.5
+_LARGEST_RADIUS = np.float32(3e38)  # beyond it the shader takes a radius as unknown
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the surfels backend."""
+
+    instancing: str = param(
+        "auto",
+        "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
+        "the others: quads from a geometry shader, uniform blocks, buffer textures, vertex attributes or "
+        "pulled vertices",
+        choices=("auto", *_WAYS),
+        affects="shader",
+    )
+    passes: str = param(
+        "one",
+        "How splats that overlap become one surface. one: the nearest is seen, and where all are about a "
+        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it. "
+        "The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); one_no_depth (b); visibility, "
+        "the first of two alone (c); two_large, the first enlarged as well (e); sorted, each over those "
+        "behind it",
+        choices=("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
+        sweep=("one", "two"),
+    )
+    enlarge: float = param(2.0, "Factor on splats in the second pass (f); 1: none (d)", low=1.0, high=8.0)
+    epsilon: float = param(
+        1.0, "How far behind the nearest splat others are blended with it, in its radii", low=0.0, high=100.0
+    )
+    radius: str = param(
+        "auto",
+        "auto: the scan's own, else uniform; own: estimated where the scan has none; uniform: one for all",
+        choices=("auto", "own", "uniform"),
+    )
+    radius_scale: float = param(1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0))
+    mask_falloff: float = param(
+        4.0, "How fast the mask fades, exp(-falloff d^2), d = 1 at the radius", low=0.1, high=100.0
+    )
+    mask_cutoff: float = param(
+        0.0183, "Value of the Gaussian mask where the splat ends", low=0.0183, high=0.99
+    )
+    cull_back: bool = param(False, "Leave out surfels that face away")
+
+
+def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+    """Normals, and radii where they shall be the points' own."""
+    return ("normals", "radii") if params.radius == "own" else ("normals",)
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Splat in as many passes as are asked for; complete where all points shall be drawn."""
+    params: Params = frame.params
+    if not len(pose.cloud):
+        surface.clear()
+        return False
+    own = {"auto": pose.stored.radii is not None, "own": True, "uniform": False}[params.radius]
+    # The spacing takes longer to find than many a pose takes to draw.
+    suffices = own and pose.remember("radii suffice", lambda: _radii_suffice(pose))
+    points = Points.of(pose, surface, frame.share, use_radii=own)
+    instancing = _instancing(params, surface)
+    surface.stats.faces_away = params.cull_back
+    _splat(points, surface, params, instancing, uniform_radius=0.0 if suffices else _uniform_radius(pose))
+    return points.rows is not None
+
+
+def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
+    mask_limit = min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff)
+    uniforms = {
+        "radius_scale": params.radius_scale,
+        "uniform_radius": uniform_radius,
+        "cull_back": params.cull_back,
+        "mask_limit": mask_limit,
+        "least_radius": LEAST_RADIUS / math.sqrt(mask_limit),
+    }
+    larger = params.enlarge if params.passes in _TWO else 1.0
+    enlarged = replace(points, enlarged=points.enlarged * larger)
+    may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
+    share = 0.0
+    if may_average:
+        share = subpixel_share(enlarged, surface, params.radius_scale, uniform_radius, mask_limit)
+    if share == 1 or (share > 0 and params.passes == "one"):
+        _draw_subpixel(points, surface, params, instancing, share, uniforms)
+    elif params.passes in _TWO:
+        _draw_two(points, surface, params, instancing, uniforms)
+    else:
+        _draw_one(points, surface, params, instancing, uniforms)
+
+
+def _draw_nearest(points: Points, surface: Surface, instancing: str, uniforms: dict[str, Any]) -> None:
+    """The nearest splat of each pixel."""
+    if instancing == "tiles":
+        splat(points, surface, SURFEL, "surfels/splat.frag", **uniforms)
+    else:
+        amplify(points, surface, instancing, SURFEL, "surfels/splat.frag", **uniforms)
+
+
+def _draw_subpixel(
+    points: Points,
+    surface: Surface,
+    params: Params,
+    instancing: str,
+    share: float,
+    uniforms: dict[str, Any],
+) -> None:
+    """Splats of about a pixel: those of a pixel are averaged, in place of any second pass; the larger they
+    are, the less, so that nothing changes at once while one comes nearer."""
+    if params.passes in _TWO:
+        surface.stats.skipped["second pass"] = "splats are under a pixel: they are averaged"
+    if params.instancing == "auto":
+        surface.stats.chosen["instancing"] = "scatter"
+        surface.stats.skipped["tiles"] = "splats are under a pixel: they are sent there one by one"
+        splat_subpixel(points, surface, **uniforms)
+    else:
+        _draw_nearest(points, surface, instancing, uniforms)
+    if params.epsilon > 0:
+        average(points, surface, params.epsilon, share, **uniforms)
+
+
+def _draw_one(
+    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
+) -> None:
+    """The nearest splats, and what is made of them beyond that."""
+    _draw_nearest(points, surface, instancing, uniforms)
+    if params.passes == "visibility":
+        passes.show_visibility(points, surface, params.epsilon, **uniforms)
+    elif params.passes != "one":
+        feed = FALLBACK if instancing == "tiles" else instancing
+        falloff = params.mask_falloff * uniforms["mask_limit"]
+        if params.passes == "sorted":
+            passes.splat_sorted(points, surface, feed, SURFEL, falloff, **uniforms)
+        else:
+            tested = params.passes == "one_blended"
+            passes.splat_over(points, surface, feed, SURFEL, falloff, tested, **uniforms)
+
+
+def _draw_two(
+    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
+) -> None:
+    """Visibility, then blending."""
+    enlarge = params.enlarge
+    if params.passes == "two_large":
+        points, enlarge = replace(points, enlarged=points.enlarged * enlarge), 1.0
+    second = passes.Second(enlarge, params.epsilon, params.mask_falloff * uniforms["mask_limit"])
+    if second.enlarge == 1 and second.epsilon == 0:
+        surface.stats.skipped["second pass"] = "nothing is enlarged or blended"
+        _draw_nearest(points, surface, instancing, uniforms)
+    elif instancing == "tiles":
+        passes.tiled_two_passes(points, surface, SURFEL, second, **uniforms)
+    else:
+        passes.two_passes(points, surface, instancing, SURFEL, second, **uniforms)
+
+
+def _instancing(params: Params, surface: Surface) -> str:
+    """How points become splats; in one pass and in two this need not be the same."""
+    like = Params(passes="two" if params.passes in _TWO else "one")
+
+    def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+        points = Points.of(pose, surface, 1.0, use_radii=True)
+        return {name: partial(_splat, points, surface, like, name, 0.0) for name in _WAYS}
+
+    return choose(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
+
+
+def _radii_suffice(pose: GpuPose) -> bool:
+    """Whether each point has a radius that the shader takes."""
+    radii = pose.cloud.radii
+    return radii is not None and bool(((radii > 0) & (radii < _LARGEST_RADIUS)).all())
+
+
+def _uniform_radius(pose: GpuPose) -> float:
+    return _RADIUS_PER_SPACING * pose.remember("spacing", lambda: typical_spacing(pose.stored))

@@ -1,0 +1,127 @@
+"""Splats of about a pixel: sent to their pixels one by one, and averaged there.
+
+Many of them share a pixel, so that lists and quads cost more than they give, and the nearest alone, another
+one with each small motion, would flicker.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ...gpu.amplify import Points
+from ...gpu.context import Gpu
+from ...gpu.scatter import scatter
+from ...gpu.surface import Surface
+from ...scan.points import PointCloud
+from .passes import bind_looks, bind_visible_radii
+
+LEAST_RADIUS = 0.7072  # pixels, of what the mask leaves of a disc: a smaller one may miss all pixel centres
+_LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
+_SAMPLE = 1 << 13
+
+
+class _Sums:
+    """Four words a pixel."""
+
+    def __init__(self, gpu: Gpu, pixels: int) -> None:
+        self._gpu = gpu
+        self.buffer = gpu.ctx.buffer(reserve=16 * pixels)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.buffer.size
+
+    def release(self) -> None:
+        """Delete it."""
+        self.buffer.release()
+
+
+def subpixel_share(
+    points: Points, surface: Surface, radius_scale: float, uniform_radius: float, mask_limit: float
+) -> float:
+    """1 where nearly all discs are as small as any is drawn; 0 where they are twice as large, or some
+    very large; between them in proportion.
+
+    Outliers count for what none may be. mask_limit: the squared share of a radius that the mask leaves.
+    """
+    pose, view = points.pose, surface.view
+    nearest = float(view.depths(pose.remember("box", lambda: _box(pose.cloud))).min())
+    usually_nearest = float(view.depths(pose.bounds.corners() - pose.cloud.origin).min())
+    if view.perspective and min(nearest, usually_nearest) <= view.near:
+        return 0.0
+    usual = largest = uniform_radius
+    if points.use_radii:
+        own = pose.remember("radii up to", lambda: _radii_up_to(pose.cloud))
+        usual, largest = max(usual, own[0]), max(largest, own[1])
+    pixels = radius_scale * math.sqrt(mask_limit) * points.enlarged * view.scale
+    if view.perspective:
+        usual, largest = usual / usually_nearest, largest / nearest
+    if largest * pixels > _LARGEST_RADIUS:
+        return 0.0
+    return min(max(2 - usual * pixels / LEAST_RADIUS, 0.0), 1.0)
+
+
+def _box(cloud: PointCloud) -> NDArray[np.float32]:
+    """The corners of the box around all points, (8, 3), relative to the origin."""
+    low, high = (np.array([f(column) for column in cloud.positions.T]) for f in (np.min, np.max))
+    return np.where([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], high, low)
+
+
+def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
+    """What nine of ten radii do not exceed, going by a sample, and what none does; unknown ones aside."""
+    radii = cloud.splat_reach()
+    sample = radii[:: max(1, len(radii) // _SAMPLE)]
+    known = sample[(sample > 0) & np.isfinite(sample)]
+    largest = float(radii.max(where=np.isfinite(radii), initial=0.0))
+    return float(np.quantile(known, 0.9)) if known.size else 0.0, largest
+
+
+def splat_subpixel(points: Points, surface: Surface, **uniforms: Any) -> None:
+    """The nearest disc at each pixel, by scatter: what `tiles.splat` draws, up to rounding."""
+
+    def bind(program: moderngl.ComputeShader) -> None:
+        points.bind()
+        surface.gpu.set(program, enlarged=points.enlarged, **uniforms)
+
+    scatter(
+        surface.gpu,
+        "surfels/scatter.glsl",
+        points.count,
+        surface.depths,
+        surface.rows,
+        bind,
+        defines=points.defines,
+    )
+
+
+def average(points: Points, surface: Surface, epsilon: float, share: float, **uniforms: Any) -> None:
+    """Colours and normals of each pixel: the mean of the discs that lie at most epsilon radii behind
+    what it shows. share: of the mean, 0..1; the rest is what it shows."""
+    gpu = surface.gpu
+    covered = surface.list_covered()
+    sums = surface.keep("mean", lambda: _Sums(gpu, surface.size[0] * surface.size[1]))
+    bound = bind_looks(points, surface)
+    # All splats may share a pixel: normals of up to 511, with sign, and colours of up to 255 add up there.
+    bound |= {"NORMAL_DIVISOR": (points.count >> 22) + 1, "COLOR_DIVISOR": f"{(points.count >> 24) + 1}u"}
+    with gpu.timers.measure("mean"):
+        sums.buffer.bind_to_storage_buffer(0)
+        bind_visible_radii(points)
+        surface.depths.bind(6)
+        surface.rows.bind(7)
+        for step in range(3):
+            defines = {"STEP": step, **bound, **points.defines}
+            program = gpu.compute("surfels/passes/mean.comp", defines)
+            gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, **uniforms)
+            gpu.set(program, share=share, item_count=points.count)
+            if step == 1:
+                points.bind()
+                gpu.dispatch(program, points.count)
+            else:
+                covered.run(program)
+                gpu.ctx.memory_barrier()

@@ -1,0 +1,260 @@
+"""Tiles: splats without quads. Each tile of the picture has a list of the discs that reach it.
+
+No atomics on pixels: a tile's pixels keep the nearest disc in registers, so that the order of the
+lists does not matter. Splats that are too large for lists go through the rasteriser.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from ...gpu import gl
+from ...gpu.amplify import Points, Shape, amplify
+from ...gpu.context import Gpu
+from ...gpu.surface import Surface
+
+TILE = 8  # pixels of a tile's edge
+_MOST_TILES = 2048  # along an edge of the picture: what bin.comp's words have bits for
+_DISC_BYTES = 16  # of a point in each of two buffers
+_LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
+_ROOM = 4  # entries of the list for each point, to begin with
+# Entries of one tile's list: llvmpipe ends all loops of an invocation after 65 535 turns, and a pass may go
+# over its list twice; on hardware a pixel alone with so many would be slow.
+_LONGEST = 30_000
+_SPARE = 4  # times the points that there is room for, beyond which room is given up
+_LARGE_HEAD = 16  # bytes before the rows of large discs
+_WORK_HEAD = 16  # bytes before the tiles that discs reach
+ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of bin.comp
+FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
+
+
+class TileLists:
+    """The discs that reach each tile of a picture, made anew for each frame (shaders/surfels/tiles/).
+
+    length: entries of all lists. large: how many discs are left to the rasteriser. away: whether
+    some that face away from the eye were left to a second filling.
+    """
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self.tiles = (-(-size[0] // TILE), -(-size[1] // TILE))
+        self.length = self.large = 0
+        self.away = False
+        self._room = 0  # points
+        words = self.tiles[0] * self.tiles[1]
+        self._textures = {name: self._texture(4 * words, gl.R32UI) for name in ("slots", "farthest")}
+        self._textures["work"] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
+        self._large_rows: gl.BufferTexture | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        textures = [*self._textures.values(), *([self._large_rows] if self._large_rows else [])]
+        return sum(texture.buffer.size for texture in textures)
+
+    def fill(self, points: Points, side: int = ALL, **uniforms: Any) -> bool:
+        """List the discs of points for the bound view; False where the lists would grow too long.
+
+        side: ALL; TOWARDS, those that face the eye; AWAY, the others, unless they are hidden by what
+        `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large ones are counted but
+        for AWAY. uniforms: of surfels/disc.glsl.
+        """
+        gpu = self._gpu
+        self._reserve(max(len(points.pose.cloud), 1))
+        with gpu.timers.measure("count"):
+            gl.clear_words(self._buffer("slots"), 0)
+            self._buffer("large").write(bytes(_LARGE_HEAD))
+            points.bind()
+            self._textures["farthest"].bind(4)
+            self._bind_blocks("slots", "places", "forms", "reach", "large")
+            self._bin(0, points, side, enlarged=points.enlarged, **uniforms)
+        with gpu.timers.measure("scan"):
+            scan = gpu.compute("surfels/tiles/scan.comp", {"TILES": f"{_mapping(gpu)[1]}u"})
+            gpu.set(scan, slot_count=self.tiles[0] * self.tiles[1])
+            self._bind_blocks("slots", "large", "work", "farthest")
+            scan.run(1)
+            gpu.ctx.memory_barrier()
+            words = self._buffer("large").read(_LARGE_HEAD)
+            self.large, self.length, self.away, longest = struct.unpack("2I?3xI", words)
+        if self.length > gpu.max_storage_bytes // 4 or longest > _LONGEST:
+            return False
+        with gpu.timers.measure("list"):
+            if 4 * self.length > self._buffer("list").size:
+                self._replace("list", min(4 * (self.length * 5 // 4), gpu.max_storage_bytes), gl.R32UI)
+            self._textures["reach"].bind(4)
+            self._bind_blocks("slots", "list")
+            self._bin(1, points, side, capacity=self._buffer("list").size // 4)
+        return True
+
+    def large_points(self, points: Points) -> Points:
+        """Those that are left to the rasteriser."""
+        rows = np.frombuffer(self._buffer("large").read(4 * self.large, offset=_LARGE_HEAD), np.uint32)
+        self._gpu.discard(self._large_rows)
+        # Ascending, so that ties fall to the lowest row.
+        self._large_rows = gl.BufferTexture(self._gpu.ctx.buffer(np.sort(rows)), gl.R32UI)
+        return replace(points, rows=self._large_rows, count=self.large)
+
+    def run(self, program: moderngl.ComputeShader) -> None:
+        """Run a program that includes surfels/tiles/nearest.glsl on the tiles that discs reach."""
+        for unit, name in enumerate(("places", "forms", "slots", "list")):
+            self._textures[name].bind(unit)
+        self._textures["work"].bind(8)
+        self._gpu.set(program, tiles=self.tiles)
+        program.run_indirect(self._buffer("work"))
+        self._gpu.ctx.memory_barrier()
+
+    def release(self) -> None:
+        """Delete everything."""
+        self._gpu.discard(*self._textures.values(), self._large_rows)
+
+    @property
+    def farthest(self) -> moderngl.Buffer:
+        """The farthest depth shown in each tile, a word each: what FARTHEST of show.comp writes."""
+        return self._buffer("farthest")
+
+    def _bin(self, number: int, points: Points, side: int, **uniforms: Any) -> None:
+        defines = {"PASS": number, "SIDE": side, "TILE": TILE, **points.defines}
+        program = self._gpu.compute("surfels/tiles/bin.comp", defines)
+        self._gpu.set(program, item_count=points.count, tiles=self.tiles, **uniforms)
+        self._gpu.dispatch(program, points.count)
+
+    def _reserve(self, count: int) -> None:
+        """Make room for so many points, and give up what a much larger pose has left."""
+        if count <= self._room <= _SPARE * count:
+            return
+        self._room = count
+        self._replace("places", _DISC_BYTES * count, gl.RGBA32F)
+        self._replace("forms", _DISC_BYTES * count, gl.RGBA32F)
+        self._replace("reach", 4 * count, gl.R32UI)
+        self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
+        self._replace("list", 4 * _ROOM * count, gl.R32UI)
+
+    def _replace(self, name: str, nbytes: int, texel_format: int) -> None:
+        self._gpu.discard(self._textures.pop(name, None))
+        self._textures[name] = self._texture(nbytes, texel_format)
+
+    def _texture(self, nbytes: int, texel_format: int) -> gl.BufferTexture:
+        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=max(nbytes, 16)), texel_format)
+
+    def _buffer(self, name: str) -> moderngl.Buffer:
+        return self._textures[name].buffer
+
+    def _bind_blocks(self, *names: str) -> None:
+        for number, name in enumerate(names):
+            self._buffer(name).bind_to_storage_buffer(number)
+
+
+def splat(points: Points, surface: Surface, shape: Shape, fragment: str, **uniforms: Any) -> None:
+    """The nearest disc at each pixel: what `amplify` draws, up to rounding.
+
+    shape, fragment: the same discs for the rasteriser. uniforms: of both. First come those that face the
+    eye, then those of the others that the first do not hide: of a closed surface next to none.
+    """
+    side = ALL if uniforms["cull_back"] else TOWARDS
+    lists = tile_lists(points, surface, side, **uniforms)
+    if lists is None:
+        amplify(points, surface, FALLBACK, shape, fragment, **uniforms)
+        return
+    away = lists.away
+    show_all(points, surface, lists, shape, fragment, farthest=away, **uniforms)
+    if not away:
+        surface.stats.skipped["second lists"] = "no splat that is drawn faces away"
+    elif lists.fill(points, AWAY, **uniforms):
+        show(surface, lists, found=True)
+    else:
+        surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"
+        amplify(points, surface, FALLBACK, shape, fragment, **uniforms)
+
+
+def tile_lists(points: Points, surface: Surface, side: int = ALL, **uniforms: Any) -> TileLists | None:
+    """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner."""
+    reason = _unfit(points, surface)
+    if not reason:
+        lists = surface.keep("tiles", lambda: TileLists(surface.gpu, surface.size))
+        if not lists.fill(points, side, **uniforms):
+            reason = f"too long lists, {lists.length:,} entries"
+        elif lists.large * _LARGE_COST > lists.length:
+            reason = f"{lists.large:,} large splats"
+    if reason:
+        surface.stats.skipped["tiles"] = f"{reason}: all rasterised"
+        return None
+    if lists.large:
+        surface.stats.skipped["large splats in tiles"] = f"{lists.large:,} rasterised"
+    else:
+        surface.stats.skipped["splat"] = "no splat is large"
+    return lists
+
+
+def show_all(
+    points: Points,
+    surface: Surface,
+    lists: TileLists,
+    shape: Shape,
+    fragment: str,
+    farthest: bool = False,
+    **uniforms: Any,
+) -> None:
+    """The nearest disc at each pixel of those listed and of the large ones. farthest: as in `show`."""
+    if lists.large:
+        amplify(lists.large_points(points), surface, FALLBACK, shape, fragment, **uniforms)
+    show(surface, lists, found=lists.large > 0, farthest=farthest)
+
+
+def show(surface: Surface, lists: TileLists, found: bool = False, farthest: bool = False) -> None:
+    """The nearest listed disc at each pixel.
+
+    found: over what the surface holds already. farthest: for a filling with AWAY that follows.
+    """
+    if not found:
+        surface.clear()
+    blocks = [surface.depths.buffer, surface.rows.buffer, *([lists.farthest] if farthest else [])]
+    defines = {"FOUND": int(found), "FARTHEST": int(farthest), "FILL": 0, "LARGE": 0}
+    run("show", surface, lists, defines, blocks)
+
+
+def run(
+    name: str,
+    surface: Surface,
+    lists: TileLists,
+    defines: Mapping[str, object],
+    blocks: Sequence[moderngl.Buffer],
+    rastered: Sequence[moderngl.Texture] = (),
+    **uniforms: Any,
+) -> None:
+    """Run surfels/tiles/NAME.comp on the tiles that have lists. blocks: its storage blocks, from 0 on.
+    rastered: two images of what the large discs gave (LARGE)."""
+    gpu = surface.gpu
+    rows, tiles = _mapping(gpu)
+    perspective = int(surface.view.perspective)
+    layout = {"TILE": TILE, "ROWS": rows, "COLUMNS": TILE // rows, "TILES": tiles, "PERSPECTIVE": perspective}
+    with gpu.timers.measure(name):
+        program = gpu.compute(f"surfels/tiles/{name}.comp", {**defines, **layout})
+        gpu.set(program, **uniforms)
+        for number, block in enumerate(blocks):
+            block.bind_to_storage_buffer(number)
+        for unit, image in enumerate(rastered, start=9):
+            image.use(unit)
+        lists.run(program)
+
+
+def _mapping(gpu: Gpu) -> tuple[int, int]:
+    """Pixels of an invocation and tiles of a work group.
+
+    A software driver's lanes are the pixels of a row: one reads a disc for a whole tile. On hardware
+    each pixel has its invocation, and two tiles fill a work group.
+    """
+    return (TILE, 8) if gpu.software else (1, 2)
+
+
+def _unfit(points: Points, surface: Surface) -> str:
+    """Why such a pose or picture has no lists; empty where it has."""
+    if max(surface.size) > _MOST_TILES * TILE:
+        return f"more than {_MOST_TILES * TILE} pixels along an edge"
+    most = surface.gpu.max_storage_bytes // _DISC_BYTES
+    return f"more than {most:,} points" if len(points.pose.cloud) > most else ""

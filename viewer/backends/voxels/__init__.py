@@ -1,0 +1,286 @@
+"""A sparse octree of the points, drawn as cubes as coarse as the picture allows.
+
+Slomp 2014, VI: octants are divided as long as that tells points apart, and drawn from where
+they are no larger than a pixel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...gpu.amplify import FEEDS, Points
+from ...gpu.context import Gpu
+from ...gpu.fastest import choose
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Stats, Surface
+from ...params import param
+from ...scan.octree import DEEPEST, Octree
+from ...scan.octree.build import STOPS, Stop, build, shortfall
+from ...scan.octree.leaves import closing_levels
+from ...scan.octree.traverse import Cut, Sight, Traversal
+from ...scan.points import PointCloud
+from ...view import View
+from .. import FrameView
+from .cubes import draw_voxels, shade_flat
+
+TITLE = "Voxels"
+DERIVES_ON_THREAD = True
+
+_UPRIGHT = "cubes are upright: turned points lie in other ones"
+_AROUND_ALL = "octants divide the cube around all points: other points make other octants"
+# Rows of the stability suite that cubes cannot hold in principle -> why.
+LIMITS = {
+    "rotated by a quarter turn": _UPRIGHT,
+    "rotated by 37 degrees": _UPRIGHT,
+    "normals parallel to y": _UPRIGHT,
+    "near plane inside the cloud": _AROUND_ALL,
+    "eye inside the cloud": _AROUND_ALL,
+    "zoomed in on 10^-3 of the scan": _AROUND_ALL,
+    "coplanar points": _AROUND_ALL,
+    "collinear points": _AROUND_ALL,
+    "collinear points end on, perspective": _AROUND_ALL,
+    "collinear points end on, orthographic": _AROUND_ALL,
+    "an outlier at 10^6 times the size": _AROUND_ALL,
+    "coplanar points without normals": "without normals, faces are lit",
+}
+
+_UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
+_ANYWHERE = Sight(np.zeros(3), np.eye(3), 1.0, (1, 1), 1.0, math.inf, perspective=True)
+_PRIMES = np.array([73856093, 19349663, 83492791], np.uint32)  # spatial hash (Teschner et al. 2003, 4.1)
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the voxels backend."""
+
+    stop: str = param(
+        "delta",
+        "Where octants are not divided any more. delta: when few positions share one; depth: at a level; "
+        "occupancy: each by itself, when it holds few points",
+        choices=STOPS,
+        affects="derive",
+    )
+    delta: float = param(
+        0.05,
+        "delta: the share of the positions that may lack an octant of their own",
+        low=0,
+        high=1,
+        affects="derive",
+    )
+    depth: int = param(10, "depth: the level of the leaves", low=0, high=DEEPEST, affects="derive")
+    occupancy: int = param(
+        8, "occupancy: points that are not divided any more", low=1, high=1 << 20, affects="derive"
+    )
+    max_depth: int = param(
+        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11)
+    )
+    pixel_threshold: float = param(
+        1.0, "Octants whose edge is less are drawn in place of what they hold, pixels", low=0.25, high=64.0
+    )
+    least: float = param(
+        1.25,
+        "Least edge of a cube, in edges of the smallest octant around it that touches others: what closes "
+        "the surface where octants lie apart; 0: as large as octants",
+        low=0.0,
+        high=10.0,
+        sweep=(0.0, 1.25),
+    )
+    normals: str = param(
+        "auto",
+        "What is lit. smooth: the mean of the points' normals; flat: the cubes' faces; auto: smooth where "
+        "the scan has normals",
+        choices=("auto", "smooth", "flat"),
+        affects="derive",
+    )
+    cull_back: bool = param(False, "Leave out octants whose normals all face away")
+    scatter: bool = param(
+        True, "Send cubes of a few pixels to their pixels one by one; off: all are made by `instancing`"
+    )
+    instancing: str = param(
+        "auto",
+        "How octants become cubes: a geometry shader, uniform blocks, buffer textures, vertex attributes or "
+        "pulled vertices; auto: what is fastest on this device",
+        choices=("auto", *FEEDS),
+        affects="shader",
+    )
+
+
+def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+    """Normals where they are to be lit."""
+    return ("normals",) if params.normals == "smooth" else ()
+
+
+def derive(cloud: PointCloud, params: Params) -> tuple[Octree, list[NDArray[np.uint8]]]:
+    """The octree of a pose, and for each level how large its nodes are drawn to close the surface."""
+    stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
+    octree = build(cloud, stop)
+    # The first cut of a process imports what it needs, of a machine compiles it: not while a window draws.
+    traversal = Traversal(octree.prefix(1), _ANYWHERE)
+    traversal.advance()
+    traversal.cut(octree.low)
+    return octree, closing_levels(octree)
+
+
+def upload(gpu: Gpu, derived: tuple[Octree, list[NDArray[np.uint8]]]) -> Voxels:
+    """Nothing is uploaded until a view is known."""
+    return Voxels(gpu, *derived)
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Draw the nodes that the view tells apart; complete where all were found, and all shall be drawn."""
+    params: Params = frame.params
+    voxels: Voxels = frame.derived
+    if not voxels.octree.points:
+        surface.clear()
+        return False
+    flat = params.normals == "flat" or (params.normals == "auto" and pose.stored.normals is None)
+    shown = voxels.show(pose, frame, flat)
+    surface.show(shown.pose, shown.rows)
+    coarse = frame.share < 1 and bool((shown.cut.level < min(params.max_depth, voxels.octree.depth)).any())
+    _report(shown.cut, voxels.octree, params, surface.stats)
+    if coarse:
+        surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
+    points = Points(shown.pose, use_radii=True, count=len(shown.cut))
+    feed = choose(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
+    draw_voxels(points, surface, feed, params.scatter)
+    if flat:
+        shade_flat(points, surface)
+    return coarse or not shown.cut.complete
+
+
+def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    points = Points.of(pose, surface, 1.0, use_radii=True)
+    return {feed: partial(draw_voxels, points, surface, feed, scattered=False) for feed in FEEDS}
+
+
+def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
+    stopped = shortfall(octree, Stop(params.stop, params.delta))
+    if stopped:
+        stats.chosen["depth"] = stopped
+    for cause, count in (("out of view", cut.outside), ("facing away", cut.facing_away)):
+        if count:
+            stats.skipped[f"octants {cause}"] = f"{count:,}, with all that they hold"
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What a view shows. rows: (n,) the first point of each node."""
+
+    cut: Cut
+    pose: GpuPose
+    rows: NDArray[np.uint32]
+
+
+class Voxels:
+    """An octree, and the nodes of it that the last view showed."""
+
+    def __init__(self, gpu: Gpu, octree: Octree, closing: list[NDArray[np.uint8]]) -> None:
+        self.octree = octree
+        self._closing = closing
+        self._gpu = gpu
+        self._traversal: Traversal | None = None
+        self._asked: tuple[object, ...] = ()
+        self._seen: tuple[object, ...] = ()
+        self._shown: _Shown | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held: the octree on the CPU, what the last view showed on both sides."""
+        shown = self._shown.pose.uploaded_bytes + self._shown.pose.cloud.nbytes if self._shown else 0
+        looking = self._traversal.nbytes if self._traversal else 0
+        return self.octree.nbytes + sum(levels.nbytes for levels in self._closing) + looking + shown
+
+    def release(self) -> None:
+        """Let go of what the last view showed."""
+        self._traversal = self._shown = None
+
+    def show(self, pose: GpuPose, frame: FrameView, flat: bool) -> _Shown:
+        """The nodes for a view, found anew where it or the parameters changed, else found further."""
+        params: Params = frame.params
+        threshold = params.pixel_threshold / math.sqrt(frame.share)  # four times the nodes at half the edge
+        asked = (threshold, params.max_depth, params.least, params.cull_back, flat)
+        seen = (asked, _view_key(frame.view))
+        if self._shown is not None and self._seen == seen and self._shown.cut.complete:
+            return self._shown
+        sight = sight_of(frame.view, pose.cloud.origin)
+        if self._traversal is None or self._asked != asked:
+            self._traversal = Traversal(
+                self.octree,
+                sight,
+                pixel_threshold=threshold,
+                max_depth=params.max_depth,
+                cull_cones=params.cull_back,
+                margin=self._margin(params.least),
+            )
+        elif self._seen != seen:
+            self._traversal.look(sight)
+        self._asked, self._seen = asked, seen
+        self._traversal.advance(frame.budget_ms)
+        self._shown = self._look_at(self._traversal.cut(pose.cloud.origin), pose, params, flat)
+        return self._shown
+
+    def _margin(self, least: float) -> float:
+        """How far cubes reach beyond the balls around their octants at most, scan units."""
+        half = self.octree.edge / 2
+        levels = [(level, int(found.min())) for level, found in enumerate(self._closing) if len(found)]
+        beyond = (least * (1 + _UNLIKE) * half / 2**closing - half / 2**level for level, closing in levels)
+        return math.sqrt(3) * max(0.0, *beyond)
+
+    def _look_at(self, cut: Cut, pose: GpuPose, params: Params, flat: bool) -> _Shown:
+        """The nodes of a cut as points, their radii being half of the cubes' edges."""
+        rows = cut.gather(self.octree, "rows")
+        unlike = _unlike(self.octree, cut, pose.cloud.origin)
+        closing = np.ldexp(np.float32(self.octree.edge / 2), -cut.pick(self._closing).astype(np.int32))
+        cloud = PointCloud(
+            positions=cut.centers,
+            origin=pose.cloud.origin,
+            # Faces give their own normals to pixels.
+            normals=np.zeros_like(cut.centers) if flat else cut.gather(self.octree, "normals"),
+            colors=None if pose.cloud.colors is None else cut.gather(self.octree, "colors"),
+            radii=np.maximum(cut.halves, params.least * unlike * closing),
+            scalars=_Scalars(pose.cloud.scalars, rows),
+            ids=cut.numbers(self.octree),  # in the cut's order, near first: no row is looked for by them
+        )
+        return _Shown(cut, GpuPose(self._gpu, cloud), rows)
+
+
+def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
+    """What a cut has to know of a view of a pose with this origin, (3,)."""
+    eye = origin - view.rotation.T @ view.translation
+    return Sight(eye, view.rotation, view.scale, view.size, view.near, view.far, view.perspective)
+
+
+def _view_key(view: View) -> tuple[object, ...]:
+    lens = (view.size, view.scale, view.near, view.far, view.perspective)
+    return (view.rotation.tobytes(), view.translation.tobytes(), *lens)
+
+
+def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Factors from 1 to 1 + _UNLIKE, (n,), by the nodes' places: cubes that overlap would share the planes
+    of their faces, and rounding would say which of them is seen."""
+    edges = 2 * cut.halves[:, None].astype(np.float64)
+    cells = ((cut.centers + (origin - octree.low)) / edges).astype(np.uint32)
+    mixed = (cells * _PRIMES).sum(axis=1, dtype=np.uint32) * _PRIMES[0] >> np.uint32(22)
+    return 1 + mixed.astype(np.float32) * np.float32(_UNLIKE / 1024)
+
+
+class _Scalars(Mapping[str, NDArray[np.generic]]):
+    """Of each node, those of its lowest point; looked up when they are asked for."""
+
+    def __init__(self, scalars: Mapping[str, NDArray[np.generic]], rows: NDArray[np.uint32]) -> None:
+        self._scalars, self._rows = scalars, rows
+
+    def __getitem__(self, name: str) -> NDArray[np.generic]:
+        return self._scalars[name][self._rows]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._scalars)
+
+    def __len__(self) -> int:
+        return len(self._scalars)

@@ -1,0 +1,83 @@
+"""Voxels: upright cubes around points, small ones by scatter, the others amplified (Slomp 2014, VI-B)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ...gpu import gl
+from ...gpu.amplify import Points, Shape, amplify
+from ...gpu.scatter import scatter
+from ...gpu.surface import Surface
+
+CUBE = Shape("voxels/cube.glsl", corners=9)
+_FRAGMENT = "voxels/cube.frag"
+_SMALL = 3.0  # half of the edge, pixels: up to it, a ray for each pixel of a cube costs less than faces do
+
+
+def draw_voxels(points: Points, surface: Surface, feed: str, scattered: bool = True) -> None:
+    """The nearest cube of each pixel. Points: their radii are half of the edges.
+
+    scattered: whether cubes of a few pixels are met with the ray of each pixel, which gives the same picture.
+    """
+    small, large = _by_size(points, surface) if scattered else (None, points)
+    if small is None:
+        surface.stats.skipped["scatter"] = "no voxel is small"
+    else:
+        _scatter(small, surface)
+    if large is None:
+        surface.stats.skipped["splat"] = "all voxels are small: they are sent to their pixels one by one"
+    else:
+        amplify(large, surface, feed, CUBE, _FRAGMENT, over=small is not None)
+    surface.gpu.discard(*(part.rows for part in (small, large) if part is not None and part is not points))
+
+
+def shade_flat(points: Points, surface: Surface) -> None:
+    """Give each pixel the normal of the face that it shows."""
+    gpu, covered = surface.gpu, surface.list_covered()
+    with gpu.timers.measure("faces"):
+        points.pose.array("positions").bind(0)
+        surface.depths.bind(6)
+        surface.rows.bind(7)
+        surface.own("normals").buffer.bind_to_storage_buffer(5)
+        covered.run(gpu.compute("voxels/faces.comp"))
+        gpu.ctx.memory_barrier()
+
+
+def _by_size(points: Points, surface: Surface) -> tuple[Points | None, Points | None]:
+    """The small ones and the large ones; the points themselves where they are all of one kind."""
+    cloud, view = points.pose.cloud, surface.view
+    assert cloud.radii is not None
+    pixels = cloud.radii * np.float32(points.enlarged * view.scale)
+    if view.perspective:
+        pixels /= np.maximum(view.depths(cloud.positions).astype(np.float32), np.float32(view.near))
+    small = pixels <= _SMALL
+    if small.all():
+        return points, None
+    if not small.any():
+        return None, points
+    return _part(points, small), _part(points, ~small)
+
+
+def _part(points: Points, chosen: NDArray[np.bool_]) -> Points:
+    rows = np.flatnonzero(chosen).astype(np.uint32)
+    return replace(points, rows=gl.BufferTexture(points.pose.gpu.ctx.buffer(rows), gl.R32UI), count=len(rows))
+
+
+def _scatter(points: Points, surface: Surface) -> None:
+    def bind(program: moderngl.ComputeShader) -> None:
+        points.bind()
+        surface.gpu.set(program, enlarged=points.enlarged)
+
+    scatter(
+        surface.gpu,
+        "voxels/scatter.glsl",
+        points.count,
+        surface.depths,
+        surface.rows,
+        bind,
+        defines=points.defines,
+    )

@@ -1,0 +1,1 @@
+"""What papers measured, and the same here: one folder a paper."""

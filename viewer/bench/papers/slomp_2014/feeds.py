@@ -1,0 +1,131 @@
+"""Tables of feeds (Tables II and IV of Slomp 2014): a column for each, a line for each scan and machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....errors import InputError
+from ...baselines import FLOOR
+from ...report.measurement import Measurement, circumstances, count, table
+from ...report.page import number
+from ...report.results import Row
+from . import surfels as slomp
+from .surfels import FEED, Scan
+
+Values = NDArray[np.float64]  # ms, of each view
+
+_COVERED = (25, 85)  # percent of the paper's pictures
+_FIRST = "gs"  # what the others are compared with
+
+
+@dataclass(frozen=True)
+class FeedTable:
+    """Which table it is. theirs: its name in the paper's figures. about: what to say of a scan."""
+
+    theirs: str
+    about: Callable[[Scan], str]
+
+    def milliseconds(self, measurements: Sequence[Measurement]) -> str:
+        """In Markdown: the mean over the views of the time that each feed takes."""
+        return self._table(measurements, lambda line, feed: line.text(line.times[feed].mean()))
+
+    def ratios(self, measurements: Sequence[Measurement]) -> str:
+        """In Markdown: how many times as long as the first feed each takes, the median over the views."""
+        return self._table(measurements, _ratio)
+
+    def _table(self, measurements: Sequence[Measurement], cell: Callable[[_Line, str], str]) -> str:
+        lines = [(scan, line) for scan in slomp.scans() for line in self._lines(scan, measurements)]
+        feeds = list(dict.fromkeys(feed for _, line in lines for feed in line.times))
+        feeds.sort(key=lambda feed: feed == FLOOR)
+        rows, above = [], None
+        for scan, line in lines:
+            head = ["", ""] if scan == above else [self.about(scan), count(line.points)]
+            covered = "{:.0f} to {:.0f} %".format(*line.covered)
+            cells = (cell(line, feed) if feed in line.times else "" for feed in feeds)
+            rows.append([*head, covered, line.machine, *cells])
+            above = scan
+        head = ["scan", "points", "covered", "machine", *(f"`{feed}`" for feed in feeds)]
+        return table(head, rows, left=("scan", "machine"))
+
+    def _lines(self, scan: Scan, measurements: Sequence[Measurement]) -> Iterator[_Line]:
+        """The times of one scan: the paper's, and what each measurement has of it."""
+        if scan.points is not None:
+            theirs = slomp.paper()[self.theirs][scan.name]
+            times = {feed: np.array([ms]) for feed, ms in theirs.items() if feed != "depth"}
+            yield _Line(scan.points, _COVERED, "2014", times, "{:#.4g}".format)
+        for measurement in measurements:
+            rows = of_scan(measurement["rows"], scan)
+            if not rows:
+                continue
+            points = rows[0]["n"]
+            covered = [percent for row in rows if row["feed"] != FLOOR for percent in row["covered"]]
+            seen = (min(covered), max(covered))
+            times = {row["feed"]: np.array(row["gpu_ms"]) for row in rows}
+            yield _Line(points, seen, measurement["device"], times)
+            if measurement["timer"] == "finish":
+                busy = {row["feed"]: np.array(row["busy_ms"]) / measurement["processors"] for row in rows}
+                yield _Line(points, seen, "its processors", busy)
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line of the tables. points: of the scan. covered: from and to which percent of the pictures are.
+
+    times: of each feed. text: how a time is written.
+    """
+
+    points: int
+    covered: tuple[float, float]
+    machine: str
+    times: dict[str, Values]
+    text: Callable[[float], str] = number
+
+
+def title(scan: Scan) -> str:
+    """The paper's name of a scan, and of what stands in for it."""
+    return f"{scan.name}, `{scan.scene}`" if scan.name else f"`{scan.scene}`"
+
+
+def of_scan(rows: Sequence[dict[str, Any]], scan: Scan) -> list[dict[str, Any]]:
+    """What a measurement has of a scan."""
+    return [row for row in rows if row["scene"] == scan.scene and scan.points in (None, row["n"])]
+
+
+def digest(rows: Sequence[Row], backend: str, suite: str) -> Measurement:
+    """What the tables need of a run: how it was measured, and the times of each view.
+
+    Raises InputError where the rows are of another suite.
+    """
+    own = [row for row in rows if row["sweep"] == FEED]
+    drawn = [row for row in own if row["backend"] == backend]
+    if not drawn:
+        raise InputError("no feeds among the results", hint=f"Run scan4d bench --suite {suite}")
+    return {
+        **circumstances(drawn),
+        "rows": [
+            {
+                "scene": row["scene"],
+                "n": row["n"],
+                "feed": row["params"].get(FEED, FLOOR),
+                "covered": [round(percent, 1) for percent in row["covered_by_view"]],
+                **times(row),
+            }
+            for row in own
+        ],
+    }
+
+
+def times(row: Row) -> dict[str, list[float]]:
+    """Of each view, ms."""
+    return {kind: [round(ms, 2) for ms in row["times_by_view"][kind]] for kind in ("gpu_ms", "busy_ms")}
+
+
+def _ratio(line: _Line, feed: str) -> str:
+    if _FIRST not in line.times:  # a driver without it
+        return ""
+    return f"{np.median(line.times[feed] / line.times[_FIRST]):.2f}"

@@ -1,0 +1,111 @@
+"""Drawing for the command line: which pictures of which poses, and from where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import frame
+from ..camera import Camera
+from ..document.recording import Entry
+from ..frame import Request
+from ..gpu.context import headless
+from ..gpu.surface import Surface
+from ..output.export import numbered
+from ..output.marks import Legend
+from ..renderer import Renderer
+from ..scan.points import Bounds
+from ..scan.timeline import Timeline
+from ..scan.times import typical_rate
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Pictures to draw.
+
+    count: how many are drawn. size: of the first one, and of a film. fps: of a film.
+    pictures: number of the file, request, entry that tells all of it, and legend of its marks; where one
+    request comes several times in a row, its picture is put several times and drawn once.
+    """
+
+    count: int
+    size: tuple[int, int]
+    fps: float
+    pictures: Iterator[tuple[int, Request, Entry, Legend]]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture. number: its file's. pose: an index. azimuth: degrees on the turntable."""
+
+    number: int
+    pose: int
+    azimuth: float = 0.0
+
+
+def shots(indices: Sequence[int], turntable: int | None = None) -> list[Shot]:
+    """The pictures of these poses. turntable: how many make a turn; a single pose gets a whole one."""
+    if turntable is None:
+        return [Shot(index, index) for index in indices]
+    if len(indices) == 1:
+        return [Shot(k, indices[0], 360 * k / turntable) for k in range(turntable)]
+    return [Shot(index, index, 360 * k / turntable) for k, index in enumerate(indices)]
+
+
+def outputs(out: Path, numbers: Iterable[int], stats: Path | None = None) -> list[Path]:
+    """The files that pictures of these numbers go to, and that of their stats."""
+    pictures = dict.fromkeys(numbered(out, number) for number in numbers)  # once, for a film
+    return [*pictures, *([stats] if stats else [])]
+
+
+def turntable_camera(
+    bounds: Bounds, azimuths: Sequence[float], aspect: float, up: str
+) -> Callable[[Shot], Camera]:
+    """A camera for each shot, at the one distance that shows the whole bounds from all azimuths."""
+    distance = max(Camera.orbit(bounds, azimuth, aspect=aspect, up=up).distance for azimuth in azimuths)
+    return lambda shot: Camera.orbit(bounds, shot.azimuth, distance=distance, up=up)
+
+
+def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> float:
+    """Pictures a second: `fps` where given, else as fast as the poses follow each other."""
+    if fps is not None:
+        return fps
+    return typical_rate(timeline.times[list(indices)])
+
+
+def renderer(device: int | None) -> Renderer:
+    """A headless renderer on this device; None: the one that `viewer.render` uses."""
+    return frame.shared_renderer() if device is None else Renderer(headless(device))
+
+
+@contextmanager
+def canvases(
+    device: int | None, size: tuple[int, int]
+) -> Iterator[tuple[Renderer, Callable[[tuple[int, int]], Surface]]]:
+    """A headless renderer, and a function that gives the surface of a size; it holds one at a time.
+
+    size: of the first one. Raises InputError where that cannot be drawn.
+    """
+    its_renderer = renderer(device)
+    held = [Surface(its_renderer.gpu, size)]
+
+    def surface_of(size: tuple[int, int]) -> Surface:
+        if held[-1].size != size:
+            held.pop().release()
+            held.append(Surface(its_renderer.gpu, size))
+        return held[-1]
+
+    try:
+        yield its_renderer, surface_of
+    finally:
+        for surface in held:
+            surface.release()
+
+
+@contextmanager
+def canvas(device: int | None, size: tuple[int, int]) -> Iterator[tuple[Renderer, Surface]]:
+    """A headless renderer and a surface to draw to."""
+    with canvases(device, size) as (its_renderer, surface_of):
+        yield its_renderer, surface_of(size)

@@ -1,0 +1,62 @@
+"""What a command writes: never onto what it reads, and onto other files only where that is wanted."""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import ArgumentParser
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from ..errors import InputError, explained
+from ..scan.inputs import found_among
+from ..unfinished import remove_leftovers
+from ._console import plain
+
+
+def add_force_argument(parser: ArgumentParser) -> None:
+    """`--force`."""
+    parser.add_argument("--force", action="store_true", help="replace files that are there already")
+
+
+def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
+    """Raise InputError, before any work, where these files are not to be written.
+
+    Refused are inputs of the command, under whatever name (links as well); and what is there already, unless
+    force is told or a person at the terminal agrees. inputs: they need not be there. What killed processes
+    have left behind is removed on the way.
+    """
+    remove_leftovers()
+    for path in found_among(outputs, inputs):
+        raise InputError("is read by this command, and is not replaced", path, "Write to another file")
+    there = [path for path in outputs if _is_there(path)]
+    if there and not force and not _agreed(there):
+        hint = "--force replaces it" if len(there) == 1 else "--force replaces them"
+        raise InputError(f"is there already{_and_more(there)}", there[0], hint)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether something has this name. Raises InputError for a folder, and a name that cannot be."""
+    try:
+        os.lstat(path)
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be written: {what}", path, hint) from error
+    if os.path.isdir(path):
+        raise InputError("is a folder", path, "Name a file in it")
+    return True
+
+
+def _agreed(there: Sequence[Path]) -> bool:
+    """Whether a person says that these are replaced; without a terminal nobody does."""
+    if not (sys.stdin and sys.stdin.isatty() and sys.stderr and sys.stderr.isatty()):
+        return False
+    question = f"{plain(str(there[0]))}: is there already{_and_more(there)}. Replace? [y/N] "
+    print(question, end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def _and_more(there: Sequence[Path]) -> str:
+    return f", and {len(there) - 1} more" if len(there) > 1 else ""

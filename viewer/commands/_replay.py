@@ -1,0 +1,188 @@
+"""Replaying: the pictures of a recording, or of a picture that tells how it was made."""
+
+from __future__ import annotations
+
+import os
+from argparse import Namespace
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+from ..document.anonymous import anonymous_pose, anonymous_request
+from ..document.recording import Entry, Recording, fingerprint, fingerprint_as, new_salt, places_to_open
+from ..errors import InputError
+from ..frame import Request
+from ..output.export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
+from ..output.marks import Legend, marks_of
+from ..scan.inputs import scan_inputs
+from ..scan.open import DEMO, open_scan
+from ..scan.timeline import Timeline
+from ..scan.times import DEFAULT_FPS
+from . import _drawing as drawing
+from ._console import warn
+from ._drawing import Plan
+from ._outputs import claim
+from ._scans import check_color_source
+
+# What the recording tells, by the names of arguments.
+_TOLD = (
+    "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
+)  # fmt: skip
+
+
+@contextmanager
+def planned(args: Namespace) -> Iterator[Plan]:
+    """The pictures of `args.replay`. Raises InputError where other arguments tell what to draw as well."""
+    _check_arguments(args)
+    recording = Recording.load(args.replay)
+    entries: Sequence[Entry] = recording.entries
+    check_output(args.out, OUTPUT_SUFFIXES, several=len(entries) > 1)
+    fps = DEFAULT_FPS if args.fps is None else args.fps
+    if args.out.suffix.lower() == FILM_SUFFIX:
+        entries = _film(recording, fps)
+    outputs = drawing.outputs(args.out, range(len(entries)), args.stats)
+    claim(outputs, [args.replay, *_scan_files(entries, args)], args.force)
+    with closing(_pictures(entries, args)) as pictures:
+        yield Plan(len(set(map(id, entries))), entries[0].size, fps, pictures)
+
+
+def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
+    """The files that the scans of the entries are read from; what is wrong with these is told later."""
+    for scan in dict.fromkeys(args.scan or entry.scan for entry in entries):
+        with suppress(InputError):
+            if scan is not None:
+                with open_scan(scan) if args.scan else _open(scan, args.replay)[1] as timeline:
+                    yield from scan_inputs(timeline)
+
+
+def _check_arguments(args: Namespace) -> None:
+    given = [f"--{name}" for name in _TOLD if _is_given(getattr(args, name))]
+    if args.up != "+y":
+        given.append("--up")
+    if given:
+        hint = "The recording tells what to draw; leave it out"
+        raise InputError(f"--replay takes no {', '.join(given)}", args.replay, hint)
+
+
+def _is_given(value: object) -> bool:
+    return not (value is None or value is False or value == [])
+
+
+def _film(recording: Recording, fps: float) -> Sequence[Entry]:
+    """The entries at the film's pace, all of the size of the first."""
+    low, high = FRAME_RATES
+    if not low <= fps <= high:
+        raise InputError(f"{fps:g} pictures a second are not usable", "--fps", f"Use {low:g} to {high:g}")
+    size = recording.entries[0].size
+    resized = Recording(tuple(replace(e, size=size) for e in recording.entries), recording.seconds)
+    return resized.paced(fps)
+
+
+def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int, Request, Entry, Legend]]:
+    """Number, request, entry and legend of each; an entry that stays makes one request.
+
+    Broken frames among several are reported and left out. Raises InputError where none is left.
+    """
+    timeline: Timeline | None = None
+    opened, source, failed, drawn = None, None, None, False
+    salt = new_salt() if args.anonymous else None
+    try:
+        for number, entry in enumerate(entries):
+            if timeline is None or (entry.scan, entry.hash) != opened:
+                if timeline is not None:
+                    timeline.close()
+                found, timeline, hash = _scan_of(entry, args, salt)
+                opened = entry.scan, entry.hash
+            if entry is not source:
+                source = entry
+                try:
+                    request, failed = _request(entry, args, timeline), None
+                except InputError as error:
+                    if not _may_be_left_out(entry, timeline, entries):
+                        raise
+                    if str(error) != str(failed):
+                        warn(f"{timeline.name}: frame {entry.pose} is left out: {error}")
+                    failed = error
+                else:
+                    shown = _completed(entry, request, args, found, hash, timeline)
+            if failed is None:
+                drawn = True
+                yield number, request, shown, shown.legend(timeline)
+        if failed and not drawn:
+            raise failed
+    finally:
+        if timeline is not None:
+            timeline.close()
+
+
+def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
+    """The picture of an entry, anonymous where it or the arguments are. Raises InputError."""
+    pose, start = timeline.pose(entry.pose), float(timeline.times[0])
+    if entry.anonymous:
+        return entry.request(anonymous_pose(pose, start))
+    request = entry.request(pose)
+    check_color_source(entry.look, timeline, [entry.pose])
+    return anonymous_request(request, start) if args.anonymous else request
+
+
+def _completed(
+    entry: Entry, request: Request, args: Namespace, scan: str, hash: str | None, timeline: Timeline
+) -> Entry:
+    """The entry with what is known by now, and with the marks and the unit that the arguments tell.
+
+    What is anonymous stays so.
+    """
+    marks = entry.marks if args.marks is None else marks_of(args.marks)
+    unit = args.unit or entry.unit or timeline.unit
+    shown = replace(entry, scan=scan, hash=hash, marks=marks, unit=unit)
+    if not (entry.anonymous or args.anonymous):
+        return shown
+    time = float(request.pose.time)
+    return replace(shown, time=time, camera=request.camera, look=request.look).without_names()
+
+
+def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:
+    """Whether the entry's frame is a broken one among several."""
+    return entry.pose in timeline.broken and any(other.pose != entry.pose for other in entries)
+
+
+def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Timeline, str | None]:
+    """The scan of an entry: how it was found, opened, and its hash.
+
+    salt: of the hash where what is drawn is made anonymous. Raises InputError where it is unusable, or where
+    the one that was named is another one.
+    """
+    if args.scan is not None:
+        found, timeline = args.scan, open_scan(args.scan)
+    elif entry.scan is None:
+        hint = f"Name it: scan4d render SCAN --replay {args.replay} -o {args.out}"
+        raise InputError("does not tell its scan", args.replay, hint)
+    else:
+        found, timeline = _open(entry.scan, args.replay)
+    hash = fingerprint_as(entry.hash, timeline.files)
+    if None not in (hash, entry.hash) and hash != entry.hash:
+        if args.scan is not None:
+            timeline.close()
+            what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
+            raise InputError(what, found, "Name that one, as it was")
+        warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
+    return found, timeline, hash if salt is None or entry.anonymous else fingerprint(timeline.files, salt)
+
+
+def _open(scan: str, path: Path) -> tuple[str, Timeline]:
+    """A scan that a recording names, and how it was found: beside the recording, or as it is named.
+
+    Raises InputError where it is in neither place, or unusable.
+    """
+    for place in places_to_open(scan, path):
+        try:
+            return place, open_scan(place)
+        except InputError as error:
+            if os.path.exists(place):
+                raise
+            missing = error
+    if scan == DEMO or os.path.isabs(scan):
+        raise missing
+    hint = f"Looked in '{path.parent}' and in the working directory; put it there, or correct 'scan'"
+    raise InputError(f"its scan '{scan}' is not there", path, hint) from missing

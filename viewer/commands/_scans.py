@@ -1,0 +1,235 @@
+"""Scans as the command line names them: opened, their poses chosen, and read one after another."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from argparse import ArgumentParser, Namespace
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..files import absolute, printable, whole_file
+from ..look import COLOR_BY, Look, drawable
+from ..output.export import is_pattern, numbered
+from ..scan import formats
+from ..scan.open import entries, open_scan
+from ..scan.points import Bounds
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
+from ..scan.times import TIMES_FILE
+from ._console import warn
+
+_FRAMED = 5  # poses that a camera is fitted to
+SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'frame*.ply', or demo"
+
+
+def add_pose_arguments(parser: ArgumentParser) -> None:
+    """The arguments that choose poses."""
+    group = parser.add_argument_group("which poses").add_mutually_exclusive_group()
+    group.add_argument("--pose", type=int, metavar="I", help="one pose, counted from 0")
+    group.add_argument("--time", type=float, metavar="S", help="the pose nearest to a time in seconds")
+    group.add_argument("--poses", metavar="A:B[:STEP]", help="from A up to but not including B")
+    group.add_argument("--all", action="store_true", help="all poses")
+
+
+def open_timeline(args: Namespace, scan: str) -> Timeline:
+    """Open a scan with the unit and the frame rate of the command line. Raises InputError."""
+    return open_scan(scan, unit=args.unit, fps=args.fps)
+
+
+def chosen_poses(args: Namespace, timeline: Timeline) -> list[int] | None:
+    """The indices that the arguments choose, at least one; None where they leave it open.
+
+    Raises InputError where there is no such pose.
+    """
+    if args.pose is not None:
+        timeline.label(args.pose)  # raises where there is none
+        return [args.pose]
+    if args.time is not None:
+        if not math.isfinite(args.time):
+            raise InputError(f"{args.time} is no time", "--time", "Use seconds")
+        return [timeline.nearest(args.time)]
+    if args.poses is not None:
+        return _poses_between(args.poses, timeline)
+    return list(range(len(timeline))) if args.all else None
+
+
+def _poses_between(text: str, timeline: Timeline) -> list[int]:
+    match = re.fullmatch(r"(\d*):(\d*)(?::0*([1-9]\d*))?", text)
+    if not match:
+        raise InputError(
+            f"'{text}' is no range of poses", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
+        )
+    start, stop, step = (int(part) if part else None for part in match.groups())
+    indices = list(range(len(timeline)))[start:stop:step]
+    if not indices:
+        raise InputError(
+            f"there is no pose in {text}", timeline.name, f"It has the poses 0 to {len(timeline) - 1}"
+        )
+    return indices
+
+
+def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
+    """The poses of these indices, the next one being read while one is in use.
+
+    Where several are asked for, broken ones are reported and left out. Raises InputError
+    where none is left.
+    """
+    said, found = 0, False
+    for place, index in enumerate(indices):
+        try:
+            pose = timeline.pose(index)
+        except InputError:
+            if len(indices) == 1:
+                raise
+            said = _report(timeline, said)
+            continue
+        said, found = _report(timeline, said), True
+        if place + 1 < len(indices):
+            timeline.request(indices[place + 1])
+        yield pose
+    if not found:
+        raise InputError(f"none of its {len(indices)} frames can be read", timeline.name)
+
+
+def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
+    """The bounds of some of these poses together, so that a subject that moves stays in the picture.
+
+    Broken ones are passed over. Raises InputError where none can be read.
+    """
+    spread = dict.fromkeys(indices[i * (len(indices) - 1) // (_FRAMED - 1)] for i in range(_FRAMED))
+    boxes = []
+    for index in spread:
+        with suppress(InputError):
+            boxes.append(timeline.pose(index).cloud.bounds())
+    if not boxes:  # there may be a readable one between
+        return next(read_poses(timeline, indices)).cloud.bounds()
+    return Bounds(np.min([b.low for b in boxes], axis=0), np.max([b.high for b in boxes], axis=0))
+
+
+def check_color_source(look: Look, timeline: Timeline, indices: Sequence[int]) -> None:
+    """Raise InputError where none of these poses has what the look colours by; it lists what there is.
+
+    Broken ones are passed over; it reads until one has it.
+    """
+    if look.color_by in COLOR_BY:
+        return
+    readable, scalars = False, dict[str, None]()
+    for index in indices:
+        try:
+            cloud = timeline.pose(index).cloud
+        except InputError:
+            continue
+        if drawable(look, cloud) is look:
+            return
+        readable, scalars = True, scalars | dict.fromkeys(cloud.scalars)
+    if readable:
+        error = unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars])
+        where = timeline.name if len(indices) > 1 else frame_title(timeline, indices[0])
+        raise InputError(error.what, where, error.hint)
+
+
+def frame_title(timeline: Timeline, index: int) -> str:
+    """A frame's number and file, for messages."""
+    return f"frame {index} ({timeline.label(index)})"
+
+
+def first_readable(timeline: Timeline) -> Pose:
+    """The first pose that is not broken, and no other is read. Raises InputError where all are."""
+    pose = next(iter(timeline), None)
+    if pose is None:
+        raise timeline.broken[0]
+    _report(timeline, 0)
+    return pose
+
+
+def _report(timeline: Timeline, said: int) -> int:
+    """Say the timeline's messages from number `said` on; how many are said now."""
+    messages = timeline.messages[said:]
+    for notice in messages:
+        known = notice.text.startswith(timeline.name)  # a single file is named after itself
+        warn(notice.text if known else f"{timeline.name}: {notice.text}")
+    return said + len(messages)
+
+
+def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list[Path]:
+    """All that `frame_files` leads to, of these poses of a scan.
+
+    Raises InputError where a times.csv tells the times of other files, or would be one to other frames.
+    """
+    files = [numbered(out, index) for index in indices]
+    if not is_pattern(out):
+        return files
+    times_file = out.with_name(TIMES_FILE)
+    _check_times_file(times_file, {printable(file.name) for file in files})
+    _check_other_frames(out, {file.name for file in files}, timeline)
+    return [*files, times_file]
+
+
+@contextmanager
+def frame_files(out: Path) -> Iterator[Callable[[Pose], Path]]:
+    """The file that each pose goes to; for a pattern, times.csv beside them when all are written."""
+    rows: list[tuple[str, float]] = []
+
+    def file_of(pose: Pose) -> Path:
+        path = numbered(out, pose.index)
+        rows.append((printable(path.name), pose.time))  # as labels have it
+        return path
+
+    yield file_of
+    if is_pattern(out):
+        times_file = out.with_name(TIMES_FILE)
+        with whole_file(times_file) as path, open(path, "w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows([("file", "time"), *rows])
+
+
+def _check_times_file(path: Path, names: set[str]) -> None:
+    """Raise InputError where there is a times.csv that tells the times of other files."""
+    if not path.exists():
+        return
+    try:
+        with open(path, newline="", encoding="utf-8") as stream:
+            told = {row[0] for row in csv.reader(stream) if row}
+    except (OSError, UnicodeDecodeError, csv.Error):
+        told = {"?"}
+    if told - names - {"file"}:
+        raise InputError("tells the times of other files", path, "Write into a folder of its own")
+
+
+def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
+    """Raise InputError where a times.csv beside these outputs would have to tell when other frames are.
+
+    These are files of the same kind, and several of another one: a single file needs no times. Those in a
+    folder `frames` as well, and those of the scan itself that are in several folders.
+    """
+    folder = out.parent
+    found = [file for file in _scan_files(folder) if file.name not in names]
+    found += _scan_files(folder / "frames")
+    if len(timeline.files) > 1 and os.path.samefile(_common_folder(timeline.files), folder):
+        found += [file for file in timeline.files if file.parent != folder]
+    kinds = Counter(file.suffix.lower() for file in found)
+    if kinds[out.suffix.lower()] or any(count > 1 for count in kinds.values()):
+        what = f"holds other frames, such as {found[0].name}, whose times its {TIMES_FILE} would not tell"
+        raise InputError(what, folder, "Write into a folder of its own")
+
+
+def _scan_files(folder: Path) -> list[Path]:
+    """The files in a folder that can be frames, if it is there."""
+    if not os.path.isdir(folder):
+        return []
+    known = set(formats.known_suffixes())
+    there = [entry for entry in sorted(entries(folder)) if not entry.name.startswith(".")]
+    return [
+        file for file in there if file.suffix.lower() in known and file.name != TIMES_FILE and file.is_file()
+    ]
+
+
+def _common_folder(files: Sequence[Path]) -> Path:
+    return Path(os.path.commonpath([absolute(file.parent) for file in files]))

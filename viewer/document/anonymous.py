@@ -1,0 +1,91 @@
+"""Anonymous pictures: a scan drawn without what tells whose it is, where and when; see docs/privacy.md.
+
+The scan itself is changed before it is drawn, not what comes of it: whatever is made of such a picture
+(its text, its channels, the marks on it) has nothing to tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..frame import Request
+from ..geometry import up_vector
+from ..look import Look, drawable, unnamed, value_source
+from ..scan.points import UNKNOWN_UNIT
+from ..scan.pose import Pose
+from ..scan.range_view import RangeView
+from ..scan.units import is_length
+
+_STEPS = 256  # of the grid that the middle is on, at least, in the extent of a pose
+_DECIMALS = 6  # of seconds
+
+
+def anonymous_request(request: Request, start: float) -> Request:
+    """The same picture of a pose that stands about the origin of its coordinates.
+
+    Times count from the scan's first frame, which is at `start` seconds, heights from the middle of the
+    pose, and a scalar is told by its number.
+    """
+    pose = request.pose
+    middle = middle_of(pose)
+    look = raised(unnamed(request.look, pose.cloud), -middle)
+    return replace(request, pose=anonymous_pose(pose, start), camera=request.camera.moved(-middle), look=look)
+
+
+@lru_cache(maxsize=1)  # several pictures of one pose share what is uploaded of it
+def anonymous_pose(pose: Pose, start: float) -> Pose:
+    """The pose with its middle at zero, seconds counted from `start`, and without names."""
+    middle = middle_of(pose)
+    views = tuple(_anonymous_view(view, middle, number) for number, view in enumerate(pose.views))
+    cloud = replace(pose.cloud, origin=pose.cloud.origin - middle)
+    time = round(pose.time - start, _DECIMALS)  # no rest of a large number tells that it was one
+    return Pose(pose.index, time, f"frame {pose.index}", cloud, views)
+
+
+def middle_of(pose: Pose) -> NDArray[np.float64]:
+    """The middle of its robust bounds, (3,), on a power-of-two grid: taking it off rounds nothing, as a rule.
+
+    The origin of the cloud would not do: it is zero where the scan is no farther from it than it is wide.
+    """
+    bounds = pose.cloud.bounds()
+    extent = float((bounds.high - bounds.low).max())
+    if extent <= np.finfo(np.float64).eps * np.abs(bounds.center).max():
+        return bounds.center
+    grid = 2.0 ** np.floor(np.log2(extent / _STEPS))
+    return np.round(bounds.center / grid) * grid
+
+
+def anonymous_unit(unit: str) -> str:
+    """The unit of length where it is a common one: others may tell anything."""
+    return unit if is_length(unit) else UNKNOWN_UNIT
+
+
+def in_place(camera: Camera, look: Look, pose: Pose) -> tuple[Camera, Look]:
+    """Camera and look of an anonymous picture, for the pose as the scan has it."""
+    middle = middle_of(pose)
+    scalar = value_source(drawable(look, pose.cloud), pose.cloud)
+    return camera.moved(middle), raised(replace(look, color_by=scalar or look.color_by), middle)
+
+
+def raised(look: Look, by: NDArray[np.float64]) -> Look:
+    """The look of a scan that is moved: where it colours by height, its range moves too.
+
+    by: (3,) scan units.
+    """
+    if look.color_by != "height":
+        return look
+    height = float(by @ up_vector(look.up))
+    low, high = (None if end is None else end + height for end in (look.low, look.high))
+    return replace(look, low=low, high=high)
+
+
+def _anonymous_view(view: RangeView, middle: NDArray[np.float64], number: int) -> RangeView:
+    to_camera = view.world_to_camera.copy()
+    to_camera[:3, 3] += to_camera[:3, :3] @ middle
+    unit = anonymous_unit(view.unit)
+    return replace(view, world_to_camera=to_camera, name=f"pod {number}", unit=unit)

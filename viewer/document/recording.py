@@ -1,0 +1,337 @@
+"""Recordings: what was shown, as plain data that draws the same pictures again.
+
+A recording is a JSON file, an entry a line:
+
+    {
+    "format": 1, "version": "0.1.0", "seconds": 2.4, "entries": [
+    {"at": 0.0, "scan": "knot", "hash": ..., "pose": 0, "time": 0.0, "size": [1280, 720], "camera": {...},
+     "backend": "points", "params": {...}, "look": {...}, "marks": {...}, "unit": "mm"},
+    {"at": 0.52, "pose": 1, "time": 0.04}
+    ]}
+
+The first entry is complete, every other one tells what has changed. Each PNG and EXR that Scan4D writes
+holds its own complete entry, with `format` and `version` beside it, and is a recording of one entry.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+import secrets
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..backends import backend as find_backend
+from ..camera import Camera
+from ..errors import InputError, shortened, unknown_name
+from ..files import open_plain, whole_file
+from ..frame import Request
+from ..look import Look
+from ..output.export import read_description
+from ..output.marks import Legend, Marks
+from ..params import parse
+from ..scan.open import DEMO, searches_folders
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
+from .anonymous import anonymous_unit
+from .recording_json import DAMAGED, checked, placed, read_json
+
+FORMAT = 1
+_HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
+_TICK = 0.001  # seconds that time stamps are rounded to
+# What earlier files lack, and pictures.
+_LATER: dict[str, Any] = {"at": 0.0, "marks": {}, "unit": None, "anonymous": False}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One picture that was shown: all that is needed to draw it again.
+
+    scan: as the user named it, None where it is anonymous. hash: of its files (see `fingerprint`), None
+    where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
+    params: the backend's own `Params`. marks: what is drawn over it. unit: of length, as marks have it;
+    None for the scan's own. anonymous: whether camera, time and look are those of the scan as
+    `anonymous_request` has it. at: seconds since the recording began; entries that differ in it alone are
+    equal.
+    """
+
+    scan: str | None
+    hash: str | None
+    pose: int
+    time: float
+    size: tuple[int, int]
+    camera: Camera
+    backend: str
+    params: Any
+    look: Look
+    marks: Marks = field(default_factory=Marks)
+    unit: str | None = None
+    anonymous: bool = False
+    at: float = field(default=0.0, compare=False)
+
+    @classmethod
+    def of(
+        cls,
+        request: Request,
+        scan: str | None,
+        hash: str | None,
+        size: tuple[int, int],
+        unit: str,
+        marks: Marks | None = None,
+    ) -> Entry:
+        """The entry of a picture that was asked for with a backend's name and its parameters."""
+        return cls(
+            scan, hash, request.pose.index, float(request.pose.time), size,
+            request.camera, str(request.backend), request.params, request.look, marks or Marks(), unit,
+        )  # fmt: skip
+
+    def request(self, pose: Pose) -> Request:
+        """The picture to draw. pose: number `self.pose` of the scan."""
+        return Request(pose, self.camera, self.backend, self.params, self.look)
+
+    def legend(self, timeline: Timeline) -> Legend:
+        """What the marks say. timeline: the scan's."""
+        unit = timeline.unit if self.unit is None else self.unit
+        return Legend(self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time)
+
+    def to_json(self, before: Entry | None = None) -> dict[str, Any]:
+        """A JSON object, without `at`. before: leave out what is as it was there."""
+        changed = (f.name for f in fields(self) if f.compare)
+        if before is not None:
+            changed = (name for name in changed if getattr(self, name) != getattr(before, name))
+        return {name: _plain(getattr(self, name)) for name in changed}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Entry:
+        """The entry of a complete JSON object. Raises InputError for whatever is wrong in it."""
+        data = {**_LATER, **data}
+        known = [f.name for f in fields(cls)]
+        for name in data:
+            if name not in known:
+                raise unknown_name("field", name, known)
+        for name in known:
+            if name not in data:
+                raise InputError(f"has no '{name}'", hint=DAMAGED)
+        read = {name: checked(name, data[name]) for name in known}
+        backend = find_backend(read["backend"])
+        read["size"] = tuple(read["size"])
+        read["camera"] = Camera.from_json(read["camera"])
+        read["params"] = backend.params(read["params"])
+        read["look"] = parse(Look, read["look"], "look")
+        read["marks"] = parse(Marks, read["marks"], "mark")
+        return cls(**read)
+
+    def without_names(self) -> Entry:
+        """What an anonymous picture tells, of a scan that is as `anonymous_request` has it."""
+        unit = None if self.unit is None else anonymous_unit(self.unit)
+        return replace(self, scan=None, unit=unit, anonymous=True)
+
+    def description(self) -> str:
+        """The JSON text that a picture carries."""
+        return json.dumps(_head() | self.to_json())
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was shown, in the order of time. entries: at least one. seconds: how long it took."""
+
+    entries: tuple[Entry, ...]
+    seconds: float = 0.0
+
+    def save(self, path: Path) -> None:
+        """Write its JSON. Raises InputError where it cannot be written."""
+        before = (None, *self.entries[:-1])
+        lines = (json.dumps(_change(entry, last)) for entry, last in zip(self.entries, before, strict=True))
+        head = json.dumps(_head() | {"seconds": self.seconds}).strip("{}")
+        text = f'{{\n{head}, "entries": [\n' + ",\n".join(lines) + "\n]}\n"
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> Recording:
+        """Read a recording, or the entry that a .png or .exr of Scan4D carries.
+
+        Raises InputError, which names the file and the entry, for whatever is wrong in it.
+        """
+        return cls.from_json(read_json(path), path)
+
+    @classmethod
+    def from_json(cls, data: Any, path: Path) -> Recording:
+        """The recording of a JSON object of this file. Raises InputError for whatever is wrong in it."""
+        if not isinstance(data, dict) or "format" not in data:
+            raise InputError("is no recording", path, "Use a JSON that the window has recorded, or a picture")
+        if data["format"] != FORMAT:
+            what = f"has the format {data['format']!r:.40}, this Scan4D ({__version__}) reads {FORMAT}"
+            raise InputError(what, path, f"It was written by version {data.get('version')!r:.40}; use that")
+        entries = data.get("entries")
+        if entries is None:
+            complete = {name: value for name, value in data.items() if name not in _head()}
+            return cls((_parsed(complete, path),))
+        if not isinstance(entries, list) or not entries:
+            raise InputError("has no entries", path, DAMAGED)
+        read = _read_changes(entries, path)
+        seconds = placed(lambda: checked("seconds", data.get("seconds", 0.0)), path)
+        return cls(read, max(seconds, read[-1].at))
+
+    def paced(self, fps: float) -> list[Entry]:
+        """What a film shows: picture k, at k / fps seconds, is the entry that was shown then.
+
+        An entry that was gone before the next picture of the film is left out; the last one is always in it.
+        """
+        starts = [math.ceil((entry.at - _TICK / 2) * fps) for entry in self.entries]
+        count = max(round(self.seconds * fps), starts[-1] + 1)
+        return [self.entries[bisect_right(starts, number) - 1] for number in range(count)]
+
+
+class Recorder:
+    """Takes down what is shown. now: by the clock, seconds."""
+
+    def __init__(self, now: float) -> None:
+        self._began = now
+        self._entries: list[Entry] = []
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def note(self, entry: Entry, now: float) -> dict[str, Any] | None:
+        """Take down what is shown from now on, unless it is what was shown before.
+
+        Returns what has changed, as the recording's file will have it; None where nothing has.
+        """
+        before = self._entries[-1] if self._entries else None
+        if entry == before:
+            return None
+        self._entries.append(replace(entry, at=self._since(now)))
+        return _change(self._entries[-1], before)
+
+    def finish(self, now: float) -> Recording:
+        """All that was noted, which must be something."""
+        return Recording(tuple(self._entries), self._since(now))
+
+    def _since(self, now: float) -> float:
+        return round(now - self._began, 3)
+
+
+def fingerprint(files: Sequence[Path], salt: str | None = None) -> str | None:
+    """A hash that tells whether a scan is still the same: its kind, and 16 hex digits of a SHA-256.
+
+    "sha256:" is of the bytes of a single file, as sha256sum gives it; "files:" is of the names and sizes of
+    several files, or of one above 256 MiB. With a salt, which stands before it, "salted:" is of sizes and
+    bytes, of large files at both ends: names cannot be guessed from it, and two pictures of one scan have
+    nothing in common. None where there are no files, or they cannot be read.
+    """
+    try:
+        if salt is not None:
+            return _salted(files, salt) if files else None
+        if len(files) == 1 and os.path.getsize(files[0]) <= _HASHED_BYTES:
+            with open_plain(files[0]) as stream:
+                return f"sha256:{hashlib.file_digest(stream, 'sha256').hexdigest()[:16]}"
+        listed = "\n".join(f"{os.path.getsize(file)} {file.name}" for file in files)
+    except OSError:
+        return None
+    return f"files:{hashlib.sha256(os.fsencode(listed)).hexdigest()[:16]}" if files else None
+
+
+def new_salt() -> str:
+    """A salt for the hashes of anonymous pictures, 16 hex digits by chance."""
+    return secrets.token_hex(8)
+
+
+def fingerprint_as(known: str | None, files: Sequence[Path]) -> str | None:
+    """The hash of files in the way that a known one was made."""
+    salted = re.fullmatch("salted:([0-9a-f]{16}):[0-9a-f]{16}", known or "")
+    return fingerprint(files, salted[1] if salted else None)
+
+
+def _salted(files: Sequence[Path], salt: str) -> str:
+    digest = hashlib.sha256(salt.encode())
+    most = _HASHED_BYTES // len(files) // 2  # at either end
+    for file in files:
+        with open_plain(file) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            digest.update(f"{size} ".encode() + stream.read(most))
+            stream.seek(max(size - most, stream.tell()))
+            digest.update(stream.read(most))
+    return f"salted:{salt}:{digest.hexdigest()[:16]}"
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file is one to replay, by its suffix; an .exr may also be a scan, so it is looked into."""
+    if path.suffix.lower() != ".exr":
+        return path.suffix.lower() in (".json", ".png")
+    try:
+        return bool(read_description(path))
+    except InputError:
+        return False
+
+
+def places_of(scan: str, recording: Path) -> list[str]:
+    """Where a scan may be that a recording names: beside the recording, then as it is named."""
+    return [DEMO] if scan == DEMO else list(dict.fromkeys([str(recording.parent / scan), scan]))
+
+
+def places_to_open(scan: str, recording: Path) -> list[str]:
+    """The same places, to open what is there.
+
+    Raises InputError where that would search through folders for whoever wrote the recording.
+    """
+    if searches_folders(scan):
+        hint = "If it is the right one, open it first, or name it: scan4d render SCAN --replay ..."
+        raise InputError(f"names its scan as '{shortened(scan)}', all over the folders", recording, hint)
+    return places_of(scan, recording)
+
+
+def place_of(scan: str, recording: Path) -> str:
+    """The first of these places where something is, else the last one. Raises InputError likewise."""
+    places = places_to_open(scan, recording)
+    return next((place for place in places if os.path.exists(place)), places[-1])
+
+
+# --- reading --------------------------------------------------------------------------------
+
+
+def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
+    """The entries, each with what the one before tells and it does not."""
+    entries: list[Entry] = []
+    complete: dict[str, Any] = {}
+    for number, change in enumerate(changes):
+        where = f"{path}, entry {number}"
+        if not isinstance(change, dict):
+            raise InputError("is no JSON object", where, DAMAGED)
+        complete |= change
+        entries.append(_parsed(complete, where))
+        if number and entries[-1].at < entries[-2].at:
+            raise InputError("is earlier than the entry before it", where, "Put the entries in order of 'at'")
+    return tuple(entries)
+
+
+def _parsed(complete: Mapping[str, Any], where: object) -> Entry:
+    return placed(lambda: Entry.from_json(complete), where)
+
+
+# --- writing --------------------------------------------------------------------------------
+
+
+def _head() -> dict[str, Any]:
+    return {"format": FORMAT, "version": __version__}
+
+
+def _change(entry: Entry, before: Entry | None) -> dict[str, Any]:
+    """An entry as a recording has it, after the one before."""
+    return {"at": entry.at} | entry.to_json(before)
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it."""
+    if isinstance(value, Camera):
+        return value.to_json()
+    if isinstance(value, tuple):
+        return list(value)
+    return asdict(value) if hasattr(value, "__dataclass_fields__") else value

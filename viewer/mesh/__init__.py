@@ -1,0 +1,1 @@
+"""Faces between points: triangle meshes, and the rays that hit them."""

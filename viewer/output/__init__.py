@@ -1,0 +1,1 @@
+"""Pictures and films as files, and the marks over them."""

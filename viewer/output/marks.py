@@ -1,0 +1,279 @@
+"""Marks on a picture: a scale bar, a colour bar and a stamp, laid out alike in files and in the window.
+
+A `Canvas` draws them: `marked` has one for images, the window has one of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..look import Look, color_table
+from ..params import describe, param
+from ..resources import resource_path
+
+Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
+Box = tuple[float, float, float, float]  # left, top, right, bottom; pixels from the upper left corner
+
+INK: Color = (245, 245, 245, 255)
+PLATE: Color = (0, 0, 0, 170)  # light on dark, so that it is read on any picture
+_LINES = 45  # of text that are as high as a picture
+_LEAST_TEXT = 11.0  # pixels, where the picture has room for it
+_BAR_SHARE = 1 / 6  # of the picture's width that a scale bar takes at most
+_TEXT_SHARE = 0.4  # the same of a text
+_MOST_DIGITS = 15  # that a float64 holds
+
+# In heights of the text:
+_MARGIN, _PAD, _GAP = 0.8, 0.5, 0.35
+_TICK, _LINE = 0.5, 0.14  # height of a scale bar's ends, thickness of its line
+_MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What is drawn over a picture."""
+
+    scale_bar: bool = param(
+        False, "A bar of a round length in scan units; in perspective at the depth of the camera's target"
+    )
+    color_bar: bool = param(False, "The colour map and its numbers, where the look colours by a number")
+    stamp: bool = param(False, "Number of the frame, and its time")
+
+    def __bool__(self) -> bool:
+        return self.scale_bar or self.color_bar or self.stamp
+
+
+MARKS = tuple(parameter.name for parameter in describe(Marks))
+
+
+def marks_of(names: Sequence[str] | None) -> Marks:
+    """These of MARKS."""
+    return Marks(**dict.fromkeys(names or (), True))
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What the marks of a picture say.
+
+    unit: of length. pose: its index, of `count`. time: the pose's, seconds.
+    """
+
+    marks: Marks
+    camera: Camera
+    look: Look
+    unit: str
+    pose: int
+    count: int
+    time: float
+
+
+class Canvas(Protocol):
+    """What marks are drawn with. Text is one line, `em` pixels high."""
+
+    em: float
+
+    def width(self, text: str) -> float:
+        """Of a text, pixels."""
+
+    def text(self, left: float, top: float, text: str) -> None:
+        """Write in INK."""
+
+    def box(self, box: Box, color: Color) -> None:
+        """Fill a rectangle."""
+
+    def gradient(self, box: Box, colors: NDArray[np.uint8]) -> None:
+        """Fill a rectangle with colours, (N, 4) uint8, from bottom to top."""
+
+
+# --- what they say --------------------------------------------------------------------------
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is no longer than `most`, which is positive."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return max((factor * power for factor in (1, 2, 5) if factor * power <= most), default=power)
+
+
+def scale_bar(camera: Camera, size: tuple[float, float]) -> tuple[float, float]:
+    """A round length in scan units, and how many pixels it takes at the depth of the camera's target.
+
+    It takes at most a sixth of the picture's width. size: (width, height), pixels.
+    """
+    width, height = size
+    length = round_length(_BAR_SHARE * width * camera.view_height / height)
+    return length, length * height / camera.view_height
+
+
+def quantity(look: Look, unit: str) -> str:
+    """The number that the look colours by, with its unit where it is a length."""
+    if look.color_by in ("depth", "height"):
+        return f"{look.color_by.capitalize()} ({unit})"
+    return "Value" if look.color_by.startswith("#") else look.color_by
+
+
+def number(value: float, span: float) -> str:
+    """A number with three digits of the span that it is one of, the shorter way."""
+    if not math.isfinite(value):
+        return str(value)
+    magnitude = math.floor(math.log10(span)) if span > 0 else math.floor(math.log10(abs(value) or 1))
+    decimals = max(2 - magnitude, 0)
+    plain = f"{round(value, decimals) + 0.0:,.{decimals}f}"  # + 0.0: no minus before zero
+    if not value:
+        return "0"
+    digits = min(max(math.floor(math.log10(abs(value))) + 2 - magnitude, 2), _MOST_DIGITS)
+    scientific = f"{value:.{digits}e}"
+    return plain if len(plain) <= len(scientific) + 1 else scientific
+
+
+def stamp(legend: Legend) -> str:
+    """The frame, counted from 1, and its time."""
+    return f"Frame {legend.pose + 1} of {legend.count}, {legend.time:.3f} s"
+
+
+# --- where they are -------------------------------------------------------------------------
+
+
+def text_height(size: tuple[int, int]) -> int:
+    """Of marks in a picture of (width, height) pixels: less in one that is small or narrow."""
+    extent = min(size[1], 0.75 * size[0])
+    return max(1, round(max(extent / _LINES, min(_LEAST_TEXT, extent / 16))))
+
+
+def draw(
+    canvas: Canvas, size: tuple[float, float], legend: Legend, values: tuple[float, float] | None
+) -> None:
+    """Draw the legend's marks: scale bar lower left, colour bar lower right, stamp upper left.
+
+    size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar.
+    """
+    if legend.marks.scale_bar:
+        _draw_scale_bar(canvas, size, legend)
+    if legend.marks.color_bar and values is not None:
+        _draw_color_bar(canvas, size, legend, values)
+    if legend.marks.stamp:
+        _draw_stamp(canvas, size, legend)
+
+
+def scale_bar_box(canvas: Canvas, size: tuple[float, float], legend: Legend) -> Box:
+    """Where the scale bar's plate is."""
+    em = canvas.em
+    _, pixels = scale_bar(legend.camera, size)
+    width = max(round(pixels), canvas.width(_scale_text(canvas, size, legend))) + 2 * _PAD * em
+    left, bottom = round(_MARGIN * em), round(size[1] - _MARGIN * em)
+    return left, bottom - round((1 + _GAP + _TICK + 2 * _PAD) * em), left + width, bottom
+
+
+def _scale_text(canvas: Canvas, size: tuple[float, float], legend: Legend) -> str:
+    length, _ = scale_bar(legend.camera, size)
+    return _shortened(canvas, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
+
+
+def _draw_scale_bar(canvas: Canvas, size: tuple[float, float], legend: Legend) -> None:
+    em = canvas.em
+    box = left, top, right, bottom = scale_bar_box(canvas, size, legend)
+    canvas.box(box, PLATE)
+    text, pixels = _scale_text(canvas, size, legend), round(scale_bar(legend.camera, size)[1])
+    canvas.text((left + right - canvas.width(text)) / 2, top + _PAD * em, text)
+    start, foot = round((left + right - pixels) / 2), round(bottom - _PAD * em)
+    line, tick = max(1, round(_LINE * em)), max(2, round(_TICK * em))
+    for x in (start, start + pixels - line):
+        canvas.box((x, foot - tick, x + line, foot), INK)
+    canvas.box((start + line, foot - line, start + pixels - line, foot), INK)
+
+
+def _draw_color_bar(
+    canvas: Canvas, size: tuple[float, float], legend: Legend, values: tuple[float, float]
+) -> None:
+    em, (low, high) = canvas.em, values
+    title = _shortened(canvas, quantity(legend.look, legend.unit), _TEXT_SHARE * size[0])
+    shares = (0.0, 0.5, 1.0) if high != low else (0.0,)
+    texts = [number(low + share * (high - low), abs(high - low)) for share in shares]
+    widest = (_MAP_WIDTH + _GAP) * em + max(map(canvas.width, texts))
+    height = min(_MAP_HEIGHT * em, 0.6 * size[1])
+    right, bottom = round(size[0] - _MARGIN * em), round(size[1] - _MARGIN * em)
+    left = round(right - max(widest, canvas.width(title)) - 2 * _PAD * em)
+    top = round(bottom - height - (2.5 + 2 * _PAD) * em)
+    canvas.box((left, top, right, bottom), PLATE)
+    left, top = left + round(_PAD * em), top + round(_PAD * em)
+    canvas.text(left, top, title)
+    foot = bottom - round((_PAD + 0.5) * em)
+    colors = color_table(legend.look.color_map)
+    canvas.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
+    for share, text in zip(shares, texts, strict=True):
+        canvas.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
+
+
+def _draw_stamp(canvas: Canvas, size: tuple[float, float], legend: Legend) -> None:
+    em, text = canvas.em, _shortened(canvas, stamp(legend), size[0] - 2 * (_MARGIN + _PAD) * canvas.em)
+    left = top = round(_MARGIN * em)
+    right, bottom = left + canvas.width(text) + 2 * _PAD * em, top + round((1 + 2 * _PAD) * em)
+    canvas.box((left, top, right, bottom), PLATE)
+    canvas.text(left + _PAD * em, top + _PAD * em, text)
+
+
+def _shortened(canvas: Canvas, text: str, room: float) -> str:
+    if canvas.width(text) <= room:
+        return text
+    while text and canvas.width(text + "…") > room:
+        text = text[:-1]
+    return text + "…"
+
+
+# --- in images ------------------------------------------------------------------------------
+
+
+def marked(image: NDArray[np.uint8], legend: Legend, values: tuple[float, float] | None) -> NDArray[np.uint8]:
+    """The image, (H, W, 4) uint8 sRGB and alpha, with the legend's marks; outside them as it was.
+
+    values: where the colour map begins and ends (see `draw`).
+    """
+    from PIL import Image
+
+    if not legend.marks:
+        return image
+    below = Image.fromarray(image)
+    canvas = _Overlay(below.size)
+    draw(canvas, below.size, legend, values)
+    return np.asarray(Image.alpha_composite(below, canvas.image))
+
+
+class _Overlay:
+    """A Canvas of transparent pixels."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        from PIL import Image, ImageDraw, ImageFont
+
+        self.image = Image.new("RGBA", size)
+        self.em = float(text_height(size))
+        self._draw: Any = ImageDraw.Draw(self.image)
+        path = resource_path("assets", "fonts", "Roboto-Regular.ttf")
+        # The same layout whether or not the library for complex scripts is there.
+        self._font = ImageFont.truetype(path, self.em, layout_engine=ImageFont.Layout.BASIC)
+
+    def width(self, text: str) -> float:
+        return float(self._font.getlength(text))
+
+    def text(self, left: float, top: float, text: str) -> None:
+        # Capitals and digits stand 0.71 em high: in the middle of the line.
+        self._draw.text((round(left), round(top + 0.855 * self.em)), text, INK, self._font, anchor="ls")
+
+    def box(self, box: Box, color: Color) -> None:
+        left, top, right, bottom = map(round, box)
+        if left < right and top < bottom:  # else the picture is too small for it
+            self._draw.rectangle((left, top, right - 1, bottom - 1), color)
+
+    def gradient(self, box: Box, colors: NDArray[np.uint8]) -> None:
+        from PIL import Image
+
+        left, top, right, bottom = map(round, box)
+        if left >= right or top >= bottom:
+            return
+        rows = colors[np.linspace(len(colors) - 1, 0, bottom - top).round().astype(int)]
+        stripe = np.repeat(rows[:, None], right - left, axis=1)
+        self.image.paste(Image.fromarray(np.ascontiguousarray(stripe)), (left, top))

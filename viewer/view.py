@@ -1,0 +1,106 @@
+"""What shaders know of the camera: float32, relative to the pose's origin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+from .scan.points import Bounds
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera at a picture size, seen from a pose's origin (the block of common/view.glsl).
+
+    rotation: (3, 3) float64, world to view. translation: (3,) float64, from the origin to
+    view space. scale: pixels per unit of x/-z (perspective) or of x (orthographic).
+    near, far: what is outside is not drawn. reach: the depth that an orthographic depth
+    buffer ends at.
+    """
+
+    BLOCK_BYTES: ClassVar[int] = 96
+
+    size: tuple[int, int]
+    rotation: NDArray[np.float64]
+    translation: NDArray[np.float64]
+    scale: float
+    near: float
+    far: float
+    reach: float
+    perspective: bool
+
+    @classmethod
+    def of(cls, camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], bounds: Bounds) -> View:
+        """Combine camera and origin in float64, so that the GPU sees only small numbers."""
+        rotation = camera.rotation()
+        perspective = camera.projection == "perspective"
+        extent = 2 * math.tan(math.radians(camera.fov_y) / 2) if perspective else camera.view_height
+        near, far = camera.clip_range()
+        return cls(
+            size=size,
+            rotation=rotation,
+            translation=rotation @ (origin - np.array(camera.eye)),
+            scale=size[1] / extent,
+            near=near,
+            far=far,
+            reach=min(far, camera.reach(bounds)),
+            perspective=perspective,
+        )
+
+    def block(self) -> bytes:
+        """The std140 block `View` of common/view.glsl."""
+        matrix = np.zeros((4, 4), np.float32)  # columns, as GLSL stores them
+        matrix[:3, :3] = self.rotation.T
+        matrix[3, :3] = self.translation
+        matrix[3, 3] = 1
+        limits = np.array([self.scale, self.near, self.far, self.reach], np.float32)
+        return (
+            matrix.tobytes()
+            + limits.tobytes()
+            + np.array([*self.size, self.perspective, 0], np.int32).tobytes()
+        )
+
+    def project(self, positions: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Pixel coordinates (N, 2), row 0 at the top, and depths (N,), in float64.
+
+        The plain twin of `project` in common/view.glsl. positions: (N, 3) relative to the origin.
+        """
+        view = positions @ self.rotation.T + self.translation
+        depth = -view[:, 2]
+        scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
+        center = np.array(self.size) / 2
+        return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
+
+    def unproject(self, pixels: NDArray[np.floating], depth: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Positions (N, 3), relative to the origin, of pixel coordinates (N, 2) at depths (N,).
+
+        The inverse of `project`, in float64.
+        """
+        scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
+        offsets = (pixels - np.array(self.size) / 2) * np.array([1, -1]) / scale[:, None]
+        return (np.column_stack([offsets, -depth]) - self.translation) @ self.rotation
+
+    def depths(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Depths (...) of points (..., 3), relative to the origin."""
+        return -(positions @ self.rotation[2] + self.translation[2])
+
+    def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # a point in the eye's plane is out of range
+            pixels, depth = self.project(positions)
+        in_picture = ((pixels >= 0) & (pixels < self.size)).all(axis=1)
+        return in_picture & (depth >= self.near) & (depth <= self.far)
+
+    def faces_away(self, positions: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Which points (N, 3), relative to the origin, have a normal (N, 3) away from the eye; those that
+        have none do not."""
+        with np.errstate(invalid="ignore"):  # NaN is none
+            if not self.perspective:
+                return normals @ self.rotation[2] < 0
+            eye = -self.translation @ self.rotation
+            return np.einsum("ij,ij->i", normals, eye - positions) < 0
