@@ -12,10 +12,10 @@ from hostile_values import variants
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.geometry import up_vector
-from viewer.scan.points import Bounds
 from viewer.view import View
 
 BOX = Bounds(np.array([-1.0, -2, -3]), np.array([3.0, 2, 1]))

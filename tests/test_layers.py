@@ -1,29 +1,35 @@
-"""The layers of the design, read from the imports: scan <- gpu <- backends <- frame <- app, bench, cli."""
+"""The layers of the design, read from the imports: plain values <- scan <- mesh <- gpu <- ... <- cli."""
 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+
+from viewer.backends import backends
+from viewer.commands import command_names
 
 PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 
 # A part of the package may import its own layer and those before it.
 LAYERS = (
     {
-        "errors", "files", "geometry", "params", "resources", "camera", "look", "view", "task", "helper",
-        "native", "signals", "unfinished", "scan",
+        "errors", "files", "folders", "geometry", "bounds", "params", "resources", "camera", "look", "view",
+        "task", "helper", "native", "signals", "unfinished",
     },
-    {"mesh", "gpu"},
+    {"scan"},
+    {"mesh"},
+    {"simulate", "gpu"},
     {"backends"},
     {"renderer", "frame", "timing"},
     {"analysis"},
     {"output"},
     {"document", "__init__"},
     {"app", "bench"},
-    {"cli", "commands"},
+    {"cli", "commands", "__main__"},
 )  # fmt: skip
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}
 
@@ -80,6 +86,43 @@ def all_imports(path: Path) -> set[str]:
     return set(imports(ast.walk(parse(path)), path))
 
 
+def texts(node: ast.AST) -> Iterator[str]:
+    """The texts in the code below a node, docstrings aside."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant):
+            continue
+        if isinstance(child, ast.Constant) and isinstance(child.value, str):
+            yield child.value
+        yield from texts(child)
+
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+NAMES = {name_of(path) for path in modules()}
+
+
+def imported_modules(path: Path) -> set[str]:
+    """The package's modules that one imports: `from a import b` is a.b where that is a module, else a."""
+    found = {name if name in NAMES else name.rpartition(".")[0] for name in names_at_run_time(path)}
+    return {name for name in found if name in NAMES and name != name_of(path)}
+
+
+def names_at_run_time(path: Path) -> set[str]:
+    nodes = [node for node in nodes_at_run_time(parse(path))]
+    return set(imports(nodes, path))
+
+
+def nodes_at_run_time(node: ast.AST) -> Iterator[ast.AST]:
+    """All but what is for types alone."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if not for_types(child):
+            yield from nodes_at_run_time(child)
+
+
 def libraries(names: Iterable[str]) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
@@ -99,11 +142,48 @@ def test_imports_point_down_the_layers() -> None:
     assert upward == []
 
 
-def test_scan_and_plain_geometry_know_no_gl() -> None:
+def test_no_text_hides_an_import() -> None:
+    """What another process is told to run counts as well: by module name, or as code."""
+    hidden = [
+        f"{path.relative_to(PACKAGE)}: {text[:60]!r}"
+        for path in modules()
+        for text in texts(parse(path))
+        if re.search(r"\b(from|import) viewer\b|^viewer\.[a-z]|-m viewer", text)
+    ]
+    assert hidden == []
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """The window's parts may; whatever else is imported where it is used counts too."""
+    graph = {name_of(path): sorted(imported_modules(path)) for path in modules() if part_of(path) != "app"}
+    circles = []
+    seen: dict[str, int] = {}  # 1: on the way, 2: done
+
+    def visit(name: str, way: tuple[str, ...]) -> None:
+        seen[name] = 1
+        for other in graph.get(name, ()):
+            if seen.get(other) == 1:
+                circles.append(" -> ".join([*way[way.index(other) :], other]))
+            elif other not in seen:
+                visit(other, (*way, other))
+        seen[name] = 2
+
+    for name in graph:
+        if name not in seen:
+            visit(name, (name,))
+    assert circles == []
+
+
+def test_entries_have_no_underscore() -> None:
+    assert {"_line", "_parsing"}.isdisjoint(command_names())
+    assert not [name for name in (*backends(), *command_names()) if name.startswith("_")]
+
+
+def test_scan_and_plain_values_know_no_gl() -> None:
     knowing = {
         f"{path.relative_to(PACKAGE)} imports {library}"
         for path in modules()
-        if LAYER_OF[part_of(path)] == 0
+        if LAYER_OF[part_of(path)] < LAYER_OF["gpu"] or part_of(path) == "simulate"
         for library in libraries(all_imports(path)) & GL
     }
     assert knowing == set()

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .bounds import Bounds
 from .errors import InputError, explained, shortened, unknown_name
 from .files import parsed_json, read_text, whole_file
 from .geometry import Vector, front_vector, up_vector
-from .scan.points import Bounds
 
 PROJECTIONS = ("perspective", "orthographic")
 _FIT_MARGIN = 1.04

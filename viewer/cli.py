@@ -11,8 +11,6 @@ TYPE_CHECKING = False  # as `typing` has it, which takes its time to import
 if TYPE_CHECKING:
     from types import TracebackType
 
-COMMANDS = ("view", "render", "info", "convert", "simulate", "bench", "backends", "doctor")
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code.
@@ -23,12 +21,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is None:
         _end_quietly_when_interrupted()
-    from .commands import _line as line  # not before: it imports for a tenth of a second and more
+    from .commands import _line  # not before: it imports for a tenth of a second and more
 
     if argv is not None:
-        return line.run(list(argv), COMMANDS)
-    line.prepare_streams()
-    return line.run(sys.argv[1:], COMMANDS, then_ends=True)
+        return _line.run(list(argv))
+    _line.prepare_streams()
+    return _line.run(sys.argv[1:], then_ends=True)
 
 
 def _end_quietly_when_interrupted() -> None:

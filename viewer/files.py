@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, explained
+from .unfinished import temporary_file
 
 
 @contextmanager
@@ -23,8 +24,6 @@ def whole_file(path: Path | str) -> Iterator[Path]:
     Whatever goes wrong, a former file of that name stays as it was and nothing else remains.
     Raises InputError where the file cannot be written.
     """
-    from .unfinished import temporary_file  # which needs to know the cache folder
-
     path = Path(path)
     try:
         with temporary_file(path) as temporary:
@@ -79,20 +78,6 @@ def parsed_json(text: str) -> Any:
         return json.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-
-
-def user_folder() -> Path:
-    """Where the settings of this user are kept; it need not be there yet."""
-    import platformdirs
-
-    return platformdirs.user_config_path("scan4d", appauthor=False)
-
-
-def cache_folder() -> Path:
-    """Where what was found out about this machine is kept for this user; it need not be there yet."""
-    import platformdirs
-
-    return platformdirs.user_cache_path("scan4d", appauthor=False)
 
 
 def free_file(folder: Path, suffix: str) -> Path:

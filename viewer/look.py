@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from .errors import InputError, shortened, unknown_name
 from .geometry import AXES
 from .params import param
-from .scan.points import PointCloud
 
 # Perceptually uniform and readable with colour-blindness; the tables are the library cmap's.
 COLOR_MAPS = ("batlow", "cividis", "viridis", "lapaz", "oslo", "vik")
@@ -57,7 +57,7 @@ class Look:
         rgba(self.background, "background")
 
 
-def value_source(look: Look, cloud: PointCloud) -> str | None:
+def value_source(look: Look, scalars: Collection[str]) -> str | None:
     """What the look colours by where that is a number: "depth", "height" or a scalar's name.
 
     None where colours do not come from a number. Raises InputError for an unknown name.
@@ -66,32 +66,32 @@ def value_source(look: Look, cloud: PointCloud) -> str | None:
         return look.color_by
     if look.color_by in COLOR_BY:
         return None
-    if (scalar := _scalar(look, cloud)) is None:
-        raise unknown_name("colour source", look.color_by, [*COLOR_BY, *cloud.scalars])
+    if (scalar := _scalar(look, scalars)) is None:
+        raise unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars])
     return scalar
 
 
-def drawable(look: Look, cloud: PointCloud) -> Look:
+def drawable(look: Look, scalars: Collection[str]) -> Look:
     """The look where the cloud has what it colours by, else with colours of its own choice: frames of one
     scan may differ in their scalars."""
-    has_source = look.color_by in COLOR_BY or _scalar(look, cloud) is not None
+    has_source = look.color_by in COLOR_BY or _scalar(look, scalars) is not None
     return look if has_source else replace(look, color_by="auto")
 
 
-def unnamed(look: Look, cloud: PointCloud) -> Look:
+def unnamed(look: Look, scalars: Collection[str]) -> Look:
     """The same look, which tells the number of the scalar that it colours by rather than its name."""
-    if look.color_by in COLOR_BY or (scalar := _scalar(look, cloud)) is None:
+    if look.color_by in COLOR_BY or (scalar := _scalar(look, scalars)) is None:
         return look
-    return replace(look, color_by=f"#{[*cloud.scalars].index(scalar) + 1}")
+    return replace(look, color_by=f"#{[*scalars].index(scalar) + 1}")
 
 
-def _scalar(look: Look, cloud: PointCloud) -> str | None:
+def _scalar(look: Look, scalars: Collection[str]) -> str | None:
     """The scalar that `color_by` names or numbers, counted from 1; None where the cloud has none such, or it
     is called like another source."""
     scalar, number = look.color_by, re.fullmatch("#([1-9][0-9]{0,8})", look.color_by)
-    if scalar not in cloud.scalars and number is not None:
-        scalar = next(islice(cloud.scalars, int(number[1]) - 1, None), "")
-    return scalar if scalar in cloud.scalars and scalar not in COLOR_BY else None
+    if scalar not in scalars and number is not None:
+        scalar = next(islice(scalars, int(number[1]) - 1, None), "")
+    return scalar if scalar in scalars and scalar not in COLOR_BY else None
 
 
 def wants_normals(look: Look) -> bool:

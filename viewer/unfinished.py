@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from .files import cache_folder
+from .folders import cache_folder
 
 _FILE = re.compile(r"\..+\.[0-9]+\.part(\.[^.]+)?", re.DOTALL)  # as `temporary_name` has it
 _FOLDER = re.compile(r"\.scan4d_[0-9a-z_]+")

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .bounds import Bounds
 from .camera import Camera
-from .scan.points import Bounds
 
 
 @dataclass(frozen=True, eq=False)

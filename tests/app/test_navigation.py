@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from viewer.app.scene import navigation
+from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.geometry import up_vector
-from viewer.scan.points import Bounds
 from viewer.view import View
 
 SIZE = (300, 200)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from viewer.app.scene import navigation, orientation
+from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.geometry import AXES
-from viewer.scan.points import Bounds
 
 BOUNDS = Bounds(np.array([-1.0, -1, -1]), np.array([1.0, 1, 1]))
 PARTS = [part for part in itertools.product((-1, 0, 1), repeat=3) if any(part)]

@@ -21,12 +21,12 @@ from written import picture
 
 from viewer import cli
 from viewer.analysis.pick import pick
+from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.document.recording import Recording
 from viewer.frame import render_frame, shared_renderer
 from viewer.gpu.surface import Surface
 from viewer.scan.open import open_scan
-from viewer.scan.points import Bounds
 from viewer.view import View
 
 SIZE = (1280, 720)

@@ -12,18 +12,19 @@ from scenes import NOTHING, looking_down_z, plane, sphere
 from viewer.backends import backend
 from viewer.bench import metrics
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.scenes.scanner import Faults, around, capture, rig
 from viewer.bench.truth import tessellation
-from viewer.bench.truth.reference import Reference, footprint, trace, visible
 from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.mesh.reference import Reference, footprint, trace, visible
 from viewer.mesh.scene import Scene
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.simulate.scanner import Faults, around, capture, rig
 
 Draw = Callable[..., Surface]
 SIZE = (240, 180)
@@ -86,7 +87,7 @@ def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None
         pixel = float(np.median(footprint(truth.view, truth.depth[inside])))
         sagitta = 1 - np.sqrt(1 - float(cloud.radii[0]) ** 2)
         assert np.sqrt((error**2).mean()) < 0.05 * pixel + sagitta
-        reference = truth.surface(surface.gpu, look).image()
+        reference = reference_surface(truth, surface.gpu, look).image()
         assert metrics.color(surface.image(), reference, inside)["psnr"] >= 40
 
 

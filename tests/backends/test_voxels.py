@@ -16,12 +16,12 @@ from viewer.analysis.pick import pick
 from viewer.backends import backend
 from viewer.backends.voxels import Params, derive
 from viewer.bench.scenes.catalog import subject
-from viewer.bench.truth.reference import trace
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.mesh.reference import trace
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -7,11 +7,12 @@ import pytest
 from scenes import sphere, sphere_mesh, zbuffer
 
 from viewer.bench import baselines
-from viewer.bench.truth.reference import trace
+from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.mesh.reference import trace
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 
@@ -37,7 +38,7 @@ def test_the_mesh_is_what_rays_see(renderer: Renderer, projection: str) -> None:
     np.testing.assert_allclose(surface.depth[inside], truth.depth[inside], atol=0.0165 / 256 * 3)
     np.testing.assert_allclose(surface.normal[inside], truth.normal[inside], atol=1e-4)
     np.testing.assert_allclose(surface.color[inside], truth.color[inside], atol=0.006)  # 8 bits
-    picture = truth.surface(renderer.gpu, LOOK).image().astype(int)
+    picture = reference_surface(truth, renderer.gpu, LOOK).image().astype(int)
     assert np.abs(surface.image().astype(int) - picture)[inside].max() <= 1
 
 

@@ -12,10 +12,11 @@ import pytest
 from scenes import plane, sphere_mesh
 
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.truth.reference import trace
 from viewer.bench.truth.shapes import Plane, Shapes, Sphere
+from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.look import Look, rgba
+from viewer.mesh.reference import trace
 from viewer.mesh.scene import Scene
 from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
@@ -42,7 +43,7 @@ def judge(
 
 def picture(renderer: Renderer, scene: Scene, camera: Camera = AHEAD) -> Surface:
     """What a flawless backend would draw of another scene."""
-    return trace(scene, camera, SIZE).surface(renderer.gpu, LOOK)
+    return reference_surface(trace(scene, camera, SIZE), renderer.gpu, LOOK)
 
 
 def counts(errors: dict[str, float]) -> tuple[float, float, float]:
@@ -164,7 +165,9 @@ def test_of_many_points_some_stand_for_all(renderer: Renderer) -> None:
 
 def test_pictures_are_compared_in_the_judge_s_look(renderer: Renderer) -> None:
     truth = Shapes((Sphere(),))
-    other = trace(truth, AHEAD, SIZE).surface(renderer.gpu, Look(light="flat", background="#ff0000"))
+    other = reference_surface(
+        trace(truth, AHEAD, SIZE), renderer.gpu, Look(light="flat", background="#ff0000")
+    )
     assert judge(renderer, truth).errors(other)["psnr_frame"] == math.inf
 
 
@@ -179,7 +182,7 @@ def test_the_back_of_the_bunny_shows_between_small_points(
     camera = Camera.orbit(stored.bounds, 20, 10)
     bunny = Judge.of(renderer.gpu, stored, camera, (480, 320), LOOK, cloud, None)
     errors = bunny.errors(draw(cloud, camera, (480, 320), "points", LOOK, {"point_size": size}))
-    own = bunny.errors(bunny.reference.surface(renderer.gpu, LOOK))
+    own = bunny.errors(reference_surface(bunny.reference, renderer.gpu, LOOK))
     assert own["visibility_error_percent"] < 4
     if size:
         assert errors["false_positives"] > 10 * errors["false_negatives"]
@@ -199,7 +202,7 @@ def orbit(renderer: Renderer, frames: int = 3) -> list[Judge]:
 def redrawn(renderer: Renderer, judges: list[Judge]) -> Iterator[Surface]:
     """The truth of each judge; a frame is gone when the next is asked for."""
     for frame in judges:
-        surface = frame.reference.surface(renderer.gpu, LOOK)
+        surface = reference_surface(frame.reference, renderer.gpu, LOOK)
         yield surface
         surface.release()
 
@@ -215,7 +218,7 @@ def test_a_frame_that_is_missing_flickers_by_what_it_lacks(renderer: Renderer) -
     mesh = sphere_mesh()
     still = judge(renderer, mesh, cloud=mesh.points)
     empty = picture(renderer, Shapes((Sphere(center=(0, 0, 99)),)))
-    full = still.reference.surface(renderer.gpu, LOOK)
+    full = reference_surface(still.reference, renderer.gpu, LOOK)
     flicker = Walk([still] * 4, [None] * 3).flicker([full, empty, empty, full], "orbit")
     lost = np.abs(still.image[still.reference.covered, :3] / 255 - np.array(rgba(LOOK.background)[:3]) / 255)
     assert flicker["flicker_orbit_color"] == pytest.approx(2 / 3 * lost.mean(), rel=1e-9)
@@ -234,7 +237,7 @@ def test_flicker_follows_what_moves(renderer: Renderer) -> None:
     judges = [judge(renderer, scene, camera, scene.points) for scene in (mesh, moved)]
     first = judges[0].reference
     carried = mesh.carry(first.id[first.covered], first.positions(), moved)
-    still = [first.surface(renderer.gpu, LOOK)] * 2  # a picture that stays while the body moves
+    still = [reference_surface(first, renderer.gpu, LOOK)] * 2  # a picture that stays while the body moves
     followed = Walk(judges, [carried]).flicker(still, "pose")
     assert followed["flicker_pose_color"] > 0.02
     assert followed["flicker_pose_normal"] > 5
@@ -244,6 +247,6 @@ def test_flicker_follows_what_moves(renderer: Renderer) -> None:
 @pytest.mark.parametrize("frames", [2, 4])
 def test_a_walk_wants_a_frame_for_each_judge(renderer: Renderer, frames: int) -> None:
     judges = orbit(renderer)
-    surface = judges[0].reference.surface(renderer.gpu, LOOK)
+    surface = reference_surface(judges[0].reference, renderer.gpu, LOOK)
     with pytest.raises(ValueError, match="zip"):
         Walk(judges, [None, None]).flicker([surface] * frames, "orbit")

@@ -26,6 +26,7 @@ from viewer import cli, frame
 from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.commands import _drawing as drawing
+from viewer.commands import command_names
 from viewer.errors import NoOpenGLError
 from viewer.gpu.surface import NOTHING
 from viewer.look import Look
@@ -448,7 +449,7 @@ def test_unusable_arguments_are_one_message(
 
 def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, scans: Path) -> None:
     message = refused("rendre", "x")
-    assert all(name in message for name in ("'rendre'. Did you mean 'render'?", *cli.COMMANDS))
+    assert all(name in message for name in ("'rendre'. Did you mean 'render'?", *command_names()))
     assert "'scan4d --help'" in refused("--bogus")
     assert "Write it after 'info'" in refused("-q", "info", scans / "ball.npz")
     assert "-o" in refused("render", scans / "ball.npz")
@@ -456,7 +457,7 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     for words in (["--set", "a=1", scans / "ball.npz"], [scans / "ball.npz"]):
         message = refused(*words)
         assert f"a command is missing. 'scan4d view {scans / 'ball.npz'}' shows it" in message
-        assert all(name in message for name in cli.COMMANDS)
+        assert all(name in message for name in command_names())
     assert "a command is missing before '--set'" in refused("--set", "a=1", "nowhere.ply")
     for command in ("doctor", "backends"):
         message = refused(command, "extra")
@@ -467,7 +468,7 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     assert "SCAN" in refused("info")
     done = run()
     assert (done.code, done.err) == (0, "")
-    assert all(f"\n    {name} " in done.out for name in cli.COMMANDS)
+    assert all(f"\n    {name} " in done.out for name in command_names())
 
 
 def test_an_unexpected_error_is_one_message(
@@ -1037,7 +1038,7 @@ def test_progress_is_for_terminals_alone(
     assert "\nscan4d: a word\n" in shown.replace("\r", "\n")
 
 
-@pytest.mark.parametrize("command", cli.COMMANDS)
+@pytest.mark.parametrize("command", command_names())
 def test_help(command: str, run: Run) -> None:
     done = run(command, "--help")
     assert (done.code, done.err) == (0, "")
@@ -1049,8 +1050,8 @@ def test_the_docs_name_every_flag_and_no_other(run: Run) -> None:
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
     sections = dict(re.findall(r"^## `scan4d (\w+).*?`\n(.*?)(?=^## |\Z)", page, re.M | re.S))
     common = {"--device", "--unit", "--fps", "--up", "--quiet", "--debug"}
-    assert list(sections) == list(cli.COMMANDS)
-    for command in cli.COMMANDS:
+    assert sorted(sections) == list(command_names())
+    for command in command_names():
         flags = set(re.findall(r"(?<![\w-])--[a-z]+", run(command, "--help").out)) - common - {"--help"}
         assert set(re.findall(r"`(--[a-z]+)", sections[command])) - common == flags - {"--output"}, command
     assert common <= set(re.findall(r"`(--[a-z]+)", page.split("\n## ")[0]))

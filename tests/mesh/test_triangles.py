@@ -9,9 +9,9 @@ import pytest
 from scenes import sphere_hits, sphere_mesh
 
 from viewer.bench.metrics import angles
-from viewer.bench.truth.reference import trace
 from viewer.camera import Camera
 from viewer.errors import InputError
+from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh, face_normals, read_faces, read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
 

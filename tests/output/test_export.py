@@ -178,7 +178,8 @@ def test_a_failed_file_leaves_the_old_one(error: BaseException, tmp_path: Path) 
 def test_a_full_disk_is_one_message_and_leaves_nothing(suffix: str, tmp_path: Path) -> None:
     code = f"""
 import resource, numpy as np
-from viewer import export, files
+from viewer import files
+from viewer.output import export
 class Noise:
     def image(self): return np.random.default_rng(0).integers(0, 255, (480, 640, 4), np.uint8)
     def arrays(self):

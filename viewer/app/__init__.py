@@ -34,7 +34,7 @@ def run(
     from .closing import Signals
 
     with Signals() as signals:
-        from ..files import user_folder  # only now: a wrong name is told without waiting for ImGui
+        from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
         from ..task import Task, in_background
         from ..unfinished import remove_leftovers
         from . import settings

@@ -13,7 +13,7 @@ from typing import Any
 from ..document.anonymous import in_place
 from ..document.recording import Entry
 from ..errors import InputError, Scan4DError
-from ..files import user_folder
+from ..folders import user_folder
 from ..gpu.context import Gpu
 from ..scan.open import open_scan
 from ..scan.pose import Pose

@@ -98,7 +98,7 @@ def _colors(app: App, pose: Pose) -> dict[str, str]:
     titles = {name: printable(name) for name in there}
     if look.color_by in there:
         return titles
-    is_here = drawable(look, pose.cloud) == look  # as the scalar's number
+    is_here = drawable(look, pose.cloud.scalars) == look  # as the scalar's number
     return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not here)")}
 
 

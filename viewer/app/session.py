@@ -87,7 +87,7 @@ class Session:
         """
         assert self.camera is not None
         name, params = self.chosen(pose)
-        return Request(pose, self.camera, name, params, drawable(self.look, pose.cloud))
+        return Request(pose, self.camera, name, params, drawable(self.look, pose.cloud.scalars))
 
     def turn_to(self, scan: str) -> None:
         """Go to another scan, where it was left."""

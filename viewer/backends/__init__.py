@@ -1,4 +1,4 @@
-"""Renderer backends: one file each, found by scanning this folder.
+"""Renderer backends: one file or package each, found by scanning this folder.
 
 A backend answers one question: which surface does each pixel see? Its module has
 
@@ -17,7 +17,7 @@ and, where it prepares something for a pose,
 
 which `draw` then finds as `frame.derived`. A window runs `derive` in a process of its own, or, with
 DERIVES_ON_THREAD = True, on a thread, which is sooner done: for what lets go of the interpreter's lock.
-No list of backends exists anywhere else.
+Names that begin with an underscore are no backends. No list of backends exists anywhere else.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class Backend:
 @cache
 def backends() -> dict[str, Backend]:
     """All backends by name, in alphabetical order."""
-    names = sorted(m.name for m in pkgutil.iter_modules(__path__))
+    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
     return {name: Backend(name, importlib.import_module(f"{__name__}.{name}")) for name in names}
 
 

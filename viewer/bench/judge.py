@@ -14,12 +14,13 @@ from ..camera import Camera
 from ..gpu.context import Gpu
 from ..gpu.surface import Surface
 from ..look import Look
+from ..mesh.reference import Reference, both_see, footprint, trace, visible
 from ..mesh.scene import Rays, Scene
 from ..scan.points import PointCloud
 from ..scan.spacing import typical_spacing
 from . import metrics
 from .metrics import Errors
-from .truth.reference import Reference, both_see, footprint, trace, visible
+from .truth.surface import reference_surface
 
 _PROBES = 50_000  # points of a cloud whose visibility is looked at
 _STEEPEST = 0.1  # the least cosine that counts: 84 degrees
@@ -79,7 +80,7 @@ class Judge:
         return cls(
             reference=reference,
             look=look,
-            image=reference.surface(gpu, look).image(),
+            image=reference_surface(reference, gpu, look).image(),
             steps=steps,
             probes=_probes(truth, camera, reference, cloud, steps, tolerance),
         )

@@ -26,6 +26,7 @@ from ..files import whole_file
 from ..frame import Request
 from ..gpu.surface import Surface
 from ..look import Look
+from ..mesh.reference import footprint
 from ..renderer import Renderer
 from ..signals import Interrupts
 from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
@@ -39,7 +40,6 @@ from .report.results import SPREADS, Row, spread
 from .scenes import catalog
 from .scenes.subjects import Moment, Subject
 from .scenes.viewpoints import viewpoints
-from .truth.reference import footprint
 
 LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the scan
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit

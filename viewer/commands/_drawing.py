@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import frame
+from ..bounds import Bounds
 from ..camera import Camera
 from ..document.recording import Entry
 from ..frame import Request
@@ -16,7 +17,6 @@ from ..gpu.surface import Surface
 from ..output.export import numbered
 from ..output.marks import Legend
 from ..renderer import Renderer
-from ..scan.points import Bounds
 from ..scan.timeline import Timeline
 from ..scan.times import typical_rate
 

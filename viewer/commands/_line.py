@@ -16,15 +16,15 @@ from ._parsing import parsed
 _MOST_SHOWN = 2000  # characters of a message
 
 
-def run(words: Sequence[str], commands: Sequence[str], then_ends: bool = False) -> int:
-    """Run the words of a command line, the first of which is one of the commands; its exit code.
+def run(words: Sequence[str], then_ends: bool = False) -> int:
+    """Run the words of a command line, the first of which is a command; its exit code.
 
     then_ends: the process does; once it is stopped, further interrupts do not change that code.
     """
     output = PlainOutput(sys.stdout)
     try:
         with redirect_stdout(output):
-            code = _run(words, commands)
+            code = _run(words)
         output.flush()  # here, where it can be told that this fails
         return code
     except ReaderGone:
@@ -40,9 +40,9 @@ def run(words: Sequence[str], commands: Sequence[str], then_ends: bool = False) 
         return error.exit_code if isinstance(error, Scan4DError) else 1
 
 
-def _run(words: Sequence[str], commands: Sequence[str]) -> int:
+def _run(words: Sequence[str]) -> int:
     try:
-        args = parsed(words, commands)
+        args = parsed(words)
         with quietly(args.quiet), _logged(args.debug), ending_as_interrupts():
             return args.run(args)
     except SystemExit as stop:  # --help, --version

@@ -14,14 +14,16 @@ from typing import Any, NoReturn
 from .. import __version__
 from ..errors import InputError, did_you_mean, shortened, unknown_name
 from ..geometry import up_vector
+from . import command_names
 
 _SIGNED_OPTIONS = ("--orbit", "--up")
 _SIGNED_VALUE = re.compile(r"-([xyz]$|[0-9.])")
 _MOST_NAMED = 3  # of words that are too many
 
 
-def parsed(words: Sequence[str], commands: Sequence[str]) -> Namespace:
+def parsed(words: Sequence[str]) -> Namespace:
     """The arguments, with the command's `run`. Raises InputError; SystemExit after --help and --version."""
+    commands = command_names()
     named = [word for word in words[:1] if word in commands]
     if not named and words and words[0] not in ("--version", "--help", "-h"):
         raise _no_command(words, commands)

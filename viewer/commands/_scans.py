@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bounds import Bounds
 from ..errors import InputError, unknown_name
 from ..files import absolute, printable, whole_file
 from ..look import COLOR_BY, Look, drawable
 from ..output.export import is_pattern, numbered
 from ..scan import formats
 from ..scan.open import entries, open_scan
-from ..scan.points import Bounds
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import TIMES_FILE
@@ -127,7 +127,7 @@ def check_color_source(look: Look, timeline: Timeline, indices: Sequence[int]) -
             cloud = timeline.pose(index).cloud
         except InputError:
             continue
-        if drawable(look, cloud) is look:
+        if drawable(look, cloud.scalars) is look:
             return
         readable, scalars = True, scalars | dict.fromkeys(cloud.scalars)
     if readable:

@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from ..bench.scenes.scanner import Faults, around, capture, rig
 from ..errors import InputError
 from ..mesh.triangles import Faces, Mesh, read_faces
 from ..output.export import check_output
@@ -21,6 +20,7 @@ from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.range_view import merge
 from ..scan.timeline import Timeline
+from ..simulate.scanner import Faults, around, capture, rig
 from . import _arguments as arguments
 from ._console import progress, tell
 from ._outputs import add_force_argument, claim

@@ -33,7 +33,7 @@ def anonymous_request(request: Request, start: float) -> Request:
     """
     pose = request.pose
     middle = middle_of(pose)
-    look = raised(unnamed(request.look, pose.cloud), -middle)
+    look = raised(unnamed(request.look, pose.cloud.scalars), -middle)
     return replace(request, pose=anonymous_pose(pose, start), camera=request.camera.moved(-middle), look=look)
 
 
@@ -68,7 +68,7 @@ def anonymous_unit(unit: str) -> str:
 def in_place(camera: Camera, look: Look, pose: Pose) -> tuple[Camera, Look]:
     """Camera and look of an anonymous picture, for the pose as the scan has it."""
     middle = middle_of(pose)
-    scalar = value_source(drawable(look, pose.cloud), pose.cloud)
+    scalar = value_source(drawable(look, pose.cloud.scalars), pose.cloud.scalars)
     return camera.moved(middle), raised(replace(look, color_by=scalar or look.color_by), middle)
 
 

@@ -24,6 +24,7 @@ from ..unfinished import temporary_folder
 from .recording import Recording
 
 _SAID = "scan4d: "  # before each line of warnings and errors
+_PROGRAM = __name__.partition(".")[0]  # which a process of its own runs, as `python -m` does
 _NICE = 5  # what waits for a person goes first
 
 
@@ -110,10 +111,10 @@ def _run(task: Task, arguments: list[str], said: Path, told_once: Path) -> tuple
     said: a file for what it says on standard error. told_once: what it reads at first, deleted then, as it
     names the scan. Returns the device that drew, the exit code, and what was said. Raises Cancelled.
     """
-    code = "import sys; from viewer.cli import main; sys.exit(main())"
+    program = f"from runpy import run_module; run_module({_PROGRAM!r}, run_name='__main__')"
     with (
         open(said, "wb") as stream,
-        start_python(code, *arguments, nice=_NICE, stdin=subprocess.DEVNULL, stderr=stream) as process,
+        start_python(program, *arguments, nice=_NICE, stdin=subprocess.DEVNULL, stderr=stream) as process,
     ):
         device = _follow(task, process, told_once)
     return device, process.returncode, said.read_text("utf-8", errors="replace")

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..camera import Camera
 from ..errors import InputError, Scan4DError
-from ..files import cache_folder, whole_file
+from ..files import whole_file
+from ..folders import cache_folder
 from ..scan.points import PointCloud
 from ..view import View
 from .context import Gpu

@@ -12,8 +12,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bounds import Bounds
 from ..errors import InputError, unknown_name
-from ..scan.points import Bounds, PointCloud
+from ..scan.points import PointCloud
 from . import gl
 from .context import Gpu
 

@@ -24,7 +24,7 @@ def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
     pose, gpu = surface.pose, surface.gpu
     cloud = pose.cloud
-    source = value_source(look, cloud)
+    source = value_source(look, cloud.scalars)
     value = source if source in (None, "depth", "height") else "scalar"
     color = "value" if source is not None else "own" if look.color_by == "auto" else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("colors"):
@@ -80,7 +80,7 @@ def shade(surface: Surface, look: Look) -> None:
         surface.picture.bind_to_storage_buffer(0)
         covered.run(program)
         gpu.ctx.memory_barrier()
-    surface.look = look
+    surface.look, surface.shaded_by = look, shade
 
 
 def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
@@ -90,7 +90,7 @@ def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles of the scan's points."""
-    pose, source = surface.scanned, value_source(look, surface.pose.cloud)
+    pose, source = surface.scanned, value_source(look, surface.pose.cloud.scalars)
     if source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample))
     elif source == "height":

@@ -78,6 +78,7 @@ class Surface:
     On the GPU: `depths` (float bits, +inf: nothing) and `rows` (the point that a pixel
     shows, 0xFFFFFFFF: none), one word a pixel; colour, normal and value are fetched by row,
     unless the backend wrote its `own`. Reading a property copies it to the CPU.
+    look: what it was shaded in, and shaded_by: what did it, None before.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
     """
 
@@ -105,6 +106,7 @@ class Surface:
         self._shown: tuple[GpuPose, View] | None = None
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
         self.look = Look()
+        self.shaded_by: Callable[[Surface, Look], None] | None = None
         self.color_range: tuple[float, float] | None = None
         self.stats = Stats()
         self.covered = IndexList(gpu, width * height)
@@ -316,7 +318,7 @@ class Surface:
     @property
     def value(self) -> NDArray[np.float32]:
         """(H, W) float32, the number that the look colours by; NaN where there is none."""
-        source, cloud = value_source(self.look, self._cloud), self._cloud
+        source, cloud = value_source(self.look, self._cloud.scalars), self._cloud
         if source is None:
             return np.full(self.size[::-1], np.nan, np.float32)
         if source == "depth":
@@ -327,10 +329,10 @@ class Surface:
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
         if look is not None and look != self.look:
+            if self.shaded_by is None:
+                raise RuntimeError("this surface was not shaded yet")
             self.gpu.activate()
-            from .shade import shade  # shading reads surfaces; this is its one way back
-
-            shade(self, look)
+            self.shaded_by(self, look)
         return self._read(self.picture, np.uint8).reshape(*self.size[::-1], 4)
 
     def arrays(self) -> dict[str, NDArray]:

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bounds import Bounds
 from ..look import Look, rgba
-from ..scan.points import Bounds
 
 NOTHING = 0xFFFFFFFF
 PLAIN = Look().plain  # what a scan without colours is drawn in

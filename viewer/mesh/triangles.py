@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bounds import Bounds
 from ..errors import InputError
 from ..scan.formats import read
-from ..scan.points import Bounds, PointCloud
+from ..scan.points import PointCloud
 from .scene import NOTHING, PLAIN, Hits, Rays, linear, to_linear
 
 Faces = NDArray[np.uint32]  # (F, 3) rows of the vertices

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..bounds import Bounds
 from ..errors import InputError
 from ..task import checkpoint
 
@@ -21,33 +22,6 @@ _LONGEST_SPLAT = 1e6  # extents of the points: float32 cannot intersect a ray wi
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """An axis-aligned box in scan units. low, high: (3,) float64."""
-
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-
-    @property
-    def center(self) -> NDArray[np.float64]:
-        """(3,) float64."""
-        return (self.low + self.high) / 2
-
-    @property
-    def radius(self) -> float:
-        """Half of the diagonal."""
-        return float(np.linalg.norm(self.high - self.low) / 2)
-
-    def corners(self) -> NDArray[np.float64]:
-        """(8, 3) float64."""
-        pick = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)
-        return np.where(pick, self.high, self.low)
-
-    def grown(self, margin: float) -> Bounds:
-        """Larger by a margin on every side."""
-        return Bounds(self.low - margin, self.high + margin)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ import pytest
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.real_scans import placed_scans
 from viewer.bench.scenes.subjects import Moment, Subject, smooth
-from viewer.bench.truth.reference import trace
 from viewer.bench.truth.shapes import Shapes
 from viewer.camera import Camera
 from viewer.errors import InputError
+from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import merge

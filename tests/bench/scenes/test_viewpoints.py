@@ -8,8 +8,8 @@ import pytest
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.viewpoints import COVERAGE, coverage, viewpoints
 from viewer.bench.truth import tessellation
-from viewer.bench.truth.reference import trace
 from viewer.errors import InputError
+from viewer.mesh.reference import trace
 
 SIZE = (300, 200)
 WITHOUT_DATA = ["sphere", "plane", "box", "torus"]

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scenes import sphere_hits
 
-from viewer.bench.truth.reference import pixel_rays, trace
 from viewer.bench.truth.shapes import Box, DemoHead, Plane, Shape, Shapes, Sphere, Torus
 from viewer.camera import Camera
+from viewer.mesh.reference import pixel_rays, trace
 from viewer.mesh.scene import NOTHING
 from viewer.scan.demo.motion import surface_value
 

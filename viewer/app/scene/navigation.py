@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...bounds import Bounds
 from ...camera import Camera
 from ...geometry import Vector
-from ...scan.points import Bounds
 
 # (azimuth, elevation) in degrees; left and right are the subject's. Just short of the poles,
 # a hundredth of a pixel, so that the scan's up axis stays the one that orbiting turns about.

@@ -10,13 +10,13 @@ from dataclasses import replace
 from typing import Any
 
 from ...analysis.pick import Picked, before_gap, pick
+from ...bounds import Bounds
 from ...errors import Scan4DError
 from ...frame import Request, bring, fallback, is_prepared, render_frame
 from ...gpu.context import Gpu
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
 from ...renderer import Renderer
-from ...scan.points import Bounds
 from ...scan.pose import Pose
 from ..failures import in_words
 from .detail import Detail, Level

@@ -24,7 +24,7 @@ class Rendering:
         """Tell, once a scan, that a frame has not the scalar that the user chose to colour by."""
         session = self._app.session
         missed = session.scan, session.look.color_by
-        if missed not in self._missed and drawable(session.look, pose.cloud) != session.look:
+        if missed not in self._missed and drawable(session.look, pose.cloud.scalars) != session.look:
             self._missed.add(missed)
             chosen = missed[1]
             name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"

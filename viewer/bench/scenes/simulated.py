@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...bounds import Bounds
 from ...camera import Camera
-from ...scan.points import Bounds
 from ...scan.pose import Pose
-from .scanner import Faults, around, capture, rig
+from ...simulate.scanner import Faults, around, capture, rig
 from .subjects import Moment, Subject
 
 _PODS = 4

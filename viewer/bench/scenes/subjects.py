@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...mesh.reference import Reference
 from ...mesh.scene import Rays, Scene
 from ...mesh.triangles import Mesh, vertex_normals
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
-from ..truth.reference import Reference
 
 _KEPT = 2  # moments in memory: flicker compares one with the next
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ...camera import Camera
 from ...errors import InputError
 from ...geometry import Vector, up_vector
+from ...mesh.reference import trace
 from ...mesh.scene import Rays
 from ...mesh.triangles import Mesh
-from ..truth.reference import trace
 from .samples import evenly
 
 COVERAGE = (0.25, 0.85)  # of the picture's pixels (Slomp 2014, VII)

@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bounds import Bounds
 from ...geometry import Vector
 from ...mesh.scene import PLAIN, Hits, Rays, distance_to_ball, linear
-from ...scan.points import Bounds
 
 # How a ray is followed through an implicit surface, in radii of the ball around it. Where a ray is inside
 # for less than the finest step it is taken to pass by: that moves a silhouette by 1e-7 radii at most.

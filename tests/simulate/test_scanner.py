@@ -12,15 +12,15 @@ import pytest
 from scenes import sphere_hits, sphere_mesh
 
 from viewer import cli
-from viewer.bench.scenes.scanner import Faults, around, capture, rig
-from viewer.bench.truth.reference import trace
 from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.errors import InputError
+from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh, face_normals, read_faces, read_mesh
 from viewer.scan.formats import exr, read, read_points
-from viewer.scan.points import Bounds
 from viewer.scan.range_view import RangeView, merge
+from viewer.simulate.scanner import Faults, around, capture, rig
 
 SIZE = (160, 120)
 UNIT_BOX = Bounds(-np.ones(3), np.ones(3))

@@ -12,11 +12,12 @@ import pytest
 from scenes import sphere, sphere_mesh
 
 from viewer.bench import metrics
-from viewer.bench.truth.reference import both_see, footprint, trace, visible
 from viewer.bench.truth.shapes import Plane, Shapes, Sphere
+from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.look import Look
+from viewer.mesh.reference import both_see, footprint, trace, visible
 from viewer.mesh.scene import to_linear, to_srgb
 from viewer.mesh.triangles import Mesh, read_faces, read_mesh, vertex_normals
 from viewer.scan.formats import read
@@ -45,7 +46,7 @@ def test_no_picture_is_one_message() -> None:
 
 def test_its_surface_has_its_channels(renderer: Renderer) -> None:
     picture = trace(sphere_mesh(), CAMERA, SIZE)
-    surface, arrays = picture.surface(renderer.gpu), picture.arrays()
+    surface, arrays = reference_surface(picture, renderer.gpu), picture.arrays()
     shown = surface.arrays()
     assert shown.keys() == arrays.keys()
     assert all(shown[name].shape == arrays[name].shape for name in arrays)
@@ -58,14 +59,14 @@ def test_its_surface_has_its_channels(renderer: Renderer) -> None:
 
 def test_nothing_seen_is_all_background(renderer: Renderer) -> None:
     picture = trace(Shapes((Sphere(),)), Camera(eye=(0, 0, 4), target=(0, 0, 9)), SIZE)
-    image = picture.surface(renderer.gpu, Look(background="#102030")).image()
+    image = reference_surface(picture, renderer.gpu, Look(background="#102030")).image()
     assert (image == [16, 32, 48, 255]).all()
 
 
 def test_a_head_light_shades_a_sphere_by_its_cosine(renderer: Renderer) -> None:
     look = Look(light="head", ambient=0.25, diffuse=0.75, specular=0, color_by="plain", plain="#c0c0c0")
     picture = trace(Shapes((Sphere(),)), CAMERA, SIZE)
-    image = picture.surface(renderer.gpu, look).image()[..., :3]
+    image = reference_surface(picture, renderer.gpu, look).image()[..., :3]
     to_eye = np.array(CAMERA.eye) - picture.positions() - picture.origin
     to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True)
     facing = (to_eye * picture.normal[picture.covered]).sum(axis=1, keepdims=True)
@@ -77,7 +78,7 @@ def test_points_drawn_at_the_true_hits_look_the_same(
     renderer: Renderer, draw: Callable[..., Surface]
 ) -> None:
     look = Look(light="head")
-    reference = trace(sphere_mesh(), CAMERA, SIZE).surface(renderer.gpu, look)
+    reference = reference_surface(trace(sphere_mesh(), CAMERA, SIZE), renderer.gpu, look)
     drawn = draw(reference.pose.cloud, CAMERA, SIZE, look=look)
     both = (drawn.coverage > 0) & (reference.coverage > 0)
     assert both.sum() > 0.8 * reference.coverage.sum()  # some fall on the edge to a neighbour's pixel
@@ -158,7 +159,7 @@ def test_pairs_follow_a_moving_mesh() -> None:
 
 def test_a_reference_has_no_error_against_itself(renderer: Renderer) -> None:
     picture = trace(sphere_mesh(), CAMERA, SIZE)
-    image = picture.surface(renderer.gpu).image()
+    image = reference_surface(picture, renderer.gpu).image()
     frame = {"image": image, "normal": picture.normal}
     pair = both_see(picture, picture)
     assert (pair[0] == pair[1]).all()
@@ -220,7 +221,7 @@ def test_errors_of_the_bunny_are_sane(
     normals = metrics.normals(drawn.normal, picture.normal)
     assert normals["normal_median"] < 10
     assert normals["normal_signed_median"] == pytest.approx(normals["normal_median"], rel=0.01)
-    image, true = drawn.image(), picture.surface(renderer.gpu, look).image()
+    image, true = drawn.image(), reference_surface(picture, renderer.gpu, look).image()
     color = metrics.color(image, true, picture.covered)
     if backend == "surfels":
         assert color["psnr"] > 25

@@ -7,16 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...camera import Camera
-from ...errors import InputError
-from ...gpu.context import Gpu
-from ...gpu.pose import GpuPose
-from ...gpu.shade import shade
-from ...gpu.surface import Surface
-from ...look import Look
-from ...mesh.scene import NOTHING, Hits, Rays, Scene, distance_to_ball, to_srgb
-from ...scan.points import PointCloud
-from ...view import View
+from ..camera import Camera
+from ..errors import InputError
+from ..view import View
+from .scene import NOTHING, Hits, Rays, Scene, distance_to_ball
 
 _CHUNK = 1 << 18  # rays cast at a time
 # A hit may come before its own point by so many steps of float32 at the size of the scene: the ray's
@@ -72,28 +66,6 @@ class Reference:
         cosine = np.zeros(self.depth.shape)
         cosine[self.covered] = np.minimum(along, 1)
         return cosine
-
-    def surface(self, gpu: Gpu, look: Look | None = None) -> Surface:
-        """A shaded Surface of it, one point a covered pixel: so it is shaded as any backend's is.
-
-        A look that colours by depth or height needs its own `low` and `high`: what is not seen is not known.
-        """
-        gpu.activate()
-        hits = PointCloud(
-            positions=self.positions().astype(np.float32),
-            origin=self.origin,
-            normals=self.normal[self.covered],
-            colors=np.pad(to_srgb(self.color[self.covered]), ((0, 0), (0, 1)), constant_values=255),
-            ids=self.id[self.covered],
-        )
-        rows = np.full(self.depth.shape, NOTHING, np.uint32)
-        rows[self.covered] = np.arange(len(hits))
-        surface = Surface(gpu, self.view.size)
-        surface.start(GpuPose(gpu, hits), self.view)
-        surface.depths.buffer.write(self.depth.astype(np.float32))
-        surface.rows.buffer.write(rows)
-        shade(surface, look or Look())
-        return surface
 
 
 def trace(scene: Scene, camera: Camera, size: tuple[int, int]) -> Reference:

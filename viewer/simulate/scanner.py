@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...camera import Camera
-from ...errors import InputError
-from ...mesh.scene import Scene
-from ...scan.points import UNKNOWN_UNIT, Bounds
-from ...scan.range_view import RangeView
-from ..truth.reference import Reference, trace
+from ..bounds import Bounds
+from ..camera import Camera
+from ..errors import InputError
+from ..mesh.reference import Reference, trace
+from ..mesh.scene import Scene
+from ..scan.points import UNKNOWN_UNIT
+from ..scan.range_view import RangeView
 
 MOST_PODS = 8
 _PAIR = (-27.5, 27.5)  # left and right of the front, as Farooq's DI3D rig has them

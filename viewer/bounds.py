@@ -1,0 +1,35 @@
+"""Boxes around what a scan holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """An axis-aligned box in scan units. low, high: (3,) float64."""
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """(3,) float64."""
+        return (self.low + self.high) / 2
+
+    @property
+    def radius(self) -> float:
+        """Half of the diagonal."""
+        return float(np.linalg.norm(self.high - self.low) / 2)
+
+    def corners(self) -> NDArray[np.float64]:
+        """(8, 3) float64."""
+        pick = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)
+        return np.where(pick, self.high, self.low)
+
+    def grown(self, margin: float) -> Bounds:
+        """Larger by a margin on every side."""
+        return Bounds(self.low - margin, self.high + margin)
