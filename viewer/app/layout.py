@@ -10,7 +10,7 @@ from . import escape, help, menu, panel, tasks
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
-from .tools import measuring_panel
+from .tools.measuring import panel as measuring_panel
 
 if TYPE_CHECKING:
     from .app import App

@@ -14,7 +14,7 @@ from ..look import COLOR_BY, drawable
 from . import widgets
 from .files.scans import title
 from .scene import counting
-from .tools import measuring_panel
+from .tools.measuring import panel as measuring_panel
 
 if TYPE_CHECKING:
     from ..gpu.surface import Stats

@@ -12,7 +12,7 @@ from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
 from .. import notices, theme
-from ..tools import measuring_view
+from ..tools.measuring import overlay
 from . import cube, legend, navigation
 
 if TYPE_CHECKING:
@@ -41,13 +41,13 @@ def draw(app: App) -> float:
         with told("Moving the view"):
             _move(app, app.session.camera, app.playback.pose, size)
         with told("Measuring"):
-            measuring_view.draw(app, size)
+            overlay.draw(app, size)
     with told("The cube"):
         cube.draw(app, size)
     with told("Scale bar and colour bar"):
         legend.draw(app, size)
     text = printable(_note(app) or "")
-    head = _draw_note(text, size) if text else measuring_view.draw_banner(app, size)
+    head = _draw_note(text, size) if text else overlay.draw_banner(app, size)
     notices.draw(app, size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
@@ -70,7 +70,7 @@ def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
     if imgui.is_item_activated():
         app.steering.gesture = _gesture(io)
         app.steering.turntable.stop()
-    elif app.steering.gesture == "orbit" and app.measuring.active and measuring_view.may_click():
+    elif app.steering.gesture == "orbit" and app.measuring.active and overlay.may_click():
         pass  # so that a click does not turn the view
     elif app.steering.gesture:
         # The move that ends with the release counts as well, that of the press does not.

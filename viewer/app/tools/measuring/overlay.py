@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from ...analysis.measure import End, Reading
-from ...camera import Camera
-from ...geometry import Vector
-from .. import notices, theme
-from ..scene import navigation
-from ..scene.labels import Box, Line, free_place, usual_place
-from .measuring import distance_words
+from ....analysis.measure import End, Reading
+from ....camera import Camera
+from ....geometry import Vector
+from ... import notices, theme
+from ...scene import navigation
+from ...scene.labels import Box, Line, free_place, usual_place
+from . import distance_words
 
 if TYPE_CHECKING:
-    from ..app import App
+    from ...app import App
 
 _LINE, _OUTLINE = 0x58D6F0, 0x000000  # light on dark, so that it is seen on any surface
 _DIM = 0.35  # opacity where an end is not seen

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
-from ...analysis.measure import End, Reading
-from ...files import printable
-from ...scan.points import UNKNOWN_UNIT
-from .. import widgets
-from .measuring import distance_words, snap_words
+from ....analysis.measure import End, Reading
+from ....files import printable
+from ....scan.points import UNKNOWN_UNIT
+from ... import widgets
+from . import distance_words, snap_words
 
 if TYPE_CHECKING:
-    from ..app import App
+    from ...app import App
 
 _DIALOG = "Save measurements"
 

@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2
 
 from viewer.analysis.measure import End, Measurement, Reading
 from viewer.app.tools.measuring import csv_file, snap_words
-from viewer.app.tools.measuring_view import ViewPlace
+from viewer.app.tools.measuring.overlay import ViewPlace
 from viewer.camera import Camera
 from viewer.errors import InputError
 

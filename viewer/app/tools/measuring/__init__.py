@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from ...analysis.measure import End, Measurements, Reading, in_words, read, save, table, to_text
-from ...analysis.pick import before_gap, is_seen, pick
-from ...errors import InputError
-from ...files import absolute, free_file, working_folder
-from ...scan.inputs import found_among, scan_inputs
-from ..session import known_as
+from ....analysis.measure import End, Measurements, Reading, in_words, read, save, table, to_text
+from ....analysis.pick import before_gap, is_seen, pick
+from ....errors import InputError
+from ....files import absolute, free_file, working_folder
+from ....scan.inputs import found_among, scan_inputs
+from ...session import known_as
 
 if TYPE_CHECKING:
-    from ...scan.timeline import Timeline
-    from ..app import App
+    from ....scan.timeline import Timeline
+    from ...app import App
 
 log = logging.getLogger(__name__)
 _LONGEST_UNIT = 16  # letters
