@@ -1,1 +1,1 @@
-"""What belongs to a scan and a user would be sorry to lose: recordings and their replay."""
+"""What belongs to a scan and a user would be sorry to lose: documents, recordings, replay."""
