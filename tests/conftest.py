@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from command_line import Done, Run
 from hypothesis import HealthCheck, settings
 
 from viewer import cli
+from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.look import Look
 from viewer.scan.points import PointCloud
@@ -32,6 +34,27 @@ settings.load_profile("deterministic")
 def pytest_addoption(parser: pytest.Parser) -> None:
     """--bless: write what is checked in anew instead of comparing with it."""
     parser.addoption("--bless", action="store_true", help="rewrite checked-in references")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Note which backend a test is about."""
+    for item in items:
+        if marker := item.get_closest_marker("backend"):
+            assert marker.args[0] in backends(), f"{item.nodeid} is about no backend"
+            item.user_properties.append(("backend", marker.args[0]))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Tell how long the tests of each backend took."""
+    seconds = dict.fromkeys(backends(), 0.0)
+    for report in itertools.chain.from_iterable(terminalreporter.stats.values()):
+        if isinstance(report, pytest.TestReport):
+            for name in {value for key, value in report.user_properties if key == "backend"}:
+                seconds[name] += report.duration
+    if any(seconds.values()):
+        terminalreporter.section("seconds per backend")
+        for name, taken in seconds.items():
+            terminalreporter.write_line(f"{taken:8.1f}  {name}")
 
 
 @pytest.fixture

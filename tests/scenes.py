@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from viewer.backends import backends
+from viewer.backends import Backend, backends
 from viewer.camera import Camera
+from viewer.gpu.amplify import FEEDS
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 from viewer.view import View
@@ -14,26 +16,44 @@ from viewer.view import View
 NOTHING = 0xFFFFFFFF
 
 
+BUFFERS = tuple(feed for feed in FEEDS if feed != "gs")  # feeds that give the same bits: test_same_bits.py
+
+
 def variants() -> list[str]:
-    """All backends by name, and each again with every word that changes its shaders but not its picture:
-    "surfels instancing=gs"."""
-    return [
-        *backends(),
-        *(
+    """All backends by name, each in every way that changes its shaders but not its picture.
+
+    "surfels instancing=gs". One of those that give the same bits: "auto" is one of the others, feeds from
+    buffers agree.
+    """
+
+    def ways(one: Backend) -> list[str]:
+        return [
             f"{one.name} {parameter.name}={word}"
-            for one in backends().values()
             for parameter in one.parameters
             if parameter.affects == "shader"
             for word in parameter.choices
-            if word != parameter.default
-        ),
-    ]
+            if word not in ("auto", *BUFFERS[1:])
+        ]
+
+    return [variant for one in backends().values() for variant in ways(one) or [one.name]]
 
 
 def of_variant(name: str) -> tuple[str, dict[str, object]]:
     """The backend of a variant and its parameters."""
     name, _, setting = name.partition(" ")
     return name, dict([setting.split("=")]) if setting else {}
+
+
+def _for_each(names: list[str]) -> pytest.MarkDecorator:
+    marked = (pytest.param(name, marks=pytest.mark.backend(of_variant(name)[0])) for name in names)
+    return pytest.mark.parametrize("name", list(marked))
+
+
+every_backend = _for_each(variants())
+# Those that show the points themselves, where they lie.
+every_backend_of_points = _for_each(
+    [name for name in variants() if backends()[of_variant(name)[0]].rows == "points"]
+)
 
 
 def sphere(count: int, radius: float = 1.0, center: tuple[float, float, float] = (0, 0, 0)) -> PointCloud:

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from viewer.backends import backends
+
 MOST_MEMORY = 600_000  # kilobytes, of the whole process
 CONTROL = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")  # all but tab and the end of a line
 
@@ -49,7 +51,7 @@ def test_scans(data_dir: Path) -> None:
             path = unpacked
         if path.suffix not in others:
             assert_done_or_refused("info", path)
-            for backend in ("points", "surfels", "voxels"):
+            for backend in backends():
                 assert_done_or_refused("render", path, "--backend", backend, "--size", "64x48", "--force",
                                        "-o", "a.png")  # fmt: skip
 

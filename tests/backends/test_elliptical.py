@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import NOTHING, sphere
-from test_instancing import BUFFERS, CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
+from scenes import BUFFERS, NOTHING, sphere
+from test_instancing import CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
 
 from viewer.camera import Camera
 from viewer.gpu.amplify import FEEDS
@@ -17,6 +17,7 @@ from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 
+pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
 WAYS = ("tiles", *FEEDS)
 

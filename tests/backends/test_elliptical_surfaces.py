@@ -16,6 +16,7 @@ from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 
+pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
 SIZE = (320, 240)
 

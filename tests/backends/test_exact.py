@@ -6,7 +6,18 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scenes import NOTHING, looking_down_z, of_variant, plane, sphere, sphere_hits, variants, zbuffer
+from scenes import (
+    NOTHING,
+    every_backend,
+    every_backend_of_points,
+    looking_down_z,
+    of_variant,
+    plane,
+    sphere,
+    sphere_hits,
+    variants,
+    zbuffer,
+)  # fmt: skip
 
 from viewer.backends import backend, backends
 from viewer.camera import Camera
@@ -18,11 +29,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 Draw = Callable[..., Surface]
-every_backend = pytest.mark.parametrize("name", variants())
-# Those that show the points themselves, where they lie.
-every_backend_of_points = pytest.mark.parametrize(
-    "name", [name for name in variants() if of_variant(name)[0] != "voxels"]
-)
+ways_of_surfels = pytest.mark.parametrize("way", [v for v in variants() if of_variant(v)[0] == "surfels"])
 PROJECTIONS = ("perspective", "orthographic")
 
 
@@ -74,8 +81,13 @@ def test_a_plane_has_constant_depth(draw: Draw, name: str, projection: str) -> N
     covered = surface.id != NOTHING
     assert covered.sum() > 1000
     np.testing.assert_allclose(surface.depth[covered], 3.0, rtol=3e-7)
-    if name.startswith("surfels"):
-        assert covered.all()
+
+
+@ways_of_surfels
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_surfels_close_a_plane(draw: Draw, way: str, projection: str) -> None:
+    camera = looking_down_z(fov_y=40, projection=projection, height=2.0)
+    assert (draw(plane(120, 3.0), camera, (64, 48), way).id != NOTHING).all()
 
 
 @pytest.mark.parametrize("projection", PROJECTIONS)

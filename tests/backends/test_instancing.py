@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import NOTHING, sphere
+from scenes import BUFFERS, NOTHING, sphere
 
 from viewer.backends import backend
 from viewer.backends.surfels import tiles
@@ -20,8 +20,8 @@ from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
+pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
-BUFFERS = ("ubo", "tbo", "vbo", "pull")
 SIZE = (320, 240)
 CLOUD = sphere(12_000)  # several ranges of uniform blocks
 CAMERAS = {

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scenes import NOTHING, of_variant, sphere, sphere_hits, variants
+from scenes import NOTHING, every_backend, every_backend_of_points, of_variant, sphere, sphere_hits
 
 from viewer.backends import backend
 from viewer.camera import Camera
@@ -20,11 +20,6 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 SIZE = (320, 240)
-every_backend = pytest.mark.parametrize("name", variants())
-# Those that draw rows of the sample; voxels draw coarser octants.
-every_backend_of_points = pytest.mark.parametrize(
-    "name", [name for name in variants() if of_variant(name)[0] != "voxels"]
-)
 Preview = Callable[..., Surface]
 
 
@@ -36,8 +31,7 @@ def preview(renderer: Renderer) -> Preview:
         surface = Surface(renderer.gpu, SIZE)
         camera = camera or Camera.orbit(cloud.bounds(), 20, 10, aspect=SIZE[0] / SIZE[1])
         name, setting = of_variant(name)
-        params = backend(name).params({"point_size": 0} if name == "points" else setting)
-        request = Request(Pose(0, 0.0, "test", cloud), camera, name, params)
+        request = Request(Pose(0, 0.0, "test", cloud), camera, name, backend(name).params(setting))
         assert render_frame(renderer, request, surface, share=share) == (surface.stats.left_out > 0)
         return surface
 

@@ -17,6 +17,7 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.scan.points import PointCloud
 
+pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
 SIZE = (200, 150)
 CLOUD = sphere(300_000)

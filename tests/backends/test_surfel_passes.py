@@ -26,6 +26,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.simulate.scanner import Faults, around, capture, rig
 
+pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
 SIZE = (240, 180)
 INSTANCING = ("tiles", "gs", "tbo")

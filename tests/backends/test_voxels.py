@@ -26,6 +26,7 @@ from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
+pytestmark = pytest.mark.backend("voxels")
 Draw = Callable[..., Surface]
 SIZE = (96, 72)
 CLOUD = sphere(1200)

@@ -17,6 +17,12 @@ and, where it prepares something for a pose,
 
 which `draw` then finds as `frame.derived`. A window runs `derive` in a process of its own, or, with
 DERIVES_ON_THREAD = True, on a thread, which is sooner done: for what lets go of the interpreter's lock.
+
+It may declare
+
+    ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" where it says nothing
+    LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`
+
 Names that begin with an underscore are no backends. No list of backends exists anywhere else.
 """
 
@@ -36,6 +42,20 @@ from ..gpu.surface import Surface
 from ..params import Parameter, describe, parse
 from ..scan.points import PointCloud
 from ..view import View
+
+ROWS = ("points", "octants", "samples")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What cannot be held in principle of a row of the stability suite, and what is held instead.
+
+    pixels: the share of the pixels that may be apart by more than the suite's coarse steps. reason: why
+    finer ones cannot be held.
+    """
+
+    pixels: float
+    reason: str
 
 
 class Derived(Protocol):
@@ -88,6 +108,16 @@ class Backend:
     def parameters(self) -> list[Parameter]:
         """Its parameters as declared."""
         return describe(self.module.Params)
+
+    @property
+    def rows(self) -> str:
+        """What a row of its pictures stands for: one of `ROWS`."""
+        return getattr(self.module, "ROWS", "points")
+
+    @property
+    def limits(self) -> Mapping[str, Limit]:
+        """What it cannot hold of the stability suite, by the suite's rows."""
+        return getattr(self.module, "LIMITS", {})
 
     def params(self, values: Mapping[str, object] | None = None) -> Any:
         """Its parameters, with these values in place of defaults; raises InputError."""

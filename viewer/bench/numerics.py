@@ -1,8 +1,8 @@
 """Numerical stability: a scan given in another way must still give the same picture.
 
 A row draws a shot and its variant with one backend, and says how far they may be apart.
-Where a backend cannot hold a row in principle, its module says so:
-`LIMITS = {name of the row: reason}`.
+Where a backend cannot hold a row in principle, its module says so and what it holds instead:
+`LIMITS = {name of the row: Limit(share of the pixels, reason)}`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..backends import Backend
+from ..backends import Backend, Limit
 from ..camera import PROJECTIONS, Camera
 from ..frame import Request, render_frame
 from ..gpu.surface import Surface
@@ -127,6 +127,8 @@ def picture(renderer: Renderer, backend: Backend, shot: Shot, params: Any = None
 # From these steps on a pixel counts as another one. Eight bits round within one level, and a
 # highlight doubles that.
 _DEPTH_STEP, _COLOR_STEP = 0.1, 3  # pixel widths, levels of 255
+# The same where a row cannot be held: another surface or another side of it, not another point beside.
+_COARSE_STEPS = (8.0, 64)
 
 
 @dataclass(frozen=True)
@@ -145,13 +147,15 @@ class Difference:
         return f"{self.pixels:.4%} of the pixels, depth {self.depth:.2g} px, colour {self.color:.2g} levels"
 
 
-def difference(one: Picture, other: Picture) -> Difference:
-    """Compare two pictures of one size."""
+def difference(
+    one: Picture, other: Picture, depth_step: float = _DEPTH_STEP, color_step: float = _COLOR_STEP
+) -> Difference:
+    """Compare two pictures of one size. Steps in pixel widths and in levels of 255."""
     covered = np.isfinite(one.depth)
     both = covered & np.isfinite(other.depth)
     depth = np.abs(np.where(both, one.depth, 0) - np.where(both, other.depth, 0))
     color = np.abs(one.color - other.color)
-    same = (covered == np.isfinite(other.depth)) & (depth < _DEPTH_STEP) & (color.max(axis=2) < _COLOR_STEP)
+    same = (covered == np.isfinite(other.depth)) & (depth < depth_step) & (color.max(axis=2) < color_step)
     if not same.any():
         return Difference(1.0, 0.0, 0.0)
     return Difference(1 - float(same.mean()), float(depth[same].mean()), float(color[same].mean()))
@@ -187,27 +191,51 @@ class Tolerance:
         return found.pixels <= bound.pixels and found.depth <= bound.depth and found.color <= bound.color
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a row.
+
+    found: how far apart the pictures are. held: whether that is within the row's tolerance. limit: what
+    holds in place of it; None: the tolerance must hold. coarse: the share of the pixels that are coarse
+    steps apart, which a limit bounds.
+    """
+
+    found: Difference
+    held: bool
+    limit: Limit | None
+    coarse: float
+
+    @property
+    def allowed(self) -> bool:
+        """Whether it is held, or within its limit."""
+        return self.held or (self.limit is not None and self.coarse <= self.limit.pixels)
+
+
 @dataclass(frozen=True, eq=False)
 class Row:
     """One line of the suite: a shot, and a variant that must give its picture.
 
-    limit: why it cannot be held in principle, where that is so.
+    limit: what holds instead for all backends where the tolerance cannot in principle.
     """
 
     name: str
     shot: Callable[[], Shot]
     variant: Callable[[Shot], Shot]
     tolerance: Tolerance
-    limit: str = ""
+    limit: Limit | None = None
 
-    def limit_of(self, backend: Backend) -> str:
-        """Why this backend cannot hold it in principle; empty where it must."""
-        return self.limit or getattr(backend.module, "LIMITS", {}).get(self.name, "")
+    def limit_of(self, backend: Backend) -> Limit | None:
+        """What this backend holds instead, by its own declaration or the row's; None: it must hold it."""
+        return backend.limits.get(self.name, self.limit)
 
-    def compare(self, renderer: Renderer, backend: Backend, params: Any = None) -> Difference:
-        """Draw both and compare them. params: of the backend; None: its defaults."""
+    def compare(self, renderer: Renderer, backend: Backend, params: Any = None) -> Outcome:
+        """Draw both and compare them. params: of the backend; None: its defaults. Raises InputError as
+        `picture` does."""
         shot = self.shot()
-        return difference(*(picture(renderer, backend, s, params) for s in (shot, self.variant(shot))))
+        one, other = (picture(renderer, backend, s, params) for s in (shot, self.variant(shot)))
+        found = difference(one, other)
+        coarse = difference(one, other, *_COARSE_STEPS).pixels
+        return Outcome(found, self.tolerance.holds(found), self.limit_of(backend), coarse)
 
 
 # --- the rows -------------------------------------------------------------------------
@@ -301,7 +329,7 @@ def _typed() -> Iterator[Row]:
         at(1e9),
         as_float32,
         FLOAT32,
-        limit="float32 resolves 64 units there: the file has lost the scan",
+        limit=Limit(0.4, "float32 resolves 64 units there: the file has lost the scan"),
     )
 
 
@@ -348,7 +376,7 @@ def _zoomed() -> Iterator[Row]:
         detail(6),
         partial(surrounded, power=6),
         FLOAT32,
-        limit="float32 offsets from one origin resolve two pixels there",
+        limit=Limit(0.25, "float32 offsets from one origin resolve two pixels there"),
     )
 
     def splat() -> Shot:
@@ -367,7 +395,7 @@ def _zoomed() -> Iterator[Row]:
         splat,
         partial(Shot.filled, name="radii", value=1e6),
         FLOAT32,
-        limit="float32 corners resolve ten pixels there",
+        limit=Limit(0.05, "float32 corners resolve ten pixels there"),
     )
 
     def flat() -> Shot:
@@ -388,7 +416,7 @@ def _zoomed() -> Iterator[Row]:
         flat,
         partial(telephoto, power=6),
         FLOAT32,
-        limit="depth from the eye is float32: it resolves 19 pixels there",
+        limit=Limit(0.25, "depth from the eye is float32: it resolves 19 pixels there"),
     )
 
     def far(power: int) -> Callable[[], Shot]:
@@ -459,7 +487,7 @@ def _arranged() -> Iterator[Row]:
         lambda: _facing(_thread()),
         lambda shot: shot.given(normals=None),
         FLOAT32,
-        limit="a line has a circle of normals, of which any may be estimated",
+        limit=Limit(0.01, "a line has a circle of normals, of which any may be estimated"),
     )
 
     def end_on(projection: str) -> Callable[[], Shot]:

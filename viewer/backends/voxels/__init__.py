@@ -26,28 +26,31 @@ from ...scan.octree.leaves import closing_levels
 from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import PointCloud
 from ...view import View
-from .. import FrameView
+from .. import FrameView, Limit
 from .cubes import draw_voxels, shade_flat
 
 TITLE = "Voxels"
+ROWS = "octants"
 DERIVES_ON_THREAD = True
 
 _UPRIGHT = "cubes are upright: turned points lie in other ones"
 _AROUND_ALL = "octants divide the cube around all points: other points make other octants"
-# Rows of the stability suite that cubes cannot hold in principle -> why.
+_ALONG_A_LINE = "octants along a line touch too few others: each is drawn as large as the line is long"
+# Rows of the stability suite that cubes cannot hold in principle.
 LIMITS = {
-    "rotated by a quarter turn": _UPRIGHT,
-    "rotated by 37 degrees": _UPRIGHT,
-    "normals parallel to y": _UPRIGHT,
-    "near plane inside the cloud": _AROUND_ALL,
-    "eye inside the cloud": _AROUND_ALL,
-    "zoomed in on 10^-3 of the scan": _AROUND_ALL,
-    "coplanar points": _AROUND_ALL,
-    "collinear points": _AROUND_ALL,
-    "collinear points end on, perspective": _AROUND_ALL,
-    "collinear points end on, orthographic": _AROUND_ALL,
-    "an outlier at 10^6 times the size": _AROUND_ALL,
-    "coplanar points without normals": "without normals, faces are lit",
+    "rotated by a quarter turn": Limit(0.01, _UPRIGHT),
+    "rotated by 37 degrees": Limit(0.015, _UPRIGHT),
+    "normals parallel to y": Limit(0.1, _UPRIGHT),
+    "near plane inside the cloud": Limit(0.015, _AROUND_ALL),
+    "eye inside the cloud": Limit(0.12, _AROUND_ALL),
+    "zoomed in on 10^-3 of the scan": Limit(0.025, _AROUND_ALL),
+    "zoomed in on 10^-6 of the scan": Limit(0.96, _AROUND_ALL),
+    "coplanar points": Limit(0.02, _AROUND_ALL),
+    "coplanar points without normals": Limit(0.04, "without normals, faces are lit"),
+    "collinear points": Limit(1.0, _ALONG_A_LINE),
+    "collinear points end on, perspective": Limit(1.0, _ALONG_A_LINE),
+    "collinear points end on, orthographic": Limit(0.93, _ALONG_A_LINE),
+    "an outlier at 10^6 times the size": Limit(0.65, _AROUND_ALL),
 }
 
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
