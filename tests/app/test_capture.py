@@ -42,14 +42,14 @@ def app() -> Any:
     picture = SimpleNamespace(request=request, is_there=True, size=(64, 48))
     session = SimpleNamespace(scan="ball.npz")
     return SimpleNamespace(
-        told=told, note=told.append, picture=picture, session=session, hash=None, unit="mm"
+        told=told, note=told.append, viewport=picture, session=session, hash=None, unit="mm"
     )
 
 
 def turn(app: Any) -> None:
     """Show another picture."""
-    request = app.picture.request
-    app.picture.request = Request(
+    request = app.viewport.request
+    app.viewport.request = Request(
         POSE, request.camera.orbited(10, 0), request.backend, request.params, request.look
     )
 

@@ -8,60 +8,60 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from viewer.app.scene.detail import Detail, Level, levels
+from viewer.app.scene.detail import Detail, Quality, qualities
 
 DEMO = 86_361
 GOAL = 36.0
-Cost = Callable[[Level], float]
+Cost = Callable[[Quality], float]
 
 
 def machine(full_ms: float, fixed_ms: float, noise: float = 0.0) -> Cost:
     """What a picture takes: some always, the rest by points and, half of that, by width and height."""
     rng = np.random.default_rng(1)
 
-    def ms(level: Level) -> float:
-        exact = fixed_ms + (full_ms - fixed_ms) * level.share * (1 + level.scale) / 2
+    def ms(quality: Quality) -> float:
+        exact = fixed_ms + (full_ms - fixed_ms) * quality.share * (1 + quality.scale) / 2
         return float(exact * (1 + noise * rng.standard_normal()))
 
     return ms
 
 
-def play(detail: Detail, ms: Cost, pictures: int, points: int = DEMO) -> list[Level]:
+def play(detail: Detail, ms: Cost, pictures: int, points: int = DEMO) -> list[Quality]:
     """The levels of so many pictures in a row."""
     shown = []
     for _ in range(pictures):
-        shown.append(detail.level)
-        detail.note(ms(detail.level), detail.level, GOAL, points)
+        shown.append(detail.quality)
+        detail.note(ms(detail.quality), detail.quality, GOAL, points)
     return shown
 
 
 @pytest.mark.parametrize("points", [1, 5000, 20_000, DEMO, 10_000_000])
 def test_levels_go_from_full_to_few_points_and_pixels(points: int) -> None:
-    steps = levels(points)
-    assert steps[0] == Level(1, 1)
+    steps = qualities(points)
+    assert steps[0] == Quality(1, 1)
     assert all(finer.cost > coarser.cost for finer, coarser in pairwise(steps))
-    assert all(level.share * points >= 10_000 for level in steps if level.share < 1)
+    assert all(quality.share * points >= 10_000 for quality in steps if quality.share < 1)
     assert steps[-1].scale == 0.5
-    at_full_size = [level for level in steps if level.scale == 1]
+    at_full_size = [quality for quality in steps if quality.scale == 1]
     assert at_full_size == list(steps[: len(at_full_size)]), "first fewer points, then fewer pixels"
 
 
 def test_nothing_is_left_out_where_there_is_time() -> None:
-    assert set(play(Detail(), machine(full_ms=30, fixed_ms=5, noise=0.1), 500)) == {Level()}
+    assert set(play(Detail(), machine(full_ms=30, fixed_ms=5, noise=0.1), 500)) == {Quality()}
 
 
 def test_a_slow_picture_now_and_then_changes_nothing() -> None:
     detail = Detail()
     for number in range(200):
-        detail.note(60.0 if number % 4 == 0 else 30.0, detail.level, GOAL, DEMO)
-    assert detail.level == Level()
+        detail.note(60.0 if number % 4 == 0 else 30.0, detail.quality, GOAL, DEMO)
+    assert detail.quality == Quality()
 
 
 @pytest.mark.parametrize(("full_ms", "fixed_ms"), [(60, 10), (80, 20), (110, 12), (300, 8)])
 def test_pictures_are_soon_in_time_and_not_much_sooner(full_ms: float, fixed_ms: float) -> None:
     ms = machine(full_ms, fixed_ms)
-    level = play(Detail(), ms, 200)[-1]
-    assert GOAL / 2 < ms(level) <= GOAL
+    quality = play(Detail(), ms, 200)[-1]
+    assert GOAL / 2 < ms(quality) <= GOAL
 
 
 def test_the_level_stays_where_times_vary() -> None:
@@ -72,26 +72,26 @@ def test_the_level_stays_where_times_vary() -> None:
 def test_one_very_slow_picture_is_enough() -> None:
     """A large scan is dragged: its picture at rest was slow, so the first one of the drag is a preview."""
     detail = Detail()
-    detail.note(4000.0, Level(), GOAL, 10_000_000)
-    assert detail.level.share < 0.02
-    assert 4000 * detail.level.cost <= GOAL
+    detail.note(4000.0, Quality(), GOAL, 10_000_000)
+    assert detail.quality.share < 0.02
+    assert 4000 * detail.quality.cost <= GOAL
 
 
 def test_it_becomes_finer_again_when_the_machine_has_time() -> None:
     detail = Detail()
     assert play(detail, machine(full_ms=300, fixed_ms=8), 100)[-1].cost < 0.2
-    assert play(detail, machine(full_ms=30, fixed_ms=5), 100)[-1] == Level()
+    assert play(detail, machine(full_ms=30, fixed_ms=5), 100)[-1] == Quality()
 
 
 def test_a_picture_in_full_that_was_in_time_ends_previews() -> None:
     detail = Detail()
     play(detail, machine(full_ms=300, fixed_ms=8), 100)
-    detail.note(50.0, Level(), GOAL, DEMO)
-    assert detail.level != Level()
-    detail.note(20.0, Level(), GOAL, DEMO)
-    assert detail.level == Level()
+    detail.note(50.0, Quality(), GOAL, DEMO)
+    assert detail.quality != Quality()
+    detail.note(20.0, Quality(), GOAL, DEMO)
+    assert detail.quality == Quality()
 
 
 def test_there_is_a_floor() -> None:
-    assert play(Detail(), lambda level: 500.0, 300)[-1] == levels(DEMO)[-1]
-    assert play(Detail(), lambda level: 500.0, 300, points=100)[-1] == Level(1, 0.5)
+    assert play(Detail(), lambda quality: 500.0, 300)[-1] == qualities(DEMO)[-1]
+    assert play(Detail(), lambda quality: 500.0, 300, points=100)[-1] == Quality(1, 0.5)

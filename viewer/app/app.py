@@ -15,6 +15,7 @@ from ..document.recording import Entry
 from ..errors import InputError, Scan4DError
 from ..folders import user_folder
 from ..gpu.context import Gpu
+from ..renderer import Renderer
 from ..scan.open import open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -32,10 +33,10 @@ from .playing.playback import Playback
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
 from .scene.full_view import FullView
-from .scene.picture import Picture
 from .scene.pointed import Pointer
 from .scene.rendering import Rendering
 from .scene.steering import Steering
+from .scene.viewport import Viewport
 from .session import Left, known_as
 from .settings import Keeper, Settings
 from .tools.measuring import Measuring
@@ -47,7 +48,8 @@ log = logging.getLogger(__name__)
 class App:
     """What the window shows and can do. Panels read it and call its commands.
 
-    session: what the user has chosen. playback: the scan. picture: the 3D view.
+    session: what the user has chosen. playback: the scan. renderer: what is on the GPU. viewport: the 3D
+    view.
     capture: pictures and recordings of it. exporting: pictures and films at other sizes.
     theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
     keys: which do what. help: its open pages.
@@ -96,10 +98,10 @@ class App:
         window.text_scale = remembered.text_scale
         self.set_theme(self.theme)
         self.keeper = Keeper(user_folder() / settings.FILE, remembered)
-        self.picture = Picture(Gpu(window.ctx))
-        self._view_place = (0, 0, *window.buffer_size)  # left, bottom, width, height: pixels
-        if self.picture.gpu.software:
-            self.note(f"Drawn in software ({self.picture.gpu.device}); a graphics card is faster.")
+        self.renderer = Renderer(Gpu(window.ctx))
+        self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
+        if self.renderer.gpu.software:
+            self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
         self.playback: Playback = self._start(begin(timeline))
 
     # --- commands ---------------------------------------------------------------------
@@ -198,7 +200,7 @@ class App:
     @property
     def tasks(self) -> list[Task]:
         """What goes on beside the window, the latest last."""
-        tasks = [self.exporting.task, self.picture.renderer.preparing, self._opening.task]
+        tasks = [self.exporting.task, self.renderer.preparing, self._opening.task]
         if self.playback.pose is None:
             tasks.append(self.playback.timeline.reading)
         return [task for task in tasks if task is not None]
@@ -208,7 +210,7 @@ class App:
         is_told = task is self.playback.timeline.reading  # by what the timeline says of the frame
         if task is self._opening.task:
             self._opening.cancel()
-        elif task is self.picture.renderer.preparing:
+        elif task is self.renderer.preparing:
             self._choose_prepared()
         task.cancel()
         if not is_told:
@@ -216,9 +218,9 @@ class App:
 
     def _choose_prepared(self) -> None:
         """Go back to what was drawn before, or to plain points."""
-        if self.picture.request is not None:
-            drawn, chosen = self.picture.request.look, self.session.look
-            request = self.picture.without_preparing(self.picture.request)
+        if self.viewport.request is not None:
+            drawn, chosen = self.viewport.request.look, self.session.look
+            request = self.viewport.without_preparing(self.viewport.request)
             look = request.look
             if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
                 look = replace(look, color_by=chosen.color_by)
@@ -237,7 +239,7 @@ class App:
         self.seek(entry.pose)
         session.camera, session.pivot, session.look = camera, None, look
         session.backend, session.params[entry.backend] = entry.backend, entry.params
-        self.picture.rest()
+        self.viewport.rest()
         self.window.touch()
         log.debug("replays frame %d", entry.pose)
 
@@ -274,7 +276,7 @@ class App:
 
     def _start(self, opened: Opened) -> Playback:
         timeline, self._hash = opened
-        self.picture.clear()
+        self.viewport.clear()
         self._messages_read = 0
         self.window.title = f"{timeline.name} - Scan4D"
         self.scans.opened(self.session.scan)
@@ -290,26 +292,12 @@ class App:
 
     def place_view(self, place: tuple[int, int, int, int]) -> None:
         """Take in where the 3D view is: left, bottom, width, height in pixels from the lower left."""
-        if place != self._view_place:
-            self._view_place = place
-            left, bottom, width, height = place
+        left, bottom, width, height = place
+        place = left, bottom, max(width, 1), max(height, 1)
+        if place != self.viewport.place:
+            self.viewport.place = place
             top = self.window.buffer_size[1] - bottom - height
             log.debug("view at %d,%d %dx%d pixels", left, top, width, height)
-
-    @property
-    def view_corner(self) -> tuple[int, int]:
-        """Its lower left corner, pixels."""
-        return self._view_place[:2]
-
-    @property
-    def view_size(self) -> tuple[int, int]:
-        """Its width and height, pixels."""
-        return max(self._view_place[2], 1), max(self._view_place[3], 1)
-
-    @property
-    def aspect(self) -> float:
-        """Its width / height."""
-        return self.view_size[0] / self.view_size[1]
 
     def keep(self, now: float) -> None:
         """Save what is to come back, where it has changed. now: by the clock, seconds."""
@@ -327,7 +315,8 @@ class App:
             ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop
             ("Opening", self._opening.cancel),
             ("Reading", self.playback.close),
-            ("Drawing", self.picture.release),
+            ("Drawing", self.viewport.release),
+            ("Preparing", self.renderer.release),
         ):
             with self.failures.told(name):
                 end()

@@ -93,7 +93,7 @@ def _draw_messages(app: App) -> None:
 
 
 def _draw_about(app: App) -> None:
-    gpu = app.picture.gpu
+    gpu = app.renderer.gpu
     imgui.text_wrapped(f"Scan4D {__version__}: a viewer for 4D scans.")
     imgui.spacing()
     imgui.text_wrapped(f"OpenGL {gpu.driver} on {gpu.device}" + (", in software" if gpu.software else ""))

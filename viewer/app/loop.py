@@ -74,7 +74,7 @@ class Loop:
             app.playback.player.until_next(now), app.notices.next_change(now),
             app.steering.turntable.next_change(now), app.capture.until_next(now),
         )  # fmt: skip
-        return min(look, *changes, app.picture.better_at(app.playback.player.playing) - now)
+        return min(look, *changes, app.viewport.better_at(app.playback.player.playing) - now)
 
     def _advance(self, now: float) -> bool:
         """Take in what time and workers have brought; True where there is something to show."""
@@ -91,7 +91,7 @@ class Loop:
             ("Playing", lambda: app.playback.advance(now)),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
-            ("Counting", lambda: app.counting.advance(app.picture, not app.moving, now)),
+            ("Counting", lambda: app.counting.advance(app.viewport, not app.moving, now)),
         ):
             with app.failures.told(name):
                 changed |= bool(advance())
@@ -100,7 +100,7 @@ class Loop:
         report = (app.playback.pose, app.session.index, cached, told, tasks.report(app))
         changed |= report != self._reported
         self._reported = report
-        return changed or now >= app.picture.better_at(app.playback.player.playing)
+        return changed or now >= app.viewport.better_at(app.playback.player.playing)
 
     def _draw(self) -> None:
         app, start = self._app, time.perf_counter()
@@ -117,11 +117,11 @@ class Loop:
         with self._turns.part("show"):
             with app.failures.told("Showing the picture"):
                 app.window.fill(app.palette.panel)
-                if app.picture.is_visible and (app.picture.is_there or app.playback.problem is None):
-                    app.picture.present(*app.view_corner)
+                if app.viewport.is_visible and (app.viewport.is_there or app.playback.problem is None):
+                    app.viewport.present()
             app.window.end()
         if drew:
-            app.picture.took((time.perf_counter() - start) * 1e3, self._goal_ms)
+            app.viewport.took((time.perf_counter() - start) * 1e3, self._goal_ms)
         log.debug("window drawn")
 
     def _draw_picture(self) -> bool:
@@ -131,9 +131,9 @@ class Loop:
         app.steering.settle(pose)
         playing, held = app.playback.player.playing, app.steering.moves
         app.rendering.tell_missing(pose)
-        drew = app.picture.draw(app.session.request(pose), app.view_size, playing=playing, held=held)
-        if drew and app.picture.problem is not None:
-            app.failures.tell("Drawing", app.picture.problem)
+        drew = app.viewport.draw(app.session.request(pose), playing=playing, held=held)
+        if drew and app.viewport.problem is not None:
+            app.failures.tell("Drawing", app.viewport.problem)
         elif drew:
             app.capture.note_shown()
         return drew

@@ -27,7 +27,7 @@ _STATISTICS_SHARE = 0.4  # of the panel's height at most
 
 def draw(app: App) -> None:
     """Declare the panel in the current ImGui window."""
-    stats = app.picture.surface.stats if app.picture.surface else None
+    stats = app.viewport.surface.stats if app.viewport.surface else None
     passes = len(stats.passes) + len(stats.chosen) if stats else 0
     rows = imgui.get_text_line_height_with_spacing() * (_STATISTICS_ROWS + passes)
     head = imgui.get_frame_height_with_spacing() + 2 * imgui.get_style().item_spacing.y
@@ -113,26 +113,26 @@ def _draw_projection(app: App) -> None:
 def _draw_statistics(app: App) -> None:
     imgui.align_text_to_frame_padding()
     imgui.text_disabled("Statistics")
-    surface, pose = app.picture.surface, app.playback.pose
-    timers = app.picture.gpu.timers
+    surface, pose = app.viewport.surface, app.playback.pose
+    timers = app.renderer.gpu.timers
     width = imgui.get_item_rect_size().x + imgui.get_style().item_spacing.x
     imgui.same_line(max(imgui.get_content_region_avail().x - 8 * imgui.get_font_size(), width))
     timers.enabled = imgui.checkbox("Time each pass", timers.enabled)[1]
     imgui.set_item_tooltip("Measure each pass of a picture; this makes it a little slower")
-    if surface is None or pose is None or not app.picture.is_there:
+    if surface is None or pose is None or not app.viewport.is_there:
         return
-    x, y, z = app.picture.bounds(pose).high - app.picture.bounds(pose).low
+    x, y, z = app.viewport.bounds(pose).high - app.viewport.bounds(pose).low
     _row(
         "Points",
         f"{len(pose.cloud):,}" + (f" ({pose.cloud.dropped:,} dropped)" if pose.cloud.dropped else ""),
     )
-    for name, number in counting.words(app):
+    for name, number in counting.words(app.viewport, app.counting.counts):
         _row(name, number)
     _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.unit}")
     _row("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
     for name, choice in surface.stats.chosen.items():
         _row(name.capitalize(), choice)
-    _row("Time", _times(surface.stats) + (f", {app.picture.rate:.0f} fps" if app.moving else ""))
+    _row("Time", _times(surface.stats) + (f", {app.viewport.rate:.0f} fps" if app.moving else ""))
     for name, milliseconds in surface.stats.passes:
         _row(f"  {name}", f"{milliseconds:.2f} ms")
 

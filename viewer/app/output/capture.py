@@ -50,15 +50,15 @@ class Capture:
     def shown(self) -> Entry | None:
         """What the picture shows, None where there is none."""
         app = self._app
-        request = app.picture.request
-        if not app.picture.is_there or request is None:
+        request = app.viewport.request
+        if not app.viewport.is_there or request is None:
             return None
-        return Entry.of(request, app.session.scan, app.hash, app.picture.size, app.unit)
+        return Entry.of(request, app.session.scan, app.hash, app.viewport.size, app.unit)
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""
-        self._app.picture.finish()
-        surface, entry = self._app.picture.surface, self.shown()
+        self._app.viewport.finish()
+        surface, entry = self._app.viewport.surface, self.shown()
         if surface is None or entry is None:
             self._app.note("There is no picture to save.")
             return

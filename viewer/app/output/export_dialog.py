@@ -33,7 +33,7 @@ def draw(app: App) -> None:
             choices, problems = exporting.choices, exporting.problems()
             choices = _edit_what(choices, exporting.count, problems)
             choices = _edit_format(choices, choices.rate(app.playback.timeline.times), problems)
-            choices = _edit_size(choices, app.picture.size if app.picture.surface else None, problems)
+            choices = _edit_size(choices, app.viewport.size if app.viewport.surface else None, problems)
             marks = _edit_marks(exporting.marks, choices)
             choices = _edit_place(choices, problems)
             exporting.change(choices, marks)

@@ -50,7 +50,7 @@ class Exporting:
     @property
     def can(self) -> bool:
         """Whether there is something to export, and nothing is being exported."""
-        return self._app.picture.is_there and self.task is None
+        return self._app.viewport.is_there and self.task is None
 
     @property
     def kept(self) -> Choices:
@@ -84,7 +84,7 @@ class Exporting:
 
     def problems(self) -> dict[str, str]:
         """What is wrong with the choices, by field."""
-        return export_plan.problems(self.choices, self.count, self._app.picture.gpu.max_pixels)
+        return export_plan.problems(self.choices, self.count, self._app.renderer.gpu.max_pixels)
 
     def start(self) -> None:
         """Export, unless that would replace files that the user was not asked about; closes the dialog."""
@@ -124,7 +124,7 @@ class Exporting:
         self._app.note(f"Saved {first if len(made.files) == 1 else several}")
         for warning in made.warnings[:_MOST_WARNINGS]:
             self._app.note(warning)
-        if made.device != self._app.picture.gpu.device:
+        if made.device != self._app.renderer.gpu.device:
             self._app.note(
                 f"It was drawn by {made.device}, not by the window's GPU: small differences may show."
             )

@@ -49,7 +49,7 @@ class Replaying:
     def advance(self, app: App, now: float) -> bool:
         """Show the next picture if it is due and all that it needs is there; whether it goes on."""
         if self._next:
-            if self._since is None and not app.picture.is_complete:
+            if self._since is None and not app.viewport.is_complete:
                 return True
             self._since = now if self._since is None else self._since
             if self._left(self._since, now) > 0:

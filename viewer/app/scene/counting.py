@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,7 @@ from ...gpu.counts import count_points
 from ...task import Task, in_background
 
 if TYPE_CHECKING:
-    from ..app import App
-    from .picture import Picture
+    from .viewport import Viewport
 
 _REST = 0.3  # seconds after the last picture
 
@@ -25,23 +25,23 @@ class Counting:
         self._task: Task | None = None
         self._future: Future[dict[str, int]] | None = None
 
-    def advance(self, picture: Picture, at_rest: bool, now: float) -> bool:
+    def advance(self, viewport: Viewport, at_rest: bool, now: float) -> bool:
         """Begin to count, or take in what was; whether there are other counts than before."""
         had = self.counts
-        if picture.number != self._picture:
+        if viewport.number != self._picture:
             self.cancel()
             self.counts = None
-            if at_rest and picture.is_complete and now > picture.shown_at + _REST:
-                self._begin(picture)
+            if at_rest and viewport.is_complete and now > viewport.shown_at + _REST:
+                self._begin(viewport)
         if self._future is not None and self._future.done():
             self.counts, self._future = self._future.result(), None
         return self.counts is not had
 
-    def _begin(self, picture: Picture) -> None:
-        surface = picture.surface
+    def _begin(self, viewport: Viewport) -> None:
+        surface = viewport.surface
         assert surface is not None
         cloud, view, rows, stats = surface.pose.stored, surface.view, surface.row, surface.stats
-        self._picture, self._task = picture.number, Task("Counting points")
+        self._picture, self._task = viewport.number, Task("Counting points")
         self._future = in_background(
             self._task, lambda: count_points(cloud, view, rows, stats.share, stats.faces_away)
         )
@@ -53,13 +53,16 @@ class Counting:
         self._task = self._future = None
 
 
-def words(app: App) -> list[tuple[str, str]]:
-    """(name, number), as many each time: what is drawn of the points, and why the others are not."""
-    surface, counts = app.picture.surface, app.counting.counts
+def words(viewport: Viewport, counts: Mapping[str, int] | None) -> list[tuple[str, str]]:
+    """(name, number), as many each time: what is drawn of the points, and why the others are not.
+
+    counts: those of the picture; None while they are not there yet.
+    """
+    surface = viewport.surface
     if surface is not None and surface.stats.left_out:
         left_out = surface.stats.left_out
         drawn = len(surface.scan) - left_out
-        pixels = math.prod(surface.size) / math.prod(app.picture.size)
+        pixels = math.prod(surface.size) / math.prod(viewport.size)
         return [
             ("Drawn", f"{drawn:,} at most"),
             ("Preview", f"{left_out:,} left out"),

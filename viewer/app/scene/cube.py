@@ -24,7 +24,7 @@ _READABLE = 0.3  # cosine between line of sight and face from which its label is
 SHADE = 0.24  # how much darker a face is that is seen from the side
 
 
-class Cube:
+class OrientationCube:
     """What the mouse does with it.
 
     is_shown: by the user's choice. is_held: the button went down on it. is_dragged: the

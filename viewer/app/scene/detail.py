@@ -18,7 +18,7 @@ _MARGIN = 0.9  # of the goal that a finer picture may be expected to take: less 
 _MUCH = 2.0  # times the goal: one such picture is enough
 
 
-class Level(NamedTuple):
+class Quality(NamedTuple):
     """share: of the points. scale: of width and height. 1 and 1: the picture in full."""
 
     share: float = 1.0
@@ -31,50 +31,50 @@ class Level(NamedTuple):
 
 
 @cache
-def levels(points: int) -> tuple[Level, ...]:
+def qualities(points: int) -> tuple[Quality, ...]:
     """What there is for a scan of so many points, in full first: fewer points, fewer pixels, fewer points."""
     many = [1.0, *takewhile(lambda share: share * points >= _MANY, _SHARES)]
     few = [share for share in _SHARES if share < many[-1] and share * points >= _FEWEST]
     return (
-        *(Level(share) for share in many),
-        *(Level(many[-1], scale) for scale in _SCALES),
-        *(Level(share, _SCALES[-1]) for share in few),
+        *(Quality(share) for share in many),
+        *(Quality(many[-1], scale) for scale in _SCALES),
+        *(Quality(share, _SCALES[-1]) for share in few),
     )
 
 
 class Detail:
-    """The level to draw at, for pictures that take about as long as they may.
+    """The quality to draw at, for pictures that take about as long as they may.
 
     Finer pictures are drawn only where even in proportion to their cost they would be in time
-    with a margin, and then they are: the level does not go up and down by itself.
+    with a margin, and then they are: the quality does not go up and down by itself.
     """
 
     def __init__(self) -> None:
-        self.level = Level()
-        self._times: deque[float] = deque(maxlen=_FAST)  # ms, of pictures at this level
+        self.quality = Quality()
+        self._times: deque[float] = deque(maxlen=_FAST)  # ms, of pictures at this quality
 
-    def note(self, ms: float, level: Level, goal_ms: float, points: int) -> None:
-        """Take in what a picture of so many points took at a level, and should have taken at most."""
-        if level != self.level:
-            if level != Level() or ms > _MARGIN * goal_ms:
+    def note(self, ms: float, quality: Quality, goal_ms: float, points: int) -> None:
+        """Take in what a picture of so many points took at a quality, and should have taken at most."""
+        if quality != self.quality:
+            if quality != Quality() or ms > _MARGIN * goal_ms:
                 return
-            self._go_to(level)  # a picture in full was in time
+            self._go_to(quality)  # a picture in full was in time
         self._times.append(ms)
         recent = list(self._times)[-_SLOW:]
         if ms > _MUCH * goal_ms or (len(recent) == _SLOW and median(recent) > goal_ms):
-            coarser = [other for other in levels(points) if other.cost < level.cost]
-            in_time = _in_time(coarser, min(recent) / level.cost, goal_ms)
-            self._go_to([*in_time[:1], *coarser[-1:], level][0])
+            coarser = [other for other in qualities(points) if other.cost < quality.cost]
+            in_time = _in_time(coarser, min(recent) / quality.cost, goal_ms)
+            self._go_to([*in_time[:1], *coarser[-1:], quality][0])
         elif len(self._times) == _FAST:
-            finer = [other for other in levels(points) if other.cost > level.cost]
-            in_time = _in_time(finer, median(self._times) / level.cost, _MARGIN * goal_ms)
-            self._go_to([*in_time, level][0])
+            finer = [other for other in qualities(points) if other.cost > quality.cost]
+            in_time = _in_time(finer, median(self._times) / quality.cost, _MARGIN * goal_ms)
+            self._go_to([*in_time, quality][0])
 
-    def _go_to(self, level: Level) -> None:
-        if level != self.level:
-            self.level = level
+    def _go_to(self, quality: Quality) -> None:
+        if quality != self.quality:
+            self.quality = quality
             self._times.clear()
 
 
-def _in_time(choices: list[Level], full_ms: float, goal_ms: float) -> list[Level]:
-    return [level for level in choices if level.cost * full_ms <= goal_ms]
+def _in_time(choices: list[Quality], full_ms: float, goal_ms: float) -> list[Quality]:
+    return [quality for quality in choices if quality.cost * full_ms <= goal_ms]

@@ -30,19 +30,19 @@ class Pointer:
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
         app = self._app
-        picked = app.picture.pick(pixel) if pixel else None
+        picked = app.viewport.pick(pixel) if pixel else None
         if picked is self.picked:
             return
         self.picked, self.words = picked, []
-        if picked is not None and app.picture.request is not None:
-            pose = app.picture.request.pose
+        if picked is not None and app.viewport.request is not None:
+            pose = app.viewport.request.pose
             frame = f"frame {pose.index + 1}/{len(app.playback.timeline)}"
-            self.words = describe(picked, frame, app.unit, app.picture.bounds(pose).radius)
+            self.words = describe(picked, frame, app.unit, app.viewport.bounds(pose).radius)
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
         """What is seen there when the picture is no preview."""
-        return self._app.picture.pick_in_full() or self.picked
+        return self._app.viewport.pick_in_full() or self.picked
 
 
 def describe(picked: Picked, frame: str, unit: str, radius: float) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...camera import Camera
 from ...scan.pose import Pose
 from . import navigation
-from .cube import Cube
+from .cube import OrientationCube
 from .turntable import Turntable
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Steering:
         """cube: whether it is shown. turn_seconds: that the turntable takes."""
         self._app = app
         self.gesture: str | None = None
-        self.cube: Cube = Cube(cube)
+        self.cube: OrientationCube = OrientationCube(cube)
         self.turntable: Turntable = Turntable(turn_seconds)
         self._is_checked = False
 
@@ -45,16 +45,16 @@ class Steering:
         """Show all of the current pose, from the same side."""
         app, session = self._app, self._app.session
         if app.playback.pose and session.camera:
-            session.camera = session.camera.fit(app.picture.bounds(app.playback.pose), app.aspect)
+            session.camera = session.camera.fit(app.viewport.bounds(app.playback.pose), app.viewport.aspect)
             session.pivot = None
 
     def look_from(self, azimuth: float, elevation: float) -> None:
         """Show all of the current pose from a direction in degrees, such as those of `navigation.VIEWS`."""
         app, session = self._app, self._app.session
         if app.playback.pose and session.camera:
-            bounds = app.picture.bounds(app.playback.pose)
+            bounds = app.viewport.bounds(app.playback.pose)
             session.camera = navigation.view_from(
-                azimuth, elevation, session.camera, bounds, app.aspect, app.up
+                azimuth, elevation, session.camera, bounds, app.viewport.aspect, app.up
             )
             session.pivot = None
 
@@ -103,13 +103,13 @@ class Steering:
         The latter is looked at once a scan: its file may have changed since it was left.
         """
         app, session = self._app, self._app.session
-        bounds = app.picture.bounds(pose)
+        bounds, aspect = app.viewport.bounds(pose), app.viewport.aspect
         if not self._is_checked:
             self._is_checked = True
-            if session.camera is not None and not navigation.shows(session.camera, bounds, app.aspect):
+            if session.camera is not None and not navigation.shows(session.camera, bounds, aspect):
                 session.camera = None
         if session.camera is None:
-            session.camera = Camera.orbit(bounds, aspect=app.aspect, up=app.up)
+            session.camera = Camera.orbit(bounds, aspect=aspect, up=app.up)
 
     def begin_scan(self) -> None:
         """Another scan is shown from now on."""

@@ -60,7 +60,7 @@ def _move(app: App, camera: Camera, pose: Pose, size: ImVec2) -> None:
     if imgui.is_item_hovered() and sets_pivot:
         app.steering.set_pivot()
         camera = app.session.camera or camera
-    app.session.camera = _navigate(app, camera, size, app.picture.bounds(pose).radius)
+    app.session.camera = _navigate(app, camera, size, app.viewport.bounds(pose).radius)
     if app.session.pivot and imgui.is_item_hovered():
         _draw_pivot(app.session.camera, app.session.pivot, size)
 
@@ -119,8 +119,8 @@ def _gesture(io: imgui.IO) -> str:
 def _note(app: App) -> str | None:
     """What to say over the picture: why it is not what was asked for."""
     playback = app.playback
-    if app.picture.problem:
-        return str(app.picture.problem)
+    if app.viewport.problem:
+        return str(app.viewport.problem)
     if app.capture.replaying is not None:
         return str(app.capture.replaying)
     if playback.pose is None:

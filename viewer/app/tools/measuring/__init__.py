@@ -63,9 +63,9 @@ class Measuring:
 
     def click(self, pixel: tuple[int, int]) -> None:
         """Set an end at what a pixel of the view shows, or say why it cannot be."""
-        self.app.picture.finish()
-        surface, request = self.app.picture.surface, self.app.picture.request
-        if surface is None or request is None or not self.app.picture.is_there:
+        self.app.viewport.finish()
+        surface, request = self.app.viewport.surface, self.app.viewport.request
+        if surface is None or request is None or not self.app.viewport.is_there:
             return
         meant = before_gap(surface, *pixel)
         picked = pick(surface, *meant)
@@ -112,15 +112,15 @@ class Measuring:
 
     def is_seen(self, end: End) -> bool:
         """Whether an end is in the picture and not behind what that shows; found once a picture."""
-        surface, shown = self.app.picture.surface, self.app.picture.request
-        if surface is None or shown is None or not self.app.picture.is_there:
+        surface, shown = self.app.viewport.surface, self.app.viewport.request
+        if surface is None or shown is None or not self.app.viewport.is_there:
             return True
         if self._seen[0] is not shown:
             self._seen = shown, {}
         known = self._seen[1]
         if end not in known:
             spacings, share = _SLACK
-            slack = spacings * (end.spacing or 0) + share * self.app.picture.bounds(shown.pose).radius
+            slack = spacings * (end.spacing or 0) + share * self.app.viewport.bounds(shown.pose).radius
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
 

@@ -1,4 +1,4 @@
-"""The picture in the window: drawn anew only where another one is asked for."""
+"""A viewport: a picture in the window, drawn anew only where another one is asked for."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from ...analysis.pick import Picked, before_gap, pick
 from ...bounds import Bounds
 from ...errors import Scan4DError
 from ...frame import Request, bring, fallback, is_prepared, render_frame
-from ...gpu.context import Gpu
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
 from ...renderer import Renderer
 from ...scan.pose import Pose
 from ..failures import in_words
-from .detail import Detail, Level
+from .detail import Detail, Quality
 from .motion import Motion
 
 log = logging.getLogger(__name__)
@@ -28,26 +27,30 @@ _PREPARED_LATER = 0.1  # seconds until drawing again may find what a worker prep
 _UPLOAD_MS = 20.0  # that one turn of the window's loop may spend on uploading a pose
 
 
-class Picture:
-    """Draws requests for the view.
+class Viewport:
+    """A rectangle of the window and the picture in it: what a camera sees of a pose.
 
-    request: what was drawn last, None before. problem: why it could not be drawn, None
-    where it could; the image before stays then. size: of the view, pixels. While it moves, a picture may
-    be a preview, of fewer points and pixels, which is drawn in full at rest. surface: what the picture
-    shows, smaller than the view where it is a preview. number: of pictures drawn so far. shown_at: by
-    the clock, when the last one was there.
+    Several share a renderer, so that what they show of one pose is uploaded once; surfaces, motion and what
+    is drawn meanwhile are each one's own.
+
+    place: the rectangle: left, bottom, width, height, pixels from the window's lower left; the next picture
+    is as large. request: what was drawn last, None before: pose, camera and how it is shown. problem: why it
+    could not be drawn, None where it could; the image before stays then. size: of the picture, pixels. While
+    it moves, a picture may be a preview, of fewer points and pixels, which is drawn in full at rest. surface:
+    what the picture shows, smaller than `size` where it is a preview. number: of pictures drawn so far.
+    shown_at: by the clock, when the last one was there.
     """
 
-    def __init__(self, gpu: Gpu) -> None:
-        self.gpu = gpu
-        self.renderer = Renderer(gpu)
-        self._presenter = Presenter(gpu)
-        self.size = (1, 1)
+    def __init__(self, renderer: Renderer, place: tuple[int, int, int, int] = (0, 0, 1, 1)) -> None:
+        self.renderer = renderer
+        self.place = place
+        self._presenter = Presenter(renderer.gpu)
+        self.size = place[2:]
         self.number = 0
         self.shown_at = -math.inf
         self.surface: Surface | None = None
         self._surfaces: dict[str, Surface] = {}  # one in full, one for previews
-        self._level = Level()  # that was drawn last
+        self._quality = Quality()  # that was drawn last
         self.request: Request | None = None
         self.problem: Scan4DError | None = None
         self._prepared_at = math.inf  # by the clock, when what is being prepared may be there
@@ -59,16 +62,20 @@ class Picture:
         self._times: deque[float] = deque()
         self._picked: tuple[tuple[int, int], Picked | None] | None = None
 
-    def draw(
-        self, request: Request, size: tuple[int, int], *, playing: bool = False, held: bool = False
-    ) -> bool:
+    @property
+    def aspect(self) -> float:
+        """The rectangle's width / height."""
+        return self.place[2] / self.place[3]
+
+    def draw(self, request: Request, *, playing: bool = False, held: bool = False) -> bool:
         """Draw a request, unless the picture already shows it; whether it did.
 
-        size: pixels. playing: other poses will follow in time. held: the camera is dragged or turns.
+        playing: other poses will follow in time. held: the camera is dragged or turns.
         """
+        size = self.place[2:]
         wanted = (
             request.pose, request.camera, request.backend, request.params, request.look, size,
-            self.gpu.timers.enabled,
+            self.renderer.gpu.timers.enabled,
         )  # fmt: skip
         now, before = time.monotonic(), self.surface
         if wanted != self._drawn:
@@ -85,9 +92,9 @@ class Picture:
             self._drawn, self.request, self._picked = wanted, request, None
             self.problem, self._prepared_at = None, math.inf
             self.size = size
-            self._level = self._detail(request).level if playing or now < self._motion.ends else Level()
-            self.surface = surface = self._surface_of(self._level)
-            refinable = render_frame(self.renderer, request, surface, wait=False, share=self._level.share)
+            self._quality = self._detail(request).quality if playing or now < self._motion.ends else Quality()
+            self.surface = surface = self._surface_of(self._quality)
+            refinable = render_frame(self.renderer, request, surface, wait=False, share=self._quality.share)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
@@ -120,7 +127,7 @@ class Picture:
         """Draw the picture in full, where it is a preview."""
         if self.is_preview and self.request is not None:
             self._motion.end()
-            self.draw(self.request, self.size)
+            self.draw(self.request)
 
     def rest(self) -> None:
         """Draw the next picture in full, however soon it comes."""
@@ -148,21 +155,21 @@ class Picture:
         if self.problem is not None or surface is None or request is None:
             return
         if surface.stats.backend == str(request.backend):
-            self._detail(request).note(ms, self._level, goal_ms, len(request.pose.cloud))
+            self._detail(request).note(ms, self._quality, goal_ms, len(request.pose.cloud))
 
     def _detail(self, request: Request) -> Detail:
         return self._details[str(request.backend)]
 
-    def _surface_of(self, level: Level) -> Surface:
-        """The surface for a level; one in full and one for previews are kept."""
-        width, height = (max(1, round(pixels * level.scale)) for pixels in self.size)
-        kind = "full" if level.scale == 1 else "preview"
+    def _surface_of(self, quality: Quality) -> Surface:
+        """The surface for a quality; one in full and one for previews are kept."""
+        width, height = (max(1, round(pixels * quality.scale)) for pixels in self.size)
+        kind = "full" if quality.scale == 1 else "preview"
         surface = self._surfaces.get(kind)
         if surface is None or surface.size != (width, height):
             if surface is not None:
                 del self._surfaces[kind]
                 surface.release()
-            surface = self._surfaces[kind] = Surface(self.gpu, (width, height))
+            surface = self._surfaces[kind] = Surface(self.renderer.gpu, (width, height))
         return surface
 
     @property
@@ -175,10 +182,10 @@ class Picture:
         """Whether there is an image to show: where the last request was not drawn, the one before."""
         return self.surface is not None
 
-    def present(self, left: int, bottom: int) -> None:
-        """Copy it to the window. left, bottom: its corner, pixels from the window's lower left."""
+    def present(self) -> None:
+        """Copy it to its place in the window."""
         if self.surface is not None:
-            self._presenter.present(self.surface, left, bottom, self.size)
+            self._presenter.present(self.surface, *self.place[:2], self.size)
 
     def pick(self, pixel: tuple[int, int]) -> Picked | None:
         """What a pixel shows, without its spacing, never through a gap (`before_gap`).
@@ -221,11 +228,10 @@ class Picture:
         return len(self._times) / _RATE_SPAN
 
     def release(self) -> None:
-        """Let go of everything on the GPU."""
+        """Let go of what is its own on the GPU."""
         for surface in self._surfaces.values():
             surface.release()
         self._presenter.release()
-        self.renderer.release()
 
 
 def _problem(request: Request, error: Exception) -> Scan4DError:

@@ -1,0 +1,212 @@
+"""The picture reads from the GPU what the mouse asks for, no more often than it can have changed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import sphere
+
+from viewer.app.scene import viewport as viewport_module
+from viewer.app.scene.viewport import Viewport
+from viewer.camera import Camera
+from viewer.frame import Request, shared_renderer
+from viewer.gpu.surface import NOTHING, Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.pose import Pose
+
+POSE = Pose(0, 0.0, "sphere", sphere(3000))
+REQUEST = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "points")
+SIZE = (60, 40)
+
+
+@pytest.fixture
+def viewport() -> Iterator[Viewport]:
+    viewport = Viewport(shared_renderer(), (0, 0, *SIZE))
+    yield viewport
+    viewport.release()
+
+
+def test_a_pixel_is_read_once_until_mouse_or_picture_move(
+    viewport: Viewport, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reads = []
+
+    def counted(surface: Surface, x: int, y: int, **options: bool) -> object:
+        reads.append((x, y))
+        return picture_pick(surface, x, y, **options)
+
+    picture_pick = viewport_module.pick
+    monkeypatch.setattr(viewport_module, "pick", counted)
+    assert viewport.pick((30, 20)) is None, "before the first picture"
+    viewport.draw(REQUEST)
+    first = viewport.pick((30, 20))
+    assert first is not None
+    viewport.draw(REQUEST)
+    assert viewport.pick((30, 20)) is first
+    assert viewport.pick((0, 0)) is viewport.pick((0, 0)) is None
+    assert len(reads) == 2
+    other = replace(REQUEST, camera=REQUEST.camera.orbited(40, 0))
+    viewport.pick((30, 20))
+    viewport.draw(other)
+    turned = viewport.pick((30, 20))
+    assert turned is not None
+    assert turned.row != first.row
+    assert len(reads) == 4
+
+
+def test_nothing_is_picked_where_there_is_no_picture(viewport: Viewport) -> None:
+    viewport.draw(REQUEST)
+    assert viewport.pick((30, 20)) is not None
+    broken = replace(REQUEST, look=replace(REQUEST.look, color_by="missing"))
+    viewport.draw(broken)
+    assert viewport.problem is not None
+    assert viewport.pick((30, 20)) is None
+    viewport.draw(REQUEST)
+    assert viewport.pick((30, 20)) is not None
+    viewport.clear()
+    assert viewport.pick((30, 20)) is None
+    assert viewport.is_visible, "until another one is drawn"
+
+
+def test_a_preview_is_drawn_in_full_at_rest_and_on_demand(viewport: Viewport) -> None:
+    viewport.draw(REQUEST)
+    full = shown(viewport)
+    assert not viewport.is_preview
+    assert viewport.is_complete
+    for _ in range(2):  # both are far too slow: all that can be left out is
+        viewport.took(1000.0, goal_ms=10.0)
+        viewport.draw(turned(REQUEST), held=True)
+    assert viewport.is_preview
+    assert viewport.surface is not None
+    assert viewport.surface.size == (30, 20)
+    assert viewport.size == SIZE
+    assert not viewport.is_complete
+
+    assert not viewport.draw(viewport.request or REQUEST, playing=True), "other poses are to come"
+    assert math.isinf(viewport.better_at(playing=True))
+    assert viewport.better_at(playing=False) < time.monotonic() + 1
+    viewport.finish()
+    assert not viewport.is_preview
+    assert viewport.surface.size == SIZE
+    viewport.draw(REQUEST)
+    viewport.finish()
+    for before, after in zip(full, shown(viewport), strict=True):
+        np.testing.assert_array_equal(after, before)
+
+
+def test_what_is_under_the_mouse_in_a_preview_is_about_what_it_is_in_full(viewport: Viewport) -> None:
+    viewport.draw(REQUEST)
+    whole = viewport.pick((37, 12))
+    viewport.took(1000.0, goal_ms=10.0)
+    viewport.draw(replace(REQUEST, look=Look(light="flat")), held=True)
+    assert viewport.is_preview
+    rough = viewport.pick((37, 12))
+    assert whole is not None
+    assert rough is not None
+    assert np.linalg.norm(rough.position - whole.position) < 0.1
+    exact = viewport.pick_in_full()
+    assert not viewport.is_preview
+    assert exact is not None
+    np.testing.assert_array_equal(exact.position, whole.position)
+    assert viewport.pick((SIZE[0] - 1, SIZE[1] - 1)) is None
+
+
+def shown(viewport: Viewport) -> tuple[np.ndarray, ...]:
+    assert viewport.surface is not None
+    return viewport.surface.image(), viewport.surface.depth, viewport.surface.id
+
+
+def test_two_viewports_of_one_scan_share_its_upload_and_nothing_else(viewport: Viewport) -> None:
+    renderer = Renderer(shared_renderer().gpu)
+    front, side = (Viewport(renderer, (left, 0, *SIZE)) for left in (0, SIZE[0]))
+    from_side = turned(REQUEST)
+    front.draw(REQUEST)
+    held = renderer.nbytes
+    assert held >= POSE.cloud.positions.nbytes
+    side.draw(from_side)
+    assert renderer.nbytes == held, "one scan, uploaded once"
+
+    assert front.surface is not side.surface
+    for one, request in ((front, REQUEST), (side, from_side)):
+        viewport.draw(request)
+        for alone, beside in zip(shown(viewport), shown(one), strict=True):
+            np.testing.assert_array_equal(beside, alone)
+    assert not np.array_equal(shown(front)[2], shown(side)[2])
+    in_front, at_side = front.pick((30, 20)), side.pick((30, 20))
+    assert in_front is not None
+    assert at_side is not None
+    assert in_front.id != at_side.id
+
+    number = front.number
+    front.took(1000.0, goal_ms=10.0)
+    front.draw(turned(from_side), held=True)
+    front.draw(turned(turned(from_side)), held=True)
+    assert front.is_preview, "the one that moves"
+    assert not side.is_preview
+    assert (front.number, side.number) == (number + 2, 1)
+    front.release()
+    assert side.draw(replace(from_side, look=Look(light="flat"))), "the other goes on"
+    side.release()
+    renderer.release()
+
+
+def test_two_viewports_of_two_scans_hold_both_in_one_renderer() -> None:
+    renderer = Renderer(shared_renderer().gpu)
+    other_pose = Pose(0, 0.0, "other", sphere(500))
+    other_request = Request(other_pose, Camera.orbit(other_pose.cloud.bounds()), "points")
+    one, other = (Viewport(renderer, (left, 0, *SIZE)) for left in (0, SIZE[0]))
+    for _ in range(2):
+        one.draw(REQUEST)
+        other.draw(other_request)
+    assert one.number == other.number == 1, "neither puts the other's picture off"
+    assert renderer.nbytes == renderer.bytes_of(POSE) + renderer.bytes_of(other_pose)
+    assert min(renderer.bytes_of(POSE), renderer.bytes_of(other_pose)) > 0
+    ids = shown(one)[2], shown(other)[2]
+    assert 500 <= ids[0][ids[0] != NOTHING].max() < 3000
+    assert 0 < ids[1][ids[1] != NOTHING].max() < 500
+    for viewport in (one, other):
+        viewport.release()
+    renderer.release()
+
+
+def turned(request: Request) -> Request:
+    return replace(request, camera=request.camera.orbited(10, 0))
+
+
+@pytest.mark.parametrize("step", ["bring", "render_frame"])
+def test_whatever_fails_is_a_problem_and_the_image_before_stays(
+    viewport: Viewport, step: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewport.draw(REQUEST)
+    before = shown(viewport)[0]
+    monkeypatch.setattr(viewport_module, step, failing)
+    assert viewport.draw(turned(REQUEST))
+    assert str(viewport.problem).startswith("Drawing frame 1 failed (ValueError: of a library)")
+    assert not viewport.is_there
+    assert viewport.is_visible
+    np.testing.assert_array_equal(shown(viewport)[0], before)
+    assert not viewport.draw(turned(REQUEST)), "it is not tried again and again"
+    assert math.isinf(viewport.better_at(playing=False))
+    monkeypatch.undo()
+    assert viewport.draw(REQUEST)
+    assert viewport.is_there
+
+
+def test_a_surface_that_nothing_was_drawn_into_is_not_shown(
+    viewport: Viewport, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewport.draw(REQUEST)
+    monkeypatch.setattr(viewport_module, "render_frame", failing)
+    viewport.place = (0, 0, 30, 20)
+    viewport.draw(REQUEST)
+    assert not viewport.is_visible
+
+
+def failing(*args: object, **options: object) -> bool:
+    raise ValueError("of a library")
