@@ -19,8 +19,8 @@ from viewer.errors import InputError
 from viewer.look import Look
 from viewer.mesh.reference import both_see, footprint, trace, visible
 from viewer.mesh.scene import to_linear, to_srgb
-from viewer.mesh.triangles import Mesh, read_faces, read_mesh, vertex_normals
-from viewer.scan.formats import read
+from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
+from viewer.scan.formats import read, read_faces
 from viewer.scan.points import PointCloud
 from viewer.scan.spacing import typical_spacing
 
@@ -239,7 +239,10 @@ def test_errors_of_the_bunny_are_sane(
 
 def test_a_sequence_keeps_its_faces_in_a_file_of_their_own(data_dir: Path) -> None:
     folder = data_dir / "sequences" / "crane_175"
-    faces, frames = read_faces(folder / "mesh_topology.ply"), sorted((folder / "frames").iterdir())
+    faces, frames = (
+        read_faces(folder / "mesh_topology.ply").triangles(),
+        sorted((folder / "frames").iterdir()),
+    )
     first, later = (Mesh(read(frame), faces) for frame in (frames[0], frames[5]))
     camera = Camera.orbit(first.bounds)
     a, b = trace(first, camera, SIZE), trace(later, camera, SIZE)

@@ -12,7 +12,8 @@ from viewer.bench.metrics import angles
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.mesh.reference import trace
-from viewer.mesh.triangles import Mesh, face_normals, read_faces, read_mesh, vertex_normals
+from viewer.mesh.triangles import Mesh, face_normals, read_mesh, vertex_normals
+from viewer.scan.formats import read_faces
 from viewer.scan.points import PointCloud
 
 SIZE = (64, 48)
@@ -39,12 +40,17 @@ PLY = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float
 def test_ply_faces_by_either_name(tmp_path: Path, name: str, faces: str) -> None:
     header = f"{PLY}element face {faces.count(chr(10))}\nproperty list uchar int {name}\nend_header\n"
     text = header + SQUARE.replace("v ", "") + faces
-    assert read_faces(write(tmp_path / "a.ply", text)).tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert read_faces(write(tmp_path / "a.ply", text)).triangles().tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
 @pytest.mark.parametrize(
     ("faces", "message"),
-    [("", "no faces"), ("f 1 2 9\n", "vertex 8 of 4"), ("f 1 2 x\n", "damaged"), ("f 0 1 2\n", "damaged")],
+    [
+        ("", "no faces"),
+        ("f 1 2 9\n", "vertex 8 of 4"),
+        ("f 1 2 x\n", "faces cannot be read"),
+        ("f 0 1 2\n", "no vertex"),
+    ],
 )
 def test_unusable_faces_are_one_message(tmp_path: Path, faces: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as error:
@@ -58,10 +64,14 @@ def test_unusable_faces_are_one_message(tmp_path: Path, faces: str, message: str
         ("", "", "no faces"),
         ("element face 1\nproperty int flag\n", "3\n", "name no vertices"),
         ("element face 1\nproperty int vertex_index\n", "3\n", "name no vertices"),
-        ("element face 2\nproperty list uchar int vertex_index\n", "3 0 1 2\n", "damaged"),
+        ("element face 2\nproperty list uchar int vertex_index\n", "3 0 1 2\n", "holds 1 of the 2 faces"),
         ("element face 1\nproperty list uchar int vertex_index\n", "3 0 1 -2\n", "no vertex"),
-        ("element face 1\nproperty list uchar float vertex_index\n", "3 0 1 nan\n", "no vertex"),
-        ("element face 99999999999\nproperty list uchar int vertex_index\n", "3 0 1 2\n", "bytes"),
+        ("element face 1\nproperty list uchar float vertex_index\n", "3 0 1 nan\n", "faces cannot be read"),
+        (
+            "element face 99999999999\nproperty list uchar int vertex_index\n",
+            "3 0 1 2\n",
+            "holds 1 of the 99999999999 faces",
+        ),
     ],
 )
 def test_unusable_ply_faces_are_one_message(tmp_path: Path, header: str, faces: str, message: str) -> None:
@@ -72,8 +82,8 @@ def test_unusable_ply_faces_are_one_message(tmp_path: Path, header: str, faces: 
 
 
 def test_a_format_without_faces_is_no_mesh(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no mesh"):
-        read_faces(tmp_path / "a.pcd")
+    with pytest.raises(InputError, match="the mesh has no faces"):
+        read_mesh(write(tmp_path / "a.xyz", SQUARE.replace("v ", "")))
 
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])

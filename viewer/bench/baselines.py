@@ -16,7 +16,8 @@ from ..gpu import gl
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
-from ..mesh.triangles import Faces, Mesh
+from ..mesh.triangles import Mesh
+from ..scan.faces import Triangles
 from ..scan.points import PointCloud
 
 FLOOR, CEILING = "gl-points", "mesh"
@@ -59,14 +60,14 @@ class _Triangles:
     TITLE = "Mesh"
     Params = NoParams
 
-    def __init__(self, faces: Faces) -> None:
+    def __init__(self, faces: Triangles) -> None:
         self._faces = faces
 
     def needs(self, cloud: PointCloud, params: NoParams) -> tuple[str, ...]:
         """The normals that it interpolates."""
         return ("normals",)
 
-    def derive(self, cloud: PointCloud, params: NoParams) -> Faces:
+    def derive(self, cloud: PointCloud, params: NoParams) -> Triangles:
         """The faces as they are."""
         return self._faces
 
@@ -98,7 +99,7 @@ class _Triangles:
 class _FaceBuffer:
     """The corners of all faces, three texels each, and how many there are."""
 
-    def __init__(self, gpu: Gpu, faces: Faces) -> None:
+    def __init__(self, gpu: Gpu, faces: Triangles) -> None:
         self.corners = gl.BufferTexture(gpu.ctx.buffer(np.ascontiguousarray(faces)), gl.R32UI)
         self.count, self.nbytes = faces.size, faces.nbytes
 

@@ -9,16 +9,17 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 from ..errors import InputError
-from ..mesh.triangles import Faces, Mesh, read_faces
+from ..mesh.triangles import Mesh
 from ..output.export import check_output
 from ..scan import formats
+from ..scan.faces import Faces
 from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.range_view import merge
+from ..scan.sources import FACES_FILE
 from ..scan.timeline import Timeline
 from ..simulate.scanner import Faults, around, capture, rig
 from . import _arguments as arguments
@@ -34,20 +35,19 @@ from ._scans import (
     read_poses,
 )
 
-_FACES_FILE = "mesh_topology.ply"  # beside the frames of a sequence that moves one mesh
 _HINT = "Name the mesh that has them with --faces"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d simulate`."""
-    parser.add_argument("scan", metavar="MESH|SEQUENCE", help="PLY or OBJ: a file, a folder, or a pattern")
+    parser.add_argument("scan", metavar="MESH|SEQUENCE", help="PLY, OBJ or NPZ with faces: a file, a folder, or a pattern")
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
         help=f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d",
     )  # fmt: skip
     parser.add_argument(
         "--faces", type=Path, metavar="FILE",
-        help=f"the faces of every frame; default: {_FACES_FILE} where it is beside them, else each its own",
+        help=f"the faces of every frame; default: its own, else those of {FACES_FILE} beside them",
     )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
@@ -95,10 +95,9 @@ def run(args: Namespace) -> int:
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
         check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
-        shared = args.faces or _faces_beside(Path(args.scan))
-        inputs = [*scan_inputs(timeline), *([shared] if shared else [])]
+        inputs = [*scan_inputs(timeline), *([args.faces] if args.faces else [])]
         claim(frame_outputs(args.out, indices, timeline), inputs, args.force)
-        faces_of = _faces_reader(timeline, shared)
+        faces_of = _faces_reader(timeline, args.faces)
         faces_of(indices[0])  # told before all frames are looked at
         aspect = args.size[0] / args.size[1]
         bounds = framing(timeline, indices)
@@ -127,29 +126,14 @@ def _faults(args: Namespace, pods: int) -> list[Faults]:
     return [replace(common, noise=args.noise[pod % len(args.noise)]) for pod in range(pods)]
 
 
-def _faces_beside(scan: Path) -> Path | None:
-    """The file beside the frames of a sequence that has the faces of all, where there is one."""
-    folder = scan if scan.is_dir() else scan.parent
-    beside = [folder / _FACES_FILE, *([folder.parent / _FACES_FILE] if folder.name == "frames" else [])]
-    return None if scan.is_file() else next(filter(Path.is_file, beside), None)
-
-
 def _faces_reader(timeline: Timeline, shared: Path | None) -> Callable[[int], Faces]:
     """A function from the index of a frame to its faces. shared: the file that has those of all."""
-    read_once = cache(read_faces)
+    of_all = None if shared is None else formats.read_faces(shared)
 
     def faces_of(index: int) -> Faces:
-        if shared is not None:
-            return read_once(shared)
-        if len(timeline.files) != len(timeline):  # one file of many frames, or the demo
-            raise InputError("is no mesh: it has no faces", timeline.label(index), _HINT)
-        path = timeline.files[index]
-        try:
-            faces = read_faces(path)
-        except InputError as error:
-            raise InputError(error.what, error.where, error.hint or _HINT) from error
+        faces = timeline.faces(index) if of_all is None else of_all
         if not len(faces):
-            raise InputError("is no mesh: it has no faces", path, _HINT)
+            raise InputError("is no mesh: it has no faces", shared or timeline.label(index), _HINT)
         return faces
 
     return faces_of
@@ -157,7 +141,7 @@ def _faces_reader(timeline: Timeline, shared: Path | None) -> Callable[[int], Fa
 
 def _mesh(pose: Pose, faces: Faces) -> Mesh:
     try:
-        return Mesh(pose.cloud, faces)
+        return Mesh(pose.cloud, faces.triangles())
     except InputError as error:
         raise InputError(
             error.what, pose.label, "Its faces and its vertices do not belong together"

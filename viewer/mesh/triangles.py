@@ -1,9 +1,7 @@
-"""Triangle meshes as scenes: read from PLY and OBJ, hit by rays."""
+"""Triangle meshes as scenes, hit by rays."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,13 +12,10 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..errors import InputError
-from ..scan.formats import read
+from ..scan.faces import Triangles
+from ..scan.formats import read, read_faces
 from ..scan.points import PointCloud
-from .scene import NOTHING, PLAIN, Hits, Rays, linear, to_linear
-
-Faces = NDArray[np.uint32]  # (F, 3) rows of the vertices
-_LISTS = ("vertex_indices", "vertex_index")  # what PLY files call the corners of a face
-_HEADER_LIMIT = 1 << 20  # bytes looked at for a header
+from .scene import PLAIN, Hits, Rays, linear, to_linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +28,7 @@ class Mesh:
     """
 
     points: PointCloud
-    faces: Faces
+    faces: Triangles
 
     def __post_init__(self) -> None:
         if not len(self.faces):
@@ -116,31 +111,13 @@ class Mesh:
 
 
 def read_mesh(path: Path | str) -> Mesh:
-    """The mesh of a PLY or OBJ file. Raises InputError where it is damaged or has no faces."""
-    path = Path(path)
+    """The mesh of a file of points with faces. Raises InputError where it is damaged or has no faces."""
     faces, points = read_faces(path), read(path)
     assert isinstance(points, PointCloud), "the formats with faces hold points"
     try:
-        return Mesh(points, faces)
+        return Mesh(points, faces.triangles())
     except InputError as error:
         raise InputError(error.what, path) from error
-
-
-def read_faces(path: Path | str) -> Faces:
-    """The faces of a PLY or OBJ file as triangles, (F, 3) uint32; polygons become fans. Raises InputError.
-
-    A sequence that moves one mesh has the faces in a file of their own.
-    """
-    path = Path(path)
-    readers = {".ply": _ply_faces, ".obj": _obj_faces}
-    if path.suffix.lower() not in readers:
-        raise InputError("is no mesh that can be read", path, f"Known: {', '.join(sorted(readers))}")
-    try:
-        return readers[path.suffix.lower()](path)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", path) from error
-    except (ValueError, IndexError, OverflowError) as error:
-        raise InputError(f"has damaged faces: {error}", path) from error
 
 
 def face_normals(mesh: Mesh) -> Rays:
@@ -167,66 +144,3 @@ def _unit(vectors: Rays) -> Rays:
 def _blend(corners: NDArray, weights: Rays) -> Rays:
     """Values (3, N, C) of the corners of faces at places of barycentric weights (N, 3): (N, C)."""
     return (corners * weights.T[:, :, None]).sum(axis=0)
-
-
-def _ply_faces(path: Path) -> Faces:
-    from plyfile import PlyData, PlyParseError
-
-    _check_counts(path)
-    try:
-        try:  # triangles alone are many times faster
-            ply = PlyData.read(path, known_list_len={"face": dict.fromkeys(_LISTS, 3)})
-        except PlyParseError:
-            ply = PlyData.read(path)
-    except PlyParseError as error:
-        raise InputError(f"has damaged faces: {error}", path) from error
-    if "face" not in ply:
-        raise InputError("the mesh has no faces", path)
-    face = ply["face"].data
-    corners = next((face[name] for name in _LISTS if name in face.dtype.names), None)
-    if corners is None or (corners.ndim == 1 and not corners.dtype.hasobject):
-        raise InputError("its faces name no vertices", path)
-    return _fans(list(corners)) if corners.ndim == 1 else _vertex_numbers(corners)
-
-
-def _check_counts(path: Path) -> None:
-    """Raise ValueError where a PLY header promises more than the file holds: memory follows the header."""
-    with open(path, "rb") as file:
-        header = file.read(_HEADER_LIMIT).partition(b"end_header")[0]
-    size = path.stat().st_size
-    for name, count in re.findall(rb"^element\s+(\S+)\s+(\d+)", header, re.MULTILINE):
-        if int(count) > size:
-            raise ValueError(f"{int(count):,} elements '{name.decode('latin-1')}' in {size:,} bytes")
-
-
-def _obj_faces(path: Path) -> Faces:
-    return _fans(list(_obj_polygons(path)))
-
-
-def _obj_polygons(path: Path) -> Iterator[NDArray[np.int64]]:
-    """The corners of each face; negative numbers count back from the vertices read so far."""
-    vertices = 0
-    with open(path, encoding="latin-1") as lines:
-        for line in lines:
-            if line.startswith(("v ", "v\t")):
-                vertices += 1
-            elif line.startswith(("f ", "f\t")):
-                corners = np.array([int(corner.partition("/")[0]) for corner in line.split()[1:]])
-                yield np.where(corners < 0, corners + vertices, corners - 1)
-
-
-def _fans(polygons: list[NDArray]) -> Faces:
-    """Polygons as triangles around their first corners. Raises ValueError as `_vertex_numbers` does."""
-    triangles = [
-        np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1) for p in polygons if len(p) > 2
-    ]
-    if not triangles:
-        return np.empty((0, 3), np.uint32)
-    return _vertex_numbers(np.concatenate(triangles))
-
-
-def _vertex_numbers(corners: NDArray) -> Faces:
-    """Corners as uint32. Raises ValueError for what cannot be the number of a vertex."""
-    if corners.dtype.kind not in "iu" or (len(corners) and not 0 <= corners.min() <= corners.max() < NOTHING):
-        raise ValueError("a corner is no vertex")
-    return np.ascontiguousarray(corners, np.uint32)

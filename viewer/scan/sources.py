@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import printable
 from . import formats
+from .faces import Faces
 from .points import PointCloud
 from .pose import Scanned
 from .times import TIMES_FILE, read_times_csv
 
-FACES_FILE = "mesh_topology.ply"  # beside a folder `frames`: the faces that all frames in it have
+FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces that all of them have
 
 
 class FrameSource(Protocol):
@@ -49,6 +50,9 @@ class FrameSource(Protocol):
     def load(self, index: int) -> Scanned:
         """Read one frame. Raises InputError where it is unusable."""
 
+    def faces(self, index: int) -> Faces:
+        """Read the faces between the points of a frame, perhaps none. Raises InputError."""
+
 
 class FileSequence:
     """One frame a file, in the order given. paths: at least one."""
@@ -77,11 +81,10 @@ class FileSequence:
         """From a times.csv beside the frames, or beside their folder where that is called `frames`."""
         if len(self) == 1:
             return None
-        folders = [self._folder, self._folder.parent] if self._folder.name == "frames" else [self._folder]
-        for file in (folder / TIMES_FILE for folder in folders):
-            if file.is_file():
-                return read_times_csv(file, [self.label(index) for index in range(len(self))])
-        return None
+        file = self._beside(TIMES_FILE)
+        return (
+            None if file is None else read_times_csv(file, [self.label(index) for index in range(len(self))])
+        )
 
     def load(self, index: int) -> Scanned:
         path = self.files[index]
@@ -90,22 +93,36 @@ class FileSequence:
                 f"holds {count} frames, where each file of a sequence holds one", path, "Open this file alone"
             )
         scanned = formats.read(path)
-        faces = self._shared_faces
-        if faces is None or not isinstance(scanned, PointCloud) or scanned.topology is not None:
+        if not isinstance(scanned, PointCloud) or scanned.topology is not None:
             return scanned
-        fits = len(scanned) + scanned.dropped == len(faces) + faces.dropped
-        return replace(scanned, topology=faces.topology) if fits else scanned
+        points, topology = self._shared_topology
+        return replace(scanned, topology=topology) if len(scanned) + scanned.dropped == points else scanned
+
+    def faces(self, index: int) -> Faces:
+        """The frame's own faces; where it has none, those of the file beside the frames."""
+        own = formats.read_faces(self.files[index])
+        return own if len(own) else self._shared_faces
 
     @cached_property
-    def _shared_faces(self) -> PointCloud | None:
-        """The mesh whose faces all frames have, None where there is none; it may as well be unreadable."""
-        file = self._folder.parent / FACES_FILE
-        if self._folder.name != "frames" or not file.is_file():
-            return None
+    def _shared_faces(self) -> Faces:
+        file = self._beside(FACES_FILE)
+        return Faces.joined([]) if file is None else formats.read_faces(file)
+
+    @cached_property
+    def _shared_topology(self) -> tuple[int, str | None]:
+        """How many points the shared faces are between, and their topology; none where unreadable."""
+        file = self._beside(FACES_FILE)
         try:
-            return formats.read_points(file)
+            mesh = file and formats.read_points(file)
         except InputError:
-            return None
+            mesh = None
+        return (len(mesh) + mesh.dropped, mesh.topology) if mesh else (0, None)
+
+    def _beside(self, name: str) -> Path | None:
+        """The file of this name beside the frames, or beside their folder where that is called `frames`."""
+        folders = [self._folder, self._folder.parent] if self._folder.name == "frames" else [self._folder]
+        places = [folder / name for folder in folders]
+        return next((file for file in places if file.is_file() and file not in self.files), None)
 
 
 class MultiFrameFile:
@@ -133,3 +150,6 @@ class MultiFrameFile:
 
     def load(self, index: int) -> Scanned:
         return self._read(index)
+
+    def faces(self, index: int) -> Faces:
+        return formats.read_faces(self._path, index)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..task import Cancelled, Task
 from .cache import PoseCache, default_budget
+from .faces import Faces
 from .points import UNKNOWN_UNIT, PointCloud
 from .pose import Pose
 from .range_view import RangeView, in_one_unit
@@ -105,6 +106,10 @@ class Timeline:
     def label(self, index: int) -> str:
         """The name of a frame, for example its file's."""
         return self._source.label(self._checked_index(index))
+
+    def faces(self, index: int) -> Faces:
+        """Read the faces between the points of a frame, perhaps none. Raises InputError."""
+        return self._source.faces(self._checked_index(index))
 
     def nearest(self, time: float) -> int:
         """The index of the pose nearest to a time in seconds, the earlier one of two."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from ...errors import InputError, unknown_name
-from ...mesh.triangles import Mesh, read_faces, read_mesh
+from ...mesh.triangles import Mesh, read_mesh
 from ...scan.demo import DemoSource
 from ...scan.open import find_source
 from ...scan.points import PointCloud
@@ -29,7 +29,6 @@ _STANFORD = "Stanford Computer Graphics Laboratory"
 _CYBERWARE = "Cyberware"
 _COUNT = 100_000  # points of an analytic scene
 _NOISE = 0.5  # of a virtual scanner, in footprints of its pixels
-_FACES_FILE = "mesh_topology.ply"  # beside the frames of a sequence that moves one mesh
 _HEAD_TOLERANCE = 0.5  # mm: 99 % of the mesh is within 0.07 mm of the exact surface
 _PHONE = "range/truedepth_head_30"
 _PHONE_TOLERANCE = 2e-3  # m
@@ -110,14 +109,13 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
         (path,) = request.paths
         source = find_source(path)
         labels = [source.label(index) for index in range(len(source))]
-        times, shared = paced_times(labels, DEFAULT_FPS), path / _FACES_FILE
-        faces_of = cache(read_faces)
+        times = paced_times(labels, DEFAULT_FPS)
 
         def load(index: int) -> Moment:
             points = source.load(index)
             assert isinstance(points, PointCloud), "the formats with faces hold points"
-            faces = faces_of(shared) if shared.exists() else read_faces(path / labels[index])
-            return _of_mesh(smooth(Mesh(points, faces)), request, index, float(times[index]), labels[index])
+            mesh = smooth(Mesh(points, source.faces(index).triangles()))
+            return _of_mesh(mesh, request, index, float(times[index]), labels[index])
 
         return Subject(name=request.name, load=load, moments=len(source), up=up, credit=credit)
 
@@ -239,7 +237,7 @@ def subject(
     noise: float | None = None,
     seed: int = 0,
 ) -> Subject:
-    """The subject of a scene's name, or of a PLY or OBJ file with faces.
+    """The subject of a scene's name, or of a file with faces.
 
     count: of points; None: as many as it has. noise: standard deviation of depth of a virtual scanner, in
     footprints of its pixels; None: 0.5. seed: of all chance. Raises InputError.
@@ -248,7 +246,7 @@ def subject(
     if scene is None:
         if not Path(name_or_file).is_file():
             if Path(name_or_file).is_dir():
-                raise InputError("is a folder, not a mesh", name_or_file, "Name a PLY or OBJ file")
+                raise InputError("is a folder, not a mesh", name_or_file, "Name a PLY, OBJ or NPZ file")
             if Path(name_or_file).name != name_or_file or Path(name_or_file).suffix:
                 raise InputError("no such file", name_or_file)
             raise unknown_name("scene", name_or_file, list(_SCENES))

@@ -12,10 +12,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mesh.triangles import Faces, Mesh
+from ...mesh.triangles import Mesh
 from ...scan.demo import colors, head
 from ...scan.demo.motion import move
 from ...scan.demo.sampling import Solid, projected
+from ...scan.faces import Triangles
 from ...scan.points import PointCloud
 from .isosurface import grid_values, isosurface
 
@@ -43,7 +44,7 @@ class _Rest:
     positions: NDArray[np.float64]
     normals: NDArray[np.float64]
     colors: NDArray[np.uint8]
-    faces: Faces
+    faces: Triangles
     skin: int
 
 
@@ -79,7 +80,7 @@ def _rest() -> _Rest:
     )
 
 
-def _surface(solid: Solid, runs: _Runs) -> tuple[NDArray[np.float64], Faces]:
+def _surface(solid: Solid, runs: _Runs) -> tuple[NDArray[np.float64], Triangles]:
     """The mesh of a solid: vertices (V, 3) and faces."""
 
     def values(points: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mesh.scene import Rays
-from ...mesh.triangles import Faces
+from ...scan.faces import Triangles
 
 _SKIPPED = 4  # lines from one of the coarse grid to the next
 
 Lines = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # ascending places along x, y, z
 
 
-def isosurface(grid: NDArray[np.float32], lines: Lines) -> tuple[Rays, Faces]:
+def isosurface(grid: NDArray[np.float32], lines: Lines) -> tuple[Rays, Triangles]:
     """Vertices (V, 3) and faces (F, 3) of where values on a grid are zero.
 
     Marching cubes (Lewiner et al. 2003). grid: (X, Y, Z), negative inside, NaN: no surface near. lines: where

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..faces import Faces
 from ..points import PointCloud
 from .asset import rest_points
 from .motion import PERIOD, move
@@ -56,3 +57,7 @@ class DemoSource:
             origin=np.zeros(3),
         )
         return replace(cloud, topology=self.name)
+
+    def faces(self, index: int) -> Faces:
+        """No faces: the points stand for themselves."""
+        return Faces.joined([])

@@ -6,6 +6,7 @@ A format module declares
 - `read(path, frame=0) -> PointCloud`, or a tuple of RangeViews;
 - where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
   `read_times(path)` (seconds, (T,) float64, or None);
+- where it holds faces: `read_faces(path, frame=0) -> Iterator[Faces]`, in pieces, none where there are none;
 - where frames are told by others: `Frames(path)`, whose `read(frame)` keeps what the next one needs;
 - where it tells the unit of length: `read_unit(path) -> str`, from the header alone;
 - where it can be written: `write(path, cloud)`, or `write_views(path, views)`, or, all poses in one file,
@@ -31,10 +32,12 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError, explained, shortened
 from ...files import whole_file
+from ..faces import Faces
 from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
 from ..units import usable_unit
+from ._admission import admit
 
 _LONGEST_MESSAGE = 400  # characters
 
@@ -98,6 +101,24 @@ def read(path: Path | str, frame: int = 0) -> Scanned:
     where = path if frames == 1 else f"{path}, frame {frame}"
     with _one_message(where, f"cannot be read as {module.TITLE}"):
         return _with_points(module.read(path, frame))
+
+
+def read_faces(path: Path | str, frame: int = 0) -> Faces:
+    """The faces between the points of one moment of a file, perhaps none.
+
+    Raises InputError as `read` does, and where the faces are damaged.
+    """
+    path = Path(path)
+    module = _readable(path)
+    if not hasattr(module, "read_faces"):
+        return Faces.joined([])
+    with _one_message(path, f"its faces cannot be read as {module.TITLE}"):
+        held, taken, pieces = path.stat().st_size, 0, []
+        for piece in module.read_faces(path, frame):
+            taken += piece.nbytes
+            admit(held, 2 * taken)  # in pieces, and joined
+            pieces.append(piece)
+        return Faces.joined(pieces)
 
 
 def frames(path: Path | str) -> Callable[[int], Scanned]:

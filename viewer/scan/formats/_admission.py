@@ -31,7 +31,6 @@ LONGEST_LINE = 1 << 20  # characters of text
 _MOST_DIGITS = 40  # of a number that counts something
 _RATIO = 10  # of the memory that reading takes to the size of the file
 _FREE = 180 << 20  # bytes that reading any file may take
-_CHUNK = 1 << 20  # bytes passed on at a time
 
 
 @contextmanager
@@ -95,14 +94,6 @@ def read_exactly(stream: BinaryIO, size: int) -> bytes:
     if len(data) != size:
         raise InputError(f"ends early: {len(data)} bytes where {size} should be")
     return data
-
-
-def read_rest(stream: BinaryIO) -> Iterator[bytes]:
-    """What is left of a file, in pieces. Raises InputError where the file gets shorter meanwhile."""
-    left = size_of(stream) - stream.tell()
-    while left > 0:
-        yield (part := read_exactly(stream, min(left, _CHUNK)))
-        left -= len(part)
 
 
 def read_records(stream: BinaryIO, dtype: np.dtype, count: int, what: str) -> NDArray:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain, count, islice
-from typing import IO, AnyStr, BinaryIO
+from typing import IO, AnyStr, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
@@ -22,6 +22,7 @@ from ._deferred import Deferred, cloud_of
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
 _ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
 Columns = dict[str, NDArray]  # name -> (N,)
+T = TypeVar("T")
 
 # What the columns of a file may be called, in lower case; the first set that is complete is taken.
 _POSITIONS = [("x", "y", "z")]
@@ -201,6 +202,22 @@ def parse_table(
         done += len(part)
     table.resize((done, table.shape[1]), refcheck=False)
     return table
+
+
+def whole_numbers(rows: Sequence[Sequence[str]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The numbers of rows of words, one row behind the other, and how many each row has.
+
+    Raises ValueError where a word is no whole number, OverflowError where it is far too large.
+    """
+    numbers = np.array([int(word) for word in chain.from_iterable(rows)], np.int64)
+    return numbers, np.array([len(row) for row in rows], np.int64)
+
+
+def batches(items: Iterable[T], size: int) -> Iterator[list[T]]:
+    """The items in lists of so many; the last has what is left."""
+    left = iter(items)
+    while batch := list(islice(left, size)):
+        yield batch
 
 
 def _parse_rows(

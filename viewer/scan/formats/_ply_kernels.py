@@ -15,40 +15,42 @@ def pack_rows(
     lengths: NDArray[np.int64],
     signed: NDArray[np.bool_],
     big_endian: bool,
+    kept: int,
     packed: NDArray[np.uint8],
-) -> tuple[int, int, bool]:
-    """Copy what is no list of each row, one row behind the other; how many rows were whole, and their bytes.
+    counts: NDArray[np.uint32],
+) -> tuple[int, int, int, bool]:
+    """Copy what is no list of each row, or the items of one list, one row behind the other.
 
-    Ends in front of a row with a list of a negative length, and tells so.
+    Returns how many rows were whole, their bytes, the bytes copied, and whether the next row has a list of a
+    negative length.
 
     data: (B,), from the first row on. sizes: (P,), bytes of each property, or of an item of its list.
     lengths: (P,), bytes of the length in front of the list, 0: no list. signed: (P,), whether
-    that length may be negative. packed: (N, bytes), or (N, 0).
+    that length may be negative. kept: the number of the list, or -1. packed: bytes enough. counts: (N,) for
+    as many rows as are wanted; gets the length of the list that is kept.
     """
-    at = 0
-    for row in range(len(packed)):
-        here, filled = at, 0
+    at, filled = 0, 0
+    for row in range(len(counts)):
+        here, end = at, filled
         for p in range(len(sizes)):
+            items = np.int64(1)
             if lengths[p]:
                 if lengths[p] > len(data) - here:
-                    return row, at, False
+                    return row, at, filled, False
                 items = np.int64(0)
                 for i in range(lengths[p]):
                     byte = i if big_endian else lengths[p] - 1 - i
                     items = items << 8 | data[here + byte]
                 here += lengths[p]
                 if signed[p] and items >> (8 * lengths[p] - 1):
-                    return row, at, True
-                if items > (len(data) - here) // sizes[p]:
-                    return row, at, False
-                here += items * sizes[p]
-                continue
-            if sizes[p] > len(data) - here:
-                return row, at, False
-            if packed.shape[1]:
-                for i in range(sizes[p]):
-                    packed[row, filled + i] = data[here + i]
-                filled += sizes[p]
-            here += sizes[p]
-        at = here
-    return len(packed), at, False
+                    return row, at, filled, True
+            if items > (len(data) - here) // sizes[p]:
+                return row, at, filled, False
+            if p == kept or (kept < 0 and not lengths[p]):
+                for i in range(items * sizes[p]):
+                    packed[end + i] = data[here + i]
+                end += items * sizes[p]
+                counts[row] = items
+            here += items * sizes[p]
+        at, filled = here, end
+    return len(counts), at, filled, False

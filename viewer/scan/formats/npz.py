@@ -24,12 +24,13 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ._admission import MOST_MEMBERS, admit, check_count, opened, size_of
 from ._columns import first_repeated
 from ._deferred import Deferred, cloud_of
-from ._faces import with_faces
 from ._stored import StoredArray
+from ._topology import with_topology
 
 TITLE = "NPZ"
 SUFFIXES = (".npz",)
@@ -50,6 +51,7 @@ _LONGEST_DIRECTORY = 1 << 20  # bytes
 # Of the record at the end of an archive, and of that of large ones: how many members, bytes of their names.
 _END, _END_64, _LOCATOR_BYTES = struct.Struct("<10xHI6x"), struct.Struct("<32xQQ8x"), 20
 _LONGEST_END = (1 << 16) + _END.size + _LOCATOR_BYTES + _END_64.size  # bytes, with a remark
+_FACES_AT_ONCE = 1 << 16
 _SAMPLE = 1 << 13  # positions looked at
 _FAR = 16  # radii of the points from their origin, where float32 still tells a millionth of one
 
@@ -71,7 +73,6 @@ def read(path: Path, frame: int = 0) -> PointCloud:
     """One frame; arrays that are not needed and other frames are not kept. Raises InputError."""
     with opened(path) as stream, _arrays(stream) as arrays:
         shares = _shares(arrays, frame)
-        faces = _faces(arrays)
         share, held = shares.pop("positions"), size_of(stream)
         admit(held, arrays["positions"].memory(share))
         positions = [arrays["positions"].read(share)]
@@ -89,9 +90,13 @@ def read(path: Path, frame: int = 0) -> PointCloud:
         cloud = cloud_of(positions, attributes, values, shift, held)
         if origin is not None:
             cloud = replace(cloud, origin=origin)
-        if faces:
-            admit(held, cloud.nbytes + faces.memory() * (2 if faces.column_order else 1))
-        return with_faces(cloud, [np.ascontiguousarray(faces.read()).data] if faces else [])
+        return with_topology(cloud, _faces(arrays, held, cloud.nbytes))
+
+
+def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
+    """The triangles of the array `faces`, in pieces; none where it has another shape. Raises InputError."""
+    with opened(path) as stream, _arrays(stream) as arrays:
+        yield from _faces(arrays, size_of(stream))
 
 
 def _shifted(
@@ -203,10 +208,14 @@ def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
     return arrays["positions"]
 
 
-def _faces(arrays: dict[str, StoredArray]) -> StoredArray | None:
+def _faces(arrays: dict[str, StoredArray], held: int, kept: int = 0) -> Iterator[Faces]:
+    """The triangles of a file of `held` bytes, beside so many bytes that are kept."""
     faces = arrays.get("faces")
-    fits = faces and len(faces.shape) == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu"
-    return faces if fits else None
+    if faces and len(faces.shape) == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":
+        admit(held, kept + faces.memory())
+        corners = faces.read()
+        for start in range(0, len(corners), _FACES_AT_ONCE):
+            yield Faces.of(corners[start : start + _FACES_AT_ONCE])
 
 
 def _vector(array: StoredArray, length: int) -> NDArray[np.float64]:

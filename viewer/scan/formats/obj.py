@@ -14,15 +14,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..faces import Faces
 from ..points import PointCloud
 from ._admission import opened
-from ._columns import bounded_lines, parse_table
-from ._faces import with_faces
+from ._columns import batches, bounded_lines, parse_table, whole_numbers
+from ._topology import with_topology
 
 TITLE = "OBJ"
 SUFFIXES = (".obj",)
 
 _CORNERS_AT_ONCE = 1 << 18
+_FACES_AT_ONCE = 1 << 12
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
 
 
@@ -36,7 +38,33 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             normals=_normals(text, len(table)),
             colors=table[:, 3:6] if table.shape[1] >= 6 else None,
         )
-        return with_faces(cloud, (line.encode("latin-1") for line in _lines(text, "f")))
+        return with_topology(cloud, _faces(text))
+
+
+def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
+    """The faces of an OBJ file, in pieces. Raises InputError or ValueError where they cannot be used."""
+    with opened(path) as stream:
+        text = TextIOWrapper(stream, "latin-1")  # closes the stream when it goes
+        yield from _faces(text)
+
+
+def _faces(text: TextIOWrapper) -> Iterator[Faces]:
+    for rows in batches(_polygons(text), _FACES_AT_ONCE):
+        corners, sizes = whole_numbers([words for words, _ in rows])
+        vertices = np.repeat([vertices for _, vertices in rows], sizes)
+        yield Faces.of(np.where(corners < 0, corners + vertices, corners - 1), sizes)
+
+
+def _polygons(text: TextIOWrapper) -> Iterator[tuple[list[str], int]]:
+    """The vertices of each face as written, and how many there are so far: negative ones count back."""
+    vertices = 0
+    text.seek(0)
+    for line in bounded_lines(text):
+        if line.startswith(("v ", "v\t")):
+            vertices += 1
+        elif line.startswith(("f ", "f\t")):
+            words = line.split()[1:]
+            yield [word.partition("/")[0] for word in words] if "/" in line else words, vertices
 
 
 def _normals(text: TextIOWrapper, count: int) -> NDArray[np.float64] | None:

@@ -6,11 +6,10 @@ with lists are walked, since only the lengths in them tell where the next one be
 
 from __future__ import annotations
 
-import re
+import os
 import sys
 from array import array
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -18,20 +17,11 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, unknown_name
+from ...errors import InputError
 from ...task import checkpoint
+from ..faces import Faces
 from ..points import PointCloud
-from ._admission import (
-    MOST_COLUMNS,
-    check_count,
-    opened,
-    read_exactly,
-    read_records,
-    read_rest,
-    size_of,
-    too_few,
-    whole_number,
-)
+from ._admission import opened, read_exactly, read_records, size_of, too_few, whole_number
 from ._columns import (
     Columns,
     cloud_from_columns,
@@ -43,76 +33,30 @@ from ._columns import (
     records,
     text_lines,
 )
-from ._faces import with_faces
+from ._ply_faces import face_rows
+from ._ply_header import (
+    ENDIAN,
+    LONGEST_HEADER,
+    TYPES,
+    Element,
+    PlyHeader,
+    Property,
+    header_text,
+    negative_list,
+    parse_header,
+)
+from ._topology import with_topology
 
 TITLE = "PLY"
 SUFFIXES = (".ply",)
 
-_HEADER_LIMIT = 1 << 20  # bytes looked at for the header
-_LONGEST_WORD = 40  # of a file, in a message
 _ROWS_AT_ONCE = 1 << 12  # of text
-_ROWS = {"vertex": "vertices"}  # what rows are called in messages
-_ENDIAN = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Property:
-    name: str
-    type: str  # as the file spells it
-    length_type: str | None = None  # of a list
-
-    def __post_init__(self) -> None:
-        for name in (self.type, self.length_type or self.type):
-            if name not in _TYPES:
-                raise unknown_name("PLY property type", name[:_LONGEST_WORD], list(_TYPES))
-        if _TYPES[self.length_type or "int"][0] == "f":
-            raise InputError(
-                f"the list '{self.name[:_LONGEST_WORD]}' has a length of type {self.length_type}"
-            )
-
-    @property
-    def line(self) -> str:
-        kind = self.type if self.length_type is None else f"list {self.length_type} {self.type}"
-        return f"property {kind} {self.name}"
-
-
-@dataclass(frozen=True)
-class _Element:
-    name: str
-    count: int
-    properties: list[_Property] = field(default_factory=list)
-
-    @property
-    def has_lists(self) -> bool:
-        return any(p.length_type for p in self.properties)
-
-    @property
-    def numbers(self) -> list[_Property]:
-        """The properties that are no lists."""
-        return [p for p in self.properties if not p.length_type]
-
-    def dtype(self, endian: str) -> np.dtype:
-        """One row without its lists; fields go by number, since names may repeat."""
-        return np.dtype([(str(i), endian + _TYPES[p.type]) for i, p in enumerate(self.numbers)])
-
-
-@dataclass(frozen=True)
-class _Header:
-    encoding: str
-    elements: list[_Element]
-    odd_lines: list[str]  # that mean nothing to us
-    size: int  # bytes
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
     """The vertices of a PLY file, ascii or binary. Raises InputError."""
     with opened(path) as stream:
-        header = _read_header(stream.read(_HEADER_LIMIT))
+        header = parse_header(stream.read(LONGEST_HEADER))
         names = [element.name for element in header.elements]
         if "vertex" not in names:
             raise InputError(f"has no vertex element, only: {listed(names)}")
@@ -126,15 +70,33 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             )
             raise InputError(f"no x, y and z{reason}")
         stream.seek(header.size)
-        read_rows = _read_ascii if header.encoding == "ascii" else _read_binary
         for element in before:
-            if element.count and element.properties:
-                read_rows(stream, element, header.encoding)
+            _skip(stream, element, header.encoding)
+        read_rows = _read_ascii if header.encoding == "ascii" else _read_binary
         cloud = cloud_from_columns(read_rows(stream, vertex, header.encoding))
-        has_faces = any(element.name == "face" and element.count for element in header.elements)
-        if has_faces and not vertex.has_lists and not any(element.count for element in before):
-            cloud = with_faces(cloud, read_rest(stream))  # all that is behind the vertices
-    return cloud
+        return with_topology(cloud, _faces(stream, header, len(before) + 1))
+
+
+def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
+    """The faces of a PLY file, in pieces. Raises InputError or ValueError where they cannot be used."""
+    with opened(path) as stream:
+        header = parse_header(stream.read(LONGEST_HEADER))
+        stream.seek(header.size)
+        yield from _faces(stream, header)
+
+
+def _faces(stream: BinaryIO, header: PlyHeader, passed: int = 0) -> Iterator[Faces]:
+    """The faces, from a stream that stands behind so many elements."""
+    names = [element.name for element in header.elements]
+    at = names.index("face") if "face" in names else -1
+    if at < 0 or not header.elements[at].count:
+        return
+    if at < passed:
+        stream.seek(header.size)
+        passed = 0
+    for element in header.elements[passed:at]:
+        _skip(stream, element, header.encoding)
+    yield from face_rows(stream, header.elements[at], header.encoding)
 
 
 def write(path: Path, cloud: PointCloud) -> None:
@@ -143,70 +105,59 @@ def write(path: Path, cloud: PointCloud) -> None:
         name: column.astype("f8") if column.dtype.kind in "iu" and column.itemsize == 8 else column
         for name, column in columns_from_cloud(cloud).items()
     }
-    spelling = {code: name for name, code in reversed(_TYPES.items())}
-    properties = [_Property(name, spelling[column.dtype.str[1:]]) for name, column in columns.items()]
+    spelling = {code: name for name, code in reversed(TYPES.items())}
+    properties = [Property(name, spelling[column.dtype.str[1:]]) for name, column in columns.items()]
     with open(path, "wb") as stream:
-        stream.write(_header_text("binary_little_endian", [_Element("vertex", len(cloud), properties)]))
+        stream.write(header_text("binary_little_endian", [Element("vertex", len(cloud), properties)]))
         records(columns).tofile(stream)
 
 
-def _read_header(head: bytes) -> _Header:
-    end = re.search(rb"\nend_header[ \t\r]*(\n|\Z)", head)
-    if not re.match(rb"ply\s", head) or end is None:
-        raise InputError("is not a PLY file: it does not start with 'ply' or has no 'end_header'")
-    encoding, elements, odd_lines = "", [], []
-    for line in head[: end.start()].decode("utf-8", "replace").splitlines()[1:]:
-        match line.split():
-            case ["format", encoding, *_]:
-                if encoding not in _ENDIAN:
-                    raise unknown_name("PLY format", encoding[:_LONGEST_WORD], list(_ENDIAN))
-            case ["element", name, count]:
-                if not count.isdecimal() or len(count) > _LONGEST_WORD:
-                    raise InputError(f"the header promises '{count[:_LONGEST_WORD]}' rows of {name}")
-                elements.append(_Element(name, int(count)))
-            case ["property", "list", length_type, type_, name] if elements:
-                elements[-1].properties.append(_Property(name, type_, length_type))
-            case ["property", type_, name] if elements:
-                elements[-1].properties.append(_Property(name, type_))
-            case ["comment" | "obj_info", *_] | []:
-                pass
-            case _:
-                odd_lines.append(line.strip())
-    for element in elements:
-        check_count(len(element.properties), MOST_COLUMNS, "properties of an element")
-    if not encoding:
-        raise InputError("the PLY header has no format line")
-    return _Header(encoding, elements, odd_lines, end.end())
-
-
-def _header_text(encoding: str, elements: list[_Element]) -> bytes:
-    lines = ["ply", f"format {encoding} 1.0"]
-    for element in elements:
-        lines += [f"element {element.name} {element.count}", *(p.line for p in element.properties)]
-    return "\n".join([*lines, "end_header\n"]).encode()
-
-
-def _read_ascii(stream: BinaryIO, element: _Element, encoding: str) -> Columns:
-    lines = text_lines(stream)
-    if element.has_lists:
-        table = _walk_lines(lines, element)
+def _skip(stream: BinaryIO, element: Element, encoding: str) -> None:
+    """Go on behind the rows of an element. Raises InputError where there are fewer."""
+    if not (element.count and element.properties):
+        return
+    if encoding == "ascii":
+        held = sum(1 for _ in _filled_lines(stream, element))
+    elif element.has_lists:
+        held = len(_walk_bytes(stream, element, encoding))
     else:
-        table = parse_table(lines, rows=element.count)
+        size = element.dtype("").itemsize
+        held = min(element.count, (size_of(stream) - stream.tell()) // size)
+        stream.seek(held * size, os.SEEK_CUR)
+    if held < element.count:
+        raise too_few(held, element.count, _rows_of(element))
+
+
+def _rows_of(element: Element) -> str:
+    """The rows of an element as messages call them."""
+    return "vertices" if element.name == "vertex" else f"rows of {element.name}"
+
+
+def _filled_lines(stream: BinaryIO, element: Element) -> Iterator[str]:
+    """The lines of the rows of an element, as far as there are that many."""
+    return islice(filter(str.strip, text_lines(stream)), min(element.count, sys.maxsize))
+
+
+def _read_ascii(stream: BinaryIO, element: Element, encoding: str) -> Columns:
+    if element.has_lists:
+        table = _walk_lines(_filled_lines(stream, element), element)
+    else:
+        table = parse_table(text_lines(stream), rows=element.count)
         if len(table) and table.shape[1] < len(element.properties):
             promised = len(element.properties)
             raise InputError(f"its rows hold {table.shape[1]} values, the header promises {promised}")
     if len(table) < element.count:
-        raise too_few(len(table), element.count, _ROWS.get(element.name, f"rows of {element.name}"))
+        raise too_few(len(table), element.count, _rows_of(element))
     return named(
-        (p.name, declared(p.name, column, _TYPES[p.type]))
+        (p.name, declared(p.name, column, TYPES[p.type]))
         for p, column in zip(element.numbers, table.T, strict=False)
     )
 
 
-def _walk_lines(lines: Iterable[str], element: _Element) -> NDArray[np.float64]:
+def _walk_lines(lines: Iterable[str], element: Element) -> NDArray[np.float64]:
     """What is no list of each row, (N, C); a row a line."""
     values, rows = array("d"), 0
-    for row, line in enumerate(islice(filter(str.strip, lines), min(element.count, sys.maxsize))):
+    for row, line in enumerate(lines):
         if row % _ROWS_AT_ONCE == 0:
             checkpoint(row / element.count)
         words, at = line.split(), 0
@@ -216,7 +167,7 @@ def _walk_lines(lines: Iterable[str], element: _Element) -> NDArray[np.float64]:
             if p.length_type:
                 length = whole_number(words[at], f"the length of {p.name} in row {row} of {element.name}")
                 if length < 0:
-                    raise _negative(row, element)
+                    raise negative_list(f"row {row} of {element.name}")
                 at += 1 + length
             else:
                 values.append(float(words[at]))
@@ -227,40 +178,32 @@ def _walk_lines(lines: Iterable[str], element: _Element) -> NDArray[np.float64]:
     return np.frombuffer(values, np.float64).reshape(rows, len(element.numbers))
 
 
-def _negative(row: int, element: _Element) -> InputError:
-    return InputError(f"row {row} of {element.name} has a list of a negative length")
-
-
-def _read_binary(stream: BinaryIO, element: _Element, encoding: str) -> Columns:
-    dtype = element.dtype(_ENDIAN[encoding])
-    what = _ROWS.get(element.name, f"rows of {element.name}")
+def _read_binary(stream: BinaryIO, element: Element, encoding: str) -> Columns:
+    dtype = element.dtype(ENDIAN[encoding])
     if not element.has_lists:
-        rows = read_records(stream, dtype, element.count, what)
+        rows = read_records(stream, dtype, element.count, _rows_of(element))
     else:
-        packed = _walk_bytes(stream, element, encoding, what)
+        packed = _walk_bytes(stream, element, encoding)
         rows = packed.view(dtype)[:, 0] if element.numbers else packed
     return named((p.name, rows[str(i)]) for i, p in enumerate(element.numbers))
 
 
-def _walk_bytes(stream: BinaryIO, element: _Element, encoding: str, what: str) -> NDArray[np.uint8]:
+def _walk_bytes(stream: BinaryIO, element: Element, encoding: str) -> NDArray[np.uint8]:
     """The bytes of each row but those of its lists, (N, bytes)."""
     from ._ply_kernels import pack_rows
 
-    sizes = np.array([np.dtype(_TYPES[p.type]).itemsize for p in element.properties])
-    lengths = np.array(
-        [np.dtype(_TYPES[p.length_type]).itemsize if p.length_type else 0 for p in element.properties]
-    )
+    layout = element.layout
     start, held = stream.tell(), size_of(stream) - stream.tell()
-    least = int(lengths.sum() + sizes[lengths == 0].sum())  # bytes of a row with empty lists
-    if element.count * least > held:
-        raise too_few(held // least, element.count, what)
+    if element.count * layout.least > held:
+        raise too_few(held // layout.least, element.count, _rows_of(element))
     data = np.frombuffer(read_exactly(stream, held), np.uint8)
-    packed = np.empty((element.count, int(sizes[lengths == 0].sum())), np.uint8)
-    signed = np.array([_TYPES[p.length_type or p.type][0] == "i" for p in element.properties])
-    rows, size, is_negative = pack_rows(data, sizes, lengths, signed, encoding == "binary_big_endian", packed)
+    packed = np.empty(element.count * layout.width, np.uint8)
+    lengths = np.empty(element.count, np.uint32)
+    is_big = encoding == "binary_big_endian"
+    rows, size, _, is_negative = pack_rows(data, *layout, is_big, -1, packed, lengths)
     if is_negative:
-        raise _negative(rows, element)
+        raise negative_list(f"row {rows} of {element.name}")
     if rows < element.count:
-        raise too_few(rows, element.count, what)
+        raise too_few(rows, element.count, _rows_of(element))
     stream.seek(start + size)
-    return packed
+    return packed.reshape(element.count, layout.width)

@@ -1,0 +1,113 @@
+"""The faces of PLY files, in pieces: rows with a list of corners, whatever else is in them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from itertools import islice
+from typing import BinaryIO
+
+import numpy as np
+
+from ...errors import InputError
+from ...task import checkpoint
+from ..faces import Faces
+from ._admission import too_few
+from ._columns import batches, text_lines, whole_numbers
+from ._ply_header import ENDIAN, TYPES, Element, negative_list
+
+_LISTS = ("vertex_indices", "vertex_index")  # what files call the corners
+_ROWS_AT_ONCE = 1 << 12
+_BYTES_AT_ONCE = 1 << 20
+
+
+def face_rows(stream: BinaryIO, element: Element, encoding: str) -> Iterator[Faces]:
+    """The faces of a stream that stands before them, in pieces.
+
+    Raises InputError where no list is one of corners, and where rows are missing or damaged, or ValueError.
+    """
+    lists = {p.name: number for number, p in enumerate(element.properties) if p.length_type}
+    corners = next((lists[name] for name in _LISTS if name in lists), None)
+    if corners is None:
+        raise InputError("its faces name no vertices")
+    left = element.count
+    pieces = _from_text(stream, element, corners)
+    if encoding != "ascii":
+        pieces = _from_bytes(stream, element, corners, ENDIAN[encoding])
+    for piece in pieces:
+        checkpoint(1 - left / element.count)
+        left -= len(piece)
+        yield piece
+    if left:
+        raise too_few(element.count - left, element.count, "faces")
+
+
+def _from_text(stream: BinaryIO, element: Element, corners: int) -> Iterator[Faces]:
+    def words(line: str) -> list[str]:
+        row, at = line.split(), 0
+        for p in element.properties[:corners]:
+            at += 1 + (int(row[at]) if p.length_type else 0)
+        end = at + 1 + int(row[at])
+        if not at < end <= len(row):
+            raise InputError("a face ends within its corners")
+        return row[at + 1 : end]
+
+    lines = islice(filter(str.strip, text_lines(stream)), min(element.count, sys.maxsize))
+    for rows in batches(map(words, lines), _ROWS_AT_ONCE):
+        yield Faces.of(*whole_numbers(rows))
+
+
+def _from_bytes(stream: BinaryIO, element: Element, corners: int, endian: str) -> Iterator[Faces]:
+    data, left = b"", element.count
+    while left:
+        part = stream.read(max(_BYTES_AT_ONCE, len(data)))  # a polygon may be longer than a piece
+        data += part
+        piece, size = _alike(data, element, corners, endian, left) or _unlike(
+            data, element, corners, endian, left
+        )
+        if not (part or len(piece)):
+            return
+        yield piece
+        data, left = data[size:], left - len(piece)
+
+
+def _alike(data: bytes, element: Element, corners: int, endian: str, most: int) -> tuple[Faces, int] | None:
+    """Whole rows at the beginning of the data, and their bytes; None where their lists differ in length."""
+    fields: list[tuple[str, np.dtype, tuple[int, ...]]] = []
+    at = 0
+    for number, p in enumerate(element.properties):
+        count = 1
+        if p.length_type:
+            of_length = np.dtype(endian + TYPES[p.length_type])
+            if at + of_length.itemsize > len(data):
+                return None
+            count = int(np.frombuffer(data, of_length, 1, at)[0])
+            fields.append((f"length {number}", of_length, ()))
+            at += of_length.itemsize
+        item = np.dtype(endian + TYPES[p.type])
+        at += count * item.itemsize
+        if not 0 <= count <= at <= len(data):
+            return None
+        fields.append((str(number), item, (count,)))
+    row = np.dtype(fields)
+    rows = np.frombuffer(data, row, min(most, len(data) // row.itemsize))
+    lengths = [rows[name] for name, *_ in fields if name.startswith("length")]
+    if any((each != each[0]).any() for each in lengths):
+        return None
+    return Faces.of(rows[str(corners)]), rows.nbytes
+
+
+def _unlike(data: bytes, element: Element, corners: int, endian: str, most: int) -> tuple[Faces, int]:
+    """Whole rows at the beginning of the data, and their bytes."""
+    from ._ply_kernels import pack_rows
+
+    layout = element.layout
+    packed = np.empty(len(data), np.uint8)
+    sizes = np.empty(min(most, len(data) // layout.least), np.uint32)
+    rows, size, filled, is_negative = pack_rows(
+        np.frombuffer(data, np.uint8), *layout, endian == ">", corners, packed, sizes
+    )
+    if is_negative and not rows:
+        raise negative_list("a face")
+    item = np.dtype(endian + TYPES[element.properties[corners].type])
+    return Faces.of(packed[:filled].view(item), sizes[:rows]), size

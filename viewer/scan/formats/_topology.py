@@ -1,0 +1,22 @@
+"""What the faces of a file tell: which of its points are those of another file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from ...errors import InputError
+from ..faces import Faces, topology
+from ..points import PointCloud
+
+
+def with_topology(cloud: PointCloud, faces: Iterable[Faces]) -> PointCloud:
+    """The cloud with the topology that its faces, in pieces, give it; itself where there are none.
+
+    Damaged faces tell nothing, and cost no point.
+    """
+    try:
+        name = topology(len(cloud) + cloud.dropped, faces)
+    except (InputError, ValueError, IndexError, OverflowError):
+        return cloud
+    return cloud if name is None else replace(cloud, topology=name)
