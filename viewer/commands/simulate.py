@@ -40,7 +40,9 @@ _HINT = "Name the mesh that has them with --faces"
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d simulate`."""
-    parser.add_argument("scan", metavar="MESH|SEQUENCE", help="PLY, OBJ or NPZ with faces: a file, a folder, or a pattern")
+    parser.add_argument(
+        "scan", metavar="MESH|SEQUENCE", help="a file with faces (PLY, OBJ, NPZ), a folder, a pattern"
+    )
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
         help=f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d",
