@@ -17,7 +17,6 @@ from viewer.analysis.measure import (
     COLUMNS,
     End,
     Measurement,
-    Measurements,
     in_words,
     read,
     save,
@@ -191,72 +190,6 @@ def test_it_stays_in_space_without_points_to_follow() -> None:
     assert "surface" in str(read(on_surface, moved(2), True).fixed)
     between_frames = Measurement(made.first, measured(moved(1), 0, 1).second)
     assert "two frames" in str(read(between_frames, moved(2), True).fixed)
-
-
-# --- undo -----------------------------------------------------------------------------------
-
-
-def make(made: Measurements, measurement: Measurement) -> None:
-    for e in measurement.ends:
-        made.set_end(e)
-
-
-def test_two_ends_make_a_measurement() -> None:
-    made, wanted = Measurements(), measured(moved(0), 0, 1)
-    assert made.set_end(wanted.first) is None
-    assert (made.begun, made.all) == (wanted.first, ())
-    assert made.set_end(wanted.first) is None
-    assert (made.begun, made.all) == (wanted.first, ()), "the same place twice is no distance"
-    assert made.set_end(wanted.second) == wanted
-    assert (made.begun, made.all) == (None, (wanted,))
-
-
-def test_undo_takes_back_a_first_end_before_whole_measurements() -> None:
-    made, wanted = Measurements(), measured(moved(0), 0, 1)
-    make(made, wanted)
-    made.set_end(wanted.second)
-    made.undo()
-    assert (made.begun, made.all) == (None, (wanted,))
-    made.undo()
-    assert made.all == ()
-    made.set_end(wanted.second)
-    made.redo()
-    assert made.begun is None
-    assert made.all == (wanted,)
-
-
-def test_every_change_is_undone_and_made_again() -> None:
-    one, two = measured(moved(0), 0, 1), measured(moved(0), 0, 2)
-    made = Measurements()
-    states = [made.all]
-    for change in (lambda: make(made, one), lambda: make(made, two), lambda: made.delete(0), made.clear):
-        change()
-        states.append(made.all)
-    assert states == [(), (one,), (one, two), (two,), ()]
-    for state in states[-2::-1]:
-        made.undo()
-        assert made.all == state
-    assert not made.can_undo
-    made.undo()
-    assert made.all == ()
-    for state in states[1:]:
-        made.redo()
-        assert made.all == state
-    assert not made.can_redo
-    made.redo()
-    assert made.all == states[-1]
-
-
-def test_a_new_change_ends_what_was_undone() -> None:
-    one, two = measured(moved(0), 0, 1), measured(moved(0), 0, 2)
-    made = Measurements()
-    make(made, one)
-    made.undo()
-    make(made, two)
-    assert (made.all, made.can_redo) == ((two,), False)
-    made.undo()
-    made.clear()
-    assert made.can_redo, "clearing nothing is no change"
 
 
 # --- as a file ------------------------------------------------------------------------------

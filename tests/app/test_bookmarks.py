@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 pytest.importorskip("imgui_bundle")
 
 from viewer.app.notices import Notices
 from viewer.app.scene.bookmarks import Bookmarks
-from viewer.app.session import Bookmark, Session
+from viewer.app.session import Session
 from viewer.camera import Camera
-from viewer.errors import InputError
 
 CAMERAS = [Camera(eye=(x, 1, 5)) for x in range(3)]
 
@@ -26,7 +23,7 @@ def session() -> Session:
 def bookmarks(session: Session) -> Bookmarks:
     bookmarks = Bookmarks(session, Notices().tell)
     for camera in CAMERAS:
-        session.camera = camera
+        session.amend(camera=camera)
         bookmarks.add()
     return bookmarks
 
@@ -45,34 +42,34 @@ def test_they_are_added_under_free_names_renamed_and_deleted(session: Session, b
     bookmarks.delete(2)
     assert names(bookmarks) == ["View 1", "the left eye", "View 2"]
     assert [bookmark.camera for bookmark in bookmarks.all] == [CAMERAS[0], CAMERAS[1], CAMERAS[2]]
-    session.camera = None
+    session.amend(camera=None)
     bookmarks.add()
     assert len(bookmarks.all) == 3, "nothing to keep before there is a picture"
 
 
 def test_going_from_one_to_the_next_and_back_round_the_end(session: Session, bookmarks: Bookmarks) -> None:
-    session.pivot = (1, 2, 3)
+    session.amend(pivot=(1, 2, 3))
     seen = []
     for direction in (1, 1, -1, -1, -1):
         bookmarks.step(direction)
-        seen.append(CAMERAS.index(session.camera))
+        seen.append(CAMERAS.index(session.document.camera))
     assert seen == [0, 1, 0, 2, 1], "on from the one added last"
-    assert session.pivot is None
+    assert session.document.pivot is None
     bookmarks.rename(1, "here")
     bookmarks.step(1)
-    assert session.camera == CAMERAS[2], "a new name is no other place"
+    assert session.document.camera == CAMERAS[2], "a new name is no other place"
     bookmarks.delete(2)
     bookmarks.step(1)
-    assert session.camera == CAMERAS[0]
+    assert session.document.camera == CAMERAS[0]
     bookmarks.delete(0)
     bookmarks.step(-1)
-    assert session.camera == CAMERAS[1]
+    assert session.document.camera == CAMERAS[1]
 
 
 def test_without_any_there_is_nowhere_to_go(session: Session) -> None:
-    session.camera = CAMERAS[1]
+    session.amend(camera=CAMERAS[1])
     Bookmarks(session, Notices().tell).step(1)
-    assert session.camera == CAMERAS[1]
+    assert session.document.camera == CAMERAS[1]
 
 
 def test_each_scan_has_its_own(session: Session, bookmarks: Bookmarks) -> None:
@@ -86,17 +83,19 @@ def test_the_menu_ticks_the_one_that_is_shown(session: Session, bookmarks: Bookm
     assert [is_shown for _, _, is_shown in bookmarks.items()] == [False, False, True]
     _, go, _ = next(bookmarks.items())
     go()
-    assert session.camera == CAMERAS[0]
+    assert session.document.camera == CAMERAS[0]
 
 
-def test_they_come_back_from_json() -> None:
-    bookmark = Bookmark("left eye", Camera(eye=(1, 2, 3), projection="orthographic", height=2.0))
-    assert Bookmark.from_json(json.loads(json.dumps(bookmark.to_json()))) == bookmark
-
-
-@pytest.mark.parametrize(
-    "data", [None, [], {}, {"name": "a"}, {"name": 3, "camera": {}}, {"name": "a", "camera": {"eye": 1}}]
-)
-def test_damaged_json_is_an_input_error(data: object) -> None:
-    with pytest.raises(InputError):
-        Bookmark.from_json(data)
+def test_what_is_done_with_them_is_undone(session: Session, bookmarks: Bookmarks) -> None:
+    bookmarks.step(1)
+    bookmarks.rename(0, "front")
+    bookmarks.delete(2)
+    for name, left in (("Delete", ["front", "View 2"]), ("Rename", ["front", "View 2", "View 3"])):
+        assert session.history.undoes == f"{name} bookmark"
+        assert names(bookmarks) == left
+        session.history.undo()
+    assert session.document.camera == CAMERAS[0]
+    session.history.undo()
+    assert session.document.camera == CAMERAS[2]
+    session.history.undo()
+    assert names(bookmarks) == ["View 1", "View 2"]

@@ -13,7 +13,7 @@ pytest.importorskip("imgui_bundle")
 from imgui_bundle import imgui
 
 from viewer.app.commands import COMMANDS, MENUS, TOOLBAR, Command, Menu
-from viewer.app.keys import Keys, chord, load, write_template
+from viewer.app.keys import Keys, chord, chords, load, write_template
 from viewer.errors import InputError
 
 USUAL = {name: command.key for name, command in COMMANDS.items()}
@@ -40,8 +40,8 @@ def test_every_command_has_a_name_and_a_place_of_its_own_and_no_two_have_the_sam
         )
 
     assert sum(map(count, MENUS)) == len(COMMANDS)
-    chords = [chord(key) for key in USUAL.values() if key]
-    assert len(set(chords)) == len(chords)
+    every = [key for keys in USUAL.values() for key in chords(keys)]
+    assert len(set(every)) == len(every)
     for group in TOOLBAR:
         assert all(COMMANDS[name].short for name in group)
 
@@ -49,6 +49,7 @@ def test_every_command_has_a_name_and_a_place_of_its_own_and_no_two_have_the_sam
 def test_keys_are_read_as_they_are_written() -> None:
     assert chord("Ctrl+Shift+1") == imgui.Key.mod_ctrl | imgui.Key.mod_shift | imgui.Key._1
     assert chord("p") == chord("P") == imgui.Key.p
+    assert chords("p Ctrl+[") == [chord("p"), chord("Ctrl+[")]
     assert chord("Alt+[") == imgui.Key.mod_alt | imgui.Key.left_bracket
 
 
@@ -91,6 +92,8 @@ def test_two_commands_can_swap_keys(file: Path) -> None:
         ('[keys]\nplay = "Hyper+F7"\nfit = "F8"', "unknown modifier key 'Hyper'"),
         ('[keys]\nplay = 7\nfit = "F8"', "the keys of 'play' are not text"),
         ('[keys]\nfit = "F8"\nplay = "R"', "R is to do both"),
+        ('[keys]\nfit = "F8"\nplay = "F7 R"', "R is to do both"),
+        ('[keys]\nfit = "F8"\nplay = "F7 Ctrl"', "unknown key 'Ctrl'"),
         ('[keys]\nfit = "F8"\nplay = "f8"', "f8 is to do both 'fit' and 'play'"),
         ('[keys]\nfit = "F8"\n[colours]\n', "unknown table 'colours'"),
     ],

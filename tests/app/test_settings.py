@@ -18,10 +18,11 @@ from viewer.app import settings
 from viewer.app.output.export_plan import Choices
 from viewer.app.place import Place, reachable
 from viewer.app.playing.player import Pace
-from viewer.app.session import Bookmark, Left, Session, known_as
+from viewer.app.session import Left, Session, known_as
 from viewer.app.settings import Keeper, Settings, load, save
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.document.document import Bookmark
 from viewer.errors import InputError
 from viewer.look import Look
 from viewer.output.marks import Marks
@@ -168,8 +169,8 @@ def test_whatever_stands_in_the_file_some_settings_come_of_it(data: st.DataObjec
 
 def test_a_session_begins_where_the_last_one_ended() -> None:
     session = FULL.session("/scans/b", "+y")
-    assert (session.index, session.camera, session.unit) == (4, CAMERA, "cm")
-    assert (session.backend, session.params["points"].point_size) == ("surfels", 7)
+    assert (session.index, session.document.camera, session.document.unit) == (4, CAMERA, "cm")
+    assert (session.document.backend, session.document.params["points"].point_size) == ("surfels", 7)
     kept = Settings.of(session)
     for name in ("backend", "params", "look", "pace", "places"):
         assert getattr(kept, name) == getattr(FULL, name), name
@@ -177,15 +178,16 @@ def test_a_session_begins_where_the_last_one_ended() -> None:
 
 def test_the_up_axis_of_the_command_line_holds() -> None:
     session = FULL.session("/scans/b", "+z")
-    assert session.camera is None, "it stood upright along another axis"
-    assert session.unit == "cm"
-    assert session.look.up == "+z"
+    assert session.document.camera is None, "it stood upright along another axis"
+    assert session.document.unit == "cm"
+    assert session.document.look.up == "+z"
     assert changed(lambda data: data["look"].update(up="-x", low=3, high=4)).look == FULL.look
 
 
 def test_scans_are_known_by_their_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    session = Session("one.ply", index=3)
+    session = Session("one.ply")
+    session.index = 3
     session.leave()
     session = Settings.of(session).session(str(tmp_path / "one.ply"), "+y")
     assert session.index == 3

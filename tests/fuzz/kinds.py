@@ -15,9 +15,10 @@ import lzf
 import numpy as np
 
 from viewer.app import keys, settings
-from viewer.app.session import Bookmark, Left
+from viewer.app.session import Left
 from viewer.backends import backend, backends
 from viewer.camera import Camera
+from viewer.document.document import Bookmark
 from viewer.document.recording import Entry, Recording
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, shared_renderer

@@ -5,12 +5,16 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from imgui_bundle import imgui
+
 from ..document.anonymous import in_place
+from ..document.document import Document
+from ..document.part import Part
 from ..document.recording import Entry
 from ..errors import InputError, Scan4DError
 from ..folders import user_folder
@@ -37,7 +41,7 @@ from .scene.pointed import Pointer
 from .scene.rendering import Rendering
 from .scene.steering import Steering
 from .scene.viewport import Viewport
-from .session import Left, known_as
+from .session import Left, Session, known_as
 from .settings import Keeper, Settings
 from .tools.measuring import Measuring
 from .window import Window
@@ -73,7 +77,7 @@ class App:
     ) -> None:
         self.scans: Scans = Scans(self, scans, remembered.recent)
         self.browser: Browser = Browser(self)
-        self.session = remembered.session(scans[0], up)
+        self.session: Session = remembered.session(scans[0], up)
         self.theme = remembered.theme
         self.notices = Notices()
         self.failures = Failures(self.note)
@@ -109,6 +113,31 @@ class App:
     def note(self, text: str) -> None:
         """Tell the user something."""
         self.notices.tell(text)
+
+    @property
+    def document(self) -> Document:
+        """What the user has chosen and made for the open scan."""
+        return self.session.document
+
+    def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:
+        """Change the document: some fields, and what tools keep.
+
+        name: of the step, such as "Delete bookmark". merge: with the step before where that had this key and
+        has not come to an end.
+        """
+        self.session.change(name, *parts, merge=merge, **fields)
+
+    def undo(self) -> None:
+        """Take back the last change of the document; first of all a measurement that was begun."""
+        if self.measuring.begun is not None:
+            self.measuring.begun = None
+        else:
+            self.session.history.undo()
+
+    def redo(self) -> None:
+        """Make the change again that was undone last."""
+        self.measuring.begun = None
+        self.session.history.redo()
 
     def quit(self) -> None:
         """Close the window."""
@@ -166,12 +195,12 @@ class App:
     @property
     def unit(self) -> str:
         """The scan's unit of length: as the user calls it, else as the scan tells, else "units"."""
-        return self.session.unit or self.playback.timeline.unit
+        return self.document.unit or self.playback.timeline.unit
 
     @property
     def up(self) -> str:
         """The scan's up axis: as the command line or the panel has it."""
-        return self.session.look.up
+        return self.document.look.up
 
     @property
     def _keys_file(self) -> Path:
@@ -219,12 +248,12 @@ class App:
     def _choose_prepared(self) -> None:
         """Go back to what was drawn before, or to plain points."""
         if self.viewport.request is not None:
-            drawn, chosen = self.viewport.request.look, self.session.look
+            drawn, chosen = self.viewport.request.look, self.document.look
             request = self.viewport.without_preparing(self.viewport.request)
             look = request.look
             if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
                 look = replace(look, color_by=chosen.color_by)
-            self.session.backend, self.session.look = str(request.backend), look
+            self.change("Cancel preparing", backend=str(request.backend), look=look)
 
     @property
     def hash(self) -> str | None:
@@ -233,12 +262,13 @@ class App:
 
     def show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""
-        session, camera, look = self.session, entry.camera, entry.look
+        camera, look = entry.camera, entry.look
         if entry.anonymous:
             camera, look = in_place(camera, look, pose)
         self.seek(entry.pose)
-        session.camera, session.pivot, session.look = camera, None, look
-        session.backend, session.params[entry.backend] = entry.backend, entry.params
+        shown = replace(self.document, camera=camera, pivot=None, look=look, backend=entry.backend)
+        shown = shown.with_params(entry.backend, entry.params)
+        self.session.history.change("Replay", shown, merge="replay")
         self.viewport.rest()
         self.window.touch()
         log.debug("replays frame %d", entry.pose)
@@ -258,6 +288,11 @@ class App:
     def moving(self) -> bool:
         """Whether the scan plays or the camera moves."""
         return self.playback.player.playing or self.steering.moves
+
+    def settle(self, now: float) -> None:
+        """End the step of the history that a drag or typing is, once it is over. now: by the clock."""
+        if self.steering.rests(now) and self.capture.replaying is None and not imgui.is_any_item_active():
+            self.session.history.settle()
 
     def take_opened(self) -> None:
         """Show the scan that has been opened, where one has."""
@@ -280,8 +315,10 @@ class App:
         self._messages_read = 0
         self.window.title = f"{timeline.name} - Scan4D"
         self.scans.opened(self.session.scan)
-        self.session.unit = self._unit or self.session.unit
+        if self._unit:
+            self.session.amend(unit=self._unit)
         self.steering.begin_scan()
+        self.measuring.begun = None
         return Playback(timeline, self.session)
 
     def pass_on_messages(self) -> None:

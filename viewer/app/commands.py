@@ -26,8 +26,9 @@ def _always(app: App) -> bool:
 class Command:
     """Something to do. name: in the file of keys. title: in menus. short: on the toolbar.
 
-    key: its usual keys, such as "Ctrl+1"; empty: none. repeats: again and again while they are held.
-    is_on: whether to tick it, None for what is not on or off. can: whether it can be done now.
+    key: its usual keys, such as "Ctrl+1", several with a space between; empty: none. repeats: again and again
+    while they are held. is_on: whether to tick it, None for what is not on or off. can: whether it can be
+    done now. title_now: what the menu says where that changes.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Command:
     is_on: Callable[[App], bool] | None = None
     can: Callable[[App], bool] = _always
     short: str = ""
+    title_now: Callable[[App], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -65,24 +67,24 @@ def _has_scans(app: App) -> bool:
 
 
 def _has_camera(app: App) -> bool:
-    return app.session.camera is not None
+    return app.document.camera is not None
 
 
 def _has_bookmarks(app: App) -> bool:
-    return bool(app.session.bookmarks)
+    return bool(app.document.bookmarks)
 
 
 def _can_undo(app: App) -> bool:
-    return app.measuring.here.can_undo
+    return app.measuring.begun is not None or app.session.history.undoes is not None
 
 
 def _can_redo(app: App) -> bool:
-    return app.measuring.here.can_redo
+    return app.session.history.redoes is not None
 
 
 def _measured(name: str, title: str, act: Callable[[App], None]) -> Command:
     """Does something with all measurements."""
-    return Command(f"{name}_measurements", title, act, can=lambda app: bool(app.measuring.here.all))
+    return Command(f"{name}_measurements", title, act, can=lambda app: bool(app.measuring.made.all))
 
 
 def _pace(name: str, title: str, key: str) -> Command:
@@ -152,6 +154,18 @@ _FILE = Menu("File", (
         ),
     ),
     (Command("quit", "Quit", lambda app: app.quit(), "Ctrl+Q"),),
+))  # fmt: skip
+_EDIT = Menu("Edit", (
+    (
+        Command(
+            "undo", "Undo", lambda app: app.undo(), "Ctrl+Z", repeats=True, can=_can_undo,
+            title_now=lambda app: f"Undo {app.session.history.undoes or ''}",
+        ),
+        Command(
+            "redo", "Redo", lambda app: app.redo(), "Ctrl+Y Ctrl+Shift+Z", repeats=True, can=_can_redo,
+            title_now=lambda app: f"Redo {app.session.history.redoes or ''}",
+        ),
+    ),
 ))  # fmt: skip
 _TURNTABLE = Menu("Turntable", (
     (
@@ -243,13 +257,11 @@ _MEASURING = (
         "measure", "Measure", lambda app: app.measuring.toggle(), "M",
         is_on=lambda app: app.measuring.active, can=_has_camera,
     ),
-    Command("undo", "Undo measuring", lambda app: app.measuring.here.undo(), "Ctrl+Z", can=_can_undo),
-    Command("redo", "Redo measuring", lambda app: app.measuring.here.redo(), "Ctrl+Y", can=_can_redo),
     Menu("Measurements", (
         (
             _measured("copy", "Copy as table", lambda app: app.measuring.copy()),
             _measured("save", "Save CSV...", lambda app: app.measuring.ask_to_save()),
-            _measured("clear", "Clear", lambda app: app.measuring.here.clear()),
+            _measured("clear", "Clear", lambda app: app.measuring.clear()),
         ),
     )),
 )  # fmt: skip
@@ -273,7 +285,7 @@ _HELP = Menu("Help", (
         Command("about", "About", lambda app: app.help.toggle("About")),
     ),
 ))  # fmt: skip
-MENUS = (_FILE, _VIEW, _TOOLS, _HELP)
+MENUS = (_FILE, _EDIT, _VIEW, _TOOLS, _HELP)
 
 
 def _commands(entry: Any) -> Iterator[Command]:

@@ -35,7 +35,8 @@ _KEYS = {
 _HEAD = """\
 # The keys of Scan4D. Take the '#' away from a line and change its keys; "" is none. Scan4D reads this
 # when it starts. Keys: letters, digits, F1 to F12, {named};
-# before them Ctrl+, Shift+, Alt+. Escape ends what is going on and cannot be changed.
+# before them Ctrl+, Shift+, Alt+; between several a space. Escape ends what is going on and cannot
+# be changed.
 
 [keys]
 """
@@ -55,12 +56,17 @@ def chord(text: str) -> int:
     return value
 
 
+def chords(text: str) -> list[int]:
+    """The chords of keys with a space between, such as "Ctrl+Y Ctrl+Shift+Z". Raises InputError."""
+    return [chord(keys) for keys in text.split()]
+
+
 class Keys:
     """The keys of every command. of: command's name -> its keys as text, empty for none."""
 
     def __init__(self, changes: Mapping[str, str] | None = None) -> None:
         self.of = {name: command.key for name, command in COMMANDS.items()} | dict(changes or {})
-        self._chords = [(COMMANDS[name], chord(text)) for name, text in self.of.items() if text]
+        self._chords = [(COMMANDS[name], keys) for name, text in self.of.items() for keys in chords(text)]
 
     def hint(self, name: str) -> str:
         """A command's title, and its keys where it has some."""
@@ -112,8 +118,7 @@ def _checked(given: Mapping[str, Any]) -> tuple[dict[str, str], list[InputError]
                 raise InputError(f"unknown command '{shortened(name)}'", hint=hint)
             if not isinstance(text, str):
                 raise InputError(f"the keys of '{name}' are not text", hint=f'Write {name} = "Ctrl+K"')
-            if text:
-                chord(text)
+            chords(text)
             changes[name] = text
         except InputError as problem:
             problems.append(problem)
@@ -124,9 +129,8 @@ def _without_clashes(changes: dict[str, str], problems: list[InputError]) -> dic
     """Leave out changes, last first, until no keys do two things; the usual keys have none."""
     while True:
         taken: dict[int, str] = {}
-        for name, text in ({n: c.key for n, c in COMMANDS.items()} | changes).items():
-            if not text:
-                continue
+        texts = {n: c.key for n, c in COMMANDS.items()} | changes
+        for name, text in ((name, one) for name, several in texts.items() for one in several.split()):
             other = taken.setdefault(chord(text), name)
             if other != name:
                 guilty = next(n for n in reversed(changes) if n in (name, other))

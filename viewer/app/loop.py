@@ -91,6 +91,7 @@ class Loop:
             ("Playing", lambda: app.playback.advance(now)),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
+            ("Keeping the history", lambda: app.settle(now)),
             ("Counting", lambda: app.counting.advance(app.viewport, not app.moving, now)),
         ):
             with app.failures.told(name):
@@ -131,7 +132,7 @@ class Loop:
         app.steering.settle(pose)
         playing, held = app.playback.player.playing, app.steering.moves
         app.rendering.tell_missing(pose)
-        drew = app.viewport.draw(app.session.request(pose), playing=playing, held=held)
+        drew = app.viewport.draw(app.document.request(pose), playing=playing, held=held)
         if drew and app.viewport.problem is not None:
             app.failures.tell("Drawing", app.viewport.problem)
         elif drew:

@@ -66,7 +66,8 @@ def _draw_button(app: App, command: Command) -> None:
 def _draw(app: App, entry: Command | Listing | Menu) -> None:
     if isinstance(entry, Command):
         is_on = entry.is_on is not None and entry.is_on(app)
-        if imgui.menu_item(entry.title, app.keys.of[entry.name], is_on, entry.can(app))[0]:
+        title = entry.title_now(app) if entry.title_now else entry.title
+        if imgui.menu_item(f"{title}###{entry.name}", app.keys.of[entry.name], is_on, entry.can(app))[0]:
             with app.failures.told(entry.title):
                 entry.act(app)
     elif imgui.begin_menu(entry.title):

@@ -40,9 +40,9 @@ def draw(app: App) -> None:
         if _section("Renderer"):
             _draw_renderer(app, pose)
         if _section("Look"):
-            app.session.look = widgets.edit(app.session.look, {"color_by": _colors(app, pose)})
+            app.rendering.edit_look(widgets.edit(app.document.look, {"color_by": _colors(app, pose)}))
             _draw_projection(app)
-        if _section("Bookmarks", is_open=bool(app.session.bookmarks)):
+        if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
             app.bookmarks.draw(app)
         if app.measuring.to_show:
             imgui.set_next_item_open(True)
@@ -80,21 +80,20 @@ def _draw_scans(app: App) -> None:
 
 
 def _draw_renderer(app: App, pose: Pose) -> None:
-    session = app.session
-    name, _ = session.chosen(pose)
+    name, _ = app.document.chosen(pose)
     imgui.set_next_item_width(-1)
     chosen = widgets.choose("backend", name, list(backends()), {n: b.title for n, b in backends().items()})
     imgui.set_item_tooltip(backend(name).help)
     if chosen != name:
-        session.backend = chosen
-    name, params = session.chosen(pose)
-    session.params[name] = widgets.edit(params)
+        app.rendering.choose(chosen)
+    _, params = app.document.chosen(pose)
+    app.rendering.edit_params(widgets.edit(params))
 
 
 def _colors(app: App, pose: Pose) -> dict[str, str]:
     """What can give colours, and the title of each: also what is chosen although the frame lacks it."""
     there = [*COLOR_BY, *pose.cloud.scalars]
-    look = app.session.look
+    look = app.document.look
     titles = {name: printable(name) for name in there}
     if look.color_by in there:
         return titles
@@ -104,7 +103,7 @@ def _colors(app: App, pose: Pose) -> dict[str, str]:
 
 def _draw_projection(app: App) -> None:
     widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth")
-    now = app.session.camera.projection if app.session.camera else PROJECTIONS[0]
+    now = app.document.camera.projection if app.document.camera else PROJECTIONS[0]
     chosen = widgets.choose("projection", now, PROJECTIONS)
     if chosen != now:
         app.steering.project(chosen)

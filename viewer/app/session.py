@@ -1,43 +1,23 @@
-"""What the user has chosen, as plain data."""
+"""What the window shows: the document of the open scan with its history, the frame, and how it plays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..camera import Camera
-from ..errors import InputError
+from ..document.document import Bookmark, Document
+from ..document.history import History
+from ..document.part import Part
 from ..files import absolute
-from ..frame import Request, choose
-from ..geometry import Vector
-from ..look import Look, drawable
 from ..scan.open import DEMO
-from ..scan.pose import Pose
 from .playing.player import Pace
 
 
 @dataclass(frozen=True)
-class Bookmark:
-    """A camera by a name that the user gave it."""
-
-    name: str
-    camera: Camera
-
-    @classmethod
-    def from_json(cls, data: Any) -> Bookmark:
-        """The bookmark of a JSON object as `to_json` gives it; raises InputError."""
-        if not isinstance(data, dict) or not isinstance(data.get("name"), str) or "camera" not in data:
-            raise InputError("a bookmark is a JSON object with name and camera")
-        return cls(data["name"], Camera.from_json(data["camera"]))
-
-    def to_json(self) -> dict[str, Any]:
-        """A JSON object."""
-        return {"name": self.name, "camera": self.camera.to_json()}
-
-
-@dataclass(frozen=True)
 class Left:
-    """How a scan was left: the fields of `Session` that belong to one scan and come back with it."""
+    """How a scan was left: what of it comes back."""
 
     index: int = 0
     camera: Camera | None = None
@@ -50,59 +30,68 @@ def known_as(scan: str) -> str:
     return scan if scan == DEMO else absolute(scan)
 
 
-@dataclass
 class Session:
-    """The choices of the user.
+    """The open scan, and those that were open.
 
-    scan: as the user named it. index: the frame. camera: None until a first pose is there to
-    fit it to. pivot: what orbiting turns about, scan units; None: the camera's target.
-    backend: None for the scan's default. params: backend name -> its `Params`, kept when
-    another backend is chosen. pace: how the scan plays.
-    unit: what the user calls the scan's unit of length, None where the scan tells or nobody does.
-    bookmarks: of the scan.
+    scan: as the user named it. index: the frame. history: of the scan's document. pace: how the scan plays.
     places: scan, as `known_as` has it -> how it was left; the one left last at the end.
     """
 
-    scan: str
-    index: int = 0
-    camera: Camera | None = None
-    pivot: Vector | None = None
-    backend: str | None = None
-    params: dict[str, Any] = field(default_factory=dict)
-    look: Look = field(default_factory=Look)
-    pace: Pace = field(default_factory=Pace)
-    unit: str | None = None
-    bookmarks: tuple[Bookmark, ...] = ()
-    places: dict[str, Left] = field(default_factory=dict)
+    def __init__(
+        self,
+        scan: str,
+        document: Document | None = None,
+        pace: Pace | None = None,
+        places: Mapping[str, Left] | None = None,
+    ) -> None:
+        """document: to begin with, where the scan is in none of the places."""
+        self.scan = scan
+        self.index = 0
+        self.history = History(document or Document())
+        self.pace = pace or Pace()
+        self.places = dict(places or {})
+        self._histories: dict[str, History] = {}
+        self._find_again()
 
-    def chosen(self, pose: Pose) -> tuple[str, Any]:
-        """The backend that draws this pose, by name, and its parameters."""
-        name, defaults = choose(pose.cloud, self.backend)
-        return name, self.params.setdefault(name, defaults)
+    @property
+    def document(self) -> Document:
+        """The document of the open scan, as it is now."""
+        return self.history.document
 
-    def request(self, pose: Pose) -> Request:
-        """The picture to draw of a pose, in other colours where it lacks the scalar that gives them.
+    def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:
+        """Change the document: some fields, and what tools keep. name, merge: as for `History.change`."""
+        changed = replace(self.document, **fields)
+        for part in parts:
+            changed = changed.with_part(part)
+        self.history.change(name, changed, merge)
 
-        The camera must be set.
-        """
-        assert self.camera is not None
-        name, params = self.chosen(pose)
-        return Request(pose, self.camera, name, params, drawable(self.look, pose.cloud.scalars))
+    def amend(self, **fields: Any) -> None:
+        """Set fields of the document that no user changed."""
+        self.history.amend(replace(self.document, **fields))
 
     def turn_to(self, scan: str) -> None:
-        """Go to another scan, where it was left."""
+        """Go to another scan, where it was left; what can be undone of it stays."""
         self.leave()
-        self.scan, self.pivot = scan, None
-        self.find_again()
+        self._histories[known_as(self.scan)] = self.history
+        self.scan, self.index = scan, 0
+        self.history = self._histories.get(known_as(scan)) or History(self.document.for_another())
+        self._find_again()
 
     def leave(self) -> None:
         """Note how the scan is now, as the one left last."""
-        name = known_as(self.scan)
+        name, now = known_as(self.scan), self.document
         self.places.pop(name, None)
-        self.places[name] = Left(**{of.name: getattr(self, of.name) for of in fields(Left)})
+        self.places[name] = Left(self.index, now.camera, now.unit, now.bookmarks)
 
-    def find_again(self) -> None:
+    def _find_again(self) -> None:
         """Take up the scan as it was left."""
-        left = self.places.get(known_as(self.scan), Left())
-        for of in fields(Left):
-            setattr(self, of.name, getattr(left, of.name))
+        if (left := self.places.get(known_as(self.scan))) is not None:
+            self.index = left.index
+            self.amend(camera=left.camera, unit=left.unit, bookmarks=left.bookmarks)
+
+
+def edit_name(before: Any, after: Any) -> str:
+    """What to call a change of some parameters: "Change colour map"; of several "Change parameters"."""
+    changed = [name for name in vars(after) if getattr(after, name) != getattr(before, name)]
+    words = changed[0].replace("_", " ").replace("color", "colour") if len(changed) == 1 else "parameters"
+    return f"Change {words}"

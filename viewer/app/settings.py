@@ -17,6 +17,7 @@ import numpy as np
 
 from ..backends import backend
 from ..camera import Camera
+from ..document.document import Bookmark, Document
 from ..errors import InputError
 from ..files import parsed_json, read_text, whole_file
 from ..geometry import up_vector
@@ -28,7 +29,7 @@ from .output.export_plan import Choices
 from .place import Place
 from .playing.player import Pace
 from .scene import legend, turntable
-from .session import Bookmark, Left, Session
+from .session import Left, Session
 
 T = TypeVar("T")
 FORMAT = 1
@@ -73,20 +74,17 @@ class Settings:
     def of(cls, session: Session, **others: Any) -> Settings:
         """What a session holds, and other fields by name."""
         session.leave()
+        now = session.document
         return cls(
-            backend=session.backend, params=dict(session.params), look=session.look, pace=session.pace,
+            backend=now.backend, params=dict(now.params), look=now.look, pace=session.pace,
             places=dict(session.places), **others,
         )  # fmt: skip
 
     def session(self, scan: str, up: str) -> Session:
         """A session that begins with a scan, as it was left. up: the up axis; other cameras are forgotten."""
         places = {name: _under(left, up) for name, left in self.places.items()}
-        session = Session(
-            scan, backend=self.backend, params=dict(self.params), look=replace(self.look, up=up),
-            pace=self.pace, places=places,
-        )  # fmt: skip
-        session.find_again()
-        return session
+        begun = Document(look=replace(self.look, up=up), backend=self.backend, params=self.params)
+        return Session(scan, begun, self.pace, places)
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object."""
@@ -284,6 +282,12 @@ def _left(data: Any) -> Left:
     return Left(**_usable(data, _OF_A_SCAN))
 
 
+def _bookmark(data: Any) -> Bookmark:
+    if not isinstance(data["name"], str):
+        raise InputError("a bookmark's name is a text")
+    return Bookmark(data["name"], Camera.from_json(data["camera"]))
+
+
 def _places(data: Any) -> dict[str, Left]:
     places = {}
     for name, left in data.items():
@@ -312,5 +316,5 @@ _OF_A_SCAN: dict[str, Callable[[Any], Any]] = {
     "index": _index,
     "camera": Camera.from_json,
     "unit": _text,
-    "bookmarks": lambda data: tuple(Bookmark.from_json(bookmark) for bookmark in data),
+    "bookmarks": lambda data: tuple(_bookmark(bookmark) for bookmark in data),
 }

@@ -53,16 +53,23 @@ class Document:
         return found if isinstance(found, kind) else kind()
 
     def with_part(self, part: Part) -> Document:
-        """The document in which a tool keeps this."""
-        return replace(self, parts={**self.parts, part.part_name: part})
+        """The document in which a tool keeps this; nothing where that is its defaults."""
+        others = {name: other for name, other in self.parts.items() if name != part.part_name}
+        return replace(self, parts=others if part == type(part)() else {**others, part.part_name: part})
 
     def with_params(self, backend: str, params: Any) -> Document:
         """The document with other parameters of a backend."""
         return replace(self, params={**self.params, backend: params})
 
+    def for_another(self) -> Document:
+        """The document that a scan begins with which is opened after this one: drawn alike, all else anew."""
+        return Document(look=self.look, backend=self.backend, params=self.params)
+
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""
-        name, defaults = choose(pose.cloud, self.backend)
+        name, defaults = choose(pose.cloud)
+        if self.backend not in (None, name):
+            name, defaults = choose(pose.cloud, self.backend)
         return name, self.params.get(name, defaults)
 
     def request(self, pose: Pose) -> Request:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from imgui_bundle import ImVec2
 
 from viewer.analysis.measure import End, Measurement, Reading
-from viewer.app.tools.measuring import csv_file, snap_words
+from viewer.app.session import Session
+from viewer.app.tools.measuring import Measuring, csv_file, snap_words
 from viewer.app.tools.measuring.overlay import ViewPlace
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -31,6 +34,26 @@ def end(id: int | None) -> End:
 )
 def test_it_says_what_the_ends_snapped_to(ids: tuple[int | None, int | None], words: str) -> None:
     assert snap_words(Reading(Measurement(end(ids[0]), end(ids[1])), None)) == words
+
+
+def test_two_ends_make_a_measurement_of_the_document() -> None:
+    session = Session("scan")
+    measuring: Any = Measuring(session)  # which has of the app what is needed here
+    first, second = end(3), replace(end(4), position=(1, 0, 0))
+    measuring.set_end(first)
+    assert (measuring.begun, measuring.made.all) == (first, ())
+    measuring.set_end(first)
+    assert (measuring.begun, measuring.made.all) == (first, ()), "the same place twice is no distance"
+    measuring.set_end(second)
+    assert (measuring.begun, measuring.made.all) == (None, (Measurement(first, second),))
+    measuring.clear()
+    assert measuring.made.all == ()
+    for name, count in (("Clear measurements", 1), ("Measure", 0)):
+        assert session.history.undoes == name
+        session.history.undo()
+        assert len(measuring.made.all) == count
+    measuring.clear()
+    assert session.history.redoes is not None, "clearing nothing is no change"
 
 
 @pytest.mark.parametrize(

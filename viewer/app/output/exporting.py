@@ -96,7 +96,7 @@ class Exporting:
             return
         self.is_open, self.replaced = False, []
         times = app.playback.timeline.times
-        recording = export_plan.recording(choices, shown, self.marks, times, app.session.pivot)
+        recording = export_plan.recording(choices, shown, self.marks, times, app.document.pivot)
         out, rate, anonymous = choices.out(), choices.rate(times), choices.anonymous
         numbers = choices.numbers(self.count)
         task = self.task = Task(f"Exporting {choices.name}")

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
+from ...document.document import Bookmark
 from .. import widgets
-from ..session import Bookmark, Session
+from ..session import Session
 
 if TYPE_CHECKING:
     from ..app import App
@@ -22,7 +23,7 @@ _LONGEST = 60  # letters of a name
 
 
 class Bookmarks:
-    """What the user does with `Session.bookmarks`. tell: takes messages.
+    """What the user does with the bookmarks of the document. tell: takes messages.
 
     editing: the one whose name is being typed, None while none is.
     """
@@ -37,22 +38,22 @@ class Bookmarks:
     @property
     def all(self) -> tuple[Bookmark, ...]:
         """Those of the scan that is shown."""
-        return self._session.bookmarks
+        return self._session.document.bookmarks
 
     def add(self) -> None:
         """Keep the camera under the next free name."""
-        camera = self._session.camera
+        camera = self._session.document.camera
         if camera is not None:
             names = {bookmark.name for bookmark in self.all}
             name = next(name for n in count(1) if (name := f"View {n}") not in names)
             self._last = Bookmark(name, camera)
-            self._session.bookmarks = *self.all, self._last
+            self._session.change("Add bookmark", bookmarks=(*self.all, self._last))
             self._tell(f"Bookmark '{name}' added.")
 
     def go_to(self, bookmark: Bookmark) -> None:
         """Look from there."""
         self._last = bookmark
-        self._session.camera, self._session.pivot = bookmark.camera, None
+        self._session.change("Go to bookmark", camera=bookmark.camera, pivot=None)
 
     def step(self, direction: int) -> None:
         """Go to the next one for 1, the previous for -1, round the end."""
@@ -66,12 +67,14 @@ class Bookmarks:
         if name:
             named = replace(self.all[number], name=name)
             self._last = named if self._last == self.all[number] else self._last
-            self._session.bookmarks = *self.all[:number], named, *self.all[number + 1 :]
+            renamed = *self.all[:number], named, *self.all[number + 1 :]
+            self._session.change("Rename bookmark", bookmarks=renamed)
 
     def delete(self, number: int) -> None:
         """Forget one."""
         self._tell(f"Bookmark '{self.all[number].name}' deleted.")
-        self._session.bookmarks = *self.all[:number], *self.all[number + 1 :]
+        left = *self.all[:number], *self.all[number + 1 :]
+        self._session.change("Delete bookmark", bookmarks=left)
 
     def items(self) -> Iterator[Item]:
         """For a menu."""
@@ -80,7 +83,7 @@ class Bookmarks:
 
     def is_shown(self, bookmark: Bookmark) -> bool:
         """Whether the view is that of a bookmark."""
-        return self._session.camera == bookmark.camera
+        return self._session.document.camera == bookmark.camera
 
     # --- the section of the panel -----------------------------------------------------
 
@@ -96,7 +99,7 @@ class Bookmarks:
             imgui.pop_id()
         if deleted is not None:
             self.delete(deleted)
-        imgui.begin_disabled(self._session.camera is None)
+        imgui.begin_disabled(self._session.document.camera is None)
         if imgui.button(f"{icons.ICON_FA_PLUS}  Add"):
             self.add()
         imgui.end_disabled()

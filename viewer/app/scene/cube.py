@@ -38,7 +38,7 @@ class OrientationCube:
 
     def is_drawn(self, app: App) -> bool:
         """Whether it can be seen."""
-        return self.is_shown and not app.full_view.is_on and app.session.camera is not None
+        return self.is_shown and not app.full_view.is_on and app.document.camera is not None
 
     def toggle(self) -> None:
         """Show it, or hide it."""
@@ -58,7 +58,7 @@ def place(width: float, height: float, em: float) -> tuple[float, float, float] 
 
 def take_mouse(app: App, size: ImVec2) -> None:
     """Let the mouse click and drag the cube; declare this before the view, so that it comes first."""
-    cube, camera = app.steering.cube, app.session.camera
+    cube, camera = app.steering.cube, app.document.camera
     where = place(size.x, size.y, imgui.get_font_size())
     cube.under_mouse = None
     if camera is None or where is None or not cube.is_drawn(app):
@@ -83,14 +83,14 @@ def take_mouse(app: App, size: ImVec2) -> None:
         app.steering.turntable.stop()
         # The cube's surface follows the mouse.
         delta = imgui.get_io().mouse_delta / (2 * reach)
-        app.session.camera = navigation.orbit(camera, delta.x, -delta.y, app.session.pivot)
+        app.steering.move("Turn view", navigation.orbit(camera, delta.x, -delta.y, app.document.pivot))
     elif under is not None:
         imgui.set_item_tooltip(f"Look from {orientation.name(under)}")
 
 
 def draw(app: App, size: ImVec2) -> None:
     """Draw it over the view in the current ImGui window. size: of the view."""
-    camera, em = app.session.camera, imgui.get_font_size()
+    camera, em = app.document.camera, imgui.get_font_size()
     where = place(size.x, size.y, em)
     if camera is None or where is None or not app.steering.cube.is_drawn(app):
         return

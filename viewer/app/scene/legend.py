@@ -27,10 +27,10 @@ def toggle(app: App, name: str) -> None:
 def draw(app: App, size: ImVec2) -> None:
     """Draw the marks of the picture into the current ImGui window, the 3D view. size: of the view."""
     request, surface = app.viewport.request, app.viewport.surface
-    if app.session.camera is None or request is None or surface is None or not app.viewport.is_there:
+    if app.document.camera is None or request is None or surface is None or not app.viewport.is_there:
         return
     pose, count = request.pose, len(app.playback.timeline)
-    told = Legend(app.marks, app.session.camera, surface.look, app.unit, pose.index, count, float(pose.time))
+    told = Legend(app.marks, app.document.camera, surface.look, app.unit, pose.index, count, float(pose.time))
     corner = imgui.get_window_pos()
     canvas = _View(corner)
     marks.draw(canvas, (size.x, size.y), told, surface.color_range)

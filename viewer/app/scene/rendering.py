@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...backends import backends
-from ...look import drawable
+from ...look import Look, drawable
 from ...scan.pose import Pose
+from ..session import edit_name
 from . import levels
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Rendering:
-    """Changes `session.backend` and `session.params`."""
+    """Changes backend, parameters and look of the document."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -22,9 +23,9 @@ class Rendering:
 
     def tell_missing(self, pose: Pose) -> None:
         """Tell, once a scan, that a frame has not the scalar that the user chose to colour by."""
-        session = self._app.session
-        missed = session.scan, session.look.color_by
-        if missed not in self._missed and drawable(session.look, pose.cloud.scalars) != session.look:
+        look = self._app.document.look
+        missed = self._app.session.scan, look.color_by
+        if missed not in self._missed and drawable(look, pose.cloud.scalars) != look:
             self._missed.add(missed)
             chosen = missed[1]
             name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"
@@ -37,11 +38,11 @@ class Rendering:
     def backend(self) -> str | None:
         """The name of the backend that draws; None before the first pose."""
         pose = self._app.playback.pose
-        return None if pose is None else self._app.session.chosen(pose)[0]
+        return None if pose is None else self._app.document.chosen(pose)[0]
 
     def choose(self, name: str) -> None:
         """Draw with a backend."""
-        self._app.session.backend = name
+        self._app.change(f"Choose {backends()[name].title}", backend=name)
 
     def step(self, by: int) -> None:
         """Draw with the next backend, 1, or the one before, -1."""
@@ -53,12 +54,20 @@ class Rendering:
     def _params(self) -> Any:
         """The backend's parameters; None before the first pose."""
         pose = self._app.playback.pose
-        return None if pose is None else self._app.session.chosen(pose)[1]
+        return None if pose is None else self._app.document.chosen(pose)[1]
 
-    @_params.setter
-    def _params(self, params: Any) -> None:
-        if self.backend is not None:
-            self._app.session.params[self.backend] = params
+    def edit_params(self, params: Any) -> None:
+        """Draw with other parameters of the backend; edits of one without a pause are one step."""
+        if self.backend is not None and params != self._params:
+            name = edit_name(self._params, params)
+            every = {**self._app.document.params, self.backend: params}
+            self._app.change(name, merge=name, params=every)
+
+    def edit_look(self, look: Look) -> None:
+        """Draw with another look; likewise."""
+        if look != self._app.document.look:
+            name = edit_name(self._app.document.look, look)
+            self._app.change(name, merge=name, look=look)
 
     @property
     def levels(self) -> dict[int, bool]:
@@ -67,7 +76,7 @@ class Rendering:
 
     def toggle_level(self, number: int) -> None:
         """Switch one of the backend's pyramid levels on or off."""
-        self._params = levels.toggled(self._params, number)
+        self.edit_params(levels.toggled(self._params, number))
 
     @property
     def is_filling(self) -> bool:
@@ -76,4 +85,4 @@ class Rendering:
 
     def toggle_filling(self) -> None:
         """Switch all levels that fill holes on or off."""
-        self._params = levels.with_filling(self._params, not self.is_filling)
+        self.edit_params(levels.with_filling(self._params, not self.is_filling))

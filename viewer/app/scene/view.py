@@ -37,9 +37,9 @@ def draw(app: App) -> float:
     imgui.invisible_button("view", size, _BUTTONS)
     with told("Looking what is under the mouse"):
         app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
-    if app.session.camera is not None and app.playback.pose is not None:
+    if app.document.camera is not None and app.playback.pose is not None:
         with told("Moving the view"):
-            _move(app, app.session.camera, app.playback.pose, size)
+            _move(app, app.playback.pose, size)
         with told("Measuring"):
             overlay.draw(app, size)
     with told("The cube"):
@@ -54,41 +54,49 @@ def draw(app: App) -> float:
     return head
 
 
-def _move(app: App, camera: Camera, pose: Pose, size: ImVec2) -> None:
+def _move(app: App, pose: Pose, size: ImVec2) -> None:
     """Take what the mouse does to the camera."""
     sets_pivot = imgui.is_mouse_double_clicked(0) and not app.measuring.active
     if imgui.is_item_hovered() and sets_pivot:
         app.steering.set_pivot()
-        camera = app.session.camera or camera
-    app.session.camera = _navigate(app, camera, size, app.viewport.bounds(pose).radius)
-    if app.session.pivot and imgui.is_item_hovered():
-        _draw_pivot(app.session.camera, app.session.pivot, size)
+    radius = app.viewport.bounds(pose).radius
+    _take_drag(app, size, radius)
+    if imgui.is_item_hovered() and imgui.get_io().mouse_wheel:
+        _take_wheel(app, size, radius)
+    camera, pivot = app.document.camera, app.document.pivot
+    if camera and pivot and imgui.is_item_hovered():
+        _draw_pivot(camera, pivot, size)
 
 
-def _navigate(app: App, camera: Camera, size: ImVec2, radius: float) -> Camera:
-    io = imgui.get_io()
+def _take_drag(app: App, size: ImVec2, radius: float) -> None:
+    io, camera, gesture = imgui.get_io(), app.document.camera, app.steering.gesture
+    assert camera is not None
     if imgui.is_item_activated():
         app.steering.gesture = _gesture(io)
         app.steering.turntable.stop()
-    elif app.steering.gesture == "orbit" and app.measuring.active and overlay.may_click():
+    elif gesture == "orbit" and app.measuring.active and overlay.may_click():
         pass  # so that a click does not turn the view
-    elif app.steering.gesture:
+    elif gesture:
         # The move that ends with the release counts as well, that of the press does not.
         right, up = io.mouse_delta.x / size.y, -io.mouse_delta.y / size.y
-        if app.steering.gesture == "zoom":
+        if gesture == "zoom":
             camera = navigation.zoom(camera, up, radius)
-        elif app.steering.gesture == "pan":
+        elif gesture == "pan":
             camera = navigation.pan(camera, right, up)
         else:
-            camera = navigation.orbit(camera, right, up, app.session.pivot)
+            camera = navigation.orbit(camera, right, up, app.document.pivot)
+        app.steering.move(gesture.capitalize(), camera)
     if not imgui.is_item_active():
         app.steering.gesture = None
-    if imgui.is_item_hovered() and io.mouse_wheel:
-        at = imgui.get_mouse_pos() - imgui.get_item_rect_min() - size * 0.5
-        mouse = at.x / size.y, -at.y / size.y
-        seen = app.pointer.picked.place if app.pointer.picked else None
-        camera = navigation.wheel(camera, io.mouse_wheel, mouse, radius, seen)
-    return camera
+
+
+def _take_wheel(app: App, size: ImVec2, radius: float) -> None:
+    camera = app.document.camera
+    assert camera is not None
+    at = imgui.get_mouse_pos() - imgui.get_item_rect_min() - size * 0.5
+    seen = app.pointer.picked.place if app.pointer.picked else None
+    notches = imgui.get_io().mouse_wheel
+    app.steering.zoom(navigation.wheel(camera, notches, (at.x / size.y, -at.y / size.y), radius, seen))
 
 
 def _pixel(app: App) -> tuple[int, int]:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import logging
 import os
-from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from ....analysis.measure import End, Measurements, Reading, in_words, read, save, table, to_text
+from ....analysis.measure import End, Measurement, Reading, in_words, read, save, table, to_text
 from ....analysis.pick import before_gap, is_seen, pick
+from ....document.measurements import Measurements
 from ....errors import InputError
 from ....files import absolute, free_file, working_folder
 from ....scan.inputs import found_among, scan_inputs
-from ...session import known_as
 
 if TYPE_CHECKING:
     from ....scan.timeline import Timeline
@@ -28,9 +27,10 @@ _SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is
 
 
 class Measuring:
-    """What was measured, by scan, and the tool that does it.
+    """The tool that measures. What was measured is in the document.
 
-    active: whether clicks in the view set ends. filled: whether they may set them where holes are filled.
+    active: whether clicks in the view set ends. begun: the first end of the one that is being made, None
+    where none is. filled: whether they may set them where holes are filled.
     to_show: whether the panel has yet to show the list. saving: the file name in the dialog that saves, None
     while it is closed; problem: why it could not be saved under that name; to_type: whether its field has yet
     to take the keyboard.
@@ -44,21 +44,29 @@ class Measuring:
         self.saving: str | None = None
         self.problem = ""
         self.to_type = False
-        self._of: defaultdict[str, Measurements] = defaultdict(Measurements)
+        self.begun: End | None = None
         self._seen: tuple[object, dict[End, bool]] = None, {}
         self._told: list[str] = []
         self._learned: Timeline | None = None  # the last that was asked whether points can be followed
         self._followed = ""  # the scan that was found to have one topology, last
 
     @property
-    def here(self) -> Measurements:
+    def made(self) -> Measurements:
         """Those of the scan that is open."""
-        return self._of[known_as(self.app.session.scan)]
+        return self.app.document.part(Measurements)
+
+    def delete(self, number: int) -> None:
+        """Take away the one at this place, counted from 0."""
+        self.app.change("Delete measurement", self.made.without(number))
+
+    def clear(self) -> None:
+        """Take away all."""
+        self.app.change("Clear measurements", Measurements())
 
     def toggle(self) -> None:
         """Take up the tool or put it away; a measurement that was begun goes with it."""
         self.active = self.to_show = not self.active
-        self.here.begun = None
+        self.begun = None
         log.debug("measuring %s", "begins" if self.active else "ends")
 
     def click(self, pixel: tuple[int, int]) -> None:
@@ -80,17 +88,30 @@ class Measuring:
         if meant != pixel:
             self.app.note("That was seen through a gap: the end is at the point before it.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
-        if made := self.here.set_end(end):
-            self.to_show = True
-            log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
+        self.set_end(end)
         _learn_topology(self.app.playback.timeline, request.pose.index)
+
+    def set_end(self, end: End) -> None:
+        """Begin a measurement, or complete the one that was begun.
+
+        An end at the very place and frame of the first, as a second click of a double click sets it, changes
+        nothing.
+        """
+        first, self.begun = self.begun, None
+        if first is None or (first.frame, first.position) == (end.frame, end.position):
+            self.begun = first or end
+            return
+        made = Measurement(first, end)
+        self.app.change("Measure", self.made.added(made))
+        self.to_show = True
+        log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
 
     def readings(self) -> list[Reading]:
         """Them as they stand in the frame that is shown, in order; none before the first frame."""
         pose, one_topology = self.app.playback.pose, self.app.playback.timeline.one_topology
         if pose is None:
             return []
-        return [read(measurement, pose, one_topology) for measurement in self.here.all]
+        return [read(measurement, pose, one_topology) for measurement in self.made.all]
 
     def watch(self, readings: Sequence[Reading]) -> None:
         """Tell when measurements that followed their points no longer can; note in the log what they read."""
@@ -127,7 +148,7 @@ class Measuring:
     def name_unit(self, text: str) -> None:
         """Call the scan's unit of length so; an empty text leaves it unknown."""
         name = "".join(letter for letter in text if letter.isprintable())[:_LONGEST_UNIT]
-        self.app.session.unit = name.strip() or None
+        self.app.change("Name unit", merge="unit", unit=name.strip() or None)
         log.debug("unit %s", self.app.unit)
 
     # --- out of the window ------------------------------------------------------------
@@ -135,7 +156,7 @@ class Measuring:
     def copy(self) -> None:
         """Put a table of all into the clipboard, for spreadsheets."""
         imgui.set_clipboard_text(to_text(self._table(), "\t"))
-        self.app.note(f"Copied {len(self.here.all)} measurements as a table.")
+        self.app.note(f"Copied {len(self.made.all)} measurements as a table.")
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
@@ -166,7 +187,7 @@ class Measuring:
     def _table(self) -> list[list[object]]:
         """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
         rows: list[tuple[int, Reading]] = []
-        for number, (made, reading) in enumerate(zip(self.here.all, self.readings(), strict=True), 1):
+        for number, (made, reading) in enumerate(zip(self.made.all, self.readings(), strict=True), 1):
             rows.append((number, Reading(made, reading.fixed)))
             if reading.measurement != made:
                 rows.append((number, reading))

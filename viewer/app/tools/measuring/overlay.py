@@ -31,7 +31,7 @@ def draw(app: App, size: ImVec2) -> None:
 
     size: of the view.
     """
-    measuring, camera = app.measuring, app.session.camera
+    measuring, camera = app.measuring, app.document.camera
     if camera is None or app.playback.pose is None:
         return
     if measuring.active:
@@ -43,7 +43,7 @@ def draw(app: App, size: ImVec2) -> None:
         box for number, reading in enumerate(readings, 1) if (box := _draw_one(app, view, number, reading))
     ]
     _draw_labels(labels, view, _boxes_of_ends(view, readings))
-    if begun := measuring.here.begun:
+    if begun := measuring.begun:
         _draw_begun(app, view, begun)
 
 
@@ -183,7 +183,7 @@ def draw_banner(app: App, size: ImVec2) -> float:
     """Say what a click does while it measures; returns where that ends, 0 without. size: of the view."""
     if not app.measuring.active:
         return 0.0
-    which = "second" if app.measuring.here.begun else "first"
+    which = "second" if app.measuring.begun else "first"
     text = f"Measuring: click the {which} place.  Esc ends."
     em, extent = imgui.get_font_size(), imgui.calc_text_size(text)
     corner = ImVec2((size.x - extent.x) / 2, 0.9 * em)

@@ -21,7 +21,7 @@ _DIALOG = "Save measurements"
 
 def draw(app: App) -> None:
     """Declare the section of the panel."""
-    measuring, here = app.measuring, app.measuring.here
+    measuring = app.measuring
     half = ImVec2((imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2, 0)
     if imgui.button("Stop measuring" if measuring.active else "Measure", half):
         measuring.toggle()
@@ -34,9 +34,9 @@ def draw(app: App) -> None:
     for number, reading in enumerate(measuring.readings()):
         imgui.push_id(number)
         if _draw_row(app, number, reading):
-            here.delete(number)
+            measuring.delete(number)
         imgui.pop_id()
-    if here.all:
+    if measuring.made.all:
         _draw_outlets(app)
     if measuring.to_show:
         measuring.to_show = False
@@ -48,7 +48,7 @@ def _draw_unit(app: App) -> None:
     if app.playback.timeline.unit != UNKNOWN_UNIT:
         imgui.text(app.unit)
         return
-    changed, text = imgui.input_text_with_hint("##unit", UNKNOWN_UNIT, app.session.unit or "")
+    changed, text = imgui.input_text_with_hint("##unit", UNKNOWN_UNIT, app.document.unit or "")
     if changed:
         app.measuring.name_unit(text)
 
@@ -95,7 +95,7 @@ def _draw_outlets(app: App) -> None:
         app.measuring.ask_to_save()
     imgui.same_line()
     if imgui.button("Clear", third):
-        app.measuring.here.clear()
+        app.measuring.clear()
     imgui.set_item_tooltip("Delete all; undo brings them back")
 
 
