@@ -1,11 +1,12 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
+// SINGLE: squares are of one pixel.
 #include "common/view.glsl"
 
 layout(binding = 2) uniform samplerBuffer positions;
 #if SAMPLED
 layout(binding = 3) uniform usamplerBuffer sampled;
 #endif
-uniform int point_size;
+#include <params>
 
 void scatter(uint i) {
 #if SAMPLED
@@ -17,7 +18,7 @@ void scatter(uint i) {
     uint key = floatBitsToUint(depth);
     vec2 pixel = to_pixel(view);
     if (!in_depth_range(depth)) return;
-#if POINT_SIZE == 1
+#if SINGLE
     if (any(lessThan(pixel, vec2(0.0))) || any(greaterThanEqual(pixel, vec2(view_size)))) return;
     ivec2 at = ivec2(pixel);
     visit(uint(at.y * view_size.x + at.x), key, i);

@@ -3,8 +3,6 @@
 // the cells that were hit. Two 32-bit passes: 64-bit atomics are not everywhere.
 #include "common/item.glsl"
 
-uniform uint item_count;
-
 #if PASS == 0
 layout(std430, binding = 0) buffer Keys { uint keys[]; };
 #else

@@ -2,8 +2,6 @@
 // changes linearly. The same cut-off and depth as the rasterised quad of surfels/surfel.glsl.
 #include "surfels/splat.glsl"
 
-uniform float mask_limit;  // squared distance from the centre at which the mask is cut off
-
 // Two programs of surfels/scatter.glsl compare depths of the same disc: `precise`, as in common/view.glsl.
 precise vec3 disc_center, disc_normal;  // view space
 precise float disc_area;                // squared radius at the cut-off; of an ellipse, squared longer half-axis

@@ -1,12 +1,11 @@
 // The round Gaussian mask of a splat, cut off (Slomp 2014, V-B), opaque.
 #include "common/view.glsl"
+#include <params>
 
 #ifndef BEHIND
 #define BEHIND 1.0  // what the depth buffer's values were divided by
 #define SIGN 1.0    // of the depth written
 #endif
-
-uniform float mask_limit;  // squared distance from the centre at which the mask is cut off
 
 flat in uint row;
 in vec2 local;

@@ -1,11 +1,8 @@
 // What a point's splat is, for quads and for discs alike.
 #include "common/view.glsl"
 #include "amplify/point.glsl"
-
-uniform float radius_scale;
-uniform float uniform_radius;  // scan units, for points without one of their own
-uniform float least_radius;    // pixels; what the mask leaves of it reaches a pixel centre
-uniform bool cull_back;
+// backends/surfels/splats.py.
+#include <params>
 
 // Scan units. Below the least one a splat can fall between pixel centres, and a far scan would flicker away.
 float splat_radius(float stored, float depth) {

@@ -44,6 +44,20 @@ def test_places_of_every_vendor_are_understood(shaders: Path, log: str) -> None:
     assert "a.comp:12" in Source("a.comp").explain(log)
 
 
+def test_what_was_not_given_is_named(shaders: Path) -> None:
+    (shaders / "a.comp").write_text("#include <params>\n")
+    with pytest.raises(ShaderError, match=r"a\.comp: nothing was given for <params>"):
+        Source("a.comp")
+
+
+def test_a_uniform_that_no_source_declares_is_an_error(shaders: Path, renderer: Renderer) -> None:
+    (shaders / "set.comp").write_text("layout(local_size_x = 1) in;\nuniform float unused;\nvoid main() {}\n")
+    program = renderer.gpu.compute("set.comp")
+    renderer.gpu.set(program, unused=1.0)  # the compiler took it out
+    with pytest.raises(ShaderError, match=r"set\.comp: no uniform is called 'misspelt'"):
+        renderer.gpu.set(program, misspelt=1.0)
+
+
 def test_programs_are_built_once(renderer: Renderer) -> None:
     renderer.gpu.activate()  # other tests leave contexts of their own current
     one = renderer.gpu.compute("compact/covered.comp")

@@ -7,11 +7,11 @@ there are far fewer points than pixels, the points list the pixels to be shaded.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import moderngl
 import numpy as np
 
+from ..gpu.context import Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import scatter
 from ..gpu.surface import Surface
@@ -60,11 +60,10 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         size = min(round(size * math.sqrt(len(pose.cloud) / count)), _LARGEST)
     sparse = count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
 
-    def bind(program: moderngl.ComputeShader) -> None:
+    def bind(_: Program) -> None:
         pose.array("positions").bind(2)
         if rows is not None:
             rows.bind(3)
-        pose.gpu.set(program, point_size=size)
 
     scatter(
         pose.gpu,
@@ -73,7 +72,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.depths,
         surface.rows,
         bind,
-        defines={"POINT_SIZE": int(size == 1), "SAMPLED": int(rows is not None)},
+        defines={"SINGLE": int(size == 1), "SAMPLED": int(rows is not None)},
+        params=replace(params, point_size=size),
         listed=surface.take_covered() if sparse else None,
     )
     if sparse:

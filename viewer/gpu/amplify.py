@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from . import gl
+from .blocks import Values
+from .context import Program
 from .pose import GpuPose
 from .surface import Surface
 
@@ -91,8 +92,9 @@ class Points:
             "SAMPLED": int(self.rows is not None),
         }
 
-    def bind(self) -> None:
+    def bind(self, program: Program) -> None:
         """Bind what amplify/texels.glsl reads: texture units 0 to 3, and 9."""
+        self.pose.gpu.set(program, enlarged=self.enlarged)
         for name, _, _ in self.attributes:
             self.pose.array(name).bind(_UNITS[name])
         if self.rows is not None:
@@ -105,13 +107,13 @@ def amplify(
     feed: str,
     shape: Shape,
     fragment: str,
+    params: Values | None = None,
     over: bool = False,
-    **uniforms: Any,
 ) -> None:
     """Draw points as shapes, in id order with a strict depth test.
 
-    feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth. over: draw
-    over what the surface holds. uniforms: of both shaders.
+    feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth. params: what
+    both find in `<params>`. over: draw over what the surface holds.
     """
     gpu = surface.gpu
     with gpu.timers.measure("splat"):
@@ -120,7 +122,7 @@ def amplify(
         if over:
             _restore(surface)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        draw_shapes(points, feed, shape, fragment, **uniforms)
+        draw_shapes(points, feed, shape, fragment, params)
     with gpu.timers.measure("copy"):
         surface.take_raster()
 
@@ -137,7 +139,7 @@ def _restore(surface: Surface) -> None:
     triangle.release()
 
 
-def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, **uniforms: Any) -> None:
+def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: Values | None = None) -> None:
     """Draw points as shapes into the bound framebuffer, with the depth test and blending that are set.
 
     Where only some are drawn, `ubo` and `vbo` are replaced by `tbo`, which gives the same picture.
@@ -149,16 +151,18 @@ def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, **unifor
     defines = {**points.defines, "CORNERS": shape.corners}
     if feed == "ubo":
         defines |= {"STRIDE": points.stride, "POINTS": _block_points(points)}
-    program = gpu.program((*stages, fragment), defines, {**parts, "shape": shape.file})
-    gpu.set(program, enlarged=points.enlarged, **uniforms)
+    program = gpu.program((*stages, fragment), defines, {**parts, "shape": shape.file}, params)
     if not points.count:
         return
+    gpu.set(program, enlarged=points.enlarged)
     if feed == "ubo":
         _draw_blocks(program, points, shape)
         return
-    content = _attributes(program, points, "/i" if feed == "vbo" else "") if feed in ("gs", "vbo") else []
-    if not content:
-        points.bind()
+    if feed in ("gs", "vbo"):
+        content = _attributes(program, points, "/i" if feed == "vbo" else "")
+    else:
+        content = []
+        points.bind(program)
     index = points.rows.buffer if feed == "gs" and points.rows is not None else None
     vertices = gpu.ctx.vertex_array(program, content, index_buffer=index)
     if feed == "gs":

@@ -14,11 +14,15 @@ import moderngl
 
 from ..errors import InputError, NoOpenGLError
 from . import gl
-from .shader import Source, shader_error
+from .bindings import UniformBlock
+from .blocks import BlockBuffer, Values
+from .shader import ShaderError, Source, shader_error
 from .shader_cache import shader_cache
 from .timers import Timers
 
 T = TypeVar("T")
+Program = moderngl.Program | moderngl.ComputeShader
+Uniform = bool | int | float | tuple[float, ...]
 REQUIRED_VERSION = 430
 _OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
@@ -76,42 +80,61 @@ class Gpu:
         gl.reverse_depth()
 
     def compute(
-        self, name: str, defines: Mapping[str, object] | None = None, parts: Mapping[str, str] | None = None
+        self,
+        name: str,
+        defines: Mapping[str, object] | None = None,
+        parts: Mapping[str, str] | None = None,
+        params: Values | None = None,
     ) -> moderngl.ComputeShader:
-        """The compute program of a shader file, built once for each set of defines and parts."""
-        return self._build((name,), defines, parts)
+        """The compute program of a shader file, built once for each set of defines and parts.
+
+        params: a frozen dataclass, whose numbers the program then finds in `<params>`.
+        """
+        return self._build((name,), defines, parts, params)
 
     def program(
         self,
         stages: tuple[str, ...],
         defines: Mapping[str, object] | None = None,
         parts: Mapping[str, str] | None = None,
+        params: Values | None = None,
     ) -> moderngl.Program:
-        """The program of a `.vert`, an optional `.geom` and a `.frag` file, built once."""
-        return self._build(stages, defines, parts)
+        """The program of a `.vert`, an optional `.geom` and a `.frag` file; as `compute`."""
+        return self._build(stages, defines, parts, params)
 
     def _build(
         self,
         names: tuple[str, ...],
         defines: Mapping[str, object] | None,
         parts: Mapping[str, str] | None,
+        params: Values | None,
     ) -> Any:
-        key = (names, tuple((defines or {}).items()), tuple((parts or {}).items()))
-        return self.keep(key, lambda: self._compile([Source(name, defines, parts) for name in names]))
+        declared = None if params is None else type(params)
+        if params is not None:
+            block = self.keep(("params", declared), lambda: BlockBuffer(self.ctx, type(params)))
+            block.bind(params, UniformBlock.PARAMS)
+        key = (names, tuple((defines or {}).items()), tuple((parts or {}).items()), declared)
+        return self.keep(
+            key, lambda: self._compile([Source(name, defines, parts, declared) for name in names])
+        )
 
     def _compile(self, sources: list[Source]) -> Any:
         texts = {s.name.rsplit(".", 1)[-1]: s.text for s in sources}
         self.activate()  # a program belongs to the context that is current
+        program: Program
         try:
             if "comp" in texts:
-                return self.ctx.compute_shader(texts["comp"])
-            return self.ctx.program(
-                vertex_shader=texts["vert"],
-                geometry_shader=texts.get("geom"),
-                fragment_shader=texts["frag"],
-            )
+                program = self.ctx.compute_shader(texts["comp"])
+            else:
+                program = self.ctx.program(
+                    vertex_shader=texts["vert"],
+                    geometry_shader=texts.get("geom"),
+                    fragment_shader=texts["frag"],
+                )
         except moderngl.Error as error:
             raise shader_error(sources, error) from error
+        program.extra = sources
+        return program
 
     def keep(self, key: object, make: Callable[[], T]) -> T:
         """What `make` returned the first time for this key: small things that live as long as this."""
@@ -137,16 +160,25 @@ class Gpu:
         while self._discarded:
             self._discarded.popleft().release()
 
-    def set(self, program: moderngl.Program | moderngl.ComputeShader, **values: Any) -> None:
-        """Set uniforms by name; those that the compiler found unused are passed over."""
+    def set(self, program: Program, **values: Uniform) -> None:
+        """Set uniforms by name: what changes from one call of a program to the next.
+
+        Those that the compiler found unused are passed over. Raises ShaderError for a name that the program's
+        source does not declare.
+        """
         for name, value in values.items():
             if name in program:
                 program[name] = value
+            elif not any(name in source.uniforms for source in program.extra):
+                names = ", ".join(source.name for source in program.extra)
+                raise ShaderError(f"no uniform is called '{name}'", f"shaders/{names}")
 
     def dispatch(self, program: moderngl.ComputeShader, count: int) -> None:
-        """Run one invocation for each of `count` items; shaders find theirs with `item()`."""
+        """Run one invocation for each of `count` items: `item()` in shaders, which is less than `item_count`
+        but for the last group's."""
         groups = -(-count // GROUP)
         if groups:
+            self.set(program, item_count=count)
             rows = -(-groups // GROUP_LIMIT)
             program.run(-(-groups // rows), rows)
             self.ctx.memory_barrier()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import moderngl
-
 from . import gl
+from .blocks import Values
 from .compact import IndexList
-from .context import Gpu
+from .context import Gpu, Program
 
 _NO_KEY = 0x7F800000  # +inf as float bits: a key buffer of depths reads as floats
 _NO_ITEM = 0xFFFFFFFF
@@ -20,22 +19,25 @@ def scatter(
     count: int,
     keys: gl.BufferTexture,
     best: gl.BufferTexture,
-    bind: Callable[[moderngl.ComputeShader], None],
+    bind: Callable[[Program], None],
     defines: Mapping[str, object] | None = None,
+    params: Values | None = None,
     listed: IndexList | None = None,
 ) -> None:
     """Send `count` items to cells: the least key per cell, then the lowest item that has it.
 
     cells: the shader file that names an item's cells and key (it calls `visit`). keys,
     best: one R32UI texel a cell; cells that nothing hit hold +inf bits and 0xFFFFFFFF.
-    bind: sets what `cells` reads, from texture units 0 to 9. listed: filled with the cells that were hit.
+    bind: sets what `cells` reads, from texture units 0 to 9. params: what it finds in `<params>`.
+    listed: filled with the cells that were hit.
     """
     gl.clear_words(keys.buffer, _NO_KEY)
     gl.clear_words(best.buffer, _NO_ITEM)
     if listed is not None:
         listed.clear()
     for number, name in enumerate(("depth", "id", "list") if listed is not None else ("depth", "id")):
-        program = gpu.compute("scatter/scatter.comp", {"PASS": number, **(defines or {})}, {"cells": cells})
+        defined = {"PASS": number, **(defines or {})}
+        program = gpu.compute("scatter/scatter.comp", defined, {"cells": cells}, params)
         with gpu.timers.measure(name):
             keys.buffer.bind_to_storage_buffer(0)
             keys.bind(10)
@@ -43,6 +45,5 @@ def scatter(
             best.bind(11)
             if listed is not None:
                 listed.bind()
-            gpu.set(program, item_count=count)
             bind(program)
             gpu.dispatch(program, count)

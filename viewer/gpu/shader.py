@@ -1,52 +1,79 @@
-"""Shader files: `#include`, defines, and compile errors that name file and line."""
+"""Shader files: `#include`, defines, generated declarations, and compile errors that name file and line."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cached_property
 
 from ..errors import Scan4DError
 from ..resources import resource_path
+from .blocks import Values, block_of
 
 _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 # "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (AMD, Intel)
 _PLACE = re.compile(r"\b(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
+_UNIFORM = re.compile(r"\buniform\s+\w+\s+(\w+)\s*[;\[]")
 _HEADER = "#version 430 core\n"
 
 
 class ShaderError(Scan4DError):
-    """A shader that does not compile or link: a mistake in the project or the driver."""
+    """A shader that does not compile or link, or is given what it does not declare: a mistake in the project
+    or the driver."""
 
 
 class Source:
     """One stage's text, put together from its file and what it includes.
 
     name: path under `shaders/`. defines: macro name -> value. parts: what a file in angle
-    brackets stands for, so that one file can serve several shapes: `#include <shape>`.
+    brackets stands for, so that one file can serve several shapes: `#include <shape>`. params: the dataclass
+    whose numbers `#include <params>` declares. files: what it is made of, numbered as in a compiler's log.
     """
 
     def __init__(
-        self, name: str, defines: Mapping[str, object] | None = None, parts: Mapping[str, str] | None = None
+        self,
+        name: str,
+        defines: Mapping[str, object] | None = None,
+        parts: Mapping[str, str] | None = None,
+        params: type[Values] | None = None,
     ) -> None:
         self.name = name
         self.files: list[str] = []
         self._parts = parts or {}
+        self._params = params
         macros = "".join(f"#define {key} {value}\n" for key, value in (defines or {}).items())
         self.text = _HEADER + macros + self._expand(name)
 
+    @cached_property
+    def uniforms(self) -> frozenset[str]:
+        """The names of all uniforms that stand in it outside blocks, used or not."""
+        return frozenset(_UNIFORM.findall(self.text))
+
     def _expand(self, name: str) -> str:
+        text = resource_path("shaders", *name.split("/")).read_text(encoding="utf-8")
+        return self._numbered(name, text)
+
+    def _expand_part(self, name: str) -> str:
+        if name in self._parts:
+            return self._expand(self._parts[name])
+        if name == "params" and self._params is not None:
+            block = block_of(self._params)
+            return self._numbered(f"<params: {block.name}>", block.glsl(name))
+        raise ShaderError(f"nothing was given for <{name}>", f"shaders/{self.name}")
+
+    def _numbered(self, name: str, text: str) -> str:
+        """A text with what it includes, and where each line stands."""
         if name in self.files:
-            return ""  # each file once, as with #pragma once
+            return ""  # each once, as with #pragma once
         index = len(self.files)
         self.files.append(name)
         lines = [f"#line 1 {index}"]
-        text = resource_path("shaders", *name.split("/")).read_text(encoding="utf-8")
         for number, line in enumerate(text.splitlines(), start=1):
             found = _INCLUDE.match(line)
             if found is None:
                 lines.append(line)
             else:
-                lines.append(self._expand(found[1] or self._parts[found[2]]))
+                lines.append(self._expand(found[1]) if found[1] else self._expand_part(found[2]))
                 lines.append(f"#line {number + 1} {index}")
         return "\n".join(lines) + "\n"
 

@@ -1,8 +1,7 @@
 // The second pass: what each splat gives, added up.
 #include "common/view.glsl"
 #include "surfels/passes/visible.glsl"
-
-uniform float mask_limit;  // squared distance from the centre at which the mask is cut off
+#include <params>
 
 flat in uint row;
 in vec2 local;

@@ -11,8 +11,6 @@
 layout(std430, binding = 0) buffer Depths { uint depths[]; };
 layout(std430, binding = 1) buffer Rows { uint rows[]; };
 
-uniform float enlarge;
-
 const uint EMPTY = 0x7F800000u;  // +inf
 const int DIRECTIONS = 16;
 const float SLACK = 0.75;  // pixels that the outline may grow by

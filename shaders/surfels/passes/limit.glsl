@@ -4,7 +4,6 @@
 #if HAS_RADIUS
 layout(binding = 4) uniform samplerBuffer visible_radii;
 #endif
-uniform float epsilon;  // of the visible splat's radius
 
 // Of the splat that a pixel shows at this depth, scan units.
 float visible_radius(float depth, uint row) {

@@ -2,8 +2,6 @@
 // them whole numbers, so that sums do not depend on the order as long as they stay below 2^24.
 layout(binding = 5) uniform usamplerBuffer looks;  // colour, 3 x 8 bits; normal, 3 x 10 bits
 
-uniform float falloff;  // of the mask exp(-falloff t), t the squared distance, 1 where it is cut off; at most 4
-
 const float FULL = 127.0;  // what the centre of a splat counts
 
 // FULL exp(-4 x) to 0.05, x up to 1: a cubic of exp(-x), to the fourth power.

@@ -13,8 +13,6 @@ layout(binding = 6) uniform usamplerBuffer depths;
 layout(binding = 7) uniform usamplerBuffer rows;
 
 #if STEP == 1
-uniform uint item_count;
-
 void visit(uint cell, uint key, uint item_id) {
     uint row = texelFetch(rows, int(cell)).r;
     if (row == NONE) return;  // two programs round apart at a splat's border
@@ -39,7 +37,6 @@ void main() {
 }
 #else
 #include "common/list.glsl"
-uniform float share;  // of the mean; the rest is the shown splat's
 #if HAS_COLORS
 layout(std430, binding = 4) writeonly buffer Colors { uint own_colors[]; };
 #endif
@@ -54,7 +51,7 @@ void main() {
 #else
     // The shown splat passes, unless two programs round apart: then it is alone.
     uint count = sums[4u * cell + 3u];
-    float mean = count == 0u ? 0.0 : share;
+    float mean = count == 0u ? 0.0 : mean_share;
     uvec2 look = texelFetch(looks, int(texelFetch(rows, int(cell)).r)).xy;
 #if HAS_COLORS
     vec3 color = vec3(sums[4u * cell], sums[4u * cell + 1u], sums[4u * cell + 2u]) / float(max(count, 1u));

@@ -5,9 +5,7 @@
 #include "common/item.glsl"
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
-
-uniform uint item_count;
-uniform ivec2 tiles;
+#include "surfels/tiles/grid.glsl"
 
 layout(std430, binding = 0) buffer Slots { uint slots[]; };
 #if PASS == 0
@@ -21,7 +19,6 @@ layout(binding = 4) uniform usamplerBuffer farthest;  // depth shown in each til
 #else
 layout(binding = 4) uniform usamplerBuffer known_reach;
 layout(std430, binding = 1) writeonly buffer List { uint list[]; };
-uniform uint capacity;
 #endif
 
 // First tile 11 + 11 bits, width and height 5 + 5: pictures up to 2048 tiles, discs up to 31.
@@ -33,7 +30,7 @@ void visit(uint word, uint row) {
         for (int x = first.x; x < first.x + span.x; ++x) {
             uint at = atomicAdd(slots[y * tiles.x + x], 1u);
 #if PASS == 1
-            if (at < capacity) list[at] = row;
+            if (at < uint(list.length())) list[at] = row;
 #endif
         }
 }

@@ -1,6 +1,6 @@
 // The invocations of listed tiles: each keeps ROWS pixels, one below another, and looks at the tile's discs.
 // No atomics: the best depth and the lowest row at that depth stay in registers.
-#include "common/view.glsl"
+#include "surfels/tiles/grid.glsl"
 
 layout(local_size_x = TILE, local_size_y = COLUMNS, local_size_z = TILES) in;
 
@@ -11,8 +11,6 @@ layout(binding = 3) uniform usamplerBuffer listed;
 layout(binding = 8) uniform usamplerBuffer work;  // tiles that discs reach, after a dispatch and their number
 layout(std430, binding = 0) buffer Depths { uint depths[]; };
 layout(std430, binding = 1) buffer Rows { uint rows[]; };
-
-uniform ivec2 tiles;
 
 // FILL: the best of pixels that stay as they are: nothing is better. No array of bool says which they are, as
 // Mesa's Zink cannot read one (docs/surfels.md).

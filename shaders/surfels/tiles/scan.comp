@@ -1,6 +1,8 @@
 // Counts become where each tile's part of the list starts; lists the tiles that have one, with a
 // dispatch of TILES in a work group: all tiles where large discs, which reach anywhere, are rasterised.
 // One work group.
+#include "surfels/tiles/grid.glsl"
+
 layout(local_size_x = 256) in;
 
 layout(std430, binding = 0) buffer Slots { uint slots[]; };
@@ -8,14 +10,12 @@ layout(std430, binding = 1) buffer Large { uint large_count, list_length, away, 
 layout(std430, binding = 2) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
 layout(std430, binding = 3) writeonly buffer Farthest { uint farthest[]; };
 
-uniform uint slot_count;
-
 uint is_worked(uint entries) { return entries > 0u || large_count > 0u ? 1u : 0u; }
 
 shared uvec2 sums[256];  // entries, tiles
 
 void main() {
-    uint me = gl_LocalInvocationID.x;
+    uint me = gl_LocalInvocationID.x, slot_count = uint(tiles.x * tiles.y);
     uint run = (slot_count + 255u) / 256u;
     uint first = min(me * run, slot_count), last = min(first + run, slot_count);
     uvec2 sum = uvec2(0u);

@@ -10,11 +10,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from ...gpu.amplify import FEEDS, Points, Shape, amplify
+from ...gpu.amplify import FEEDS, Points, amplify
 from ...gpu.fastest import choose
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
@@ -23,12 +22,12 @@ from ...scan.points import PointCloud
 from ...scan.spacing import typical_spacing
 from .. import FrameView
 from . import passes
+from .splats import FRAGMENT, SURFEL, Splats
 from .subpixel import LEAST_RADIUS, average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, splat
 
 TITLE = "Surfels"
 
-SURFEL = Shape("surfels/surfel.glsl", corners=4)
 _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
 # A uniform radius of 1.5 times the spacing closes the surface.
@@ -99,44 +98,41 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 
 
 def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
-    mask_limit = min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff)
-    uniforms = {
-        "radius_scale": params.radius_scale,
-        "uniform_radius": uniform_radius,
-        "cull_back": params.cull_back,
-        "mask_limit": mask_limit,
-        "least_radius": LEAST_RADIUS / math.sqrt(mask_limit),
-    }
-    larger = params.enlarge if params.passes in _TWO else 1.0
-    enlarged = replace(points, enlarged=points.enlarged * larger)
+    splats = _splats(params, uniform_radius)
+    enlarged = splats.larger(points) if params.passes in _TWO else points
     may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
-    share = 0.0
-    if may_average:
-        share = subpixel_share(enlarged, surface, params.radius_scale, uniform_radius, mask_limit)
+    share = subpixel_share(enlarged, surface, splats) if may_average else 0.0
     if share == 1 or (share > 0 and params.passes == "one"):
-        _draw_subpixel(points, surface, params, instancing, share, uniforms)
+        _draw_subpixel(points, surface, params, instancing, replace(splats, mean_share=share))
     elif params.passes in _TWO:
-        _draw_two(points, surface, params, instancing, uniforms)
+        _draw_two(points, surface, params, instancing, splats)
     else:
-        _draw_one(points, surface, params, instancing, uniforms)
+        _draw_one(points, surface, params, instancing, splats)
 
 
-def _draw_nearest(points: Points, surface: Surface, instancing: str, uniforms: dict[str, Any]) -> None:
+def _splats(params: Params, uniform_radius: float) -> Splats:
+    mask_limit = min(1.0, -math.log(params.mask_cutoff) / params.mask_falloff)
+    return Splats(
+        radius_scale=params.radius_scale,
+        uniform_radius=uniform_radius,
+        least_radius=LEAST_RADIUS / math.sqrt(mask_limit),
+        cull_back=params.cull_back,
+        mask_limit=mask_limit,
+        falloff=params.mask_falloff * mask_limit,
+        enlarge=params.enlarge,
+        epsilon=params.epsilon,
+    )
+
+
+def _draw_nearest(points: Points, surface: Surface, instancing: str, splats: Splats) -> None:
     """The nearest splat of each pixel."""
     if instancing == "tiles":
-        splat(points, surface, SURFEL, "surfels/splat.frag", **uniforms)
+        splat(points, surface, splats)
     else:
-        amplify(points, surface, instancing, SURFEL, "surfels/splat.frag", **uniforms)
+        amplify(points, surface, instancing, SURFEL, FRAGMENT, splats)
 
 
-def _draw_subpixel(
-    points: Points,
-    surface: Surface,
-    params: Params,
-    instancing: str,
-    share: float,
-    uniforms: dict[str, Any],
-) -> None:
+def _draw_subpixel(points: Points, surface: Surface, params: Params, instancing: str, splats: Splats) -> None:
     """Splats of about a pixel: those of a pixel are averaged, in place of any second pass; the larger they
     are, the less, so that nothing changes at once while one comes nearer."""
     if params.passes in _TWO:
@@ -144,45 +140,36 @@ def _draw_subpixel(
     if params.instancing == "auto":
         surface.stats.chosen["instancing"] = "scatter"
         surface.stats.skipped["tiles"] = "splats are under a pixel: they are sent there one by one"
-        splat_subpixel(points, surface, **uniforms)
+        splat_subpixel(points, surface, splats)
     else:
-        _draw_nearest(points, surface, instancing, uniforms)
-    if params.epsilon > 0:
-        average(points, surface, params.epsilon, share, **uniforms)
+        _draw_nearest(points, surface, instancing, splats)
+    if splats.epsilon > 0:
+        average(points, surface, splats)
 
 
-def _draw_one(
-    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
-) -> None:
+def _draw_one(points: Points, surface: Surface, params: Params, instancing: str, splats: Splats) -> None:
     """The nearest splats, and what is made of them beyond that."""
-    _draw_nearest(points, surface, instancing, uniforms)
+    _draw_nearest(points, surface, instancing, splats)
+    feed = FALLBACK if instancing == "tiles" else instancing
     if params.passes == "visibility":
-        passes.show_visibility(points, surface, params.epsilon, **uniforms)
+        passes.show_visibility(points, surface, splats)
+    elif params.passes == "sorted":
+        passes.splat_sorted(points, surface, feed, splats)
     elif params.passes != "one":
-        feed = FALLBACK if instancing == "tiles" else instancing
-        falloff = params.mask_falloff * uniforms["mask_limit"]
-        if params.passes == "sorted":
-            passes.splat_sorted(points, surface, feed, SURFEL, falloff, **uniforms)
-        else:
-            tested = params.passes == "one_blended"
-            passes.splat_over(points, surface, feed, SURFEL, falloff, tested, **uniforms)
+        passes.splat_over(points, surface, feed, splats, tested=params.passes == "one_blended")
 
 
-def _draw_two(
-    points: Points, surface: Surface, params: Params, instancing: str, uniforms: dict[str, Any]
-) -> None:
+def _draw_two(points: Points, surface: Surface, params: Params, instancing: str, splats: Splats) -> None:
     """Visibility, then blending."""
-    enlarge = params.enlarge
     if params.passes == "two_large":
-        points, enlarge = replace(points, enlarged=points.enlarged * enlarge), 1.0
-    second = passes.Second(enlarge, params.epsilon, params.mask_falloff * uniforms["mask_limit"])
-    if second.enlarge == 1 and second.epsilon == 0:
+        points, splats = splats.larger(points), replace(splats, enlarge=1.0)
+    if splats.enlarge == 1 and splats.epsilon == 0:
         surface.stats.skipped["second pass"] = "nothing is enlarged or blended"
-        _draw_nearest(points, surface, instancing, uniforms)
+        _draw_nearest(points, surface, instancing, splats)
     elif instancing == "tiles":
-        passes.tiled_two_passes(points, surface, SURFEL, second, **uniforms)
+        passes.tiled_two_passes(points, surface, splats)
     else:
-        passes.two_passes(points, surface, instancing, SURFEL, second, **uniforms)
+        passes.two_passes(points, surface, instancing, splats)
 
 
 def _instancing(params: Params, surface: Surface) -> str:

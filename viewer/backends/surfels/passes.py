@@ -7,45 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu import gl
-from ...gpu.amplify import Points, Shape, draw_shapes
+from ...gpu.amplify import Points, draw_shapes
 from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
+from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import FALLBACK, NOT_HIDDEN, TILE, TileLists, run, show_all, splat, tile_lists
 
 _BEHIND = 2.0**64  # as surfels/passes/fill.frag has it
 _CHUNK = 1 << 20  # points packed at a time
-_FIRST = "surfels/splat.frag"  # of the first pass
 
 
-@dataclass(frozen=True)
-class Second:
-    """The second of two passes.
-
-    enlarge: factor on the splats. epsilon: how far behind the visible splat others still count, in its
-    radii. falloff: of the mask exp(-falloff d^2), d = 1 where it is cut off; at most 4.
-    """
-
-    enlarge: float
-    epsilon: float
-    falloff: float
-
-    def larger(self, points: Points) -> Points:
-        """The points as this pass draws them."""
-        return replace(points, enlarged=points.enlarged * self.enlarge)
-
-
-def two_passes(
-    points: Points, surface: Surface, feed: str, shape: Shape, second: Second, **uniforms: Any
-) -> None:
+def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
     """Visibility, then what each splat gives, added up: by the rasteriser, fed as `amplify` says.
 
     Where the first pass finds nothing, the nearest of the enlarged splats fills the pixel, but not beyond
@@ -56,62 +36,50 @@ def two_passes(
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        draw_shapes(points, feed, shape, _FIRST, **uniforms)
-        if second.enlarge > 1:
-            _draw_fill(second.larger(points), feed, shape, **uniforms)
+        draw_shapes(points, feed, SURFEL, FRAGMENT, splats)
+        if splats.enlarge > 1:
+            _draw_fill(splats.larger(points), feed, splats)
     with gpu.timers.measure("copy"):
         surface.take_raster()
-    _add(points, second.larger(points), surface, feed, shape, second, **uniforms)
+    _add(points, splats.larger(points), surface, feed, splats)
     _resolve(points, surface, over=False)
-    if second.enlarge > 1:
-        _close(points, surface, second, **uniforms)
+    if splats.enlarge > 1:
+        _close(points, surface, splats)
 
 
-def _draw_fill(larger: Points, feed: str, shape: Shape, **uniforms: Any) -> None:
+def _draw_fill(larger: Points, feed: str, splats: Splats) -> None:
     """Enlarged splats behind all that the first pass found."""
     gl.divide_depth(_BEHIND)
-    draw_shapes(larger, feed, shape, "surfels/passes/fill.frag", **uniforms)
+    draw_shapes(larger, feed, SURFEL, "surfels/passes/fill.frag", splats)
     gl.divide_depth(1)
 
 
-def _add(
-    points: Points, larger: Points, surface: Surface, feed: str, shape: Shape, second: Second, **uniforms: Any
-) -> gl.Sums:
+def _add(points: Points, larger: Points, surface: Surface, feed: str, splats: Splats) -> gl.Sums:
     """Add up what enlarged splats give that are not too far behind what is visible. points: all that were
     drawn in the first pass; larger: those to add."""
     gpu = surface.gpu
     with _sums(points, surface) as sums:
         with gpu.timers.measure("limit"):
-            _limit(points, surface, second, **uniforms)
+            _limit(points, surface, splats)
         with gpu.timers.measure("add"):
             sums.clear()
             gl.write_depth(False)
             gpu.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
             gpu.ctx.depth_func = ">="
             gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE
-            draw_shapes(larger, feed, shape, "surfels/passes/add.frag", falloff=second.falloff, **uniforms)
+            draw_shapes(larger, feed, SURFEL, "surfels/passes/add.frag", splats)
             gl.write_depth(True)
     return sums
 
 
-def splat_sorted(
-    points: Points, surface: Surface, feed: str, shape: Shape, falloff: float, **uniforms: Any
-) -> None:
+def splat_sorted(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
     """`splat_over` from back to front."""
     ordered = _farthest_first(points, surface)
-    splat_over(ordered, surface, feed, shape, falloff, tested=False, **uniforms)
+    splat_over(ordered, surface, feed, splats, tested=False)
     surface.gpu.discard(ordered.rows)
 
 
-def splat_over(
-    points: Points,
-    surface: Surface,
-    feed: str,
-    shape: Shape,
-    falloff: float,
-    tested: bool,
-    **uniforms: Any,
-) -> None:
+def splat_over(points: Points, surface: Surface, feed: str, splats: Splats, tested: bool) -> None:
     """Each splat over those before it, as transparent as its mask; `surface` holds what is visible.
 
     tested: whether what was drawn before hides what is behind it, all of a quad and not its mask alone.
@@ -123,7 +91,7 @@ def splat_over(
         gpu.ctx.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if tested else 0))
         gpu.ctx.depth_func = ">"
         gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        draw_shapes(points, feed, shape, "surfels/passes/over.frag", falloff=falloff, **uniforms)
+        draw_shapes(points, feed, SURFEL, "surfels/passes/over.frag", splats)
     _resolve(points, surface, over=True)
 
 
@@ -138,58 +106,51 @@ def _farthest_first(points: Points, surface: Surface) -> Points:
     return replace(points, rows=order)
 
 
-def show_visibility(points: Points, surface: Surface, epsilon: float, **uniforms: Any) -> None:
+def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
     """Turn what a single pass found into what the first of two leaves to the second: depth in grey."""
     gpu, pose = surface.gpu, points.pose
-    program = gpu.compute("surfels/passes/visibility.comp", points.defines)
-    depths = robust_range(surface.view.depths(pose.sample))
-    gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, depth_range=depths, **uniforms)
+    program = gpu.compute("surfels/passes/visibility.comp", points.defines, params=splats)
+    gpu.set(program, depth_range=robust_range(surface.view.depths(pose.sample)))
     blocks = (surface.depths, surface.rows, surface.own("colors"), surface.own("normals"))
     with gpu.timers.measure("grey"):
-        bind_visible_radii(points)
+        bind_visible(points, program)
         for number, block in enumerate(blocks):
             block.buffer.bind_to_storage_buffer(number)
         gpu.dispatch(program, surface.size[0] * surface.size[1])
 
 
-def tiled_two_passes(points: Points, surface: Surface, shape: Shape, second: Second, **uniforms: Any) -> None:
+def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
     """What `two_passes` draws, by tiles; splats that are too large for these are rasterised."""
-    lists = _first_by_tiles(points, surface, shape, second, **uniforms)
+    lists = _first_by_tiles(points, surface, splats)
     if lists is None:
-        two_passes(points, surface, FALLBACK, shape, second, **uniforms)
+        two_passes(points, surface, FALLBACK, splats)
         return
-    large = lists.large_points(second.larger(points)) if lists.large else None
-    if second.enlarge > 1:
-        _fill_by_tiles(surface, lists, shape, large, **uniforms)
+    large = lists.large_points(splats.larger(points)) if lists.large else None
+    if splats.enlarge > 1:
+        _fill_by_tiles(surface, lists, large, splats)
     sums: tuple[moderngl.Texture, ...] = ()
     if large is not None:
-        sums = _add(points, large, surface, FALLBACK, shape, second, **uniforms).images
-    bind_visible_radii(points)
+        sums = _add(points, large, surface, FALLBACK, splats).images
     defines = {"FOUND": 1, "FILL": 0, "LARGE": int(lists.large > 0), **points.defines}
     defines |= bind_looks(points, surface)
     blocks = (surface.depths.buffer, surface.rows.buffer)
-    passes = {"epsilon": second.epsilon, "falloff": second.falloff, "enlarged": points.enlarged}
-    run("blend", surface, lists, defines, blocks, sums, **passes, **uniforms)
-    if second.enlarge > 1:
-        _close(points, surface, second, **uniforms)
+    run("blend", surface, lists, defines, blocks, sums, points, splats)
+    if splats.enlarge > 1:
+        _close(points, surface, splats)
 
 
-def _first_by_tiles(
-    points: Points, surface: Surface, shape: Shape, second: Second, **uniforms: Any
-) -> TileLists | None:
+def _first_by_tiles(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
     """Draw the first pass; the lists of the second. None where the rasteriser has to do it all."""
-    if second.enlarge > 1 or not uniforms["cull_back"]:
-        splat(points, surface, shape, _FIRST, **uniforms)
-        return _lists_not_hidden(points, surface, second, **uniforms)
-    lists = tile_lists(points, surface, **uniforms)  # both passes have the same
+    if splats.enlarge > 1 or not splats.cull_back:
+        splat(points, surface, splats)
+        return _lists_not_hidden(points, surface, splats)
+    lists = tile_lists(points, surface, splats)  # both passes have the same
     if lists is not None:
-        show_all(points, surface, lists, shape, _FIRST, **uniforms)
+        show_all(points, surface, lists, splats)
     return lists
 
 
-def _fill_by_tiles(
-    surface: Surface, lists: TileLists, shape: Shape, large: Points | None, **uniforms: Any
-) -> None:
+def _fill_by_tiles(surface: Surface, lists: TileLists, large: Points | None, splats: Splats) -> None:
     """The nearest of the enlarged splats where the first pass found nothing. large: those not in lists."""
     blocks = (surface.depths.buffer, surface.rows.buffer)
     images: tuple[moderngl.Texture, ...] = ()
@@ -198,27 +159,26 @@ def _fill_by_tiles(
         images = surface.raster().images
         surface.gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         surface.gpu.ctx.depth_func = ">"
-        _draw_fill(large, FALLBACK, shape, **uniforms)
+        _draw_fill(large, FALLBACK, splats)
     surface.covered.clear()
     surface.covered.bind()
     defines = {"FOUND": 1, "FARTHEST": 0, "FILL": 1, "LARGE": int(large is not None)}
     run("show", surface, lists, defines, blocks, images)
 
 
-def _lists_not_hidden(points: Points, surface: Surface, second: Second, **uniforms: Any) -> TileLists | None:
+def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
     """The lists of the second pass, without the splats that all lie too far behind what the first found."""
     gpu = surface.gpu
     lists = surface.keep("tiles", lambda: TileLists(gpu, surface.size))
-    program = gpu.compute("surfels/tiles/limits.comp", {"TILE": TILE, **points.defines})
-    gpu.set(program, tiles=lists.tiles, epsilon=second.epsilon, enlarged=points.enlarged, **uniforms)
+    program = gpu.compute("surfels/tiles/limits.comp", {"TILE": TILE, **points.defines}, params=splats)
     with gpu.timers.measure("limits"):
         gl.clear_words(lists.farthest, 0)
         lists.farthest.bind_to_storage_buffer(0)
-        bind_visible_radii(points)
+        bind_visible(points, program)
         surface.depths.bind(6)
         surface.rows.bind(7)
         gpu.dispatch(program, surface.size[0] * lists.tiles[1])
-    return tile_lists(second.larger(points), surface, NOT_HIDDEN, **uniforms)
+    return tile_lists(splats.larger(points), surface, splats, NOT_HIDDEN)
 
 
 @contextmanager
@@ -233,12 +193,13 @@ def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
     gpu.ctx.disable(moderngl.BLEND)
 
 
-def _limit(points: Points, surface: Surface, second: Second, **uniforms: Any) -> None:
+def _limit(points: Points, surface: Surface, splats: Splats) -> None:
     """Set the depth buffer to how far behind the visible splat others still count."""
     gpu = surface.gpu
-    program = gpu.program(("present/present.vert", "surfels/passes/limit.frag"), points.defines)
-    gpu.set(program, epsilon=second.epsilon, enlarged=points.enlarged, **uniforms)
-    bind_visible_radii(points)
+    program = gpu.program(
+        ("present/present.vert", "surfels/passes/limit.frag"), points.defines, params=splats
+    )
+    bind_visible(points, program)
     surface.depths.bind(6)
     gpu.ctx.enable_only(moderngl.DEPTH_TEST)
     gpu.ctx.depth_func = "1"
@@ -263,25 +224,20 @@ def _resolve(points: Points, surface: Surface, over: bool) -> None:
         gpu.dispatch(program, surface.size[0] * surface.size[1])
 
 
-def _close(points: Points, surface: Surface, second: Second, **uniforms: Any) -> None:
+def _close(points: Points, surface: Surface, splats: Splats) -> None:
     """Take back what the second pass filled beyond the outline; `covered` lists what it filled."""
     gpu = surface.gpu
     with gpu.timers.measure("close"):
-        bind_visible_radii(points)
-        points.bind()
         for number, texels in enumerate((surface.depths, surface.rows)):
             texels.buffer.bind_to_storage_buffer(number)
         for step in range(2):
-            program = gpu.compute("surfels/passes/close.comp", {"STEP": step, **points.defines})
-            gpu.set(program, enlarge=second.enlarge, enlarged=points.enlarged, **uniforms)
+            program = gpu.compute(
+                "surfels/passes/close.comp", {"STEP": step, **points.defines}, params=splats
+            )
+            points.bind(program)
+            bind_visible(points, program)
             surface.covered.run(program)
             gpu.ctx.memory_barrier()
-
-
-def bind_visible_radii(points: Points) -> None:
-    """Bind what surfels/passes/limit.glsl reads: texture unit 4."""
-    if points.use_radii:
-        points.pose.array("radii").bind(4)
 
 
 def bind_looks(points: Points, surface: Surface) -> dict[str, object]:

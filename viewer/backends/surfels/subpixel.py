@@ -7,9 +7,7 @@ one with each small motion, would flicker.
 from __future__ import annotations
 
 import math
-from typing import Any
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +16,8 @@ from ...gpu.context import Gpu
 from ...gpu.scatter import scatter
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
-from .passes import bind_looks, bind_visible_radii
+from .passes import bind_looks
+from .splats import Splats, bind_visible
 
 LEAST_RADIUS = 0.7072  # pixels, of what the mask leaves of a disc: a smaller one may miss all pixel centres
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
@@ -42,24 +41,22 @@ class _Sums:
         self.buffer.release()
 
 
-def subpixel_share(
-    points: Points, surface: Surface, radius_scale: float, uniform_radius: float, mask_limit: float
-) -> float:
+def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     """1 where nearly all discs are as small as any is drawn; 0 where they are twice as large, or some
     very large; between them in proportion.
 
-    Outliers count for what none may be. mask_limit: the squared share of a radius that the mask leaves.
+    Outliers count for what none may be.
     """
     pose, view = points.pose, surface.view
     nearest = float(view.depths(pose.remember("box", lambda: _box(pose.cloud))).min())
     usually_nearest = float(view.depths(pose.bounds.corners() - pose.cloud.origin).min())
     if view.perspective and min(nearest, usually_nearest) <= view.near:
         return 0.0
-    usual = largest = uniform_radius
+    usual = largest = splats.uniform_radius
     if points.use_radii:
         own = pose.remember("radii up to", lambda: _radii_up_to(pose.cloud))
         usual, largest = max(usual, own[0]), max(largest, own[1])
-    pixels = radius_scale * math.sqrt(mask_limit) * points.enlarged * view.scale
+    pixels = splats.radius_scale * math.sqrt(splats.mask_limit) * points.enlarged * view.scale
     if view.perspective:
         usual, largest = usual / usually_nearest, largest / nearest
     if largest * pixels > _LARGEST_RADIUS:
@@ -82,27 +79,23 @@ def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
     return float(np.quantile(known, 0.9)) if known.size else 0.0, largest
 
 
-def splat_subpixel(points: Points, surface: Surface, **uniforms: Any) -> None:
+def splat_subpixel(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel, by scatter: what `tiles.splat` draws, up to rounding."""
-
-    def bind(program: moderngl.ComputeShader) -> None:
-        points.bind()
-        surface.gpu.set(program, enlarged=points.enlarged, **uniforms)
-
     scatter(
         surface.gpu,
         "surfels/scatter.glsl",
         points.count,
         surface.depths,
         surface.rows,
-        bind,
+        points.bind,
         defines=points.defines,
+        params=splats,
     )
 
 
-def average(points: Points, surface: Surface, epsilon: float, share: float, **uniforms: Any) -> None:
+def average(points: Points, surface: Surface, splats: Splats) -> None:
     """Colours and normals of each pixel: the mean of the discs that lie at most epsilon radii behind
-    what it shows. share: of the mean, 0..1; the rest is what it shows."""
+    what it shows, as far as `mean_share` says."""
     gpu = surface.gpu
     covered = surface.list_covered()
     sums = surface.keep("mean", lambda: _Sums(gpu, surface.size[0] * surface.size[1]))
@@ -111,16 +104,14 @@ def average(points: Points, surface: Surface, epsilon: float, share: float, **un
     bound |= {"NORMAL_DIVISOR": (points.count >> 22) + 1, "COLOR_DIVISOR": f"{(points.count >> 24) + 1}u"}
     with gpu.timers.measure("mean"):
         sums.buffer.bind_to_storage_buffer(0)
-        bind_visible_radii(points)
         surface.depths.bind(6)
         surface.rows.bind(7)
         for step in range(3):
             defines = {"STEP": step, **bound, **points.defines}
-            program = gpu.compute("surfels/passes/mean.comp", defines)
-            gpu.set(program, epsilon=epsilon, enlarged=points.enlarged, **uniforms)
-            gpu.set(program, share=share, item_count=points.count)
+            program = gpu.compute("surfels/passes/mean.comp", defines, params=splats)
             if step == 1:
-                points.bind()
+                bind_visible(points, program)
+                points.bind(program)
                 gpu.dispatch(program, points.count)
             else:
                 covered.run(program)

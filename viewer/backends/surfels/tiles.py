@@ -9,15 +9,15 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import moderngl
 import numpy as np
 
 from ...gpu import gl
-from ...gpu.amplify import Points, Shape, amplify
+from ...gpu.amplify import Points, amplify
 from ...gpu.context import Gpu
 from ...gpu.surface import Surface
+from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
 TILE = 8  # pixels of a tile's edge
 _MOST_TILES = 2048  # along an edge of the picture: what bin.comp's words have bits for
@@ -58,25 +58,23 @@ class TileLists:
         textures = [*self._textures.values(), *([self._large_rows] if self._large_rows else [])]
         return sum(texture.buffer.size for texture in textures)
 
-    def fill(self, points: Points, side: int = ALL, **uniforms: Any) -> bool:
+    def fill(self, points: Points, splats: Splats, side: int = ALL) -> bool:
         """List the discs of points for the bound view; False where the lists would grow too long.
 
         side: ALL; TOWARDS, those that face the eye; AWAY, the others, unless they are hidden by what
         `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large ones are counted but
-        for AWAY. uniforms: of surfels/disc.glsl.
+        for AWAY.
         """
         gpu = self._gpu
         self._reserve(max(len(points.pose.cloud), 1))
         with gpu.timers.measure("count"):
             gl.clear_words(self._buffer("slots"), 0)
             self._buffer("large").write(bytes(_LARGE_HEAD))
-            points.bind()
             self._textures["farthest"].bind(4)
             self._bind_blocks("slots", "places", "forms", "reach", "large")
-            self._bin(0, points, side, enlarged=points.enlarged, **uniforms)
+            self._bin(0, points, splats, side)
         with gpu.timers.measure("scan"):
-            scan = gpu.compute("surfels/tiles/scan.comp", {"TILES": f"{_mapping(gpu)[1]}u"})
-            gpu.set(scan, slot_count=self.tiles[0] * self.tiles[1])
+            scan = gpu.compute("surfels/tiles/scan.comp", {"TILE": TILE, "TILES": f"{_mapping(gpu)[1]}u"})
             self._bind_blocks("slots", "large", "work", "farthest")
             scan.run(1)
             gpu.ctx.memory_barrier()
@@ -89,7 +87,7 @@ class TileLists:
                 self._replace("list", min(4 * (self.length * 5 // 4), gpu.max_storage_bytes), gl.R32UI)
             self._textures["reach"].bind(4)
             self._bind_blocks("slots", "list")
-            self._bin(1, points, side, capacity=self._buffer("list").size // 4)
+            self._bin(1, points, splats, side)
         return True
 
     def large_points(self, points: Points) -> Points:
@@ -105,7 +103,6 @@ class TileLists:
         for unit, name in enumerate(("places", "forms", "slots", "list")):
             self._textures[name].bind(unit)
         self._textures["work"].bind(8)
-        self._gpu.set(program, tiles=self.tiles)
         program.run_indirect(self._buffer("work"))
         self._gpu.ctx.memory_barrier()
 
@@ -118,10 +115,10 @@ class TileLists:
         """The farthest depth shown in each tile, a word each: what FARTHEST of show.comp writes."""
         return self._buffer("farthest")
 
-    def _bin(self, number: int, points: Points, side: int, **uniforms: Any) -> None:
+    def _bin(self, number: int, points: Points, splats: Splats, side: int) -> None:
         defines = {"PASS": number, "SIDE": side, "TILE": TILE, **points.defines}
-        program = self._gpu.compute("surfels/tiles/bin.comp", defines)
-        self._gpu.set(program, item_count=points.count, tiles=self.tiles, **uniforms)
+        program = self._gpu.compute("surfels/tiles/bin.comp", defines, params=splats)
+        points.bind(program)
         self._gpu.dispatch(program, points.count)
 
     def _reserve(self, count: int) -> None:
@@ -150,34 +147,33 @@ class TileLists:
             self._buffer(name).bind_to_storage_buffer(number)
 
 
-def splat(points: Points, surface: Surface, shape: Shape, fragment: str, **uniforms: Any) -> None:
+def splat(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel: what `amplify` draws, up to rounding.
 
-    shape, fragment: the same discs for the rasteriser. uniforms: of both. First come those that face the
-    eye, then those of the others that the first do not hide: of a closed surface next to none.
+    First come those that face the eye, then those of the others that the first do not hide: of a closed
+    surface next to none.
     """
-    side = ALL if uniforms["cull_back"] else TOWARDS
-    lists = tile_lists(points, surface, side, **uniforms)
+    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS)
     if lists is None:
-        amplify(points, surface, FALLBACK, shape, fragment, **uniforms)
+        amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
         return
     away = lists.away
-    show_all(points, surface, lists, shape, fragment, farthest=away, **uniforms)
+    show_all(points, surface, lists, splats, farthest=away)
     if not away:
         surface.stats.skipped["second lists"] = "no splat that is drawn faces away"
-    elif lists.fill(points, AWAY, **uniforms):
+    elif lists.fill(points, splats, AWAY):
         show(surface, lists, found=True)
     else:
         surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"
-        amplify(points, surface, FALLBACK, shape, fragment, **uniforms)
+        amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
 
 
-def tile_lists(points: Points, surface: Surface, side: int = ALL, **uniforms: Any) -> TileLists | None:
+def tile_lists(points: Points, surface: Surface, splats: Splats, side: int = ALL) -> TileLists | None:
     """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner."""
     reason = _unfit(points, surface)
     if not reason:
         lists = surface.keep("tiles", lambda: TileLists(surface.gpu, surface.size))
-        if not lists.fill(points, side, **uniforms):
+        if not lists.fill(points, splats, side):
             reason = f"too long lists, {lists.length:,} entries"
         elif lists.large * _LARGE_COST > lists.length:
             reason = f"{lists.large:,} large splats"
@@ -195,14 +191,12 @@ def show_all(
     points: Points,
     surface: Surface,
     lists: TileLists,
-    shape: Shape,
-    fragment: str,
+    splats: Splats,
     farthest: bool = False,
-    **uniforms: Any,
 ) -> None:
     """The nearest disc at each pixel of those listed and of the large ones. farthest: as in `show`."""
     if lists.large:
-        amplify(lists.large_points(points), surface, FALLBACK, shape, fragment, **uniforms)
+        amplify(lists.large_points(points), surface, FALLBACK, SURFEL, FRAGMENT, splats)
     show(surface, lists, found=lists.large > 0, farthest=farthest)
 
 
@@ -225,17 +219,20 @@ def run(
     defines: Mapping[str, object],
     blocks: Sequence[moderngl.Buffer],
     rastered: Sequence[moderngl.Texture] = (),
-    **uniforms: Any,
+    first: Points | None = None,
+    splats: Splats | None = None,
 ) -> None:
     """Run surfels/tiles/NAME.comp on the tiles that have lists. blocks: its storage blocks, from 0 on.
-    rastered: two images of what the large discs gave (LARGE)."""
+    rastered: two images of what the large discs gave (LARGE). first: the points of the first pass, where it
+    reads their radii, and splats: how they were drawn."""
     gpu = surface.gpu
     rows, tiles = _mapping(gpu)
     perspective = int(surface.view.perspective)
     layout = {"TILE": TILE, "ROWS": rows, "COLUMNS": TILE // rows, "TILES": tiles, "PERSPECTIVE": perspective}
     with gpu.timers.measure(name):
-        program = gpu.compute(f"surfels/tiles/{name}.comp", {**defines, **layout})
-        gpu.set(program, **uniforms)
+        program = gpu.compute(f"surfels/tiles/{name}.comp", {**defines, **layout}, params=splats)
+        if first is not None:
+            bind_visible(first, program)
         for number, block in enumerate(blocks):
             block.bind_to_storage_buffer(number)
         for unit, image in enumerate(rastered, start=9):

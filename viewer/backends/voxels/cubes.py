@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,16 +67,12 @@ def _part(points: Points, chosen: NDArray[np.bool_]) -> Points:
 
 
 def _scatter(points: Points, surface: Surface) -> None:
-    def bind(program: moderngl.ComputeShader) -> None:
-        points.bind()
-        surface.gpu.set(program, enlarged=points.enlarged)
-
     scatter(
         surface.gpu,
         "voxels/scatter.glsl",
         points.count,
         surface.depths,
         surface.rows,
-        bind,
+        points.bind,
         defines=points.defines,
     )
