@@ -22,6 +22,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 if TYPE_CHECKING:
+    from viewer.backends import Backend
     from viewer.gpu.surface import Surface
     from viewer.renderer import Renderer
 
@@ -90,7 +91,7 @@ def renderer() -> Renderer:
 
 @pytest.fixture
 def draw(renderer: Renderer) -> Callable[..., Surface]:
-    """draw(cloud, camera, size, backend or variant, look, params): one finished Surface."""
+    """draw(cloud, camera, size, backend or its name or a variant, look, params): one finished Surface."""
     from scenes import of_variant
 
     from viewer.backends import backend
@@ -101,18 +102,16 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
         cloud: PointCloud,
         camera: Camera,
         size: tuple[int, int] = (64, 48),
-        name: str = "points",
+        which: str | Backend = "points",
         look: Look | None = None,
         params: dict[str, object] | None = None,
     ) -> Surface:
-        name, setting = of_variant(name)
-        request = Request(
-            Pose(0, 0.0, "test", cloud),
-            camera,
-            name,
-            backend(name).params({**setting, **(params or {})}),
-            look or Look(light="flat"),
-        )
+        setting: dict[str, object] = {}
+        if isinstance(which, str):
+            name, setting = of_variant(which)
+            which = backend(name)
+        values = which.params({**setting, **(params or {})})
+        request = Request(Pose(0, 0.0, "test", cloud), camera, which, values, look or Look(light="flat"))
         surface = Surface(renderer.gpu, size)
         while render_frame(renderer, request, surface):
             pass

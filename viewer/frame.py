@@ -66,7 +66,7 @@ def render_frame(
         plain = fallback(request)
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
-    surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds))
+    surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds), look)
     stats = surface.stats
     stats.backend = backend.name
     if prepared is None:

@@ -10,6 +10,7 @@ layout(std140, binding = 0) uniform View {
 };
 
 const uint NONE = 0xFFFFFFFFu;
+const uint INFINITE = 0x7F800000u;  // as float bits: the depth where nothing is
 
 // Several programs compute the same point's depth and pixel, and compare: without `precise`
 // each compiler run may contract or reorder as it likes, and they differ in the last bit.

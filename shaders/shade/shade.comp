@@ -1,7 +1,7 @@
 // From a Surface to a picture: colour, light, eye-dome lighting, background.
 // COLOR_BY 0 plain, 1 own, 2 normal, 3 value, 4 id. LIGHT 0 flat, 1 head, 2 fixed.
-// OWN_COLORS, OWN_NORMALS: the backend wrote them for each pixel; else each row has them. With its colours
-// comes how much of the pixel is covered; the rest is background.
+// OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
+// filled have none. With its colour comes how much of the pixel is covered; the rest is background.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -16,7 +16,7 @@ layout(binding = 4) uniform samplerBuffer values;
 layout(binding = 5) uniform samplerBuffer color_map;
 layout(binding = 6) uniform samplerBuffer positions;
 layout(binding = 7) uniform usamplerBuffer ids;
-#if OWN_COLORS
+#if OWN_COLOR
 layout(binding = 8) uniform samplerBuffer own_colors;
 #endif
 layout(std430, binding = 0) writeonly buffer Picture { uint picture[]; };
@@ -37,12 +37,18 @@ float depth_at(ivec2 pixel) {
 vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #if COLOR_BY == 0
     return plain;
-#elif COLOR_BY == 1
-    return texelFetch(colors, OWN_COLORS != 0 ? index : int(row)).rgb;
 #elif COLOR_BY == 2
     return 0.5 * normal + 0.5;
+#else
+#if !(COLOR_BY == 1 && OWN_COLOR) && !(COLOR_BY == 3 && (OWN_VALUE || VALUE == 0))
+    if (row == NONE) return plain;
+#endif
+#if COLOR_BY == 1
+    return texelFetch(colors, OWN_COLOR != 0 ? index : int(row)).rgb;
 #elif COLOR_BY == 3
-#if VALUE == 0
+#if OWN_VALUE
+    float value = texelFetch(values, index).r;
+#elif VALUE == 0
     float value = depth;
 #elif VALUE == 1
     float value = dot(height_axis, texelFetch(positions, int(row)).xyz);
@@ -62,6 +68,7 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
     uint h = id * 2654435761u;
     h ^= h >> 16;
     return vec3(64u + (uvec3(h, h >> 8, h >> 16) & 127u) * 3u / 2u) / 255.0;
+#endif
 #endif
 }
 
@@ -106,7 +113,7 @@ vec3 shade(int index) {
     float depth = uintBitsToFloat(texelFetch(depths, index).r);
     vec3 normal = vec3(0.0);
 #if LIGHT != 0 || COLOR_BY == 2
-    normal = texelFetch(normals, OWN_NORMALS != 0 ? index : int(row)).xyz;
+    if (OWN_NORMAL != 0 || row != NONE) normal = texelFetch(normals, OWN_NORMAL != 0 ? index : int(row)).xyz;
     float len = length(normal);
     // A missing normal faces the eye.
     normal = len > 0.0 && len < 3e38
@@ -123,7 +130,7 @@ vec3 shade(int index) {
     return color;
 }
 
-#if OWN_COLORS
+#if OWN_COLOR
 // sRGB, as pictures are put on a page.
 vec4 over_background(vec4 color, float coverage) {
     float alpha = mix(background.a, 1.0, coverage);
@@ -136,7 +143,7 @@ void main() {
     uint i = item();
     if (i >= list_count) return;
     vec4 color = vec4(shade(int(list[i])), 1.0);
-#if OWN_COLORS
+#if OWN_COLOR
     color = over_background(color, texelFetch(own_colors, int(list[i])).a);
 #endif
     picture[list[i]] = packUnorm4x8(color);

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import filling
 import numpy as np
 import pytest
 from scenes import looking_down_z, plane, sphere, sphere_hits
 
 from viewer.analysis.pick import before_gap, is_seen, pick
 from viewer.camera import Camera
-from viewer.gpu.surface import EMPTY, NOTHING, Surface, Texel
+from viewer.gpu.surface import EMPTY, NOTHING, Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 
@@ -146,14 +147,18 @@ def test_depths_round_a_pixel_are_those_of_the_picture(draw: Draw, place: tuple[
     np.testing.assert_array_equal(surface.depth_around(*place, 3), around)
 
 
-def test_a_filled_pixel_has_a_place_and_no_point(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
-    surface = draw(plane(100, depth=4.0), CAMERAS["perspective"], SIZE)
-    monkeypatch.setattr(surface, "texel", lambda x, y: Texel(2.0, NOTHING, 3))
-    picked = pick(surface, 30, 20)
-    assert picked is not None
-    assert (picked.level, picked.measured) == (3, False)
-    assert picked.row is picked.id is picked.point is picked.spacing is None
-    np.testing.assert_allclose(picked.position, [0.0125, -0.0125, -2.0])
+@pytest.mark.parametrize("projection", CAMERAS)
+def test_a_filled_pixel_has_a_place_and_no_point(draw: Draw, projection: str) -> None:
+    surface = draw(plane(10, depth=4.0, spacing=0.25), CAMERAS[projection], SIZE, filling.BACKEND)
+    levels = surface.level
+    assert {*np.unique(levels)} == {0, 1, 2, 3, EMPTY}, "points are 5 pixels apart"
+    for y, x in np.argwhere((levels > 0) & (levels != EMPTY))[::37].tolist():
+        picked = pick(surface, x, y)
+        assert picked is not None
+        assert (picked.level, picked.measured) == (levels[y, x], False)
+        assert picked.row is picked.id is picked.point is picked.spacing is None
+        np.testing.assert_allclose(picked.position, [(x - 29.5) / 20, (19.5 - y) / 20, -4.0], atol=1e-6)
+        assert surface.texel(x, y) == (surface.depth[y, x], NOTHING, levels[y, x])
 
 
 def test_what_was_picked_does_not_hold_the_scan(draw: Draw) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 
+import filling
 import moderngl
 import numpy as np
 import pytest
@@ -97,6 +98,8 @@ def draw_all(renderer: Renderer) -> None:
             draw(cloud, "points", look)
             draw(cloud, "surfels", look, passes="two")
         draw(cloud, baselines.gl_points())
+        for look in LOOKS:
+            draw(cloud, filling.BACKEND, look)
     draw(sphere(1500), "surfels", radius_scale=0.01)
     mesh = sphere_mesh(16)
     draw(mesh.points, baselines.mesh(mesh))
@@ -117,7 +120,7 @@ def test_every_shader_file_is_built_for_some_picture(programs: list[list[Source]
     folder = Path(str(resource_path("shaders")))
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     used = {file for program in programs for stage in program for file in stage.files}
-    assert {file for file in used if not file.startswith("<")} == files
+    assert {file for file in used if not file.startswith("<")} == files | {filling.SHADER}
 
 
 def test_the_reference_compiler_takes_every_program(programs: list[list[Source]], tmp_path: Path) -> None:

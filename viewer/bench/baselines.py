@@ -88,9 +88,9 @@ class _Triangles:
             faces.bind(1)
             for unit, name in enumerate(("positions", "normals", *(("colors",) if colored else ())), 2):
                 pose.array(name).bind(unit)
-            surface.own("normals").buffer.bind_to_storage_buffer(0)
+            surface.own("normal").buffer.bind_to_storage_buffer(0)
             if colored:
-                surface.own("colors").buffer.bind_to_storage_buffer(1)
+                surface.own("color").buffer.bind_to_storage_buffer(1)
             covered.run(resolve)
             gpu.ctx.memory_barrier()
         return False

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
+from ..geometry import up_vector
 from ..scan.points import PointCloud
 from . import gl
 from .context import Gpu
@@ -65,6 +66,10 @@ class GpuPose:
         self.upload([name])
         return self._arrays[name]
 
+    def find(self, name: str) -> gl.BufferTexture | None:
+        """The same; None where the scan has no such attribute and none was estimated."""
+        return None if getattr(self.cloud, name) is None else self.array(name)
+
     def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:
         """Upload what is missing of these arrays, in slices until the time is over; whether all is there."""
         missing = [name for name in names if name not in self._arrays]
@@ -103,7 +108,7 @@ class GpuPose:
     def _values(self, name: str) -> NDArray:
         if name.startswith("scalar:"):
             scalar = name.removeprefix("scalar:")
-            return as_float32(self.scalar(scalar), self.scalar_zero(scalar))
+            return as_float32(self.scalar(scalar), self.scalar_range(scalar)[0])
         values: NDArray | None = getattr(self.cloud, name)
         if values is None:
             hint = (
@@ -128,9 +133,17 @@ class GpuPose:
         """The 2 % and 98 % quantiles of a scalar's finite values."""
         return self.remember(f"range of {name}", lambda: robust_range(_strided(self.scalar(name))))
 
-    def scalar_zero(self, name: str) -> float:
-        """What a scalar is stored relative to on the GPU: times of 1e9 seconds keep their steps."""
-        return self.scalar_range(name)[0]
+    def value_zero(self, source: str, up: str) -> float:
+        """What "depth", "height" along an axis or a scalar is relative to on the GPU. It is taken off in
+        float64, so that heights and times far from zero keep their steps."""
+        if source == "height":
+            return float(self.cloud.origin @ up_vector(up))
+        return 0.0 if source == "depth" else self.scalar_range(source)[0]
+
+    def heights(self, up: str) -> gl.BufferTexture:
+        """The height of each point along `up`, relative to the origin; for what cannot go by positions."""
+        axis = np.array(up_vector(up), np.float32)
+        return self.packed(f"heights along {up}", lambda: self.cloud.positions @ axis)
 
     @cached_property
     def sample(self) -> NDArray[np.float64]:

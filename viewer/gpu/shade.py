@@ -24,10 +24,10 @@ def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
     pose, gpu = surface.pose, surface.gpu
     cloud = pose.cloud
-    source = value_source(look, cloud.scalars)
+    source, surface.look = value_source(look, cloud.scalars), look
     value = source if source in (None, "depth", "height") else "scalar"
     color = "value" if source is not None else "own" if look.color_by == "auto" else look.color_by
-    if color == "own" and cloud.colors is None and not surface.is_own("colors"):
+    if color == "own" and cloud.colors is None and not surface.is_own("color"):
         color = "plain"
     light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
@@ -39,27 +39,28 @@ def shade(surface: Surface, look: Look) -> None:
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
             "HAS_IDS": int(cloud.ids is not None),
-            "OWN_COLORS": int(surface.is_own("colors")),
-            "OWN_NORMALS": int(surface.is_own("normals")),
+            **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
         },
     )
     surface.color_range = None if source is None else value_range(surface, look)
     low, high = surface.color_range or (0.0, 1.0)
-    zero = 0.0 if source is None else _stored_zero(surface, look, source)
+    zero = surface.value_zero
     surface.bind_view()
     covered = surface.list_covered()
     with gpu.timers.measure("shade"):
         surface.depths.bind(0)
         surface.rows.bind(1)
         if color == "own":
-            _attribute(surface, "colors").bind(2)
+            _attribute(surface, "color").bind(2)
         if light != "flat" or color == "normal":
-            _attribute(surface, "normals").bind(3)
-        if surface.is_own("colors"):
-            surface.own("colors").bind(8)
-        if value == "scalar":
+            _attribute(surface, "normal").bind(3)
+        if surface.is_own("color"):
+            surface.own("color").bind(8)
+        if surface.is_own("value"):
+            surface.own("value").bind(4)
+        elif value == "scalar":
             pose.array(f"scalar:{source}").bind(4)
-        if value == "height":
+        elif value == "height":
             pose.array("positions").bind(6)
         if color == "id" and cloud.ids is not None:
             pose.array("ids").bind(7)
@@ -80,17 +81,17 @@ def shade(surface: Surface, look: Look) -> None:
         surface.picture.bind_to_storage_buffer(0)
         covered.run(program)
         gpu.ctx.memory_barrier()
-    surface.look, surface.shaded_by = look, shade
+    surface.shaded_by = shade
 
 
 def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
     """What the backend wrote for each pixel, else the pose's, for each row."""
-    return surface.own(name) if surface.is_own(name) else surface.pose.array(name)
+    return surface.own(name) if surface.is_own(name) else surface.pose.array(f"{name}s")
 
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles of the scan's points."""
-    pose, source = surface.scanned, value_source(look, surface.pose.cloud.scalars)
+    pose, source = surface.scanned, surface.value_source
     if source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample))
     elif source == "height":
@@ -98,16 +99,6 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     else:
         low, high = pose.scalar_range(source or "")
     return (low if look.low is None else look.low, high if look.high is None else look.high)
-
-
-def _stored_zero(surface: Surface, look: Look, source: str) -> float:
-    """What the values on the GPU are stored relative to: it is taken off the range in float64, so that
-    heights and times far from zero keep their steps."""
-    if source == "depth":
-        return 0.0
-    if source == "height":
-        return float(surface.pose.cloud.origin @ up_vector(look.up))
-    return surface.pose.scalar_zero(source)
 
 
 def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:

@@ -25,7 +25,7 @@ class ShaderError(Scan4DError):
 class Source:
     """One stage's text, put together from its file and what it includes.
 
-    name: path under `shaders/`. defines: macro name -> value. parts: what a file in angle
+    name: path under `shaders/`, or an absolute one. defines: macro name -> value. parts: what a file in angle
     brackets stands for, so that one file can serve several shapes: `#include <shape>`. params: the dataclass
     whose numbers `#include <params>` declares. files: what it is made of, numbered as in a compiler's log.
     """
@@ -50,7 +50,7 @@ class Source:
         return frozenset(_UNIFORM.findall(self.text))
 
     def _expand(self, name: str) -> str:
-        text = resource_path("shaders", *name.split("/")).read_text(encoding="utf-8")
+        text = resource_path("shaders", name).read_text(encoding="utf-8")
         return self._numbered(name, text)
 
     def _expand_part(self, name: str) -> str:

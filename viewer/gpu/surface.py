@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import moderngl
 import numpy as np
@@ -19,13 +19,15 @@ from . import gl
 from .compact import IndexList, list_covered
 from .context import Gpu, Resource
 from .counts import NOTHING, count_points
-from .pose import FORMATS, GpuPose, as_float32
+from .pose import GpuPose, as_float32
 from .sample import sample_of
 
 _NO_DEPTH = 0x7F800000  # +inf as float bits
 EMPTY = 255  # the level of a pixel that shows nothing
 _FEW = 1000  # points of which none is left out: it would gain nothing, and they would be missed
-_OWN_BYTES = {"normals": 12, "colors": 4}  # a pixel
+# What a backend may write for each pixel: the format of a texel, and its bytes.
+_CHANNELS = {"color": (gl.RGBA8, 4), "normal": (gl.RGB32F, 12), "value": (gl.R32F, 4), "level": (gl.R32UI, 4)}
+_RESOLVED = {"color": 0, "normal": 1, "value": 2}  # as shade/resolve.comp numbers them
 
 
 @dataclass
@@ -76,9 +78,10 @@ class Surface:
     """A picture's pixels before shading. Row 0 is the top.
 
     On the GPU: `depths` (float bits, +inf: nothing) and `rows` (the point that a pixel
-    shows, 0xFFFFFFFF: none), one word a pixel; colour, normal and value are fetched by row,
-    unless the backend wrote its `own`. Reading a property copies it to the CPU.
-    look: what it was shaded in, and shaded_by: what did it, None before.
+    shows, 0xFFFFFFFF: none), one word a pixel. A pixel is covered where its depth is finite. Colour,
+    normal and value are those of the row, unless the backend wrote its `own`; a pixel without a row is
+    filled, and what the backend did not write of it is unknown. Reading a property copies it to the CPU.
+    look: what it is drawn for, and shaded in last; shaded_by: what did it, None before.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
     """
 
@@ -112,13 +115,14 @@ class Surface:
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
         self._written: set[str] = set()
+        self._blended: tuple[str | None, str] | None = None  # the source that its own values are of, and up
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
     # --- for backends -----------------------------------------------------------------
 
-    def start(self, pose: GpuPose, view: View) -> None:
+    def start(self, pose: GpuPose, view: View, look: Look | None = None) -> None:
         """Begin a frame: what backends and shading read from now on."""
-        self._shown, self._stood_for = (pose, view), None
+        self._shown, self._stood_for, self.look = (pose, view), None, look or Look()
         self._block.write(view.block())
         self.bind_view()
         self._covered_known = False
@@ -143,7 +147,7 @@ class Surface:
     def list_covered(self) -> IndexList:
         """The list of the pixels that show something, in no order: what shading works on."""
         if not self._covered_known:
-            self.rows.bind(1)
+            self.depths.bind(0)
             list_covered(self.gpu, self.size[0] * self.size[1], self.covered)
             self._covered_known = True
         return self.covered
@@ -191,23 +195,72 @@ class Surface:
         return self._kept[name]  # type: ignore[return-value]
 
     def own(self, name: str) -> gl.BufferTexture:
-        """A texel a pixel, for a backend that writes `normals` or `colors` itself in this frame:
-        they are shown in place of the row's. In the pose's formats, the alpha of a colour being what it
-        covers of the pixel; where nothing is, unread."""
+        """A channel that the backend writes itself in this frame for every covered pixel: it is shown in
+        place of what the row has. Where nothing is, it is unread. As buffers:
+
+        color: RGBA8, sRGB, the alpha being what it covers of the pixel
+        normal: 3 floats, world space, of any length; 0: unknown
+        value: float, the number that is coloured by, in the terms of `row_values`; NaN: unknown
+        level: uint32, 0 where measured; n, up to 254, where filled from level n, with a depth and no row
+        """
         if name not in self._own:
-            buffer = self.gpu.ctx.buffer(reserve=_OWN_BYTES[name] * self.size[0] * self.size[1])
-            self._own[name] = gl.BufferTexture(buffer, FORMATS[name])
+            texel_format, size = _CHANNELS[name]
+            buffer = self.gpu.ctx.buffer(reserve=size * self.size[0] * self.size[1])
+            self._own[name] = gl.BufferTexture(buffer, texel_format)
         self._written.add(name)
+        if name == "value":
+            self._blended = self.value_source, self.look.up
+        if name == "level":
+            self._covered_known = False  # a list of what points cover lacks what is filled
         return self._own[name]
 
     def is_own(self, name: str) -> bool:
-        """Whether the backend wrote this attribute for each pixel."""
-        return name in self._written
+        """Whether the backend wrote this channel for each pixel. Values are those of one source: they are not
+        its own in a look that colours by another."""
+        fits = name != "value" or self._blended == (self.value_source, self.look.up)
+        return name in self._written and fits
+
+    def resolve(self, name: str) -> gl.BufferTexture:
+        """The channel `color`, `normal` or `value` as the backend's `own`, with what the rows have written to
+        it: for one that goes on from there, as by filling pixels that have none."""
+        rows = self.row_values if name == "value" else self.pose.find(f"{name}s")
+        own = self.own(name)
+        defines = {"CHANNEL": _RESOLVED[name], "HAS_ROWS": int(rows is not None)}
+        program = self.gpu.compute("shade/resolve.comp", defines)
+        with self.gpu.timers.measure(f"resolve {name}"):
+            self.depths.bind(0)
+            self.rows.bind(1)
+            if rows is not None:
+                rows.bind(2)
+            own.buffer.bind_to_storage_buffer(0)
+            self.gpu.set(program, plain=tuple(c / 255 for c in rgba(self.look.plain)[:3]))
+            self.gpu.dispatch(program, self.size[0] * self.size[1])
+        return own
+
+    @property
+    def value_source(self) -> str | None:
+        """What the look colours by where that is a number ("depth", "height", a scalar's name), else None."""
+        return value_source(self.look, self._cloud.scalars)
+
+    @property
+    def value_zero(self) -> float:
+        """What values on the GPU are relative to."""
+        source = self.value_source
+        return 0.0 if source is None else self.pose.value_zero(source, self.look.up)
+
+    @property
+    def row_values(self) -> gl.BufferTexture | None:
+        """The number of each row that the look colours by, a float relative to `value_zero`, for a backend
+        that blends it into its own `value`. None where it colours by none, or by depth, which pixels have."""
+        source = self.value_source
+        if source in (None, "depth"):
+            return None
+        return self.pose.heights(self.look.up) if source == "height" else self.pose.array(f"scalar:{source}")
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        words = 3 + (3 if self._raster else 0) + sum(_OWN_BYTES[name] for name in self._own) // 4
+        words = 3 + (3 if self._raster else 0) + sum(_CHANNELS[name][1] for name in self._own) // 4
         kept = sum(workspace.nbytes for workspace in self._kept.values())
         return 4 * self.size[0] * self.size[1] * words + self.covered.nbytes + kept
 
@@ -251,33 +304,27 @@ class Surface:
     def id(self) -> NDArray[np.uint32]:
         """(H, W) uint32, the point's index in the file; 0xFFFFFFFF where none."""
         ids = self._cloud.ids
-        return self.row if ids is None else self._fetch(ids, NOTHING)
+        return self.row if ids is None else self._fetch(ids, np.uint32(NOTHING))
 
     @property
     def color(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, linear; the look's plain colour where the scan has none; 0 where nothing is."""
         colors = self._cloud.colors
-        if self.is_own("colors"):
-            bytes_ = self._read_texels("colors", np.uint8)
-            rgb = np.where((self.row != NOTHING)[..., None], bytes_[..., :3], np.uint8(0))
-        elif colors is None:
-            plain = np.array(rgba(self.look.plain)[:3], np.uint8)
-            rgb = np.where((self.row != NOTHING)[..., None], plain, np.uint8(0))
+        if self.is_own("color"):
+            rgb = self._read_texels("color", np.uint8)[..., :3]
         else:
-            rgb = self._fetch(colors[:, :3], 0)
-        return _LINEAR[rgb]
+            plain = np.array(rgba(self.look.plain)[:3], np.uint8)
+            rgb = self._fetch(None if colors is None else colors[:, :3], plain)
+        return _LINEAR[np.where(self._covered[..., None], rgb, np.uint8(0))]
 
     @property
     def normal(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, world space, unit length; 0 where unknown."""
-        normals = self._cloud.normals
-        if self.is_own("normals"):
-            written = self._read_texels("normals", np.float32)
-            fetched = np.where((self.row != NOTHING)[..., None], written, np.float32(0))
-        elif normals is None:
-            return np.zeros((*self.size[::-1], 3), np.float32)
+        if self.is_own("normal"):
+            written = self._read_texels("normal", np.float32)
+            fetched = np.where(self._covered[..., None], written, np.float32(0))
         else:
-            fetched = self._fetch(normals, 0)
+            fetched = self._fetch(self._cloud.normals, np.zeros(3, np.float32))
         length = np.linalg.norm(fetched, axis=2, keepdims=True)
         usable = np.isfinite(length) & (length > 0)
         return np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
@@ -285,15 +332,17 @@ class Surface:
     @property
     def coverage(self) -> NDArray[np.float32]:
         """(H, W) float32, 0..1 of the pixel: the alpha of the backend's own colours where it wrote them."""
-        covered = (self.row != NOTHING).astype(np.float32)
-        if self.is_own("colors"):
-            covered *= self._read_texels("colors", np.uint8)[..., 3] / np.float32(255)
+        covered = self._covered.astype(np.float32)
+        if self.is_own("color"):
+            covered *= self._read_texels("color", np.uint8)[..., 3] / np.float32(255)
         return covered
 
     @property
     def level(self) -> NDArray[np.uint8]:
-        """(H, W) uint8: 0 measured, 255 nothing."""
-        return _levels(self.row)
+        """(H, W) uint8: 0 measured, n filled from level n, 255 nothing. Without a row nothing was measured:
+        where the backend tells no level, such a pixel counts as filled from level 1."""
+        written = self._read(self._own["level"].buffer, np.uint32) if self.is_own("level") else 0
+        return _levels(self.depth, self.row, written)
 
     def texel(self, x: int, y: int) -> Texel:
         """One pixel, without copying the others. x: from the left, y: from the top."""
@@ -301,7 +350,8 @@ class Surface:
         place = 4 * (y * self.size[0] + x)
         depth = np.frombuffer(self.depths.buffer.read(4, offset=place), np.float32)[0]
         row = np.frombuffer(self.rows.buffer.read(4, offset=place), np.uint32)[0]
-        return Texel(float(depth), int(row), int(_levels(row)))
+        level = self._own["level"].buffer.read(4, offset=place) if self.is_own("level") else bytes(4)
+        return Texel(float(depth), int(row), int(_levels(depth, row, np.frombuffer(level, np.uint32)[0])))
 
     def depth_around(self, x: int, y: int, reach: int) -> NDArray[np.float32]:
         """(2 reach + 1, 2 reach + 1) float32: `depth` round pixel (x, y); +inf outside the picture."""
@@ -318,13 +368,17 @@ class Surface:
     @property
     def value(self) -> NDArray[np.float32]:
         """(H, W) float32, the number that the look colours by; NaN where there is none."""
-        source, cloud = value_source(self.look, self._cloud.scalars), self._cloud
-        if source is None:
-            return np.full(self.size[::-1], np.nan, np.float32)
+        source, cloud, unknown = self.value_source, self._cloud, np.float32(np.nan)
+        if source is not None and self.is_own("value"):
+            written = self._read(self._own["value"].buffer, np.float32).astype(np.float64)
+            return np.where(self._covered, as_float32(written, -self.value_zero), unknown)
         if source == "depth":
-            return np.where(self.row == NOTHING, np.float32(np.nan), self.depth)
-        values = cloud.world() @ up_vector(self.look.up) if source == "height" else cloud.scalars[source]
-        return self._fetch(as_float32(values), np.nan)
+            return np.where(self._covered, self.depth, unknown)
+        values = None
+        if source is not None:
+            exact = cloud.world() @ up_vector(self.look.up) if source == "height" else cloud.scalars[source]
+            values = as_float32(exact)
+        return self._fetch(values, unknown)
 
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
@@ -373,16 +427,25 @@ class Surface:
         """What the backend wrote for each pixel, (H, W, channels)."""
         return self._read(self._own[name].buffer, dtype).reshape(*self.size[::-1], -1)
 
-    def _fetch(self, values: NDArray, nothing: float) -> NDArray:
+    @property
+    def _covered(self) -> NDArray[np.bool_]:
+        """(H, W), where something is seen."""
+        return np.isfinite(self.depth)
+
+    def _fetch(self, values: NDArray | None, unknown: NDArray | np.generic) -> NDArray:
+        """What each pixel's row has of values (N, ...); `unknown` where there is no row, or None have any."""
         rows = self.row
-        found = rows != NOTHING
-        out = np.full((*rows.shape, *values.shape[1:]), nothing, values.dtype)
-        out[found] = values[rows[found]]
+        out = np.full((*rows.shape, *unknown.shape), unknown)
+        if values is not None:
+            found = rows != NOTHING
+            out[found] = values[rows[found]]
         return out
 
 
-def _levels(rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
-    return np.where(rows != NOTHING, 0, EMPTY).astype(np.uint8)
+def _levels(depths: Any, rows: Any, written: Any) -> NDArray[np.uint8]:
+    """The levels of pixels, of any one shape, by what the Surface holds of them."""
+    levels = np.maximum(written, rows == NOTHING)
+    return np.where(np.isfinite(depths), levels, EMPTY).astype(np.uint8)
 
 
 def _linear_table() -> NDArray[np.float32]:

@@ -111,7 +111,7 @@ def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
     gpu, pose = surface.gpu, points.pose
     program = gpu.compute("surfels/passes/visibility.comp", points.defines, params=splats)
     gpu.set(program, depth_range=robust_range(surface.view.depths(pose.sample)))
-    blocks = (surface.depths, surface.rows, surface.own("colors"), surface.own("normals"))
+    blocks = (surface.depths, surface.rows, surface.own("color"), surface.own("normal"))
     with gpu.timers.measure("grey"):
         bind_visible(points, program)
         for number, block in enumerate(blocks):
@@ -245,8 +245,8 @@ def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     cloud = points.pose.cloud
     points.pose.packed("looks", lambda: _pack_looks(cloud), gl.RG32UI).bind(5)
     if cloud.colors is not None:
-        surface.own("colors").buffer.bind_to_storage_buffer(4)
-    surface.own("normals").buffer.bind_to_storage_buffer(5)
+        surface.own("color").buffer.bind_to_storage_buffer(4)
+    surface.own("normal").buffer.bind_to_storage_buffer(5)
     return {"HAS_COLORS": int(cloud.colors is not None)}
 
 

@@ -41,7 +41,7 @@ def shade_flat(points: Points, surface: Surface) -> None:
         points.pose.array("positions").bind(0)
         surface.depths.bind(6)
         surface.rows.bind(7)
-        surface.own("normals").buffer.bind_to_storage_buffer(5)
+        surface.own("normal").buffer.bind_to_storage_buffer(5)
         covered.run(gpu.compute("voxels/faces.comp"))
         gpu.ctx.memory_barrier()
 

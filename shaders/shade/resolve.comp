@@ -1,0 +1,29 @@
+// Gives each covered pixel, as its own, what its row has. CHANNEL 0 colour, 1 normal, 2 value. HAS_ROWS: whether rows have
+// any. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
+#include "common/view.glsl"
+#include "common/item.glsl"
+
+layout(binding = 0) uniform usamplerBuffer depths;
+layout(binding = 1) uniform usamplerBuffer rows;
+layout(binding = 2) uniform samplerBuffer values;
+#if CHANNEL == 0
+layout(std430, binding = 0) writeonly buffer Own { uint own[]; };
+uniform vec3 plain;  // sRGB
+#else
+layout(std430, binding = 0) writeonly buffer Own { float own[]; };
+#endif
+
+void main() {
+    int index = int(item());
+    if (index >= view_size.x * view_size.y || texelFetch(depths, index).r >= INFINITE) return;
+    uint row = texelFetch(rows, index).r;
+    bool known = HAS_ROWS != 0 && row != NONE;
+    vec4 value = known ? texelFetch(values, int(row)) : vec4(0.0);
+#if CHANNEL == 0
+    own[index] = packUnorm4x8(vec4(known ? value.rgb : plain, 1.0));
+#elif CHANNEL == 1
+    for (int k = 0; k < 3; ++k) own[3 * index + k] = value[k];
+#else
+    own[index] = known ? value.r : uintBitsToFloat(0x7FC00000u);
+#endif
+}

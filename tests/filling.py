@@ -1,0 +1,61 @@
+"""Points, and what lies between them filled from the nearest: a backend for tests of filled pixels.
+
+Where no point is seen, up to three pixels away, a pixel takes the mean of the nearest that are.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewer.backends import Backend, FrameView
+from viewer.backends import points as plain
+from viewer.gpu.pose import GpuPose
+from viewer.gpu.surface import Surface
+from viewer.params import param
+from viewer.scan.points import PointCloud
+
+TITLE = "Filling"
+SHADER = str(Path(__file__).with_suffix(".comp").resolve())
+BACKEND = Backend("filling", sys.modules[__name__])
+CHANNELS = ("color", "normal", "value")
+
+
+@dataclass(frozen=True)
+class Params(plain.Params):
+    """Parameters of the points, and of filling."""
+
+    levels: int = param(3, "How far away what fills a pixel may be, pixels", low=0, high=8)
+    blends: bool = param(True, "Fill with what is around; off: with a depth alone")
+
+
+def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+    """Nothing but positions."""
+    return ()
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Scatter the points, then fill."""
+    params: Params = frame.params
+    refinable = plain.draw(pose, frame, surface)
+    gpu, blends = surface.gpu, params.blends
+    gathered = {n: surface.resolve(n) for n in CHANNELS if blends and _is_there(n, pose, surface)}
+    fill = gpu.compute(
+        SHADER, {f"FILL_{name.upper()}": int(name in gathered) for name in CHANNELS}, params=params
+    )
+    surface.rows.bind(1)
+    surface.depths.buffer.bind_to_storage_buffer(0)
+    surface.own("level").buffer.bind_to_storage_buffer(1)
+    for binding, name in enumerate(CHANNELS, 4):
+        if name in gathered:
+            gathered[name].buffer.bind_to_storage_buffer(binding)
+    with gpu.timers.measure("fill"):
+        gpu.dispatch(fill, surface.size[0] * surface.size[1])
+    return refinable
+
+
+def _is_there(name: str, pose: GpuPose, surface: Surface) -> bool:
+    if name == "value":
+        return surface.row_values is not None
+    return pose.find(f"{name}s") is not None
