@@ -88,7 +88,7 @@ def test_larger_splats_are_averaged_less_and_less(draw: Draw, radii: float, shar
 def test_without_epsilon_the_nearest_is_alone(draw: Draw) -> None:
     nearest = surfels(draw, CLOUD, camera(), epsilon=0)
     assert nearest.stats.chosen["instancing"] == "scatter"
-    assert not nearest.is_own("normals")
+    assert not nearest.is_own("normal")
     assert_agree(nearest, surfels(draw, CLOUD, camera(), epsilon=0, instancing="gs"), others=0.2)
 
 
@@ -150,7 +150,7 @@ def test_larger_splats_are_neither_scattered_nor_averaged(draw: Draw) -> None:
     one_large = PointCloud.from_arrays(CLOUD.positions, normals=CLOUD.normals, radii=radii)
     for surface in (close, surfels(draw, one_large, camera())):
         assert surface.stats.chosen["instancing"] == "tiles"
-        assert not surface.is_own("normals")
+        assert not surface.is_own("normal")
     assert surface.row.min() >= 0
 
 
@@ -164,7 +164,7 @@ def test_an_outlier_before_the_eye_changes_nothing(draw: Draw) -> None:
     )
     surface = surfels(draw, PointCloud.from_arrays(positions, normals=normals, radii=radii), view)
     assert surface.stats.chosen["instancing"] == "scatter"
-    assert surface.is_own("normals")
+    assert surface.is_own("normal")
     assert len(CLOUD) in surface.row
 
 
@@ -172,8 +172,8 @@ def test_no_colours_and_no_radii_of_their_own(draw: Draw) -> None:
     bare = PointCloud.from_arrays(CLOUD.positions, normals=CLOUD.normals)
     surface = surfels(draw, bare, camera())
     assert surface.stats.chosen["instancing"] == "scatter"
-    assert surface.is_own("normals")
-    assert not surface.is_own("colors")
+    assert surface.is_own("normal")
+    assert not surface.is_own("color")
     covered = surface.row != NOTHING
     away = np.linalg.norm(surface.normal[covered], axis=1)
     np.testing.assert_allclose(away, 1, atol=1e-5)

@@ -328,8 +328,8 @@ def test_a_scan_without_colours_keeps_the_looks_colour(draw: Draw) -> None:
     camera = Camera.orbit(cloud.bounds())
     surface = surfels(draw, cloud, camera, look=Look(light="flat", plain="#204060"), passes="two")
     assert (surface.image()[surface.row != NOTHING][:, :3] == [0x20, 0x40, 0x60]).all()
-    assert surface.is_own("normals")
-    assert not surface.is_own("colors")
+    assert surface.is_own("normal")
+    assert not surface.is_own("color")
 
 
 @pytest.mark.parametrize("passes", ["two", "sorted", "one_blended", "visibility"])
@@ -394,5 +394,5 @@ def test_a_second_pass_that_would_change_nothing_is_not_drawn(draw: Draw, instan
     one = surfels(draw, cloud, camera, instancing=instancing)
     two = surfels(draw, cloud, camera, instancing=instancing, passes="two", enlarge=1, epsilon=0)
     assert "second pass" in two.stats.skipped
-    assert not two.is_own("normals")
+    assert not two.is_own("normal")
     np.testing.assert_array_equal(one.image(), two.image())

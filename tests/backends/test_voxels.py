@@ -270,10 +270,10 @@ def test_the_same_view_is_not_cut_again(renderer: Renderer) -> None:
 def test_without_colours_normals_and_radii(draw: Draw) -> None:
     bare = PointCloud.from_arrays(CLOUD.world())
     surface = voxels(draw, bare, CAMERAS["perspective"])
-    assert surface.is_own("normals"), "faces are lit"
+    assert surface.is_own("normal"), "faces are lit"
     covered = (surface.row != NOTHING).mean()
     smooth = voxels(draw, bare, CAMERAS["perspective"], normals="smooth")
-    assert not smooth.is_own("normals")
+    assert not smooth.is_own("normal")
     assert (smooth.row != NOTHING).mean() == covered
     assert np.linalg.norm(smooth.normal[smooth.row != NOTHING], axis=1).min() > 0.99
 
