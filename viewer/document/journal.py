@@ -21,7 +21,7 @@ from ..errors import InputError, explained
 from ..files import free_file, read_text
 from ..scan.open import DEMO
 from .recording import FORMAT, Recording
-from .recording_json import DAMAGED
+from .schema import DAMAGED
 
 _SUFFIX, _LOCK, _ASIDE = ".jsonl", ".lock", ".damaged"
 _MOST_BYTES = 256 * 2**20

@@ -23,31 +23,44 @@ import re
 import secrets
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from .. import __version__
 from ..backends import backend as find_backend
 from ..camera import Camera
-from ..errors import InputError, shortened, unknown_name
+from ..errors import InputError, shortened
 from ..files import open_plain, whole_file
 from ..frame import Request
 from ..look import Look
 from ..output.export import read_description
 from ..output.marks import Legend, Marks
-from ..params import parse
 from ..scan.open import DEMO, searches_folders
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from .anonymous import anonymous_unit
-from .recording_json import DAMAGED, checked, placed, read_json
+from .schema import (
+    DAMAGED,
+    BackendName,
+    Count,
+    Hash,
+    Kind,
+    PoseNumber,
+    ScanName,
+    Stamp,
+    Time,
+    Unit,
+    is_object,
+    migrated,
+    plain,
+    read_json,
+    structured,
+)
 
 FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
 _TICK = 0.001  # seconds that time stamps are rounded to
-# What earlier files lack, and pictures.
-_LATER: dict[str, Any] = {"at": 0.0, "marks": {}, "unit": None, "anonymous": False}
 
 
 @dataclass(frozen=True)
@@ -62,19 +75,19 @@ class Entry:
     equal.
     """
 
-    scan: str | None
-    hash: str | None
-    pose: int
-    time: float
-    size: tuple[int, int]
+    scan: ScanName | None
+    hash: Hash | None
+    pose: PoseNumber
+    time: Time
+    size: Annotated[tuple[Count, Count], Kind("width and height", lambda _: True)]
     camera: Camera
-    backend: str
-    params: Any
+    backend: BackendName
+    params: Annotated[Any, Kind("parameters by name", is_object)]
     look: Look
     marks: Marks = field(default_factory=Marks)
-    unit: str | None = None
+    unit: Unit | None = None
     anonymous: bool = False
-    at: float = field(default=0.0, compare=False)
+    at: Stamp = field(default=0.0, compare=False)
 
     @classmethod
     def of(
@@ -106,27 +119,17 @@ class Entry:
         changed = (f.name for f in fields(self) if f.compare)
         if before is not None:
             changed = (name for name in changed if getattr(self, name) != getattr(before, name))
-        return {name: _plain(getattr(self, name)) for name in changed}
+        return {name: plain(getattr(self, name)) for name in changed}
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Entry:
-        """The entry of a complete JSON object. Raises InputError for whatever is wrong in it."""
-        data = {**_LATER, **data}
-        known = [f.name for f in fields(cls)]
-        for name in data:
-            if name not in known:
-                raise unknown_name("field", name, known)
-        for name in known:
-            if name not in data:
-                raise InputError(f"has no '{name}'", hint=DAMAGED)
-        read = {name: checked(name, data[name]) for name in known}
-        backend = find_backend(read["backend"])
-        read["size"] = tuple(read["size"])
-        read["camera"] = Camera.from_json(read["camera"])
-        read["params"] = backend.params(read["params"])
-        read["look"] = parse(Look, read["look"], "look")
-        read["marks"] = parse(Marks, read["marks"], "mark")
-        return cls(**read)
+    def from_json(cls, data: Mapping[str, Any], where: object = None) -> Entry:
+        """The entry of a complete JSON object; what earlier versions did not tell has its default.
+
+        where: it stands, for messages. Raises InputError for whatever is wrong in it.
+        """
+        entry = structured(cls, data, where)
+        params = structured(find_backend(entry.backend).module.Params, entry.params, f"{where}, params")
+        return replace(entry, params=params)
 
     def without_names(self) -> Entry:
         """What an anonymous picture tells, of a scan that is as `anonymous_request` has it."""
@@ -167,17 +170,15 @@ class Recording:
         """The recording of a JSON object of this file. Raises InputError for whatever is wrong in it."""
         if not isinstance(data, dict) or "format" not in data:
             raise InputError("is no recording", path, "Use a JSON that the window has recorded, or a picture")
-        if data["format"] != FORMAT:
-            what = f"has the format {data['format']!r:.40}, this Scan4D ({__version__}) reads {FORMAT}"
-            raise InputError(what, path, f"It was written by version {data.get('version')!r:.40}; use that")
+        data = migrated(data, FORMAT, {}, path)
         entries = data.get("entries")
         if entries is None:
             complete = {name: value for name, value in data.items() if name not in _head()}
-            return cls((_parsed(complete, path),))
+            return cls((Entry.from_json(complete, path),))
         if not isinstance(entries, list) or not entries:
             raise InputError("has no entries", path, DAMAGED)
         read = _read_changes(entries, path)
-        seconds = placed(lambda: checked("seconds", data.get("seconds", 0.0)), path)
+        seconds = structured(Stamp, data.get("seconds", 0.0), f"{path}, 'seconds'")
         return cls(read, max(seconds, read[-1].at))
 
     def paced(self, fps: float) -> list[Entry]:
@@ -306,14 +307,10 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
         if not isinstance(change, dict):
             raise InputError("is no JSON object", where, DAMAGED)
         complete |= change
-        entries.append(_parsed(complete, where))
+        entries.append(Entry.from_json(complete, where))
         if number and entries[-1].at < entries[-2].at:
             raise InputError("is earlier than the entry before it", where, "Put the entries in order of 'at'")
     return tuple(entries)
-
-
-def _parsed(complete: Mapping[str, Any], where: object) -> Entry:
-    return placed(lambda: Entry.from_json(complete), where)
 
 
 # --- writing --------------------------------------------------------------------------------
@@ -326,12 +323,3 @@ def _head() -> dict[str, Any]:
 def _change(entry: Entry, before: Entry | None) -> dict[str, Any]:
     """An entry as a recording has it, after the one before."""
     return {"at": entry.at} | entry.to_json(before)
-
-
-def _plain(value: Any) -> Any:
-    """As JSON has it."""
-    if isinstance(value, Camera):
-        return value.to_json()
-    if isinstance(value, tuple):
-        return list(value)
-    return asdict(value) if hasattr(value, "__dataclass_fields__") else value

@@ -1,0 +1,328 @@
+"""The schema of what is kept as JSON: documents and sessions, recordings, the text in pictures, settings.
+
+The declarations are the dataclasses themselves: what a file may hold is what the types of their fields say,
+and `Annotated` with a `Kind` where a type alone does not say enough. The library cattrs goes through them;
+here it is told to be strict, to read parameters and cameras as the rest of the project does, and to say what
+is wrong as a user reads it.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+
+from ..backends import backend
+from ..camera import Camera
+from ..errors import InputError, explained, shortened, unknown_name
+from ..files import parsed_json, read_text
+from ..output.export import read_description
+from ..params import parse
+from ..scan.units import checked_unit
+
+if TYPE_CHECKING:
+    from cattrs import Converter
+
+T = TypeVar("T")
+DAMAGED = "It is damaged, or was not written by Scan4D; make it again"
+_MOST_BYTES = 256 * 2**20
+_MOST_SECONDS = 86_400.0
+_LATEST = 1e12  # seconds, of a scan
+_LONGEST_WORD = 200
+_DEEPEST = 40  # levels of what is kept unread
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What values of a type are, in words, and which of them fit."""
+
+    words: str
+    fits: Callable[[Any], bool]
+
+
+@dataclass(frozen=True)
+class ReadBy:
+    """How values of a type are read from plain ones; the function raises InputError."""
+
+    read: Callable[[Any], Any]
+
+
+def _is_word(value: str) -> bool:
+    return value.isprintable() and 0 < len(value) <= _LONGEST_WORD
+
+
+def _is_unit(value: str) -> bool:
+    return _is_word(value) and checked_unit(value) == value
+
+
+def _is_name(value: str) -> bool:
+    """Of a file: whatever the system takes for one."""
+    try:
+        return value != "" and b"\0" not in os.fsencode(value)
+    except UnicodeEncodeError:
+        return False
+
+
+def is_object(value: Any) -> bool:
+    """Whether a plain value is a JSON object."""
+    return isinstance(value, dict)
+
+
+def _is_stamp(value: float) -> bool:
+    return 0 <= value <= _MOST_SECONDS
+
+
+Word = Annotated[str, Kind("a word", _is_word)]
+Unit = Annotated[str, Kind("a unit", _is_unit)]
+Hash = Annotated[str, Kind("a hash", _is_word)]
+ScanName = Annotated[str, Kind("the name of a scan", _is_name)]
+Count = Annotated[int, Kind("a whole number", lambda value: 0 <= value < 2**31)]
+PoseNumber = Annotated[int, Kind("the number of a pose", lambda value: 0 <= value < 2**31)]
+Time = Annotated[float, Kind("a time in seconds", lambda value: abs(value) <= _LATEST)]
+Stamp = Annotated[float, Kind("a time within a day, in seconds", _is_stamp)]
+
+
+def _known_backend(value: Any) -> str:
+    if not isinstance(value, str):
+        raise _Unfit("the name of a renderer", value)
+    return backend(value).name
+
+
+BackendName = Annotated[str, ReadBy(_known_backend)]
+
+
+def read_json(path: Path) -> Any:
+    """The JSON of a file, or of the description in a picture. Raises InputError, which names the file."""
+    try:
+        is_picture = path.suffix.lower() in (".png", ".exr")
+        return parsed_json(read_description(path) if is_picture else read_text(path, _MOST_BYTES))
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    except ValueError as error:  # of the text's encoding as well
+        raise InputError(f"is not JSON ({error})", path, DAMAGED) from error
+
+
+def structured(kind: type[T], data: Any, where: object = None) -> T:
+    """The value of plain JSON data, by the types of the fields of `kind`.
+
+    Raises InputError, which tells the place within the data after `where`.
+    """
+    from cattrs.errors import BaseValidationError
+
+    try:
+        return _converter().structure(data, kind)
+    except (BaseValidationError, InputError, _Unfit) as error:
+        raise _in_words(error, where) from None
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it, which `structured` reads again."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {name: plain(inner) for name, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(inner) for inner in value]
+    return value
+
+
+def unread(value: Any, depth: int = 0) -> Any:
+    """Plain data of a kind that is not known here, to be kept as it is. Raises InputError where it is
+    nested so deeply that it could not be written again."""
+    if depth > _DEEPEST:
+        raise InputError("is nested too deeply", hint=DAMAGED)
+    for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        unread(inner, depth + 1)
+    return value
+
+
+def migrated(
+    data: Mapping[str, Any],
+    to: int,
+    steps: Mapping[int, Callable[[dict[str, Any]], dict[str, Any]]],
+    where: object,
+) -> dict[str, Any]:
+    """JSON data in the form of the format `to`.
+
+    steps: format -> what makes of data in that format data in the next one. Raises InputError where the
+    data has no format, or one that is not known.
+    """
+    from .. import __version__
+
+    found = data.get("format")
+    if type(found) is not int or not (found == to or found in steps):
+        what = f"has the format {found!r:.40}, this Scan4D ({__version__}) reads {to}"
+        raise InputError(what, where, f"It was written by version {data.get('version')!r:.40}; use that")
+    current = dict(data)
+    while found < to:
+        current = steps[found](current)
+        found += 1
+    return current | {"format": to}
+
+
+# --- how the library is told ------------------------------------------------------------------
+
+
+class _Unfit(Exception):
+    """A value that is not of its kind."""
+
+    def __init__(self, words: str, value: Any) -> None:
+        super().__init__(words, value)
+        self.words, self.value = words, value
+
+
+_PLAIN: dict[type, Kind] = {
+    bool: Kind("true or false", lambda value: type(value) is bool),
+    int: Kind("a whole number", lambda value: type(value) is int),
+    float: Kind("a finite number", lambda value: type(value) in (int, float) and _is_finite(value)),
+    str: Kind("a text", lambda value: type(value) is str),
+}
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # of hundreds of digits
+        return False
+
+
+@cache
+def _converter() -> Converter:
+    from cattrs import Converter
+
+    converter = Converter(forbid_extra_keys=True)
+    for kind, rule in _PLAIN.items():
+        converter.register_structure_hook(kind, _checking(rule, kind))
+    converter.register_structure_hook_func(_is_tuple, lambda data, kind: _tuple(data, kind, converter))
+    converter.register_structure_hook_factory(is_dataclass, lambda kind: _reading_fields(kind, converter))
+    converter.register_structure_hook_func(_is_declaration, _declaration)
+    converter.register_structure_hook(Camera, lambda data, _: Camera.from_json(data))
+    converter.register_structure_hook_factory(_is_annotated, lambda kind: _annotated(kind, converter))
+    return converter
+
+
+def _checking(rule: Kind, kind: type) -> Callable[[Any, Any], Any]:
+    def read(data: Any, _: Any) -> Any:
+        if not rule.fits(data):
+            raise _Unfit(rule.words, data)
+        return kind(data)
+
+    return read
+
+
+def _is_annotated(kind: Any) -> bool:
+    return get_origin(kind) is Annotated
+
+
+def _annotated(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    inner, *rules = get_args(kind)
+    (rule,) = rules
+    if isinstance(rule, ReadBy):
+        return lambda data, _: rule.read(data)
+
+    def read(data: Any, _: Any) -> Any:
+        try:
+            value = converter.structure(data, inner)
+        except _Unfit:
+            raise _Unfit(rule.words, data) from None
+        if not rule.fits(value):
+            raise _Unfit(rule.words, data)
+        return value
+
+    return read
+
+
+def _is_tuple(kind: Any) -> bool:
+    return get_origin(kind) is tuple
+
+
+def _tuple(data: Any, kind: Any, converter: Converter) -> tuple[Any, ...]:
+    from cattrs.cols import homogenous_tuple_structure_factory
+
+    if not isinstance(data, list):
+        raise _Unfit("a list", data)
+    inner = get_args(kind)
+    if inner[-1] is Ellipsis:
+        return tuple(homogenous_tuple_structure_factory(kind, converter)(data, kind))
+    if len(data) != len(inner):
+        raise _Unfit(f"{len(inner)} values", data)
+    return tuple(converter.structure(one, of) for one, of in zip(data, inner, strict=True))
+
+
+def _is_declaration(kind: Any) -> bool:
+    """Whether its fields are parameters (see viewer/params.py)."""
+    return (
+        is_dataclass(kind) and bool(fields(kind)) and all("help" in field.metadata for field in fields(kind))
+    )
+
+
+def _declaration(data: Any, kind: type) -> Any:
+    if not isinstance(data, dict):
+        raise _Unfit("values by name", data)
+    return parse(kind, data, kind.__name__.lower().removesuffix("s"))
+
+
+def _reading_fields(kind: type, converter: Converter) -> Callable[[Any, Any], Any]:
+    from cattrs.gen import make_dict_structure_fn
+
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        if name in kind.__dataclass_fields__:  # type: ignore[attr-defined]
+            kind.__dataclass_fields__[name].type = hint  # type: ignore[attr-defined]
+    read_fields: Any = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
+
+    def read(data: Any, _: Any) -> Any:
+        if not isinstance(data, dict):
+            raise _Unfit("values by name", data)
+        return read_fields(data, kind)
+
+    return read
+
+
+# --- what is wrong, in words ------------------------------------------------------------------
+
+
+def _in_words(error: BaseException, where: object) -> InputError:
+    """The first thing that is wrong, as a user reads it."""
+    path, cause = _first(error)
+    outer, _, name = path.rpartition(".")
+
+    def told(what: str, place: str, hint: str | None = DAMAGED) -> InputError:
+        return InputError(what, ", ".join(filter(None, (str(where or ""), place))) or None, hint)
+
+    if isinstance(cause, _Unfit):
+        named = f"'{name}'" if name else "It"
+        return told(f"{named} is not {cause.words} but {shortened(cause.value)}", outer)
+    if isinstance(cause, InputError):
+        inner = "" if cause.where is None else f"{cause.where}: "
+        return told(inner + cause.what, path, cause.hint)
+    if isinstance(cause, KeyError):
+        return told(f"has no '{cause.args[0]}'", outer)
+    return told(f"cannot be used ({shortened(str(cause))})", path)
+
+
+def _first(error: BaseException) -> tuple[str, BaseException]:
+    """The place of the first thing that is wrong, such as "bookmarks[2].camera", and what it is."""
+    from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
+
+    path = ""
+    while isinstance(error, BaseValidationError):
+        error = min(error.exceptions, key=lambda one: not isinstance(one, ForbiddenExtraKeysError))
+        path += "".join(_steps(error))
+    if isinstance(error, ForbiddenExtraKeysError):  # which a misspelt name is more than what it leaves out
+        known = [field.name for field in fields(error.cl)]
+        return path.removeprefix("."), unknown_name("field", next(iter(error.extra_fields)), known)
+    return path.removeprefix("."), error
+
+
+def _steps(error: BaseException) -> Iterator[str]:
+    """From a value to the one within it that is wrong."""
+    for note in getattr(error, "__notes__", ()):
+        if hasattr(note, "name"):
+            yield f".{note.name}"
+        elif hasattr(note, "index"):
+            yield f"[{note.index}]" if isinstance(note.index, int) else f".{note.index}"
