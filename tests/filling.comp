@@ -1,20 +1,21 @@
 // Fills pixels that no point covers with the mean of those at the least distance that some cover. Only pixels with a
 // row are read, only those without are written, so that the order does not matter.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include <params>
 
-layout(binding = 1) uniform usamplerBuffer rows;
-layout(std430, binding = 0) buffer Depths { uint depths[]; };
-layout(std430, binding = 1) writeonly buffer Levels { uint own_levels[]; };
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
+layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
+layout(std430, binding = STORAGE_LEVEL) writeonly buffer Level { uint own_levels[]; };
 #if FILL_COLOR
-layout(std430, binding = 4) buffer Colors { uint own_colors[]; };
+layout(std430, binding = STORAGE_COLOR) buffer Color { uint own_colors[]; };
 #endif
 #if FILL_NORMAL
-layout(std430, binding = 5) buffer Normals { float own_normals[]; };
+layout(std430, binding = STORAGE_NORMAL) buffer Normal { float own_normals[]; };
 #endif
 #if FILL_VALUE
-layout(std430, binding = 6) buffer Values { float own_values[]; };
+layout(std430, binding = STORAGE_VALUE) buffer Value { float own_values[]; };
 #endif
 
 bool is_measured(ivec2 pixel) {

@@ -40,16 +40,15 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     params: Params = frame.params
     refinable = plain.draw(pose, frame, surface)
     gpu, blends = surface.gpu, params.blends
-    gathered = {n: surface.resolve(n) for n in CHANNELS if blends and _is_there(n, pose, surface)}
+    gathered = [n for n in CHANNELS if blends and _is_there(n, pose, surface)]
+    for name in gathered:
+        surface.resolve(name)
     fill = gpu.compute(
         SHADER, {f"FILL_{name.upper()}": int(name in gathered) for name in CHANNELS}, params=params
     )
-    surface.rows.bind(1)
-    surface.depths.buffer.bind_to_storage_buffer(0)
-    surface.own("level").buffer.bind_to_storage_buffer(1)
-    for binding, name in enumerate(CHANNELS, 4):
-        if name in gathered:
-            gathered[name].buffer.bind_to_storage_buffer(binding)
+    surface.bind_textures()
+    surface.bind_storage()
+    surface.bind_own("level", *gathered)
     with gpu.timers.measure("fill"):
         gpu.dispatch(fill, surface.size[0] * surface.size[1])
     return refinable

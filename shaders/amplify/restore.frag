@@ -1,8 +1,9 @@
 // What the Surface holds, for the rasteriser to draw over.
+#include <bindings>
 #include "common/view.glsl"
 
-layout(binding = 6) uniform usamplerBuffer depths;
-layout(binding = 7) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 
 layout(location = 0) out uint out_row;
 layout(location = 1) out float out_depth;

@@ -1,16 +1,17 @@
 // Points from buffer textures. SAMPLED: only the listed rows are drawn.
+#include <bindings>
 #include "amplify/point.glsl"
 
-layout(binding = 0) uniform samplerBuffer positions;
-layout(binding = 1) uniform samplerBuffer normals;
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 #if HAS_RADIUS
-layout(binding = 2) uniform samplerBuffer radii;
+#include "amplify/radii.glsl"
 #endif
 #if HAS_AXES
-layout(binding = 9) uniform samplerBuffer axes;
+layout(binding = TEXTURE_AXES) uniform samplerBuffer axes;
 #endif
 #if SAMPLED
-layout(binding = 3) uniform usamplerBuffer drawn_rows;
+layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
 
 // The row of the i-th point that is drawn.

@@ -1,17 +1,18 @@
 // What each covered pixel sees of its face: normal and colour, interpolated between the corners
 // by where the ray through the pixel's centre meets the face's plane.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/color.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
 
-layout(binding = 0) uniform usamplerBuffer rows;       // of faces
-layout(binding = 1) uniform usamplerBuffer corners;    // three vertices a face
-layout(binding = 2) uniform samplerBuffer positions;
-layout(binding = 3) uniform samplerBuffer normals;
-layout(binding = 4) uniform samplerBuffer colors;
-layout(std430, binding = 0) writeonly buffer Normals { float own_normals[]; };
-layout(std430, binding = 1) writeonly buffer Colors { uint own_colors[]; };
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;       // of faces
+layout(binding = TEXTURE_CORNERS) uniform usamplerBuffer corners;    // three vertices a face
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
+layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
+layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_normals[]; };
+layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors[]; };
 
 // Barycentric coordinates of the ray through the triangle: volumes that it spans with each edge.
 vec3 weights(vec3 a, vec3 b, vec3 c, vec2 pixel) {

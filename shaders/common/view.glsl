@@ -1,5 +1,7 @@
 // The camera as shaders see it: viewer/view.py fills this block.
-layout(std140, binding = 0) uniform View {
+#include <bindings>
+
+layout(std140, binding = BLOCK_VIEW) uniform View {
     mat4 world_to_view;  // from positions relative to the pose's origin
     float view_scale;    // pixels per unit of x / depth, or of x
     float view_near;     // scan units along the view axis

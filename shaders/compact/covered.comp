@@ -1,9 +1,10 @@
 // Lists the pixels that show something, and a dispatch over the list. Its order does not
 // matter: each listed pixel is then worked on by itself.
+#include <bindings>
 #include "common/item.glsl"
 #include "common/view.glsl"
 
-layout(binding = 0) uniform usamplerBuffer depths;  // float bits
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;  // float bits
 #include "common/list.glsl"
 
 // Each invocation looks at a run of pixels, so that the counter is touched once a run.

@@ -1,16 +1,17 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
 // SINGLE: squares are of one pixel.
+#include <bindings>
 #include "common/view.glsl"
 
-layout(binding = 2) uniform samplerBuffer positions;
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if SAMPLED
-layout(binding = 3) uniform usamplerBuffer sampled;
+layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
 #include <params>
 
 void scatter(uint i) {
 #if SAMPLED
-    i = texelFetch(sampled, int(i)).r;
+    i = texelFetch(drawn_rows, int(i)).r;
 #endif
     vec3 view = to_view(texelFetch(positions, int(i)).xyz);
     float depth = -view.z;

@@ -1,16 +1,19 @@
 // Gives each covered pixel, as its own, what its row has. CHANNEL 0 colour, 1 normal, 2 value. HAS_ROWS: whether rows have
 // any. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 
-layout(binding = 0) uniform usamplerBuffer depths;
-layout(binding = 1) uniform usamplerBuffer rows;
-layout(binding = 2) uniform samplerBuffer values;
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_VALUES) uniform samplerBuffer values;
 #if CHANNEL == 0
-layout(std430, binding = 0) writeonly buffer Own { uint own[]; };
+layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own[]; };
 uniform vec3 plain;  // sRGB
+#elif CHANNEL == 1
+layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own[]; };
 #else
-layout(std430, binding = 0) writeonly buffer Own { float own[]; };
+layout(std430, binding = STORAGE_VALUE) writeonly buffer Value { float own[]; };
 #endif
 
 void main() {

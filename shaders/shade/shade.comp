@@ -3,32 +3,26 @@
 // OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
 // filled have none. With its colour comes how much of the pixel is covered; the rest is background.
 // One invocation for each listed pixel; the others hold the background already.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/color.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
+// gpu/shade.py.
+#include <params>
 
-layout(binding = 0) uniform usamplerBuffer depths;  // float bits, +inf where nothing is
-layout(binding = 1) uniform usamplerBuffer rows;
-layout(binding = 2) uniform samplerBuffer colors;
-layout(binding = 3) uniform samplerBuffer normals;
-layout(binding = 4) uniform samplerBuffer values;
-layout(binding = 5) uniform samplerBuffer color_map;
-layout(binding = 6) uniform samplerBuffer positions;
-layout(binding = 7) uniform usamplerBuffer ids;
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;  // float bits, +inf where nothing is
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
+layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
+layout(binding = TEXTURE_VALUES) uniform samplerBuffer values;
+layout(binding = TEXTURE_COLOR_MAP) uniform samplerBuffer color_map;
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+layout(binding = TEXTURE_IDS) uniform usamplerBuffer ids;
 #if OWN_COLOR
-layout(binding = 8) uniform samplerBuffer own_colors;
+layout(binding = TEXTURE_OWN_COLORS) uniform samplerBuffer own_colors;
 #endif
-layout(std430, binding = 0) writeonly buffer Picture { uint picture[]; };
-
-uniform vec3 plain;          // sRGB
-uniform vec4 background;     // sRGB and alpha
-uniform vec2 value_range;    // relative to the zero that values are stored from
-uniform vec3 height_axis;
-uniform vec3 light;          // to the light, view space
-uniform vec4 phong;          // ambient, diffuse, specular, shininess
-uniform float eye_dome_strength;
-uniform int eye_dome_radius;
+layout(std430, binding = STORAGE_PICTURE) writeonly buffer Picture { uint picture[]; };
 
 float depth_at(ivec2 pixel) {
     return uintBitsToFloat(texelFetch(depths, pixel.y * view_size.x + pixel.x).r);
@@ -36,12 +30,12 @@ float depth_at(ivec2 pixel) {
 
 vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #if COLOR_BY == 0
-    return plain;
+    return plain.rgb;
 #elif COLOR_BY == 2
     return 0.5 * normal + 0.5;
 #else
 #if !(COLOR_BY == 1 && OWN_COLOR) && !(COLOR_BY == 3 && (OWN_VALUE || VALUE == 0))
-    if (row == NONE) return plain;
+    if (row == NONE) return plain.rgb;
 #endif
 #if COLOR_BY == 1
     return texelFetch(colors, OWN_COLOR != 0 ? index : int(row)).rgb;
@@ -51,11 +45,11 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #elif VALUE == 0
     float value = depth;
 #elif VALUE == 1
-    float value = dot(height_axis, texelFetch(positions, int(row)).xyz);
+    float value = dot(height_axis.xyz, texelFetch(positions, int(row)).xyz);
 #else
     float value = texelFetch(values, int(row)).r;
 #endif
-    if (isnan(value)) return plain;
+    if (isnan(value)) return plain.rgb;
     float t = (value - value_range.x) / max(value_range.y - value_range.x, 1e-30);
     return texelFetch(color_map, int(clamp(t, 0.0, 1.0) * 255.0 + 0.5)).rgb;
 #else
@@ -85,7 +79,7 @@ vec3 lit(vec3 color, ivec2 pixel, float depth, vec3 normal) {
 #if LIGHT == 1
     vec3 to_light = to_eye;
 #else
-    vec3 to_light = light;
+    vec3 to_light = light.xyz;
 #endif
     vec3 n = mat3(world_to_view) * normal;
     // A scan's normals need not agree in sign: light the side that is seen.

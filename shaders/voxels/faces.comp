@@ -1,13 +1,14 @@
 // The normal of the face that a pixel shows, for flat shading: the axis along which the seen place is farthest
 // from its voxel's centre.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
 
-layout(binding = 0) uniform samplerBuffer positions;
-layout(binding = 6) uniform usamplerBuffer depths;
-layout(binding = 7) uniform usamplerBuffer rows;
-layout(std430, binding = 5) writeonly buffer Normals { float own_normals[]; };
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
+layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_normals[]; };
 
 void main() {
     uint i = item();

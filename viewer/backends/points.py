@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..gpu.bindings import Texture
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import scatter
@@ -61,9 +62,9 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     sparse = count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
 
     def bind(_: Program) -> None:
-        pose.array("positions").bind(2)
+        pose.array("positions").bind(Texture.POSITIONS)
         if rows is not None:
-            rows.bind(3)
+            rows.bind(Texture.DRAWN_ROWS)
 
     scatter(
         pose.gpu,

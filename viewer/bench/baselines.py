@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..backends import Backend, FrameView
 from ..gpu import gl
+from ..gpu.bindings import Texture
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
@@ -84,13 +85,11 @@ class _Triangles:
         resolve = gpu.compute("bench/mesh.comp", {"HAS_COLORS": int(colored)})
         covered = surface.list_covered()
         with gpu.timers.measure("resolve"):
-            surface.rows.bind(0)
-            faces.bind(1)
-            for unit, name in enumerate(("positions", "normals", *(("colors",) if colored else ())), 2):
-                pose.array(name).bind(unit)
-            surface.own("normal").buffer.bind_to_storage_buffer(0)
-            if colored:
-                surface.own("color").buffer.bind_to_storage_buffer(1)
+            surface.rows.bind(Texture.ROWS)
+            faces.bind(Texture.CORNERS)
+            for name in ("positions", "normals", *(("colors",) if colored else ())):
+                pose.array(name).bind(Texture[name.upper()])
+            surface.bind_own("normal", *(("color",) if colored else ()))
             covered.run(resolve)
             gpu.ctx.memory_barrier()
         return False

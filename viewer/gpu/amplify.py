@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import gl
+from .bindings import Texture, UniformBlock
 from .blocks import Values
 from .context import Program
 from .pose import GpuPose
@@ -36,8 +37,6 @@ _ATTRIBUTES = (
     ("radii", "in_radius", 1),
     ("axes", "in_axes", 4),
 )
-_UNITS = {"positions": 0, "normals": 1, "radii": 2, "axes": 9}  # of amplify/texels.glsl
-_ROWS_UNIT = 3
 
 
 @dataclass(frozen=True)
@@ -93,12 +92,12 @@ class Points:
         }
 
     def bind(self, program: Program) -> None:
-        """Bind what amplify/texels.glsl reads: texture units 0 to 3, and 9."""
+        """Bind what amplify/texels.glsl reads."""
         self.pose.gpu.set(program, enlarged=self.enlarged)
         for name, _, _ in self.attributes:
-            self.pose.array(name).bind(_UNITS[name])
+            self.pose.array(name).bind(Texture[name.upper()])
         if self.rows is not None:
-            self.rows.bind(_ROWS_UNIT)
+            self.rows.bind(Texture.DRAWN_ROWS)
 
 
 def amplify(
@@ -129,8 +128,7 @@ def amplify(
 
 def _restore(surface: Surface) -> None:
     """Rasterise what the surface holds."""
-    surface.depths.bind(6)
-    surface.rows.bind(7)
+    surface.bind_textures()
     surface.gpu.ctx.depth_func = "1"
     triangle = surface.gpu.ctx.vertex_array(
         surface.gpu.program(("present/present.vert", "amplify/restore.frag")), []
@@ -192,7 +190,7 @@ def _draw_blocks(program: moderngl.Program, points: Points, shape: Shape) -> Non
     packed = points.pose.packed(f"block of {points.stride}", lambda: _pack(points)).buffer
     vertices = gpu.ctx.vertex_array(program, [])
     for first in range(0, points.count, size):
-        packed.bind_to_uniform_block(1, offset=first * point_bytes, size=size * point_bytes)
+        packed.bind_to_uniform_block(UniformBlock.POINTS, offset=first * point_bytes, size=size * point_bytes)
         gpu.set(program, first=first)
         vertices.render(
             moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=min(size, points.count - first)

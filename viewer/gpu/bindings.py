@@ -1,8 +1,82 @@
-"""Bindings: which number each thing that a shader reads or writes is bound to, by meaning."""
+"""Bindings: which number each thing that a shader reads or writes is bound to, by meaning.
+
+Shaders have them as TEXTURE_, STORAGE_ and BLOCK_ with the names below from `#include <bindings>`.
+"""
 
 from __future__ import annotations
 
-from enum import IntEnum, unique
+from enum import IntEnum, auto, unique
+
+
+@unique
+class Texture(IntEnum):
+    """Texture units, of which a driver has 96 or more: each thing has its own. A stage reads up to 16."""
+
+    # Images, below 15, the least unit that moderngl makes textures at.
+    PICTURE = 0  # shaded
+    COLOR_SUMS = auto()  # of splats that are blended, and their weight
+    NORMAL_SUMS = auto()
+    LARGE_ROWS = auto()  # what splats that are too large for tiles filled
+    LARGE_DEPTHS = auto()
+    # A Surface, a texel a pixel.
+    DEPTHS = 16  # float bits
+    ROWS = auto()
+    OWN_COLORS = auto()
+    # A pose, a texel a row.
+    POSITIONS = auto()
+    NORMALS = auto()  # of a Surface where the backend wrote them
+    COLORS = auto()  # of a Surface where the backend wrote them
+    RADII = auto()
+    AXES = auto()
+    IDS = auto()
+    VALUES = auto()  # of a scalar
+    LOOKS = auto()  # colour and normal in two words
+    DRAWN_ROWS = auto()  # the list of those that are drawn
+    CORNERS = auto()  # of faces
+    COLOR_MAP = auto()
+    # Scatter.
+    KEYS = auto()
+    BEST = auto()
+    # Tiles of splats.
+    PLACES = auto()
+    FORMS = auto()
+    REACH = auto()
+    ENDS = auto()
+    LISTED = auto()
+    WORK = auto()
+    FARTHEST = auto()
+    SCRATCH = auto()  # where buffers become textures
+
+
+class Storage(IntEnum):
+    """Binding points of storage blocks: eight, as every driver has. Names of one group have numbers of their
+    own; those of different groups share some, and no program has two of one number (tests/gpu)."""
+
+    # A Surface, a word or more a pixel, and lists of its pixels.
+    DEPTHS = 0
+    ROWS = 1
+    LIST = 2
+    DISPATCH = 3  # over the list, and its length
+    COLOR = 4  # Surface.own
+    NORMAL = 5
+    VALUE = 6
+    LEVEL = 7
+    # Shading, beside a list.
+    PICTURE = 0
+    # Scatter, beside a list.
+    KEYS = 0
+    BEST = 1
+    # Sums of splats, beside a Surface's colours, normals and lists.
+    SUMS = 0
+    # Tiles of splats; FARTHEST beside a Surface's depths and rows as well.
+    SLOTS = 0
+    PLACES = 1
+    FORMS = 2
+    REACH = 3
+    LARGE = 4
+    LISTED = 5
+    WORK = 6
+    FARTHEST = 7
 
 
 @unique
@@ -10,5 +84,19 @@ class UniformBlock(IntEnum):
     """Binding points of uniform blocks."""
 
     VIEW = 0  # the camera
-    POINTS = 1  # a range of points, for one way of instancing
-    PARAMS = 2  # the values that a primitive or a backend gives its shaders
+    POINTS = auto()  # a range of points, for one way of instancing
+    PARAMS = auto()  # the values that a primitive or a backend gives its shaders
+
+
+def bindings_glsl() -> str:
+    """The numbers as macros: what `#include <bindings>` stands for."""
+    tables: tuple[tuple[str, type[IntEnum]], ...] = (
+        ("TEXTURE", Texture),
+        ("STORAGE", Storage),
+        ("BLOCK", UniformBlock),
+    )
+    return "".join(
+        f"#define {kind}_{name} {number:d}\n"
+        for kind, table in tables
+        for name, number in table.__members__.items()
+    )

@@ -50,7 +50,7 @@ class Block:
 
     def glsl(self, name: str) -> str:
         """What shaders include. name: one of `UniformBlock`, in lower case."""
-        lines = [f"layout(std140, binding = {UniformBlock[name.upper()]:d}) uniform {name.title()} {{"]
+        lines = [f"layout(std140, binding = {UniformBlock[name.upper()]}) uniform {name.title()} {{"]
         lines += [f"    {kind} {member};{help and f'  // {help}'}" for kind, member, help in self.members]
         return "\n".join([*lines, "};"])
 

@@ -46,7 +46,7 @@ class IndexList:
 
 
 def list_covered(gpu: Gpu, pixels: int, listed: IndexList) -> None:
-    """List the pixels whose depth (texture unit 0) is finite, for the bound view."""
+    """List the pixels whose depth (`Texture.DEPTHS`) is finite, for the bound view."""
     with gpu.timers.measure("compact"):
         listed.clear()
         listed.bind()

@@ -35,6 +35,8 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
 )
 from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
 
+from .bindings import Texture  # noqa: E402
+
 RG32UI = 0x823C
 RGB32F = 0x8815
 R32F = 0x822E
@@ -59,7 +61,6 @@ _MAX_UNIFORM_BLOCK_SIZE = 0x8A30
 _MAX_TEXTURE_SIZE = 0x0D33
 _MAX_RENDERBUFFER_SIZE = 0x84E8
 _READ_FRAMEBUFFER = 0x8CA8
-_SCRATCH_UNIT = 15
 
 
 def integer(name: int) -> int:
@@ -126,7 +127,7 @@ class BufferTexture:
         GL_1_1.glGenTextures(1, ctypes.byref(name))
         self.glo = name.value
         self.buffer = buffer
-        self.bind(_SCRATCH_UNIT)  # not over what a shader is about to read
+        self.bind(Texture.SCRATCH)  # not over what a shader is about to read
         GL_3_1.glTexBuffer(_TEXTURE_BUFFER, texel_format, buffer.glo)
 
     def bind(self, unit: int) -> None:

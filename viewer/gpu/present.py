@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
+from .bindings import Texture
 from .context import Gpu
 from .surface import Surface
 
@@ -26,7 +27,7 @@ class Presenter:
         texture = self._texture_of(surface.size)
         texture.write(surface.picture)
         texture.filter = (moderngl.NEAREST,) * 2 if surface.size == size else (moderngl.LINEAR,) * 2
-        texture.use(0)
+        texture.use(Texture.PICTURE)
         self.gpu.set(self._program, corner=(left, bottom), size=size)
         ctx.screen.use()
         ctx.viewport = (left, bottom, *size)

@@ -28,7 +28,7 @@ def scatter(
 
     cells: the shader file that names an item's cells and key (it calls `visit`). keys,
     best: one R32UI texel a cell; cells that nothing hit hold +inf bits and 0xFFFFFFFF.
-    bind: sets what `cells` reads, from texture units 0 to 9. params: what it finds in `<params>`.
+    bind: sets what `cells` reads. params: what it finds in `<params>`.
     listed: filled with the cells that were hit.
     """
     gl.clear_words(keys.buffer, _NO_KEY)

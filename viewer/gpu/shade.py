@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..geometry import up_vector
 from ..look import Look, color_table, rgba, value_source
 from . import gl
+from .bindings import Storage, Texture
+from .blocks import Vec4
 from .context import Gpu
 from .pose import robust_range
 from .surface import Surface
@@ -18,6 +21,25 @@ _COLOR_CODES = {"plain": 0, "own": 1, "normal": 2, "value": 3, "id": 4}
 _VALUE_CODES = {"depth": 0, "height": 1, "scalar": 2}
 _MOST = float(np.finfo(np.float32).max)
 _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
+
+
+@dataclass(frozen=True)
+class _Shading:
+    """What shade.comp is told of a look.
+
+    plain, background: sRGB and alpha. height_axis: up. light: towards it, view space. phong: ambient,
+    diffuse, specular, shininess. value_range: of the colour map, relative to the zero that values are
+    stored from.
+    """
+
+    plain: Vec4
+    background: Vec4
+    height_axis: Vec4
+    light: Vec4
+    phong: Vec4
+    value_range: tuple[float, float]
+    eye_dome_strength: float
+    eye_dome_radius: int
 
 
 def shade(surface: Surface, look: Look) -> None:
@@ -31,6 +53,7 @@ def shade(surface: Surface, look: Look) -> None:
         color = "plain"
     light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
+    surface.color_range = None if source is None else value_range(surface, look)
     program = gpu.compute(
         "shade/shade.comp",
         {
@@ -41,47 +64,59 @@ def shade(surface: Surface, look: Look) -> None:
             "HAS_IDS": int(cloud.ids is not None),
             **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
         },
+        params=_shading(surface, look),
     )
-    surface.color_range = None if source is None else value_range(surface, look)
-    low, high = surface.color_range or (0.0, 1.0)
-    zero = surface.value_zero
     surface.bind_view()
     covered = surface.list_covered()
     with gpu.timers.measure("shade"):
-        surface.depths.bind(0)
-        surface.rows.bind(1)
+        surface.bind_textures()
         if color == "own":
-            _attribute(surface, "color").bind(2)
+            _attribute(surface, "color").bind(Texture.COLORS)
         if light != "flat" or color == "normal":
-            _attribute(surface, "normal").bind(3)
+            _attribute(surface, "normal").bind(Texture.NORMALS)
         if surface.is_own("color"):
-            surface.own("color").bind(8)
+            surface.own("color").bind(Texture.OWN_COLORS)
         if surface.is_own("value"):
-            surface.own("value").bind(4)
+            surface.own("value").bind(Texture.VALUES)
         elif value == "scalar":
-            pose.array(f"scalar:{source}").bind(4)
+            pose.array(f"scalar:{source}").bind(Texture.VALUES)
         elif value == "height":
-            pose.array("positions").bind(6)
+            pose.array("positions").bind(Texture.POSITIONS)
         if color == "id" and cloud.ids is not None:
-            pose.array("ids").bind(7)
+            pose.array("ids").bind(Texture.IDS)
         if value is not None:
-            _color_map(gpu, look.color_map).bind(5)
-        gpu.set(
-            program,
-            plain=tuple(c / 255 for c in rgba(look.plain)[:3]),
-            background=tuple(c / 255 for c in rgba(look.background)),
-            value_range=tuple(np.clip([low - zero, high - zero], -_MOST, _MOST).tolist()),
-            height_axis=up_vector(look.up),
-            light=_direction(look.azimuth, look.elevation),
-            phong=(look.ambient, look.diffuse, look.specular, look.shininess),
-            eye_dome_strength=look.eye_dome_strength,
-            eye_dome_radius=look.eye_dome_radius,
-        )
+            _color_map(gpu, look.color_map).bind(Texture.COLOR_MAP)
         gl.clear_words(surface.picture, int.from_bytes(bytes(rgba(look.background)), "little"))
-        surface.picture.bind_to_storage_buffer(0)
+        surface.picture.bind_to_storage_buffer(Storage.PICTURE)
         covered.run(program)
         gpu.ctx.memory_barrier()
     surface.shaded_by = shade
+
+
+def _shading(surface: Surface, look: Look) -> _Shading:
+    low, high = surface.color_range or (0.0, 1.0)
+    zero = surface.value_zero
+    return _Shading(
+        plain=_fractions(look.plain),
+        background=_fractions(look.background),
+        height_axis=(*up_vector(look.up), 0.0),
+        light=(*_direction(look.azimuth, look.elevation), 0.0),
+        phong=(look.ambient, look.diffuse, look.specular, look.shininess),
+        value_range=(_finite(low - zero), _finite(high - zero)),
+        eye_dome_strength=look.eye_dome_strength,
+        eye_dome_radius=look.eye_dome_radius,
+    )
+
+
+def _finite(value: float) -> float:
+    """The nearest number that a shader holds."""
+    return min(max(value, -_MOST), _MOST)
+
+
+def _fractions(color: str) -> Vec4:
+    """A colour of a look, each channel from 0 to 1."""
+    red, green, blue, alpha = (c / 255 for c in rgba(color))
+    return red, green, blue, alpha
 
 
 def _attribute(surface: Surface, name: str) -> gl.BufferTexture:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 from ..errors import Scan4DError
 from ..resources import resource_path
+from .bindings import bindings_glsl
 from .blocks import Values, block_of
 
 _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
@@ -27,7 +28,8 @@ class Source:
 
     name: path under `shaders/`, or an absolute one. defines: macro name -> value. parts: what a file in angle
     brackets stands for, so that one file can serve several shapes: `#include <shape>`. params: the dataclass
-    whose numbers `#include <params>` declares. files: what it is made of, numbered as in a compiler's log.
+    whose numbers `#include <params>` declares; `<bindings>` are those of gpu/bindings.py. files: what it is
+    made of, numbered as in a compiler's log.
     """
 
     def __init__(
@@ -56,6 +58,8 @@ class Source:
     def _expand_part(self, name: str) -> str:
         if name in self._parts:
             return self._expand(self._parts[name])
+        if name == "bindings":
+            return self._numbered("<bindings>", bindings_glsl())
         if name == "params" and self._params is not None:
             block = block_of(self._params)
             return self._numbered(f"<params: {block.name}>", block.glsl(name))

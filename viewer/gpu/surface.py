@@ -16,6 +16,7 @@ from ..look import Look, rgba, value_source
 from ..scan.points import PointCloud
 from ..view import View
 from . import gl
+from .bindings import Storage, Texture, UniformBlock
 from .compact import IndexList, list_covered
 from .context import Gpu, Resource
 from .counts import NOTHING, count_points
@@ -131,7 +132,17 @@ class Surface:
 
     def bind_view(self) -> None:
         """Make this surface's view the one that shaders read."""
-        self._block.bind_to_uniform_block(0)
+        self._block.bind_to_uniform_block(UniformBlock.VIEW)
+
+    def bind_textures(self) -> None:
+        """Bind depths and rows for shaders to fetch."""
+        self.depths.bind(Texture.DEPTHS)
+        self.rows.bind(Texture.ROWS)
+
+    def bind_storage(self) -> None:
+        """Bind depths and rows for compute shaders to change."""
+        self.depths.buffer.bind_to_storage_buffer(Storage.DEPTHS)
+        self.rows.buffer.bind_to_storage_buffer(Storage.ROWS)
 
     def show(self, pose: GpuPose, points: NDArray[np.uint32]) -> None:
         """Say that rows are those of another pose with the same origin: for a backend that shows something
@@ -147,7 +158,7 @@ class Surface:
     def list_covered(self) -> IndexList:
         """The list of the pixels that show something, in no order: what shading works on."""
         if not self._covered_known:
-            self.depths.bind(0)
+            self.depths.bind(Texture.DEPTHS)
             list_covered(self.gpu, self.size[0] * self.size[1], self.covered)
             self._covered_known = True
         return self.covered
@@ -214,6 +225,11 @@ class Surface:
             self._covered_known = False  # a list of what points cover lacks what is filled
         return self._own[name]
 
+    def bind_own(self, *names: str) -> None:
+        """Bind channels that the backend writes itself for compute shaders to change."""
+        for name in names:
+            self.own(name).buffer.bind_to_storage_buffer(Storage[name.upper()])
+
     def is_own(self, name: str) -> bool:
         """Whether the backend wrote this channel for each pixel. Values are those of one source: they are not
         its own in a look that colours by another."""
@@ -228,11 +244,10 @@ class Surface:
         defines = {"CHANNEL": _RESOLVED[name], "HAS_ROWS": int(rows is not None)}
         program = self.gpu.compute("shade/resolve.comp", defines)
         with self.gpu.timers.measure(f"resolve {name}"):
-            self.depths.bind(0)
-            self.rows.bind(1)
+            self.bind_textures()
             if rows is not None:
-                rows.bind(2)
-            own.buffer.bind_to_storage_buffer(0)
+                rows.bind(Texture.VALUES)
+            self.bind_own(name)
             self.gpu.set(program, plain=tuple(c / 255 for c in rgba(self.look.plain)[:3]))
             self.gpu.dispatch(program, self.size[0] * self.size[1])
         return own

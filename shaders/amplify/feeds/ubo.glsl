@@ -1,8 +1,9 @@
 // Feed: a range of one larger buffer as a uniform block. An array of anything but vec4 is padded to
 // it, so the attributes lie one after the other across vec4s.
+#include <bindings>
 #include "amplify/point.glsl"
 
-layout(std140, binding = 1) uniform Points { vec4 packed_points[POINTS * STRIDE / 4]; };
+layout(std140, binding = BLOCK_POINTS) uniform Points { vec4 packed_points[POINTS * STRIDE / 4]; };
 uniform int first;  // row of the range's first point
 
 float number(int at) { return packed_points[at >> 2][at & 3]; }

@@ -2,14 +2,15 @@
 // filled is taken back where nothing is shown at that distance: dilated, then eroded.
 // Filled pixels are listed and have a negative depth. STEP 0 says which are taken back, reading depths
 // alone, which change in STEP 1, so that the order does not matter.
+#include <bindings>
 #include "surfels/passes/limit.glsl"
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
 
-layout(std430, binding = 0) buffer Depths { uint depths[]; };
-layout(std430, binding = 1) buffer Rows { uint rows[]; };
+layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
+layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
 
 const uint EMPTY = 0x7F800000u;  // +inf
 const int DIRECTIONS = 16;

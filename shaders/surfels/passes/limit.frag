@@ -1,9 +1,10 @@
 // The depth buffer of the second pass: what the first one found, pushed away from the eye.
 // Filled pixels have a negative depth.
+#include <bindings>
 #include "surfels/passes/limit.glsl"
 
-layout(binding = 6) uniform usamplerBuffer depths;
-layout(binding = 7) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);

@@ -2,13 +2,13 @@
 #include "surfels/splat.glsl"
 
 #if HAS_RADIUS
-layout(binding = 4) uniform samplerBuffer visible_radii;
+#include "amplify/radii.glsl"
 #endif
 
 // Of the splat that a pixel shows at this depth, scan units.
 float visible_radius(float depth, uint row) {
 #if HAS_RADIUS
-    float radius = texelFetch(visible_radii, int(row)).r;
+    float radius = texelFetch(radii, int(row)).r;
 #else
     const float radius = 0.0;
 #endif

@@ -2,15 +2,16 @@
 // the nearest alone would flicker, and a mask's shape cannot be seen. All count the same, as whole numbers, so that sums
 // do not depend on the order; NORMAL_DIVISOR and COLOR_DIVISOR keep them in range. STEP 0: listed pixels are set to
 // zero; 1: each splat is added to its pixels; 2: sums become means, in place.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "surfels/passes/limit.glsl"
 #include "surfels/passes/look.glsl"
 
-layout(std430, binding = 0) buffer Sums { uint sums[]; };  // red, green, blue and how many of each pixel
-layout(std430, binding = 5) buffer Normals { int normal_sums[]; };  // Surface.own
-layout(binding = 6) uniform usamplerBuffer depths;
-layout(binding = 7) uniform usamplerBuffer rows;
+layout(std430, binding = STORAGE_SUMS) buffer Sums { uint sums[]; };  // red, green, blue and how many of each pixel
+layout(std430, binding = STORAGE_NORMAL) buffer Normal { int normal_sums[]; };  // Surface.own
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 
 #if STEP == 1
 void visit(uint cell, uint key, uint item_id) {
@@ -38,7 +39,7 @@ void main() {
 #else
 #include "common/list.glsl"
 #if HAS_COLORS
-layout(std430, binding = 4) writeonly buffer Colors { uint own_colors[]; };
+layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors[]; };
 #endif
 
 void main() {

@@ -1,15 +1,16 @@
 // What the splats gave, divided by how much they counted. OVER: they were drawn over one another.
 // Pixels that were filled are listed for surfels/passes/close.comp.
+#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "surfels/passes/look.glsl"
 #include "surfels/passes/store.glsl"
 #include "common/list.glsl"
 
-layout(binding = 0) uniform sampler2D color_sums;
-layout(binding = 1) uniform sampler2D normal_sums;
-layout(binding = 6) uniform usamplerBuffer depths;
-layout(binding = 7) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_COLOR_SUMS) uniform sampler2D color_sums;
+layout(binding = TEXTURE_NORMAL_SUMS) uniform sampler2D normal_sums;
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 
 void main() {
     int index = int(item());

@@ -1,8 +1,10 @@
 // The blended colour and normal of a pixel, for Surface.own.
+#include <bindings>
+
 #if HAS_COLORS
-layout(std430, binding = 4) writeonly buffer Colors { uint own_colors[]; };
+layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors[]; };
 #endif
-layout(std430, binding = 5) writeonly buffer Normals { float own_normals[]; };
+layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_normals[]; };
 
 // color, normal: sums of what `look.glsl` gives, times weights that add up to `total`; row: what is
 // shown, where those are nothing. coverage: of the pixel.

@@ -1,11 +1,12 @@
 // The first of two passes alone (Slomp 2014, Fig. 3c): depth and nothing else, pushed away from the eye, in grey.
+#include <bindings>
 #include "surfels/passes/limit.glsl"
 #include "common/item.glsl"
 
-layout(std430, binding = 0) buffer Depths { uint depths[]; };
-layout(std430, binding = 1) readonly buffer Rows { uint rows[]; };
-layout(std430, binding = 2) writeonly buffer Colors { uint own_colors[]; };
-layout(std430, binding = 3) writeonly buffer Normals { float own_normals[]; };
+layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
+layout(std430, binding = STORAGE_ROWS) readonly buffer Rows { uint rows[]; };
+layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors[]; };
+layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_normals[]; };
 
 uniform vec2 depth_range;  // light to dark
 

@@ -1,7 +1,8 @@
 // What a fragment's pixel shows.
+#include <bindings>
 #include "surfels/passes/look.glsl"
 
-layout(binding = 7) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 
 vec3 visible_normal() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);

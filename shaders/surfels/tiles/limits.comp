@@ -1,12 +1,13 @@
 // The farthest depth in each tile at which a splat still counts in the second pass; +inf where a pixel shows
 // nothing. An invocation goes down a column of a tile.
+#include <bindings>
 #include "surfels/passes/limit.glsl"
 #include "surfels/tiles/grid.glsl"
 #include "common/item.glsl"
 
-layout(binding = 6) uniform usamplerBuffer depths;
-layout(binding = 7) uniform usamplerBuffer rows;
-layout(std430, binding = 0) buffer Farthest { uint farthest[]; };
+layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
+layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };
 
 void main() {
     int i = int(item()), x = i % view_size.x, tile = i / view_size.x;

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...gpu import gl
 from ...gpu.amplify import Points, draw_shapes
+from ...gpu.bindings import Storage, Texture
 from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
@@ -111,11 +112,10 @@ def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
     gpu, pose = surface.gpu, points.pose
     program = gpu.compute("surfels/passes/visibility.comp", points.defines, params=splats)
     gpu.set(program, depth_range=robust_range(surface.view.depths(pose.sample)))
-    blocks = (surface.depths, surface.rows, surface.own("color"), surface.own("normal"))
     with gpu.timers.measure("grey"):
         bind_visible(points, program)
-        for number, block in enumerate(blocks):
-            block.buffer.bind_to_storage_buffer(number)
+        surface.bind_storage()
+        surface.bind_own("color", "normal")
         gpu.dispatch(program, surface.size[0] * surface.size[1])
 
 
@@ -173,10 +173,9 @@ def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileL
     program = gpu.compute("surfels/tiles/limits.comp", {"TILE": TILE, **points.defines}, params=splats)
     with gpu.timers.measure("limits"):
         gl.clear_words(lists.farthest, 0)
-        lists.farthest.bind_to_storage_buffer(0)
+        lists.farthest.bind_to_storage_buffer(Storage.FARTHEST)
         bind_visible(points, program)
-        surface.depths.bind(6)
-        surface.rows.bind(7)
+        surface.bind_textures()
         gpu.dispatch(program, surface.size[0] * lists.tiles[1])
     return tile_lists(splats.larger(points), surface, splats, NOT_HIDDEN)
 
@@ -188,7 +187,7 @@ def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
     sums = surface.keep("sums", lambda: gl.Sums(gpu.ctx, surface.size))
     sums.target.use()
     bind_looks(points, surface)
-    surface.rows.bind(7)
+    surface.rows.bind(Texture.ROWS)
     yield sums
     gpu.ctx.disable(moderngl.BLEND)
 
@@ -200,7 +199,7 @@ def _limit(points: Points, surface: Surface, splats: Splats) -> None:
         ("present/present.vert", "surfels/passes/limit.frag"), points.defines, params=splats
     )
     bind_visible(points, program)
-    surface.depths.bind(6)
+    surface.depths.bind(Texture.DEPTHS)
     gpu.ctx.enable_only(moderngl.DEPTH_TEST)
     gpu.ctx.depth_func = "1"
     triangle = gpu.ctx.vertex_array(program, [])
@@ -215,10 +214,9 @@ def _resolve(points: Points, surface: Surface, over: bool) -> None:
     with gpu.timers.measure("resolve"):
         defines = bind_looks(points, surface)
         program = gpu.compute("surfels/passes/resolve.comp", {**defines, "OVER": int(over)})
-        for unit, image in enumerate(sums.images):
+        for unit, image in zip((Texture.COLOR_SUMS, Texture.NORMAL_SUMS), sums.images, strict=True):
             image.use(unit)
-        surface.depths.bind(6)
-        surface.rows.bind(7)
+        surface.bind_textures()
         surface.covered.clear()
         surface.covered.bind()
         gpu.dispatch(program, surface.size[0] * surface.size[1])
@@ -228,8 +226,7 @@ def _close(points: Points, surface: Surface, splats: Splats) -> None:
     """Take back what the second pass filled beyond the outline; `covered` lists what it filled."""
     gpu = surface.gpu
     with gpu.timers.measure("close"):
-        for number, texels in enumerate((surface.depths, surface.rows)):
-            texels.buffer.bind_to_storage_buffer(number)
+        surface.bind_storage()
         for step in range(2):
             program = gpu.compute(
                 "surfels/passes/close.comp", {"STEP": step, **points.defines}, params=splats
@@ -243,10 +240,10 @@ def _close(points: Points, surface: Surface, splats: Splats) -> None:
 def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     """Bind what surfels/passes/look.glsl reads and store.glsl writes; the defines that say so."""
     cloud = points.pose.cloud
-    points.pose.packed("looks", lambda: _pack_looks(cloud), gl.RG32UI).bind(5)
+    points.pose.packed("looks", lambda: _pack_looks(cloud), gl.RG32UI).bind(Texture.LOOKS)
     if cloud.colors is not None:
-        surface.own("color").buffer.bind_to_storage_buffer(4)
-    surface.own("normal").buffer.bind_to_storage_buffer(5)
+        surface.bind_own("color")
+    surface.bind_own("normal")
     return {"HAS_COLORS": int(cloud.colors is not None)}
 
 

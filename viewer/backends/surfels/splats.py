@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ...gpu.amplify import Points, Shape
+from ...gpu.bindings import Texture
 from ...gpu.context import Program
 
 SURFEL = Shape("surfels/surfel.glsl", corners=4)
@@ -41,7 +42,7 @@ class Splats:
 
 
 def bind_visible(points: Points, program: Program) -> None:
-    """Bind what surfels/passes/limit.glsl reads of the points that were drawn first: texture unit 4."""
+    """Bind what surfels/passes/limit.glsl reads of the points that were drawn first."""
     points.pose.gpu.set(program, enlarged=points.enlarged)
     if points.use_radii:
-        points.pose.array("radii").bind(4)
+        points.pose.array("radii").bind(Texture.RADII)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu.amplify import Points
+from ...gpu.bindings import Storage
 from ...gpu.context import Gpu
 from ...gpu.scatter import scatter
 from ...gpu.surface import Surface
@@ -103,9 +104,8 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
     # All splats may share a pixel: normals of up to 511, with sign, and colours of up to 255 add up there.
     bound |= {"NORMAL_DIVISOR": (points.count >> 22) + 1, "COLOR_DIVISOR": f"{(points.count >> 24) + 1}u"}
     with gpu.timers.measure("mean"):
-        sums.buffer.bind_to_storage_buffer(0)
-        surface.depths.bind(6)
-        surface.rows.bind(7)
+        sums.buffer.bind_to_storage_buffer(Storage.SUMS)
+        surface.bind_textures()
         for step in range(3):
             defines = {"STEP": step, **bound, **points.defines}
             program = gpu.compute("surfels/passes/mean.comp", defines, params=splats)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...gpu import gl
 from ...gpu.amplify import Points, Shape, amplify
+from ...gpu.bindings import Texture
 from ...gpu.scatter import scatter
 from ...gpu.surface import Surface
 
@@ -38,10 +39,9 @@ def shade_flat(points: Points, surface: Surface) -> None:
     """Give each pixel the normal of the face that it shows."""
     gpu, covered = surface.gpu, surface.list_covered()
     with gpu.timers.measure("faces"):
-        points.pose.array("positions").bind(0)
-        surface.depths.bind(6)
-        surface.rows.bind(7)
-        surface.own("normal").buffer.bind_to_storage_buffer(5)
+        points.pose.array("positions").bind(Texture.POSITIONS)
+        surface.bind_textures()
+        surface.bind_own("normal")
         covered.run(gpu.compute("voxels/faces.comp"))
         gpu.ctx.memory_barrier()
 

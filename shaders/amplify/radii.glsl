@@ -1,0 +1,4 @@
+// The points' own radii, where they have any.
+#include <bindings>
+
+layout(binding = TEXTURE_RADII) uniform samplerBuffer radii;
