@@ -99,6 +99,31 @@ def checkpoint(progress: float | None = None) -> None:
             task.report(progress)
 
 
+def announce(what: str) -> None:
+    """Say why work takes longer than at other times: the task of this thread takes it as its name.
+
+    Whoever is `listening` is told as well.
+    """
+    task = _current.get()
+    if task is not None:
+        task.name = what
+    for listener in list(_listeners):
+        listener(what)
+
+
+@contextmanager
+def listening(listener: Callable[[str], object]) -> Iterator[None]:
+    """Have `announce` call the listener, on whatever thread, while what is inside runs."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+_listeners: list[Callable[[str], object]] = []
+
+
 def in_background(task: Task, work: Callable[[], T]) -> Future[T]:
     """Do the work on a thread of its own. At the end of the process it is cancelled."""
     future: Future[T] = Future()

@@ -97,6 +97,19 @@ def progress(total: int, as_lines: bool = False) -> Iterator[Callable[[], object
         yield bar.update
 
 
+class Delays:
+    """Tells each thing that is announced once, where someone watches."""
+
+    def __init__(self) -> None:
+        self._told: set[str] = set()
+
+    def __call__(self, what: str) -> None:
+        """A line on standard error, only in a terminal."""
+        if what not in self._told and sys.stderr.isatty():
+            self._told.add(what)
+            warn(f"{what} ...")
+
+
 class ReaderGone(Exception):
     """Nobody reads standard output any more, which is no failure to speak of."""
 

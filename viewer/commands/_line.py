@@ -10,7 +10,8 @@ from contextlib import contextmanager, redirect_stdout
 
 from ..errors import InputError, Scan4DError
 from ..signals import ending_as_interrupts, ignore_from_now_on
-from ._console import NAMES_AS_THEY_ARE, PlainOutput, ReaderGone, complain, plain, quietly
+from ..task import listening
+from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, plain, quietly
 from ._parsing import parsed
 
 _MOST_SHOWN = 2000  # characters of a message
@@ -43,7 +44,7 @@ def run(words: Sequence[str], then_ends: bool = False) -> int:
 def _run(words: Sequence[str]) -> int:
     try:
         args = parsed(words)
-        with quietly(args.quiet), _logged(args.debug), ending_as_interrupts():
+        with quietly(args.quiet), _logged(args.debug), listening(Delays()), ending_as_interrupts():
             return args.run(args)
     except SystemExit as stop:  # --help, --version
         return int(stop.code or 0)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+NOWHERE = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"  # no folder can be written
 KERNEL = """
 from viewer.scan.octree.compiled import compiled
 
@@ -17,6 +18,12 @@ def twice(number):
 def run(folder: Path, cache: Path | None, limit: str = "") -> tuple[int, int]:
     """(what twice(21) is, how often it was found on disk) in a process of its own."""
     script = f"{limit}\nimport kernel\nprint(kernel.twice(21), sum(kernel.twice.stats.cache_hits.values()))"
+    result, hits = output(script, folder, cache).split()
+    return int(result), int(hits)
+
+
+def output(script: str, folder: Path, cache: Path | None) -> str:
+    """What a script prints, in a process of its own that may keep what it compiles in `cache`."""
     paths = os.pathsep.join([str(folder), str(Path(__file__).parents[3])])
     environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
     environment |= {"NUMBA_CACHE_DIR": str(cache or "")}
@@ -28,8 +35,7 @@ def run(folder: Path, cache: Path | None, limit: str = "") -> tuple[int, int]:
         text=True,
         check=True,
     )
-    result, hits = done.stdout.split()
-    return int(result), int(hits)
+    return done.stdout
 
 
 def written(tmp_path: Path) -> tuple[Path, Path]:
@@ -37,6 +43,31 @@ def written(tmp_path: Path) -> tuple[Path, Path]:
     (tmp_path / "kernel.py").write_text(KERNEL)
     (tmp_path / "cache").mkdir()
     return tmp_path, tmp_path / "cache"
+
+
+def announced(folder: Path, cache: Path | None, limit: str = "") -> list[str]:
+    """What a task is called after each of two calls, on a thread of several, in a process of its own."""
+    script = f"""{limit}
+import kernel
+from viewer.scan.octree.threads import together
+from viewer.task import Task, listening
+
+heard = []
+task = Task("Reading")
+with task.current(), listening(heard.append):
+    together(10**6, [lambda: kernel.twice(21)] * 2)
+    together(10**6, [lambda: kernel.twice(21)] * 2)
+print(task.name, *heard, sep="|")
+"""
+    return output(script, folder, cache).strip().split("|")
+
+
+def test_what_has_to_be_compiled_is_announced_and_what_is_kept_is_not(tmp_path: Path) -> None:
+    folder, cache = written(tmp_path)
+    once = "Preparing once for this machine"
+    assert announced(folder, cache) == [once, once]
+    assert announced(folder, cache) == ["Reading"]
+    assert announced(folder, None, NOWHERE) == ["Preparing", "Preparing"]
 
 
 def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
@@ -64,5 +95,4 @@ def test_a_full_disk_only_costs_time(tmp_path: Path) -> None:
 
 def test_folders_that_cannot_be_written_only_cost_time(tmp_path: Path) -> None:
     folder, _ = written(tmp_path)
-    nowhere = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"  # none that can be written
-    assert run(folder, None, nowhere) == (42, 0)
+    assert run(folder, None, NOWHERE) == (42, 0)

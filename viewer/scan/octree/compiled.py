@@ -7,7 +7,9 @@ from contextlib import suppress
 from typing import Any, TypeVar, cast
 
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, NullCache
+
+from ...task import announce
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -16,11 +18,13 @@ def compiled(function: F) -> F:
     """The function compiled at its first call; meanwhile other threads go on.
 
     The result is kept beside the source, or in the user's cache folder where that cannot be written. Where
-    neither can be, or the disk is full, each process compiles for itself.
+    neither can be, or the disk is full, each process compiles for itself. Either is announced.
     """
-    dispatcher = njit(nogil=True)(function)
-    with suppress(RuntimeError):  # of numba, where no folder can be written
-        dispatcher._cache = _Kept(function)  # type: ignore[attr-defined]
+    dispatcher: Any = njit(nogil=True)(function)
+    try:
+        dispatcher._cache = _Kept(function)
+    except RuntimeError:  # of numba, where no folder can be written
+        dispatcher._cache = _NotKept()
     return cast(F, dispatcher)
 
 
@@ -29,12 +33,22 @@ class _Kept(FunctionCache):
 
     def load_overload(self, *args: Any) -> Any:
         try:
-            return super().load_overload(*args)
+            found = super().load_overload(*args)
         except Exception:  # whatever unpickling damaged bytes may raise
             with suppress(OSError):
                 self.flush()
-            return None
+            found = None
+        if found is None:
+            announce("Preparing once for this machine")
+        return found
 
     def save_overload(self, *args: Any) -> None:
         with suppress(OSError):
             super().save_overload(*args)
+
+
+class _NotKept(NullCache):
+    """No place on any disk."""
+
+    def load_overload(self, *_: Any) -> None:
+        announce("Preparing")

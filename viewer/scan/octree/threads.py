@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ def together(points: int, works: Iterable[Callable[[], object]]) -> None:
             work()
         return
     with ThreadPoolExecutor(count) as pool:
-        for done in [pool.submit(work) for work in works]:
+        for done in [pool.submit(copy_context().run, work) for work in works]:  # of the same task
             done.result()
 
 
