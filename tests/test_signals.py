@@ -74,7 +74,8 @@ def test_a_second_interrupt_waits_until_all_is_kept() -> None:
 STOPPED_AGAIN = """
 import atexit, signal, sys
 from viewer import cli
-from viewer.commands import info, line
+from viewer.commands import _line as line
+from viewer.commands import info
 
 def stop(*_):
     signal.raise_signal(signal.{first})
@@ -87,7 +88,7 @@ def again():
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.raise_signal(number)
 
-info.describe, line.complain = stop, told
+info.scan_facts, line.complain = stop, told
 atexit.register(again)
 sys.argv[1:] = ["info", "demo"]
 sys.exit(cli.main())

@@ -11,7 +11,7 @@ from scenes import NOTHING, looking_down_z, sphere
 from test_instancing import assert_agree
 
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
 from viewer.look import Look
@@ -129,7 +129,7 @@ def test_they_do_not_flicker(draw: Draw) -> None:
     look = Look(light="head", color_by="plain")
     cameras = [camera(azimuth=10 + 2 * step) for step in range(3)]
     gpu = surfels(draw, CLOUD, cameras[0]).gpu
-    truth = Shapes((Sphere(),))
+    truth = AnalyticScene((Sphere(),))
     walk = Walk([Judge.of(gpu, truth, one, SIZE, look, CLOUD, None) for one in cameras], [None] * 2)
     nearest, mean = (
         walk.flicker(

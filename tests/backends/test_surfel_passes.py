@@ -13,7 +13,7 @@ from viewer.backends import backend
 from viewer.bench import metrics
 from viewer.bench.judge import Judge, Walk
 from viewer.bench.truth import tessellation
-from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
@@ -75,7 +75,7 @@ def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None
     """Zero holes; depth within 5 % of a pixel and the discs' sagitta; shading within 40 dB."""
     cloud, look = sphere(20_000), Look(light="head", color_by="plain")
     camera = Camera.orbit(cloud.bounds(), 40, 25, aspect=4 / 3, projection=projection)
-    truth = trace(Shapes((Sphere(),)), camera, SIZE)
+    truth = trace(AnalyticScene((Sphere(),)), camera, SIZE)
     inside = truth.covered
     for passes, enlarge in (("one", 1.0), ("two", 1.0), ("two", 2.0)):
         surface = surfels(
@@ -94,7 +94,7 @@ def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None
 
 def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
     """Of what two pods with noise saw: at most half as many holes; outline and spill within a pixel."""
-    mesh, size = tessellation.torus(), (480, 320)
+    mesh, size = tessellation.torus_mesh(), (480, 320)
     pods = rig(mesh.bounds, around(2), aspect=4 / 3, up="+y")
     noise = Faults(noise=0.5 / 190 * mesh.bounds.radius)  # 0.5 mm of a head
     pose = Pose.of(0, 0.0, "", capture(mesh, pods, (640, 480), [noise] * 2, seed=0, frame=0))
@@ -352,7 +352,7 @@ def test_empty_poses_and_previews(renderer: Renderer, draw: Draw, instancing: st
 
 
 def test_splats_under_a_pixel_do_not_flicker_where_they_are_blended(draw: Draw) -> None:
-    cloud, truth, size = sphere(20_000), Shapes((Sphere(),)), (100, 75)
+    cloud, truth, size = sphere(20_000), AnalyticScene((Sphere(),)), (100, 75)
     look = Look(light="head", color_by="plain")
     cameras = [Camera.orbit(cloud.bounds(), 10 + 2 * step, 10, aspect=4 / 3) for step in range(3)]
     gpu = surfels(draw, cloud, cameras[0]).gpu

@@ -12,7 +12,7 @@ import pytest
 from scenes import plane, sphere_mesh
 
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.truth.shapes import Plane, Shapes, Sphere
+from viewer.bench.truth.shapes import AnalyticScene, Plane, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.look import Look, rgba
@@ -72,8 +72,8 @@ def test_the_truth_has_no_errors(renderer: Renderer, projection: str) -> None:
 
 @pytest.mark.parametrize("d", [0.5, -1.25])
 def test_a_plane_moved_back_by_d_has_a_bias_of_d(renderer: Renderer, d: float) -> None:
-    truth = judge(renderer, Shapes((Plane(),)))
-    errors = truth.errors(picture(renderer, Shapes((Plane(center=(0, 0, -d)),))))
+    truth = judge(renderer, AnalyticScene((Plane(),)))
+    errors = truth.errors(picture(renderer, AnalyticScene((Plane(center=(0, 0, -d)),))))
     assert errors["depth_bias"] == pytest.approx(d, abs=1e-6)
     assert errors["depth_rmse"] == errors["depth_p95"] == pytest.approx(abs(d), abs=1e-6)
     assert errors["depth_bias_px"] == pytest.approx(d * truth.reference.view.scale / 4, rel=1e-6)
@@ -86,7 +86,7 @@ def test_a_plane_moved_back_by_d_has_a_bias_of_d(renderer: Renderer, d: float) -
 def test_a_slanted_surface_does_not_hide_its_own_points(
     renderer: Renderer, slant: int, spacing: float
 ) -> None:
-    truth, turn = Shapes((Plane(),)), np.radians(slant)
+    truth, turn = AnalyticScene((Plane(),)), np.radians(slant)
     cloud = plane(round(1.9 / spacing), depth=0, spacing=spacing)
     camera = Camera(eye=(4 * np.sin(turn), 0, 4 * np.cos(turn)))
     errors = judge(renderer, truth, camera, cloud).errors(picture(renderer, truth, camera))
@@ -96,9 +96,9 @@ def test_a_slanted_surface_does_not_hide_its_own_points(
 
 def test_far_points_of_one_sheet_are_no_wrong_layer(renderer: Renderer) -> None:
     """Where points are finer than pixels, these set how far depths of a sheet lie apart."""
-    truth, camera = Shapes((Sphere(),)), Camera(eye=(0, 0, 8))
+    truth, camera = AnalyticScene((Sphere(),)), Camera(eye=(0, 0, 8))
     fine, coarse = plane(21, depth=0, spacing=1e-4), plane(21, depth=0, spacing=0.1)
-    drawn = picture(renderer, Shapes((Sphere(center=(0.03, 0, 0)),)), camera)  # half a pixel aside
+    drawn = picture(renderer, AnalyticScene((Sphere(center=(0.03, 0, 0)),)), camera)  # half a pixel aside
     for cloud in (fine, coarse):
         errors = judge(renderer, truth, camera, cloud).errors(drawn)
         assert errors["depth_rmse_px"] > 0.1
@@ -108,7 +108,7 @@ def test_far_points_of_one_sheet_are_no_wrong_layer(renderer: Renderer) -> None:
 def test_an_empty_picture_is_all_hole_and_hides_nothing(renderer: Renderer) -> None:
     mesh = sphere_mesh()
     truth = judge(renderer, mesh, cloud=mesh.points)
-    errors = truth.errors(picture(renderer, Shapes((Sphere(center=(0, 0, 99)),))))
+    errors = truth.errors(picture(renderer, AnalyticScene((Sphere(center=(0, 0, 99)),))))
     assert errors["hole_percent"] == 100
     assert math.isnan(errors["depth_bias"])
     assert counts(errors) == (np.count_nonzero(~truth.probes.seen), 0, np.count_nonzero(truth.probes.seen))
@@ -118,10 +118,10 @@ def test_points_of_two_planes(renderer: Renderer) -> None:
     front, back = Plane(), Plane(center=(0, 0, -2))  # the hinder one is all in the shadow of the other
     square = plane(10, depth=0, spacing=0.2).world()
     cloud = PointCloud.from_arrays(np.concatenate([square, square - np.array([0, 0, 2])]))
-    truth = judge(renderer, Shapes((front, back)), cloud=cloud)
+    truth = judge(renderer, AnalyticScene((front, back)), cloud=cloud)
 
     def found(*planes: Plane) -> tuple[float, float, float]:
-        return counts(truth.errors(picture(renderer, Shapes(planes))))
+        return counts(truth.errors(picture(renderer, AnalyticScene(planes))))
 
     assert found(front, back) == (0, 0, 200)
     assert found(back) == (100, 0, 100)  # the hinder ones are seen through what is missing
@@ -130,7 +130,7 @@ def test_points_of_two_planes(renderer: Renderer) -> None:
 
 def test_points_may_lie_as_far_behind_as_the_tolerance_says(renderer: Renderer) -> None:
     deep = PointCloud.from_arrays(plane(11, depth=0.5, spacing=0.01).world())
-    truth = Shapes((Plane(),))
+    truth = AnalyticScene((Plane(),))
     drawn = picture(renderer, truth)
     strict, lenient = (judge(renderer, truth, cloud=deep, tolerance=t) for t in (None, 0.6))
     assert counts(strict.errors(drawn)) == (0, 0, 121)
@@ -150,12 +150,12 @@ def test_cloud_and_truth_have_origins_of_their_own(renderer: Renderer) -> None:
 
 def test_only_points_in_the_picture_are_looked_at(renderer: Renderer) -> None:
     cloud = PointCloud.from_arrays([[0, 0, 0], [50, 0, 0], [0, 0, 5]])
-    assert len(judge(renderer, Shapes((Plane(),)), cloud=cloud).probes.seen) == 1
+    assert len(judge(renderer, AnalyticScene((Plane(),)), cloud=cloud).probes.seen) == 1
 
 
 def test_of_many_points_some_stand_for_all(renderer: Renderer) -> None:
     ordered = plane(300, depth=0, spacing=0.006)  # of columns, as scanners give them
-    first, again = (judge(renderer, Shapes((Plane(),)), cloud=ordered).probes for _ in range(2))
+    first, again = (judge(renderer, AnalyticScene((Plane(),)), cloud=ordered).probes for _ in range(2))
     assert len(first.seen) == 50_000
     assert (first.pixels == again.pixels).all()
     columns = np.bincount(first.pixels % SIZE[0], minlength=SIZE[0])
@@ -164,7 +164,7 @@ def test_of_many_points_some_stand_for_all(renderer: Renderer) -> None:
 
 
 def test_pictures_are_compared_in_the_judge_s_look(renderer: Renderer) -> None:
-    truth = Shapes((Sphere(),))
+    truth = AnalyticScene((Sphere(),))
     other = reference_surface(
         trace(truth, AHEAD, SIZE), renderer.gpu, Look(light="flat", background="#ff0000")
     )
@@ -217,7 +217,7 @@ def test_the_truth_does_not_flicker(renderer: Renderer, kind: Literal["orbit", "
 def test_a_frame_that_is_missing_flickers_by_what_it_lacks(renderer: Renderer) -> None:
     mesh = sphere_mesh()
     still = judge(renderer, mesh, cloud=mesh.points)
-    empty = picture(renderer, Shapes((Sphere(center=(0, 0, 99)),)))
+    empty = picture(renderer, AnalyticScene((Sphere(center=(0, 0, 99)),)))
     full = reference_surface(still.reference, renderer.gpu, LOOK)
     flicker = Walk([still] * 4, [None] * 3).flicker([full, empty, empty, full], "orbit")
     lost = np.abs(still.image[still.reference.covered, :3] / 255 - np.array(rgba(LOOK.background)[:3]) / 255)

@@ -13,8 +13,8 @@ import pytest
 from viewer.backends import backend, backends
 from viewer.bench.plan import Contender, Group, plan
 from viewer.bench.report.results import Row
-from viewer.bench.run import LOOK, Bench, Settings
-from viewer.bench.scenes.samples import torus
+from viewer.bench.run import LOOK, Bench, BenchSettings
+from viewer.bench.scenes.samples import on_torus
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request
@@ -24,7 +24,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.timing import draw
 
-SETTINGS = Settings(size=(120, 80), views=3, repeat=1, frames=2)
+SETTINGS = BenchSettings(size=(120, 80), views=3, repeat=1, frames=2)
 DEFAULTS = tuple(plan(["torus"], list(backends()), counts=(), noises=(), swept_scenes=0)[0].contenders)
 TORUS = Group("torus", DEFAULTS, count=20_000)
 SPREAD = {"median", "p5", "p95"}
@@ -189,4 +189,4 @@ def test_bytes_are_those_on_the_gpu(renderer: Renderer) -> None:
 
 
 def torus_cloud() -> PointCloud:
-    return PointCloud.from_arrays(**torus(2000))  # type: ignore[arg-type]
+    return PointCloud.from_arrays(**on_torus(2000))  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ import pytest
 from scenes import sphere, sphere_mesh
 
 from viewer.bench import metrics
-from viewer.bench.truth.shapes import Plane, Shapes, Sphere
+from viewer.bench.truth.shapes import AnalyticScene, Plane, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -38,7 +38,7 @@ def test_srgb_bytes_survive_linear_light() -> None:
 
 def test_no_picture_is_one_message() -> None:
     with pytest.raises(InputError, match="0x5"):
-        trace(Shapes((Sphere(),)), CAMERA, (0, 5))
+        trace(AnalyticScene((Sphere(),)), CAMERA, (0, 5))
 
 
 # --- as a Surface --------------------------------------------------------------------------
@@ -58,14 +58,14 @@ def test_its_surface_has_its_channels(renderer: Renderer) -> None:
 
 
 def test_nothing_seen_is_all_background(renderer: Renderer) -> None:
-    picture = trace(Shapes((Sphere(),)), Camera(eye=(0, 0, 4), target=(0, 0, 9)), SIZE)
+    picture = trace(AnalyticScene((Sphere(),)), Camera(eye=(0, 0, 4), target=(0, 0, 9)), SIZE)
     image = reference_surface(picture, renderer.gpu, Look(background="#102030")).image()
     assert (image == [16, 32, 48, 255]).all()
 
 
 def test_a_head_light_shades_a_sphere_by_its_cosine(renderer: Renderer) -> None:
     look = Look(light="head", ambient=0.25, diffuse=0.75, specular=0, color_by="plain", plain="#c0c0c0")
-    picture = trace(Shapes((Sphere(),)), CAMERA, SIZE)
+    picture = trace(AnalyticScene((Sphere(),)), CAMERA, SIZE)
     image = reference_surface(picture, renderer.gpu, look).image()[..., :3]
     to_eye = np.array(CAMERA.eye) - picture.positions() - picture.origin
     to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True)
@@ -106,13 +106,13 @@ def test_vertices_of_a_sphere_are_visible_on_the_near_side(projection: str) -> N
 
 
 def test_a_point_behind_a_plane_is_hidden_beside_it_visible() -> None:
-    scene = Shapes((Plane(), Sphere(radius=0.1, center=(3, 3, -3))))
+    scene = AnalyticScene((Plane(), Sphere(radius=0.1, center=(3, 3, -3))))
     points = np.array([[0, 0, 0.5], [0, 0, 0], [0, 0, -0.5], [1.5, 0, -0.5], [0, 0, 9]]) - scene.origin
     assert visible(scene, points, Camera(eye=(0, 0, 4))).tolist() == [True, True, False, True, False]
 
 
 def test_the_tolerance_of_visibility() -> None:
-    scene = Shapes((Sphere(),))
+    scene = AnalyticScene((Sphere(),))
     below = np.array([[0, 0, 1 - 1e-5], [0, 0, 1 - 1e-7]])
     camera = Camera(eye=(0, 0, 4))
     assert visible(scene, below, camera).tolist() == [False, True]
@@ -136,7 +136,7 @@ def test_pairs_of_pixels_show_the_same_points() -> None:
 
 
 def test_what_turns_out_of_sight_has_no_pair() -> None:
-    scene = Shapes((Sphere(),))
+    scene = AnalyticScene((Sphere(),))
     first, second = trace(scene, CAMERA, SIZE), trace(scene, CAMERA.orbited(180, 0), SIZE)
     assert len(both_see(first, second)[0]) < 0.1 * first.covered.sum()
 
@@ -150,7 +150,7 @@ def test_pairs_follow_a_moving_mesh() -> None:
     carried = mesh.carry(first.id[first.covered], first.positions(), moved)
     a, b = both_see(first, second, carried)
     assert len(a) > 0.8 * first.covered.sum()
-    turned = metrics.angles(first.normal.reshape(-1, 3)[a], second.normal.reshape(-1, 3)[b])
+    turned = metrics.angles_between(first.normal.reshape(-1, 3)[a], second.normal.reshape(-1, 3)[b])
     assert np.median(turned) < 2  # the same places of the sphere, to a pixel
 
 
@@ -182,7 +182,7 @@ def test_a_reference_has_no_error_against_itself(renderer: Renderer) -> None:
 @pytest.mark.parametrize("backend", ["points", "surfels"])
 def test_errors_of_a_drawn_sphere_are_of_its_spacing(draw: Callable[..., Surface], backend: str) -> None:
     cloud = sphere(20_000)
-    picture = trace(Shapes((Sphere(),)), CAMERA, SIZE)
+    picture = trace(AnalyticScene((Sphere(),)), CAMERA, SIZE)
     drawn = draw(cloud, CAMERA, SIZE, backend)
     errors = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), 0.025)
     assert errors["depth_median"] < 0.025

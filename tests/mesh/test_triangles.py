@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import sphere_hits, sphere_mesh
 
-from viewer.bench.metrics import angles
+from viewer.bench.metrics import angles_between
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.mesh.reference import trace
@@ -97,7 +97,7 @@ def test_a_fine_sphere_mesh_is_the_analytic_sphere(projection: str) -> None:
     radius = np.linalg.norm(picture.positions(), axis=1)
     assert radius.max() < 1 + rounding  # chords lie inside
     assert radius.min() > 1 - 1.01 * sagitta - rounding
-    angle = angles(picture.normal, normal)[picture.covered & np.isfinite(depth)]
+    angle = angles_between(picture.normal, normal)[picture.covered & np.isfinite(depth)]
     assert np.median(angle) < 0.02
     assert np.quantile(angle, 0.99) < 1  # at the outline a hit moves along the surface
 

@@ -9,7 +9,7 @@ import pytest
 from scenes import every_backend, of_variant, variants
 
 from viewer.backends import Backend, Limit, backends
-from viewer.bench.numerics import EXACT, Difference, Outcome, Picture, Row, difference, picture, rows
+from viewer.bench.numerics import EXACT, Difference, Outcome, RgbdImage, Row, difference, picture, rows
 from viewer.renderer import Renderer
 
 ROWS = list(rows())
@@ -72,18 +72,18 @@ def test_limits_of_backends_name_rows() -> None:
 def test_difference_of_pictures_that_differ_in_known_pixels() -> None:
     depth, color = np.zeros((4, 5)), np.full((4, 5, 3), 100)
     depth[0] = NOTHING
-    one = Picture(depth, color)
+    one = RgbdImage(depth, color)
     assert difference(one, one) == Difference(0, 0, 0)
 
     gone, back, other = depth.copy(), depth.copy(), color.copy()
     gone[1, 0] = NOTHING
     back[1, 1] += 7
     other[1, 2, 0] += 50
-    for changed in (Picture(gone, color), Picture(back, color), Picture(depth, other)):
+    for changed in (RgbdImage(gone, color), RgbdImage(back, color), RgbdImage(depth, other)):
         assert difference(one, changed) == difference(changed, one)
         assert difference(one, changed).pixels == pytest.approx(1 / 20)
 
-    little = Picture(depth + 0.01, color + 1)
+    little = RgbdImage(depth + 0.01, color + 1)
     found = difference(one, little)
     assert found.pixels == 0
     assert found.depth == pytest.approx(0.01 * 15 / 20)

@@ -12,7 +12,7 @@ import pytest
 from scenes import sphere_hits, sphere_mesh
 
 from viewer import cli
-from viewer.bench.truth.shapes import Shapes, Sphere
+from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -24,7 +24,7 @@ from viewer.simulate.scanner import Faults, around, capture, rig
 
 SIZE = (160, 120)
 UNIT_BOX = Bounds(-np.ones(3), np.ones(3))
-BALL = Shapes((Sphere(),))
+BALL = AnalyticScene((Sphere(),))
 EPSILON = float(np.finfo(np.float32).eps)
 FAULTY = Faults(noise=0.01, disparity=0.1, dropouts=0.1, outliers=0.05, grazing=80)
 

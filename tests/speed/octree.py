@@ -35,7 +35,7 @@ DELTAS = (0.02, 0.1, 0.5)
 
 def sphere(count: int) -> PointCloud:
     """Even points in random order, coloured by position."""
-    points = samples.cloud(samples.sphere, count)
+    points = samples.cloud(samples.on_sphere, count)
     order = np.random.default_rng(0).permutation(count)
     positions = points.positions[order]
     assert points.normals is not None

@@ -70,7 +70,7 @@ def normals(drawn: NDArray[np.floating], true: NDArray[np.floating]) -> Errors:
 
     Unsigned, as if a normal and its opposite were the same, and signed.
     """
-    angle = angles(drawn, true)
+    angle = angles_between(drawn, true)
     signed = angle[np.isfinite(angle)]
     errors: Errors = {}
     for kind, values in (("", np.minimum(signed, 180 - signed)), ("_signed", signed)):
@@ -82,7 +82,7 @@ def normals(drawn: NDArray[np.floating], true: NDArray[np.floating]) -> Errors:
     return errors
 
 
-def angles(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
+def angles_between(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
     """Angles 0..180 in degrees between vectors (..., 3); NaN where one is zero or not finite."""
     usable = np.isfinite(a).all(axis=-1) & np.isfinite(b).all(axis=-1) & a.any(axis=-1) & b.any(axis=-1)
     u, v = a[usable].astype(np.float64), b[usable].astype(np.float64)
@@ -179,7 +179,7 @@ def _changes(
         )
         for frame, at in zip(frames, pixels, strict=True)
     )
-    return np.abs(after[0] - before[0]).mean(axis=1), angles(before[1], after[1])
+    return np.abs(after[0] - before[0]).mean(axis=1), angles_between(before[1], after[1])
 
 
 def _enclosed(holes: Mask, true: Mask) -> Mask:

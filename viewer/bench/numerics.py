@@ -23,7 +23,7 @@ from ..look import Look
 from ..renderer import Renderer
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
-from .scenes.samples import Arrays, line, torus, wall
+from .scenes.samples import Arrays, line, on_torus, wall
 
 _NO_TURN = np.eye(3)
 
@@ -31,7 +31,7 @@ _NO_TURN = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
-class Shot:
+class PointView:
     """Points and how they are looked at.
 
     arrays: the arguments of `PointCloud.from_arrays`. margin: columns and rows of pixels on
@@ -51,24 +51,24 @@ class Shot:
         """The points as a scan has them."""
         return PointCloud.from_arrays(**self.arrays)  # type: ignore[arg-type]
 
-    def given(self, **arrays: NDArray | None) -> Shot:
+    def given(self, **arrays: NDArray | None) -> PointView:
         """The same with these arrays in place of its own; None: without."""
         changed = {**self.arrays, **arrays}
         return replace(self, arrays={name: a for name, a in changed.items() if a is not None})
 
-    def filled(self, name: str, value: ArrayLike) -> Shot:
+    def filled(self, name: str, value: ArrayLike) -> PointView:
         """The same with one value in all rows of an array."""
         return self.given(**{name: np.broadcast_to(value, self.arrays[name].shape)})
 
-    def picked(self, rows: NDArray) -> Shot:
+    def picked(self, rows: NDArray) -> PointView:
         """The same with these rows of every array."""
         return self.given(**{name: a[rows] for name, a in self.arrays.items()})
 
-    def joined(self, arrays: Arrays) -> Shot:
+    def joined(self, arrays: Arrays) -> PointView:
         """The same with more points after its own."""
         return self.given(**{name: np.concatenate([a, arrays[name]]) for name, a in self.arrays.items()})
 
-    def moved(self, shift: ArrayLike = 0.0, scale: float = 1.0, turn: ArrayLike = _NO_TURN) -> Shot:
+    def moved(self, shift: ArrayLike = 0.0, scale: float = 1.0, turn: ArrayLike = _NO_TURN) -> PointView:
         """Points and camera turned about zero, scaled, then shifted, in float64."""
         rotation = np.asarray(turn)
 
@@ -98,7 +98,7 @@ class Shot:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class RgbdImage:
     """What is compared.
 
     depth: (H, W) float64, from the plane of the camera's target, in widths of a pixel there;
@@ -109,7 +109,7 @@ class Picture:
     color: NDArray[np.int_]
 
 
-def picture(renderer: Renderer, backend: Backend, shot: Shot, params: Any = None) -> Picture:
+def picture(renderer: Renderer, backend: Backend, shot: PointView, params: Any = None) -> RgbdImage:
     """Draw a shot. params: of the backend; None: its defaults. Raises InputError as `render_frame` does."""
     pose = Pose(0, 0.0, "numerics", shot.cloud())
     request = Request(pose, shot.camera, backend.name, params, shot.look)
@@ -119,7 +119,7 @@ def picture(renderer: Renderer, backend: Backend, shot: Shot, params: Any = None
     (width, height), (columns, rows) = shot.size, shot.margin
     inside = slice(rows, height - rows), slice(columns, width - columns)
     depth = (surface.depth.astype(np.float64) - shot.camera.distance) * shot.pixels_per_unit()
-    return Picture(depth[inside], surface.image()[inside][..., :3].astype(int))
+    return RgbdImage(depth[inside], surface.image()[inside][..., :3].astype(int))
 
 
 # --- how it is compared ---------------------------------------------------------------
@@ -148,7 +148,7 @@ class Difference:
 
 
 def difference(
-    one: Picture, other: Picture, depth_step: float = _DEPTH_STEP, color_step: float = _COLOR_STEP
+    one: RgbdImage, other: RgbdImage, depth_step: float = _DEPTH_STEP, color_step: float = _COLOR_STEP
 ) -> Difference:
     """Compare two pictures of one size. Steps in pixel widths and in levels of 255."""
     covered = np.isfinite(one.depth)
@@ -219,8 +219,8 @@ class Row:
     """
 
     name: str
-    shot: Callable[[], Shot]
-    variant: Callable[[Shot], Shot]
+    shot: Callable[[], PointView]
+    variant: Callable[[PointView], PointView]
     tolerance: Tolerance
     limit: Limit | None = None
 
@@ -269,40 +269,42 @@ def _rounded(kind: type, at: float, source: str, unit: float = _UNIT) -> Toleran
     )
 
 
-def _body(count: int = 12_000) -> Shot:
+def _body(count: int = 12_000) -> PointView:
     """A torus that fills the picture."""
-    return Shot(torus(count), Camera((2.9, 3.4, 4.0)))
+    return PointView(on_torus(count), Camera((2.9, 3.4, 4.0)))
 
 
-def _sheet() -> Shot:
+def _sheet() -> PointView:
     """A plane of one colour, seen at a slant: which of its points a pixel shows does not matter."""
-    return Shot(wall(60, 40, spacing=0.04), Camera((1.0, 0.5, 3.0)))
+    return PointView(wall(60, 40, spacing=0.04), Camera((1.0, 0.5, 3.0)))
 
 
-def _thread() -> Shot:
+def _thread() -> PointView:
     """A line of one colour, unlit."""
-    return Shot(line(200, (1.0, 0.5, 0.3)), Camera((1.0, 0.5, 5.0)), look=Look(light="flat"))
+    return PointView(line(200, (1.0, 0.5, 0.3)), Camera((1.0, 0.5, 5.0)), look=Look(light="flat"))
 
 
 def _placed() -> Iterator[Row]:
     for power in range(3, 10):
-        move = partial(Shot.moved, shift=10.0**power * _SHIFT)
+        move = partial(PointView.moved, shift=10.0**power * _SHIFT)
         yield Row(f"translated by 10^{power}", _body, move, _rounded(np.float64, 10.0**power, "input"))
     for power in (-6, -4, -2, 2, 4, 6):
-        yield Row(f"scaled by 10^{power}", _body, partial(Shot.moved, scale=10.0**power), FLOAT32)
+        yield Row(f"scaled by 10^{power}", _body, partial(PointView.moved, scale=10.0**power), FLOAT32)
     yield Row("fitted, translated by 10^9", _fitted, _fitted_far, _rounded(np.float64, 1e9, "input"))
     yield Row("fitted, scaled by 10^-6", _fitted, lambda s: _fitted(s.moved(scale=1e-6)), FLOAT32)
-    yield Row("rotated by a quarter turn", _body, partial(Shot.moved, turn=_QUARTER_TURN), FLOAT32)
-    yield Row("rotated by 37 degrees", _body, partial(Shot.moved, turn=_rotation((1, 2, 3), 37)), FLOAT32)
+    yield Row("rotated by a quarter turn", _body, partial(PointView.moved, turn=_QUARTER_TURN), FLOAT32)
+    yield Row(
+        "rotated by 37 degrees", _body, partial(PointView.moved, turn=_rotation((1, 2, 3), 37)), FLOAT32
+    )
 
 
-def _fitted(shot: Shot | None = None) -> Shot:
+def _fitted(shot: PointView | None = None) -> PointView:
     """With the camera that a user gets."""
     shot = shot or _body()
     return replace(shot, camera=Camera.orbit(shot.cloud().bounds(), 36, 34, aspect=4 / 3))
 
 
-def _fitted_far(shot: Shot) -> Shot:
+def _fitted_far(shot: PointView) -> PointView:
     return _fitted(shot.moved(shift=1e9 * _SHIFT))
 
 
@@ -315,10 +317,10 @@ def _rotation(axis: tuple[float, float, float], degrees: float) -> NDArray[np.fl
 
 
 def _typed() -> Iterator[Row]:
-    def at(distance: float) -> Callable[[], Shot]:
+    def at(distance: float) -> Callable[[], PointView]:
         return lambda: _body().moved(shift=distance * _SHIFT)
 
-    def as_type(kind: type) -> Callable[[Shot], Shot]:
+    def as_type(kind: type) -> Callable[[PointView], PointView]:
         return lambda shot: shot.given(positions=shot.arrays["positions"].astype(kind))
 
     as_float32, as_float64 = as_type(np.float32), as_type(np.float64)
@@ -334,17 +336,17 @@ def _typed() -> Iterator[Row]:
 
 
 def _clipped() -> Iterator[Row]:
-    def cut() -> Shot:
+    def cut() -> PointView:
         shot = _body()
         return replace(shot, camera=replace(shot.camera, near=shot.camera.distance))
 
-    def inside() -> Shot:
+    def inside() -> PointView:
         return replace(_body(), camera=Camera((0, 0, 0), (0.6, 0, 0), fov_y=60))
 
-    def cleared(depth: float | None) -> Callable[[Shot], Shot]:
+    def cleared(depth: float | None) -> Callable[[PointView], PointView]:
         """Without what lies wholly in front of a depth; None: of the near plane."""
 
-        def clear(shot: Shot) -> Shot:
+        def clear(shot: PointView) -> PointView:
             limit = shot.camera.clip_range()[0] if depth is None else depth
             return shot.picked(shot.depths() + 1.5 * shot.arrays["radii"] >= limit)
 
@@ -356,12 +358,12 @@ def _clipped() -> Iterator[Row]:
 
 
 def _zoomed() -> Iterator[Row]:
-    def detail(power: int) -> Callable[[], Shot]:
+    def detail(power: int) -> Callable[[], PointView]:
         return lambda: _body().moved(shift=0.7 * 10.0**power * _SHIFT)
 
-    def surrounded(shot: Shot, power: int) -> Shot:
+    def surrounded(shot: PointView, power: int) -> PointView:
         """With a torus 10^power times as large around it, of which no splat reaches the picture."""
-        around = Shot(torus(5000), shot.camera).moved(scale=10.0**power)
+        around = PointView(on_torus(5000), shot.camera).moved(scale=10.0**power)
         around = replace(around, camera=shot.camera)
         return shot.joined(around.picked(around.depths() < -2 * around.arrays["radii"]).arrays)
 
@@ -379,29 +381,29 @@ def _zoomed() -> Iterator[Row]:
         limit=Limit(0.25, "float32 offsets from one origin resolve two pixels there"),
     )
 
-    def splat() -> Shot:
+    def splat() -> PointView:
         """A point on a leaning sheet, from so near that its splat fills the picture."""
         leaning = {"normals": np.array([[0.6, 0, 0.8]]), "radii": np.array([4.0])}
-        return Shot({**line(1, (0, 0, 0)), **leaning}, Camera((0.0, 0.0, 1.0), fov_y=40))
+        return PointView({**line(1, (0, 0, 0)), **leaning}, Camera((0.0, 0.0, 1.0), fov_y=40))
 
     yield Row(
         "zoomed in on 10^-3 of a splat",
         splat,
-        partial(Shot.filled, name="radii", value=1e3),
+        partial(PointView.filled, name="radii", value=1e3),
         _rounded(np.float32, 1e3, "corners", splat().pixels_per_unit()),
     )
     yield Row(
         "zoomed in on 10^-6 of a splat",
         splat,
-        partial(Shot.filled, name="radii", value=1e6),
+        partial(PointView.filled, name="radii", value=1e6),
         FLOAT32,
         limit=Limit(0.05, "float32 corners resolve ten pixels there"),
     )
 
-    def flat() -> Shot:
+    def flat() -> PointView:
         return replace(_body(), camera=_body().camera.projected("orthographic"))
 
-    def telephoto(shot: Shot, power: int) -> Shot:
+    def telephoto(shot: PointView, power: int) -> PointView:
         """From 10^power times as far, through a lens as narrow as shows the same."""
         camera = shot.camera.at_distance(shot.camera.distance * 10.0**power)
         angle = 2 * np.degrees(np.arctan(shot.camera.view_height / 2 / camera.distance))
@@ -419,16 +421,16 @@ def _zoomed() -> Iterator[Row]:
         limit=Limit(0.25, "depth from the eye is float32: it resolves 19 pixels there"),
     )
 
-    def far(power: int) -> Callable[[], Shot]:
+    def far(power: int) -> Callable[[], PointView]:
         """A body within one pixel, of one colour, all of which faces the eye."""
 
-        def make() -> Shot:
+        def make() -> PointView:
             body = _body().filled("colors", 0.7)
             return _facing(replace(body, size=(9, 9), camera=body.camera.zoomed(10.0**-power)))
 
         return make
 
-    def alone(shot: Shot) -> Shot:
+    def alone(shot: PointView) -> PointView:
         return shot.picked(np.arange(1)).filled("positions", 0.0)
 
     for power in (6, 9):
@@ -436,12 +438,12 @@ def _zoomed() -> Iterator[Row]:
 
 
 def _sized() -> Iterator[Row]:
-    def window(_: Shot | None, size: tuple[int, int], margin: int) -> Shot:
+    def window(_: PointView | None, size: tuple[int, int], margin: int) -> PointView:
         """A wall of four points a pixel; the same pixels whatever the margin."""
         width, height = (edge + 2 * margin for edge in size)
         points = wall(2 * size[0] + 12, 2 * size[1] + 12, spacing=0.5, wave=0.3)
         camera = Camera((0.0, 0.0, 5.0), projection="orthographic", height=float(height))
-        return Shot(points, camera, (width, height), margin=(margin, margin))
+        return PointView(points, camera, (width, height), margin=(margin, margin))
 
     for size in ((1, 1), (8192, 1)):
         yield Row(
@@ -454,26 +456,26 @@ def _sized() -> Iterator[Row]:
 
 
 def _arranged() -> Iterator[Row]:
-    def copied(order: Callable[[NDArray, int], NDArray]) -> Callable[[Shot], Shot]:
+    def copied(order: Callable[[NDArray, int], NDArray]) -> Callable[[PointView], PointView]:
         return lambda shot: shot.picked(order(np.arange(len(shot)), 1000))
 
-    def few() -> Shot:
+    def few() -> PointView:
         return _body(300)
 
-    def bare() -> Shot:
+    def bare() -> PointView:
         """The same spacing everywhere: whatever is looked at to estimate it."""
-        return Shot(wall(20, 15, spacing=0.12), Camera((1.0, 0.5, 5.0))).given(radii=None)
+        return PointView(wall(20, 15, spacing=0.12), Camera((1.0, 0.5, 5.0))).given(radii=None)
 
     yield Row("points x1000, one after the other", few, copied(np.repeat), EXACT)
     yield Row("points x1000, all over again", few, copied(np.tile), EXACT)
     yield Row("points x1000 without radii", bare, copied(np.repeat), FLOAT32)
 
-    def at_one_place() -> Shot:
+    def at_one_place() -> PointView:
         return _thread().picked(np.arange(1)).filled("positions", 0.0).filled("radii", 0.3)
 
     yield Row("one point x1000", at_one_place, copied(np.tile), EXACT)
 
-    def spread(shot: Shot) -> Shot:
+    def spread(shot: PointView) -> PointView:
         """With eight points behind the eye that span a volume."""
         corners = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], np.float64)
         behind = shot.picked(np.arange(8)).given(positions=2 * np.array(shot.camera.eye) + corners)
@@ -490,40 +492,40 @@ def _arranged() -> Iterator[Row]:
         limit=Limit(0.01, "a line has a circle of normals, of which any may be estimated"),
     )
 
-    def end_on(projection: str) -> Callable[[], Shot]:
-        def make() -> Shot:
-            shot = Shot(line(50, (0, 0, 1)), Camera(projection=projection))
+    def end_on(projection: str) -> Callable[[], PointView]:
+        def make() -> PointView:
+            shot = PointView(line(50, (0, 0, 1)), Camera(projection=projection))
             return replace(shot, camera=shot.camera.fit(shot.cloud().bounds(), 4 / 3))
 
         return make
 
-    def nearest(shot: Shot) -> Shot:
+    def nearest(shot: PointView) -> PointView:
         return shot.picked(shot.depths().argsort()[:1])
 
     for projection in PROJECTIONS:
         yield Row(f"collinear points end on, {projection}", end_on(projection), nearest, FLOAT32)
 
-    def with_outlier(shot: Shot) -> Shot:
+    def with_outlier(shot: PointView) -> PointView:
         outlier = shot.picked(np.arange(1)).given(positions=1e6 * _SHIFT[None])
         return _fitted(outlier.joined(shot.arrays))
 
     yield Row("an outlier at 10^6 times the size", _fitted, with_outlier, FLOAT32)
 
 
-def _slanted() -> Shot:
+def _slanted() -> PointView:
     return _sheet().moved(turn=_rotation((1, 2, 3), 37))
 
 
-def _facing(shot: Shot) -> Shot:
+def _facing(shot: PointView) -> PointView:
     """With normals that face the eye."""
     normals = np.array(shot.camera.eye) - shot.arrays["positions"]
     return shot.given(normals=normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def _spoilt() -> Iterator[Row]:
-    yield Row("normals parallel to y", _sheet, partial(Shot.moved, turn=_QUARTER_TURN), FLOAT32)
+    yield Row("normals parallel to y", _sheet, partial(PointView.moved, turn=_QUARTER_TURN), FLOAT32)
 
-    def about_y(shot: Shot, angle: float) -> Shot:
+    def about_y(shot: PointView, angle: float) -> PointView:
         turn = 2.4 * np.arange(len(shot))
         aside = np.stack([np.cos(turn), np.zeros(len(shot)), np.sin(turn)], axis=1)
         return shot.given(normals=shot.arrays["normals"] + angle * aside)
@@ -537,21 +539,21 @@ def _spoilt() -> Iterator[Row]:
             Tolerance(FLOAT32.error + 5 * 10.0**power, "a splat of 5 px, leaning by that angle"),
         )
 
-    def matt() -> Shot:
+    def matt() -> PointView:
         return _facing(replace(_body(), look=Look(light="head", specular=0)))
 
     for name, value in (("zero-length", 0.0), ("NaN", np.nan)):
         yield Row(
             f"{name} normals",
             matt,
-            partial(Shot.filled, name="normals", value=value),
+            partial(PointView.filled, name="normals", value=value),
             # 2 px aside, 228 px from the eye: cos 0.009 is 0.006 levels less.
             Tolerance(1e-4, "the base faces the eye from the points, a missing normal from the pixels"),
         )
 
-    def closed() -> Shot:
+    def closed() -> PointView:
         """A sheet beyond the picture's edges: closed whatever the radii, if there is one."""
         return replace(_sheet(), arrays=wall(100, 80, spacing=0.04))
 
     for name, value in (("zero", 0.0), ("negative", -1.0), ("NaN", np.nan)):
-        yield Row(f"{name} radii", closed, partial(Shot.filled, name="radii", value=value), FLOAT32)
+        yield Row(f"{name} radii", closed, partial(PointView.filled, name="radii", value=value), FLOAT32)

@@ -53,7 +53,7 @@ Frame = tuple[Moment, Camera]
 
 
 @dataclass(frozen=True)
-class Settings:
+class BenchSettings:
     """How it is measured.
 
     size: of the pictures, pixels. views: of each scene. repeat: draws that a view's time is the median of,
@@ -120,7 +120,7 @@ class Bench:
     Raises InputError for pictures that are too large for the driver.
     """
 
-    def __init__(self, renderer: Renderer, settings: Settings, folder: Path | None = None) -> None:
+    def __init__(self, renderer: Renderer, settings: BenchSettings, folder: Path | None = None) -> None:
         Surface(renderer.gpu, settings.size).release()  # raises before anything is traced
         self.renderer, self.settings, self.folder = renderer, settings, folder
         self.tick: Callable[[], object] = int  # called after each step

@@ -27,7 +27,7 @@ def run(args: Namespace) -> int:
     """Print them."""
     obstacle = _obstacle(args.device)
     if args.json:
-        print(json.dumps([describe(b, obstacle) for b in all_backends().values()], indent=2))
+        print(json.dumps([declaration(b, obstacle) for b in all_backends().values()], indent=2))
     else:
         print("\n\n".join(_as_text(b) for b in all_backends().values()))
         if obstacle:
@@ -35,7 +35,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def describe(backend: Backend, obstacle: str | None) -> dict[str, Any]:
+def declaration(backend: Backend, obstacle: str | None) -> dict[str, Any]:
     """The declaration of a backend as plain values. obstacle: why it is not available."""
     return {
         "name": backend.name,

@@ -39,7 +39,7 @@ from ..bench.report.results import (
     read_rows,
     write_row,
 )
-from ..bench.run import Bench, Settings
+from ..bench.run import Bench, BenchSettings
 from ..bench.scenes import catalog
 from ..errors import InputError, explained
 from ..files import whole_file
@@ -57,7 +57,7 @@ _OF_THE_PAPER = {
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
-_QUICK = Settings(size=(384, 256), views=4, repeat=1, frames=3)
+_QUICK = BenchSettings(size=(384, 256), views=4, repeat=1, frames=3)
 _QUICK_SCENES = ("torus", "bunny", "demo", "torus-simulated")
 _QUICK_COUNTS = (10_000, 1_000_000)
 _QUICK_NOISES = (2.0,)
@@ -185,7 +185,7 @@ def _report_files(args: Namespace) -> list[Path]:
     return [*(args.out / name for name in names), *sorted((args.out / "plots").glob("*.png"))]
 
 
-def _claim(args: Namespace, settings: Settings, groups: Sequence[Group], numerics: bool) -> None:
+def _claim(args: Namespace, settings: BenchSettings, groups: Sequence[Group], numerics: bool) -> None:
     """Raise InputError where the folder has results that are not to be replaced."""
     names = [*([RESULTS] if groups else []), *([NUMERICS] if numerics else []), NOTES]
     if args.suite == "octrees":
@@ -213,7 +213,7 @@ def _measured(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
 
 def _octrees(out: Path, bench: Bench) -> list[bool]:
     """Build, cut and store octrees; of each whether there were any."""
-    missing = catalog.names(bench.settings.data)
+    missing = catalog.scene_names(bench.settings.data)
     scans = [scan for scan in slomp.scans() if not missing[scan.scene]]
     tell(f"{len(scans) * len(octrees.DELTAS)} rows of octrees, and their sizes: some seconds each")
     trees = bench.until_stopped(octrees.build_and_cut(bench, scans))
@@ -268,7 +268,7 @@ def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str]) -> N
         tell(f"{_lines(tested)} rows of the stability suite: some seconds a backend")
 
 
-def _settings(args: Namespace) -> Settings:
+def _settings(args: Namespace) -> BenchSettings:
     """How to measure; `--quick`, and what was said."""
     beside = str(_BESIDE) if _BESIDE.is_dir() else None
     data = args.data or os.environ.get("SCAN4D_DATA") or beside
@@ -282,20 +282,22 @@ def _settings(args: Namespace) -> Settings:
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
     if args.suite == "octrees":
         told["frames"] = 0  # how voxels flicker, the scenes tell
-    return replace(_QUICK if args.quick else Settings(), **{k: v for k, v in told.items() if v is not None})
+    return replace(
+        _QUICK if args.quick else BenchSettings(), **{k: v for k, v in told.items() if v is not None}
+    )
 
 
-def _groups(args: Namespace, settings: Settings, names: Sequence[str]) -> tuple[list[Group], list[str]]:
+def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> tuple[list[Group], list[str]]:
     """What to measure, and what of all scenes cannot be had. Raises InputError for those that were named."""
     if args.suite == "numerics":
         return [], []
-    missing = {name: reason for name, reason in catalog.names(settings.data).items() if reason}
+    missing = {name: reason for name, reason in catalog.scene_names(settings.data).items() if reason}
     if args.suite in _OF_THE_PAPER:
         make_groups, *_ = _OF_THE_PAPER[args.suite]
         groups = make_groups()
         lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
         return [group for group in groups if group.scene not in lacking], _left_out(lacking)
-    known = _QUICK_SCENES if args.quick else catalog.names(settings.data)
+    known = _QUICK_SCENES if args.quick else catalog.scene_names(settings.data)
     scenes = list(dict.fromkeys(args.scene or [name for name in known if name not in missing]))
     if args.quick:
         groups = plan(scenes, names, _QUICK_COUNTS, _QUICK_NOISES, swept_scenes=1)

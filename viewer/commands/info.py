@@ -26,12 +26,12 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Print it."""
     with open_timeline(args, args.scan) as timeline:
-        facts = describe(timeline, first_readable(timeline))
+        facts = scan_facts(timeline, first_readable(timeline))
     print(json.dumps(facts, indent=2, allow_nan=False) if args.json else _as_text(facts))
     return 0
 
 
-def describe(timeline: Timeline, pose: Pose) -> dict[str, Any]:
+def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
     """What is known of a scan from one pose, as plain values. Lengths in scan units, times in seconds."""
     cloud, times = pose.cloud, timeline.times
     steps = np.diff(times)

@@ -17,7 +17,7 @@ from ..errors import InputError
 from . import formats
 from .points import UNKNOWN_UNIT
 from .sources import FileSequence, FrameSource, MultiFrameFile
-from .timeline import Notice, Timeline
+from .timeline import ScanMessage, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
 from .units import checked_unit
 
@@ -46,7 +46,9 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
         recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
     timeline = Timeline(source, recorded, unit or source.unit or UNKNOWN_UNIT)
     if measured and fps is not None:
-        timeline.messages.append(Notice("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used"))
+        timeline.messages.append(
+            ScanMessage("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used")
+        )
     return timeline
 
 

@@ -29,7 +29,7 @@ _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 
 
 @dataclass(frozen=True)
-class Notice:
+class ScanMessage:
     """Something about a scan that its user should know.
 
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
@@ -67,7 +67,7 @@ class Timeline:
         self.times = _checked_times(times, source)
         self.unit = unit
         self.name = source.name
-        self.messages: list[Notice] = []
+        self.messages: list[ScanMessage] = []
         self.finish: Callable[[Pose], object] = lambda pose: None
         self._source = source
         self._state = threading.Condition()  # guards all that follows
@@ -311,7 +311,7 @@ class Timeline:
                     error = InputError("reading was cancelled", self._source.label(index), "Open it again")
                 if isinstance(error, InputError):
                     self._broken[index] = _at_rest(error)
-                    self.messages.append(Notice("broken", f"frame {index} is left out: {error}", index))
+                    self.messages.append(ScanMessage("broken", f"frame {index} is left out: {error}", index))
                     error = copy.copy(self._broken[index])
             future.set_exception(error)
             return
@@ -319,10 +319,10 @@ class Timeline:
             del self._loading[index]
             if pose.cloud.dropped and index not in self._sizes:
                 what = f"{pose.label}: {pose.cloud.dropped} points without finite coordinates are left out"
-                self.messages.append(Notice("dropped", what, index))
+                self.messages.append(ScanMessage("dropped", what, index))
             if pose.cloud.shortened and index not in self._sizes:
                 what = f"{pose.label}: {pose.cloud.shortened} splats far larger than the scan are shortened"
-                self.messages.append(Notice("shortened", what, index))
+                self.messages.append(ScanMessage("shortened", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
             self._topologies[index] = pose.cloud.topology
             if not self._closed:
@@ -359,7 +359,7 @@ class Timeline:
             )
             with self._state:
                 if not any(notice.kind == "unit" for notice in self.messages):
-                    self.messages.append(Notice("unit", what, index))
+                    self.messages.append(ScanMessage("unit", what, index))
         return converted
 
 

@@ -16,12 +16,12 @@ from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.bench.papers.slomp_2014.octree_tables import read_measurement
 from viewer.bench.plan import Group
 from viewer.bench.report.results import Row
-from viewer.bench.run import Bench, Settings
+from viewer.bench.run import Bench, BenchSettings
 from viewer.renderer import Renderer
 from viewer.scan.octree.cube import Cube
 
 STORED = sorted((Path(__file__).resolve().parents[2] / "docs" / "data").glob("octree-tables*.json"))
-SETTINGS = Settings(size=(96, 64), views=2, repeat=1)
+SETTINGS = BenchSettings(size=(96, 64), views=2, repeat=1)
 HORSE = slomp.scans()[4]
 
 

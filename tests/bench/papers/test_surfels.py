@@ -12,7 +12,7 @@ from viewer.backends import backend
 from viewer.bench.baselines import FLOOR
 from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.bench.papers.slomp_2014.table_two import read_measurement
-from viewer.bench.run import Settings
+from viewer.bench.run import BenchSettings
 from viewer.bench.scenes import catalog
 
 STORED = sorted((Path(__file__).resolve().parents[2] / "docs" / "data").glob("table-two*.json"))
@@ -82,7 +82,7 @@ def test_feeds_were_measured_on_equal_pictures(file: Path) -> None:
 
 def test_the_scans_have_exactly_as_many_points_as_the_papers(data_dir: Path) -> None:
     for group in slomp.groups()[:-1]:
-        subject = Settings(data=data_dir).subject(group)
+        subject = BenchSettings(data=data_dir).subject(group)
         for index in (0, subject.moments - 1):
             assert len(subject.moment(index).pose.cloud) == group.count
         again = catalog.subject(group.scene, data_dir, count=group.count)

@@ -13,9 +13,9 @@ import pytest
 from PIL import Image
 from test_results import a_row, times, written
 
-from viewer.bench.report.page import number, overall, stability, summary, write_report
+from viewer.bench.report.page import overall, stability, summary_rows, three_digits, write_report
 from viewer.bench.report.pictures import _HOLE, _SPILL, picture_path, side_by_side
-from viewer.bench.report.plots import names, pareto, slope, sweeps, swept, time_against_error
+from viewer.bench.report.plots import distinct, pareto, slope, sweeps, swept, time_against_error
 from viewer.bench.report.results import METRICS, Row, error_metrics
 from viewer.errors import InputError
 
@@ -108,7 +108,7 @@ def test_a_line_joins_what_differs_in_one_parameter() -> None:
 
 def test_floor_and_ceiling_frame_the_backends() -> None:
     rows = [a_row(backend=name) for name in ("mesh", "surfels", "points", "gl-points")]
-    assert names(rows, "backend") == ["gl-points", "points", "surfels", "mesh"]
+    assert distinct(rows, "backend") == ["gl-points", "points", "surfels", "mesh"]
 
 
 def test_floor_and_ceiling_are_on_no_front_and_the_ceiling_stretches_no_axis() -> None:
@@ -134,14 +134,14 @@ def test_floor_and_ceiling_are_on_no_front_and_the_ceiling_stretches_no_axis() -
     ],
 )  # fmt: skip
 def test_numbers_have_three_digits(value: float, text: str) -> None:
-    assert number(value) == text
+    assert three_digits(value) == text
 
 
 def best(rows: list[Row], column: str) -> set[str]:
     """The backends whose value in a column is marked as best."""
     return {
         backend
-        for backend, _, cells in summary(rows)
+        for backend, _, cells in summary_rows(rows)
         for cell in cells
         if cell.kind == "best" and cell.note.startswith(f"{column} of")
     }

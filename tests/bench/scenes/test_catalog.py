@@ -9,7 +9,7 @@ import pytest
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.real_scans import placed_scans
 from viewer.bench.scenes.subjects import Moment, Subject, smooth
-from viewer.bench.truth.shapes import Shapes
+from viewer.bench.truth.shapes import AnalyticScene
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.mesh.reference import trace
@@ -44,17 +44,17 @@ def tetrahedron(tmp_path: Path) -> Path:
 
 
 def test_all_scenes_are_listed_and_say_what_they_lack(tmp_path: Path) -> None:
-    listed = catalog.names(None)
+    listed = catalog.scene_names(None)
     assert list(listed)[:6] == [*ANALYTIC, "demo", "bunny"]
     assert [name for name, reason in listed.items() if not reason] == [*ANALYTIC, "demo", "torus-simulated"]
     assert {f"{name}-simulated" for name in ["torus", *STILL, *MOVING]} <= set(listed)
     assert set(REAL) <= set(listed)
-    assert "models/stanford_bunny_35947.ply" in catalog.names(tmp_path)["bunny"]
-    assert str(tmp_path) in catalog.names(tmp_path)["bunny"]
+    assert "models/stanford_bunny_35947.ply" in catalog.scene_names(tmp_path)["bunny"]
+    assert str(tmp_path) in catalog.scene_names(tmp_path)["bunny"]
 
 
 def test_all_scenes_are_there(data_dir: Path) -> None:
-    assert set(catalog.names(data_dir).values()) == {""}
+    assert set(catalog.scene_names(data_dir).values()) == {""}
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_analytic_scenes_come_in_any_number_of_points(name: str) -> None:
     assert len(catalog.subject(name, None).moment(0).pose.cloud) == 100_000
     moment = catalog.subject(name, None, count=5000).moment(0)
     assert len(moment.pose.cloud) == 5000
-    assert isinstance(moment.truth, Shapes)
+    assert isinstance(moment.truth, AnalyticScene)
     assert distances(moment).max() < 1e-4  # of the tessellation
     camera, size = Camera((2.0, 2.2, 2.4)), (120, 90)
     exact, drawn = trace(moment.truth, camera, size), trace(moment.mesh, camera, size)

@@ -3,16 +3,16 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.bench.scenes import samples
-from viewer.bench.scenes.registration import Target, register, turned
+from viewer.bench.scenes.registration import OrientedPoints, register, turned
 
 # An ellipsoid: a sphere, squeezed, so that turning it shows.
-UNIT = samples.sphere(6000)["positions"]
+UNIT = samples.on_sphere(6000)["positions"]
 AXES = np.array([1.0, 0.7, 0.5])
 
 
-def target() -> Target:
+def target() -> OrientedPoints:
     normals = UNIT / AXES
-    return Target(UNIT * AXES, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    return OrientedPoints(UNIT * AXES, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def moved(rotation: list[float], translation: list[float]) -> np.ndarray:

@@ -7,21 +7,21 @@ import pytest
 
 from viewer.bench.scenes import samples
 from viewer.bench.truth import tessellation
-from viewer.bench.truth.shapes import Box, Plane, Shape, Sphere, Torus
+from viewer.bench.truth.shapes import AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 
 SHAPES = [
-    pytest.param(samples.sphere, Sphere(), tessellation.sphere, id="sphere"),
-    pytest.param(samples.square, Plane(), tessellation.square, id="square"),
-    pytest.param(samples.cube, Box(), tessellation.cube, id="cube"),
-    pytest.param(samples.torus, Torus(), tessellation.torus, id="torus"),
+    pytest.param(samples.on_sphere, Sphere(), tessellation.sphere_mesh, id="sphere"),
+    pytest.param(samples.on_square, Plane(), tessellation.square_mesh, id="square"),
+    pytest.param(samples.on_cube, Cuboid(), tessellation.cube_mesh, id="cube"),
+    pytest.param(samples.on_torus, Torus(), tessellation.torus_mesh, id="torus"),
 ]
 
 
 @pytest.mark.parametrize(("sampler", "shape", "mesh"), SHAPES)
 def test_points_are_on_the_shape_and_normals_are_its_own(
-    sampler: samples.Sampler, shape: Shape, mesh: Callable[[], Mesh]
+    sampler: samples.Sampler, shape: AnalyticSurface, mesh: Callable[[], Mesh]
 ) -> None:
     for points, normals in (
         (sampler(3000, slice(None))["positions"], sampler(3000, slice(None))["normals"]),
@@ -34,13 +34,15 @@ def test_points_are_on_the_shape_and_normals_are_its_own(
         steps = -(normals + 0.1 * np.roll(normals, 1, axis=1)).astype(np.float64)
         np.testing.assert_allclose(shape.distance(points - 0.25 * steps, steps), 0.25, atol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
-        edges = np.sort(np.abs(points), axis=1)[:, -2] > 0.999 if isinstance(shape, Box) else 0 * points[:, 0]
+        edges = (
+            np.sort(np.abs(points), axis=1)[:, -2] > 0.999 if isinstance(shape, Cuboid) else 0 * points[:, 0]
+        )
         kept = ~edges.astype(bool)
         np.testing.assert_allclose(shape.normal(points[kept]), normals[kept], atol=1e-5)
 
 
 @pytest.mark.parametrize(("sampler", "shape", "mesh"), SHAPES)
-def test_points_are_even(sampler: samples.Sampler, shape: Shape, mesh: Callable[[], Mesh]) -> None:
+def test_points_are_even(sampler: samples.Sampler, shape: AnalyticSurface, mesh: Callable[[], Mesh]) -> None:
     from scipy.spatial import cKDTree
 
     arrays = sampler(6000, slice(None))
@@ -54,14 +56,14 @@ def test_points_are_even(sampler: samples.Sampler, shape: Shape, mesh: Callable[
 
 
 def test_rows_are_those_of_the_whole() -> None:
-    for sampler in (samples.sphere, samples.square, samples.cube, samples.torus):
+    for sampler in (samples.on_sphere, samples.on_square, samples.on_cube, samples.on_torus):
         whole, part = sampler(1000, slice(None)), sampler(1000, slice(300, 310))
         np.testing.assert_array_equal(whole["positions"][300:310], part["positions"])
 
 
 @pytest.mark.parametrize(("sampler", "shape", "mesh"), SHAPES)
 def test_tessellations_are_near_and_face_outwards(
-    sampler: samples.Sampler, shape: Shape, mesh: Callable[[], Mesh]
+    sampler: samples.Sampler, shape: AnalyticSurface, mesh: Callable[[], Mesh]
 ) -> None:
     made = mesh()
     corners = made.points.positions[made.faces].astype(np.float64)

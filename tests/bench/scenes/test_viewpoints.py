@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewer.bench.scenes import catalog
-from viewer.bench.scenes.viewpoints import COVERAGE, coverage, viewpoints
+from viewer.bench.scenes.viewpoints import COVERAGE, covered_share, viewpoints
 from viewer.bench.truth import tessellation
 from viewer.errors import InputError
 from viewer.mesh.reference import trace
@@ -59,29 +59,29 @@ def test_views_of_real_shapes_cover_what_they_should(name: str, data_dir: Path) 
 
 
 def test_nothing_is_before_the_point_looked_at() -> None:
-    mesh = tessellation.torus()
+    mesh = tessellation.torus_mesh()
     for camera in viewpoints(mesh, 12, SIZE):
         picture = trace(mesh, camera, (1, 1))
         assert abs(picture.depth[0, 0] - camera.distance) < 1e-4
 
 
 def test_seeds_decide_everything() -> None:
-    mesh = tessellation.torus()
+    mesh = tessellation.torus_mesh()
     assert viewpoints(mesh, 5, SIZE) == viewpoints(mesh, 5, SIZE)
     assert viewpoints(mesh, 5, SIZE) != viewpoints(mesh, 5, SIZE, seed=1)
 
 
 def test_up_is_up() -> None:
-    for camera in viewpoints(tessellation.cube(), 8, SIZE, up="-z"):
+    for camera in viewpoints(tessellation.cube_mesh(), 8, SIZE, up="-z"):
         assert camera.rotation()[1] @ (0, 0, -1) > 0
 
 
 def test_a_portrait_and_a_single_view() -> None:
-    mesh = tessellation.sphere()
+    mesh = tessellation.sphere_mesh()
     (camera,) = viewpoints(mesh, 1, (200, 300))
-    assert abs(coverage(mesh, camera, (200, 300)) - 0.55) < 0.01
+    assert abs(covered_share(mesh, camera, (200, 300)) - 0.55) < 0.01
 
 
 def test_no_view_is_an_error() -> None:
     with pytest.raises(InputError, match="1 or more"):
-        viewpoints(tessellation.sphere(), 0, SIZE)
+        viewpoints(tessellation.sphere_mesh(), 0, SIZE)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import sphere_hits
 
-from viewer.bench.truth.shapes import Box, DemoHead, Plane, Shape, Shapes, Sphere, Torus
+from viewer.bench.truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, DemoHead, Plane, Sphere, Torus
 from viewer.camera import Camera
 from viewer.mesh.reference import pixel_rays, trace
 from viewer.mesh.scene import NOTHING
@@ -16,11 +16,11 @@ from viewer.scan.demo.motion import surface_value
 SIZE = (64, 48)
 
 
-def value(shape: Shape, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def value(shape: AnalyticSurface, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """The signed distance to a shape, written apart from it."""
     if isinstance(shape, Sphere):
         return np.linalg.norm(points, axis=1) - shape.radius
-    if isinstance(shape, Box):
+    if isinstance(shape, Cuboid):
         beyond = np.abs(points) - np.array(shape.half)
         return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
     assert isinstance(shape, Torus)
@@ -30,10 +30,10 @@ def value(shape: Shape, points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize(
-    "shape", [Sphere(), Box(half=(0.5, 1, 0.7)), Torus()], ids=lambda s: type(s).__name__
+    "shape", [Sphere(), Cuboid(half=(0.5, 1, 0.7)), Torus()], ids=lambda s: type(s).__name__
 )
-def test_hits_are_first_and_on_the_surface(shape: Shape, projection: str) -> None:
-    scene = Shapes((shape,))
+def test_hits_are_first_and_on_the_surface(shape: AnalyticSurface, projection: str) -> None:
+    scene = AnalyticScene((shape,))
     camera = Camera.orbit(scene.bounds, 25, 35, projection=projection)
     picture = trace(scene, camera, SIZE)
     hits = picture.positions()
@@ -47,10 +47,10 @@ def test_hits_are_first_and_on_the_surface(shape: Shape, projection: str) -> Non
 
 
 @pytest.mark.parametrize(
-    "shape", [Sphere(), Box(half=(0.5, 1, 0.7)), Torus()], ids=lambda s: type(s).__name__
+    "shape", [Sphere(), Cuboid(half=(0.5, 1, 0.7)), Torus()], ids=lambda s: type(s).__name__
 )
-def test_normals_are_the_gradient(shape: Shape) -> None:
-    scene = Shapes((shape,))
+def test_normals_are_the_gradient(shape: AnalyticSurface) -> None:
+    scene = AnalyticScene((shape,))
     picture = trace(scene, Camera.orbit(scene.bounds, 25, 35), SIZE)
     hits, normals = picture.positions(), picture.normal[picture.covered]
     h = 1e-6
@@ -65,7 +65,7 @@ def test_normals_are_the_gradient(shape: Shape) -> None:
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 def test_a_sphere_is_the_closed_form(projection: str) -> None:
     camera = Camera(eye=(3, 2, 4), projection=projection)
-    picture = trace(Shapes((Sphere(),)), camera, SIZE)
+    picture = trace(AnalyticScene((Sphere(),)), camera, SIZE)
     depth, normal = sphere_hits(camera, SIZE)
     assert (np.isfinite(depth) == picture.covered).all()
     both = picture.covered
@@ -75,14 +75,14 @@ def test_a_sphere_is_the_closed_form(projection: str) -> None:
 
 def test_a_plane_faces_where_it_says_and_ends_at_its_sides() -> None:
     camera = Camera(eye=(0, 0, 4), projection="orthographic", height=4.8)  # ten pixels a unit
-    picture = trace(Shapes((Plane(center=(0, 0, 0.5), right=(1, 0, 0), up=(0, 2, 0)),)), camera, SIZE)
+    picture = trace(AnalyticScene((Plane(center=(0, 0, 0.5), right=(1, 0, 0), up=(0, 2, 0)),)), camera, SIZE)
     assert picture.covered.sum() == 20 * 40
     assert (picture.depth[picture.covered] == 3.5).all()
     assert (picture.normal[picture.covered] == [0, 0, 1]).all()
 
 
 def test_nearer_shapes_hide_farther_ones() -> None:
-    scene = Shapes((Sphere(color="#ff0000"), Plane(center=(0, 0, 2), color="#00ff00")))
+    scene = AnalyticScene((Sphere(color="#ff0000"), Plane(center=(0, 0, 2), color="#00ff00")))
     picture = trace(scene, Camera(eye=(0, 0, 9), fov_y=30), SIZE)
     middle = SIZE[1] // 2, SIZE[0] // 2
     assert picture.id[middle] == 1
@@ -92,7 +92,7 @@ def test_nearer_shapes_hide_farther_ones() -> None:
 
 
 def test_near_and_far_planes_cut() -> None:
-    scene = Shapes((Sphere(),))
+    scene = AnalyticScene((Sphere(),))
     cut = trace(scene, Camera(eye=(0, 0, 4), near=4.0), SIZE)
     middle = SIZE[1] // 2, SIZE[0] // 2
     assert cut.depth[middle] == pytest.approx(5, abs=1e-3)  # the far side, from inside
@@ -101,9 +101,9 @@ def test_near_and_far_planes_cut() -> None:
 
 def test_a_scene_far_from_zero_is_seen_as_at_zero() -> None:
     far = np.array([3e6, -5e6, 1e6])
-    here = trace(Shapes((Torus(),)), Camera(eye=(0, 3, 4)), SIZE)
+    here = trace(AnalyticScene((Torus(),)), Camera(eye=(0, 3, 4)), SIZE)
     there = trace(
-        Shapes((Torus(center=tuple(far)),)),
+        AnalyticScene((Torus(center=tuple(far)),)),
         Camera(eye=tuple(np.add(far, (0, 3, 4))), target=tuple(far)),
         SIZE,
     )
@@ -112,7 +112,7 @@ def test_a_scene_far_from_zero_is_seen_as_at_zero() -> None:
 
 
 def test_the_demo_head_is_hit_where_its_surface_is() -> None:
-    scene = Shapes((DemoHead(time=0.8),))
+    scene = AnalyticScene((DemoHead(time=0.8),))
     camera = Camera(eye=(80, 20, 700), fov_y=20)
     picture = trace(scene, camera, (40, 40))
     hits = picture.positions() + picture.origin

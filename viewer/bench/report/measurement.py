@@ -96,12 +96,12 @@ def _machine(measurement: Measurement, backend: str) -> str:
     return "; ".join(parts) + (f". {measurement['note']}" if measurement["note"] else "")
 
 
-def count(number: float) -> str:
+def spaced(number: float) -> str:
     """A whole number with thin spaces."""
     return f"{number:,.0f}".replace(",", _SPACE)
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[str]) -> str:
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[str]) -> str:
     """A Markdown table. left: the columns of text, the others are of numbers."""
     rule = ["---" if name in left else "---:" for name in head]
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, rule, *rows))

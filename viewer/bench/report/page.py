@@ -28,7 +28,7 @@ from .results import (
     error_metrics,
     rank,
     read_rows,
-    title,
+    row_title,
 )
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Picture:
+class BackendPanels:
     """Side-by-side panels of a backend. source: a data URI, or empty where only the file has it."""
 
     scene: str
@@ -105,7 +105,7 @@ def write_report(folder: Path) -> Path:
         notes=_notes(folder),
         judged=[METRICS[name] for name in _JUDGED],
         overall=overall(list(scenes.values())) if len(scenes) > 1 else [],
-        scenes=[(scene, summary(own)) for scene, own in scenes.items()],
+        scenes=[(scene, summary_rows(own)) for scene, own in scenes.items()],
         against=list(_against(rows, metrics, folder)),
         swept=list(_swept(rows, folder)),
         passes=_passes(rows, folder),
@@ -113,7 +113,7 @@ def write_report(folder: Path) -> Path:
         panels=PANELS,
         numerics=stability(numerics),
         metrics=shown,
-        every=[(title(row), [number(metric.of(row)) for metric in shown]) for row in rows],
+        every=[(row_title(row), [three_digits(metric.of(row)) for metric in shown]) for row in rows],
     )
     path = folder / PAGE
     with whole_file(path) as temporary:
@@ -121,7 +121,7 @@ def write_report(folder: Path) -> Path:
     return path
 
 
-def number(value: float) -> str:
+def three_digits(value: float) -> str:
     """Three significant digits, without an exponent where that is short."""
     if math.isnan(value):
         return _DASH
@@ -147,7 +147,7 @@ def about(rows: Sequence[Row]) -> list[tuple[str, str]]:
     ]
 
 
-def summary(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
+def summary_rows(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
     """The default rows of a scene: backend, kind ("floor", "ceiling" or empty), a cell for each column.
 
     The best of each column, floor and ceiling aside, has the kind "best".
@@ -167,7 +167,7 @@ def summary(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
 
     return [
         (row["backend"], kinds.get(row["backend"], ""), [cell(row, METRICS[name]) for name in _SUMMARY])
-        for backend in plots.names(rows, "backend")
+        for backend in plots.distinct(rows, "backend")
         for row in rows
         if row["backend"] == backend
     ]
@@ -198,12 +198,12 @@ def overall(scenes: Sequence[Sequence[Row]]) -> list[tuple[str, str, list[str]]]
         of = [(won[backend, name], known[backend, name]) for name in _JUDGED]
         return [f"{some} of {all_}" if all_ else _DASH for some, all_ in of]
 
-    return [(name, number(_geometric_mean(ratios[name])), fronts(name)) for name in sorted(ratios)]
+    return [(name, three_digits(_geometric_mean(ratios[name])), fronts(name)) for name in sorted(ratios)]
 
 
 def stability(lines: Sequence[Row]) -> dict[str, Any]:
     """The table of numerics: backends, rows of (name, cells, reasons), and how many are of each kind."""
-    backends = plots.names(lines, "backend")
+    backends = plots.distinct(lines, "backend")
     cells = {(line["row"], line["backend"]): _outcome(line) for line in lines}
     table = []
     for name in dict.fromkeys(line["row"] for line in lines):
@@ -222,9 +222,10 @@ def _outcome(line: Row) -> Cell:
     bound = line.get("bound") or {}
     units = {"pixels": (100, "% of pixels"), "depth": (1, "px of depth"), "color": (1, "levels of colour")}
     found = {name: float(line.get(name, math.nan)) for name in units}
-    texts = {name: f"{number(found[name] * scale)} {unit}" for name, (scale, unit) in units.items()}
+    texts = {name: f"{three_digits(found[name] * scale)} {unit}" for name, (scale, unit) in units.items()}
     note = ", ".join(
-        f"{text} (bound {number(bound.get(name, math.nan) * units[name][0])})" for name, text in texts.items()
+        f"{text} (bound {three_digits(bound.get(name, math.nan) * units[name][0])})"
+        for name, text in texts.items()
     )
     if line["held"]:
         return Cell("held", "held", note)
@@ -238,7 +239,7 @@ def _defaults(rows: Iterable[Row]) -> dict[str, list[Row]]:
     scenes: dict[str, list[Row]] = {}
     for row in rows:
         if row["sweep"] == "":
-            noise = f", noise {number(row['noise'])}" if row["noise"] else ""
+            noise = f", noise {three_digits(row['noise'])}" if row["noise"] else ""
             count = f"{row['n']:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
             heading = f"{row['scene']}: {count} points{noise}"
             scenes.setdefault(heading, []).append(row)
@@ -254,10 +255,10 @@ def _shown(metric: Metric, row: Row) -> str:
     """The value of a metric; of a spread all three numbers, of bytes millions."""
     value, spread = metric.of(row), row.get(metric.name)
     if metric.unit == "bytes":
-        return f"{number(value / 1e6)} MB"
+        return f"{three_digits(value / 1e6)} MB"
     if isinstance(spread, dict):
-        return f"{number(value)} [{number(spread['p5'])}{_DASH}{number(spread['p95'])}]"
-    return number(value)
+        return f"{three_digits(value)} [{three_digits(spread['p5'])}{_DASH}{three_digits(spread['p95'])}]"
+    return three_digits(value)
 
 
 def _notes(folder: Path) -> list[str]:
@@ -288,7 +289,7 @@ def _swept(rows: Sequence[Row], folder: Path) -> Iterator[Plot]:
         ("n", "points", _SWEPT_COSTS + _SWEPT_ERRORS),
         ("noise", "noise", _SWEPT_ERRORS),
     ):
-        for scene in plots.names(rows, "scene"):
+        for scene in plots.distinct(rows, "scene"):
             of_scene = plots.swept(rows, scene, sweep)
             known = [METRICS[name] for name in names if _known(of_scene, METRICS[name])]
             if known:
@@ -329,7 +330,7 @@ def _slug(name: str) -> str:
 # --- pictures -------------------------------------------------------------------------
 
 
-def _pictures(folder: Path, rows: Iterable[Row]) -> Iterator[Picture]:
+def _pictures(folder: Path, rows: Iterable[Row]) -> Iterator[BackendPanels]:
     """The pictures of the rows; of too many for a page the last are left in their files."""
     room = _PICTURES
     shown = {(row["scene"], row["backend"]) for row in rows}
@@ -338,7 +339,7 @@ def _pictures(folder: Path, rows: Iterable[Row]) -> Iterator[Picture]:
         if path.is_file():
             source = _inline(path) if room > 0 else ""
             room -= len(source)
-            yield Picture(scene, backend, f"pictures/{path.name}", source)
+            yield BackendPanels(scene, backend, f"pictures/{path.name}", source)
 
 
 def _inline(path: Path) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metrics import angles
+from ..metrics import angles_between
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
@@ -52,7 +52,7 @@ def side_by_side(reference: dict[str, Any], drawn: dict[str, Any], footprint: ND
     both, depth = true & found, np.zeros(true.shape)
     depth[both] = (drawn["depth"][both] - reference["depth"][both]) / footprint[both]
     reach = _reach(depth[both])
-    angle = angles(drawn["normal"], reference["normal"])
+    angle = angles_between(drawn["normal"], reference["normal"])
     angle = np.minimum(angle, 180 - angle)
     change = np.abs(drawn["image"][..., :3].astype(np.float64) - reference["image"][..., :3]).max(axis=2)
 

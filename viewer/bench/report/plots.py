@@ -67,18 +67,18 @@ def time_against_error(rows: Sequence[Row], metric: Metric) -> Figure:
     Defaults are large and have their 5th to 95th percentile as a bar; a thin line joins a sweep.
     """
     rows = [row for row in rows if metric.name in row["errors"]]  # others were timed alone
-    scenes = {scene: [row for row in rows if row["scene"] == scene] for scene in names(rows, "scene")}
+    scenes = {scene: [row for row in rows if row["scene"] == scene] for scene in distinct(rows, "scene")}
     looks = _looks(rows)
 
     def panel(axes: Axes, scene: str) -> None:
         shown = [row for row in scenes[scene] if row["sweep"] not in ("n", "noise")]
         ceiling = [row for row in shown if row["backend"] == CEILING and row["sweep"] == ""]
         others = [row for row in shown if row["backend"] != CEILING]
-        for backend in names(others, "backend"):
+        for backend in distinct(others, "backend"):
             _cloud(axes, [row for row in others if row["backend"] == backend], metric, looks[backend])
         _front(axes, [row for row in others if row["backend"] != FLOOR], metric)
         _logarithmic(axes, "x", [METRICS["gpu_ms"].of(row) for row in shown])
-        _logarithmic(axes, "y", [size(metric, row) for row in others], _WIDE)
+        _logarithmic(axes, "y", [magnitude(metric, row) for row in others], _WIDE)
         for row in ceiling:
             _at_edge(axes, row, metric, looks[CEILING])
         axes.set(title=scene, xlabel="gpu_ms [ms]", ylabel=metric.label)
@@ -95,9 +95,9 @@ def along(rows: Sequence[Row], scene: str, sweep: str, metrics: Sequence[Metric]
     looks = _looks(rows)
 
     def panel(axes: Axes, metric: Metric) -> None:
-        for backend in names(shown, "backend"):
+        for backend in distinct(shown, "backend"):
             own = sorted((row for row in shown if row["backend"] == backend), key=lambda row: row[sweep])
-            x, y = [row[sweep] for row in own], [size(metric, row) for row in own]
+            x, y = [row[sweep] for row in own], [magnitude(metric, row) for row in own]
             power = slope(x, y)
             label = f"N^{power:.2f} {backend}" if math.isfinite(power) else None
             over = 3 if backend == FLOOR else 2  # hollow, so that what it covers is seen
@@ -105,7 +105,7 @@ def along(rows: Sequence[Row], scene: str, sweep: str, metrics: Sequence[Metric]
         if sweep == "n":
             _logarithmic(axes, "x", [row["n"] for row in shown])
         power_law = sweep == "n" and metric.best == "low"
-        values = [size(metric, row) for row in shown]
+        values = [magnitude(metric, row) for row in shown]
         logarithmic = _logarithmic(axes, "y", values, 1 if power_law else _WIDE)
         axes.set(title=metric.name, xlabel=_SWEEPS[sweep], ylabel=metric.label)
         if power_law and logarithmic:
@@ -116,7 +116,7 @@ def along(rows: Sequence[Row], scene: str, sweep: str, metrics: Sequence[Metric]
 
 def passes(rows: Sequence[Row]) -> Figure:
     """A panel for each scene: the passes of each backend, one after the other, and gpu_ms as a line."""
-    scenes = {scene: [row for row in rows if row["scene"] == scene] for scene in names(rows, "scene")}
+    scenes = {scene: [row for row in rows if row["scene"] == scene] for scene in distinct(rows, "scene")}
     found = sorted({name for row in rows for name in row.get("passes", {})})
     looks: dict[str, dict[str, Any]] = {
         name: {
@@ -165,7 +165,7 @@ def sweeps(rows: Sequence[Row]) -> list[list[Row]]:
     return lines
 
 
-def names(rows: Iterable[Row], column: str) -> list[str]:
+def distinct(rows: Iterable[Row], column: str) -> list[str]:
     """What stands in a column, each once: backends by name between floor and ceiling, else as they come."""
     found = list(dict.fromkeys(row[column] for row in rows))
     if column == "backend":
@@ -173,7 +173,7 @@ def names(rows: Iterable[Row], column: str) -> list[str]:
     return found
 
 
-def size(metric: Metric, row: Row) -> float:
+def magnitude(metric: Metric, row: Row) -> float:
     """What is drawn of a metric: its value, of a signed one the magnitude."""
     value = metric.of(row)
     return abs(value) if metric.best == "zero" else value
@@ -281,7 +281,7 @@ def _looks(rows: Iterable[Row]) -> dict[str, dict[str, Any]]:
         FLOOR: {"color": _INK, "marker": "o", "markerfacecolor": "none"},
         CEILING: {"color": _INK, "marker": "*", "markerfacecolor": "none"},
     }
-    found = names(rows, "backend")
+    found = distinct(rows, "backend")
     for number, name in enumerate(name for name in found if name not in baselines):
         looks[name] = {
             "color": _COLORS[number % len(_COLORS)],
@@ -294,10 +294,10 @@ def _cloud(axes: Axes, rows: list[Row], metric: Metric, look: dict[str, Any]) ->
     """The rows of one backend: its default with its spread, and a line for each sweep."""
     time = METRICS["gpu_ms"]
     for line in sweeps(rows):
-        x, y = [time.of(row) for row in line], [size(metric, row) for row in line]
+        x, y = [time.of(row) for row in line], [magnitude(metric, row) for row in line]
         axes.plot(x, y, **look, linewidth=0.6, markersize=3.5, alpha=0.75)
     for row in [row for row in rows if row["sweep"] == ""]:
-        _default(axes, row, size(metric, row), look)
+        _default(axes, row, magnitude(metric, row), look)
 
 
 def _default(axes: Axes, row: Row, y: float, look: dict[str, Any]) -> None:
@@ -309,7 +309,7 @@ def _default(axes: Axes, row: Row, y: float, look: dict[str, Any]) -> None:
 
 def _at_edge(axes: Axes, row: Row, metric: Metric, look: dict[str, Any]) -> None:
     """A row that the error axis is not stretched for: beyond its end it is at the edge, with its number."""
-    value, (low, high) = size(metric, row), axes.get_ylim()
+    value, (low, high) = magnitude(metric, row), axes.get_ylim()
     axes.set_ylim(low, high)
     if low <= value <= high or math.isnan(value):
         _default(axes, row, value, look)
@@ -324,7 +324,7 @@ def _at_edge(axes: Axes, row: Row, metric: Metric, look: dict[str, Any]) -> None
 def _front(axes: Axes, rows: list[Row], metric: Metric) -> None:
     """The Pareto front of some rows as a step line behind them."""
     times = [METRICS["gpu_ms"].of(row) for row in rows]
-    values = [size(metric, row) for row in rows]
+    values = [magnitude(metric, row) for row in rows]
     front = pareto(times, [metric.loss(metric.of(row)) for row in rows])
     x, y = [times[i] for i in front], [values[i] for i in front]
     axes.step(x, y, where="post", color=_INK, linewidth=1.2, linestyle=(0, (4, 2)), alpha=0.7, zorder=1)

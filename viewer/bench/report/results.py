@@ -217,7 +217,7 @@ _SAME_RELATIVE, _SAME_ABSOLUTE = 0.01, 1e-6
 _SAME_TIME, _SAME_MS = 1.1, 0.1  # ratio and difference of times that are the same
 
 
-def title(row: Row) -> str:
+def row_title(row: Row) -> str:
     """A row in words: backend, scene, points, noise, and the parameter that it varies."""
     words = [f"{row['backend']}, {row['scene']}, {row['n']} points"]
     if row["noise"]:
@@ -243,19 +243,19 @@ def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
         was, now = before.get(identity), after.get(identity)
         if was is None or now is None:
             notes.append(
-                f"missing in the {'old' if was is None else 'new'} results: {title(was or now or {})}"
+                f"missing in the {'old' if was is None else 'new'} results: {row_title(was or now or {})}"
             )
             continue
         if was[_SCENE] != now[_SCENE]:
-            notes.append(f"not compared, the scene changed ({_SCENE}): {title(now)}")
+            notes.append(f"not compared, the scene changed ({_SCENE}): {row_title(now)}")
             continue
         if _machine(was) == _machine(now):
-            losses += (f"slower: {title(now)}: {change}" for change in _slower(was, now))
-            gains += (f"faster: {title(now)}: {change}" for change in _slower(was, now, back=True))
+            losses += (f"slower: {row_title(now)}: {change}" for change in _slower(was, now))
+            gains += (f"faster: {row_title(now)}: {change}" for change in _slower(was, now, back=True))
         else:
             notes.append(f"times not compared: {_machine(was)} is now {_machine(now)}")
-        losses += (f"worse: {title(now)}: {change}" for change in _worse(was, now))
-        gains += (f"better: {title(now)}: {change}" for change in _worse(was, now, back=True))
+        losses += (f"worse: {row_title(now)}: {change}" for change in _worse(was, now))
+        gains += (f"better: {row_title(now)}: {change}" for change in _worse(was, now, back=True))
     return [*losses, *gains, *dict.fromkeys(notes)]
 
 

@@ -18,7 +18,7 @@ from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
-from ..truth.shapes import Box, Plane, Shape, Shapes, Sphere, Torus
+from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from . import samples
 from .real_scans import DepthFrames, placed_scans
 from .samples import Sampler
@@ -63,11 +63,11 @@ class _Scene:
     noise: float | None = None
 
 
-def _analytic(shape: Shape, sampler: Sampler, mesh: Callable[[], Mesh]) -> _Scene:
+def _analytic(shape: AnalyticSurface, sampler: Sampler, mesh: Callable[[], Mesh]) -> _Scene:
     def make(request: _Request) -> Subject:
         def load(_: int) -> Moment:
             cloud = samples.cloud(sampler, request.count or _COUNT)
-            return Moment(Pose(0, 0.0, request.name, cloud), Shapes((shape,)), mesh())
+            return Moment(Pose(0, 0.0, request.name, cloud), AnalyticScene((shape,)), mesh())
 
         return Subject(name=request.name, load=load)
 
@@ -189,10 +189,10 @@ def _simulated(name: str, scene: _Scene) -> _Scene:
 
 
 _ANALYTIC = {
-    "sphere": _analytic(Sphere(), samples.sphere, tessellation.sphere),
-    "plane": _analytic(Plane(), samples.square, tessellation.square),
-    "box": _analytic(Box(), samples.cube, tessellation.cube),
-    "torus": _analytic(Torus(), samples.torus, tessellation.torus),
+    "sphere": _analytic(Sphere(), samples.on_sphere, tessellation.sphere_mesh),
+    "plane": _analytic(Plane(), samples.on_square, tessellation.square_mesh),
+    "box": _analytic(Cuboid(), samples.on_cube, tessellation.cube_mesh),
+    "torus": _analytic(Torus(), samples.on_torus, tessellation.torus_mesh),
     "demo": _Scene(_demo),
 }
 _MESHES = {
@@ -221,7 +221,7 @@ _SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _SIMULATED | _REAL
 _FILE = _Scene(_file, counts=True)  # of a user's own mesh
 
 
-def names(data: Path | None) -> dict[str, str]:
+def scene_names(data: Path | None) -> dict[str, str]:
     """Every scene by name, with the reason why it cannot be had; "" where it can.
 
     data: the folder of real scans, None: there is none.

@@ -19,7 +19,7 @@ from ...scan.pose import Pose
 from ...scan.range_view import RangeView
 from ...scan.times import natural_key
 from ..truth.isosurface import isosurface
-from .registration import Target, register
+from .registration import OrientedPoints, register
 from .subjects import Moment
 
 _SCAN = "bmesh"  # a line of a .conf file: this, a file, a translation, a quaternion
@@ -111,7 +111,7 @@ class DepthFrames:
     def _motions(self) -> dict[int, NDArray[np.float64]]:
         """The motion of each frame to the reference, (4, 4), found from one frame to the next."""
         assert self._surfels.normals is not None
-        target = Target(self._surfels.world(), self._surfels.normals.astype(np.float64))
+        target = OrientedPoints(self._surfels.world(), self._surfels.normals.astype(np.float64))
         first = np.eye(4)
         first[:3, 3] = target.positions.mean(axis=0) - self._points(_FIRST).mean(axis=0)
         motions = {_FIRST: self._registered(_FIRST, target, first)}
@@ -124,7 +124,9 @@ class DepthFrames:
     def _points(self, index: int) -> Rays:
         return self._view(index)[0].positions()[::_EVERY]
 
-    def _registered(self, index: int, target: Target, start: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _registered(
+        self, index: int, target: OrientedPoints, start: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         motion, rms, share = register(self._points(index), target, start, _REACHES)
         if rms > _MOST_RMS or share < _LEAST_SHARE:
             found = f"{1e3 * rms:.2f} mm rms, {share:.0%} of the points"

@@ -16,7 +16,7 @@ _STILL = 1e-6  # a step that moves nothing any more: radians, and scan units
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class OrientedPoints:
     """What is registered to. positions, normals: (N, 3), normals of unit length."""
 
     positions: Rays
@@ -31,7 +31,7 @@ class Target:
 
 
 def register(
-    points: Rays, target: Target, start: NDArray[np.float64], reaches: tuple[float, ...]
+    points: Rays, target: OrientedPoints, start: NDArray[np.float64], reaches: tuple[float, ...]
 ) -> tuple[NDArray[np.float64], float, float]:
     """The rigid motion (4, 4) that brings points (N, 3) to the target, from a start near it.
 
@@ -49,7 +49,7 @@ def register(
     return motion, rms, share
 
 
-def _step(points: Rays, target: Target, reach: float) -> tuple[NDArray[np.float64], float, float]:
+def _step(points: Rays, target: OrientedPoints, reach: float) -> tuple[NDArray[np.float64], float, float]:
     """The small motion that brings points nearer to the planes of their partners, and how far they are."""
     distance, partner = target.tree.query(points, distance_upper_bound=reach)
     paired = np.isfinite(distance)

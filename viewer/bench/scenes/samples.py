@@ -35,7 +35,7 @@ def evenly(number: NDArray[np.integer], shift: NDArray[np.float64] | float = 0.0
     return (number[:, None] * _R2 + shift) % 1
 
 
-def sphere(count: int, rows: slice = _ALL) -> Arrays:
+def on_sphere(count: int, rows: slice = _ALL) -> Arrays:
     """The unit sphere, evenly covered (Fibonacci's spiral: Swinbank and Purser 2006). rows: which points."""
     number = _numbers(count, rows)
     height, turn = 1 - (2 * number + 1) / count, _GOLDEN_TURN * number
@@ -44,14 +44,14 @@ def sphere(count: int, rows: slice = _ALL) -> Arrays:
     return _points(normals, normals, np.sqrt(4 * np.pi / count))
 
 
-def square(count: int, rows: slice = _ALL) -> Arrays:
+def on_square(count: int, rows: slice = _ALL) -> Arrays:
     """The square -1..1 on z = 0, facing +z, evenly covered. rows: which points."""
     x, y = (2 * evenly(_numbers(count, rows)) - 1).T
     normals = np.tile([0.0, 0.0, 1.0], (len(x), 1))
     return _points(np.stack([x, y, np.zeros(len(x))], axis=1), normals, np.sqrt(4 / count))
 
 
-def cube(count: int, rows: slice = _ALL) -> Arrays:
+def on_cube(count: int, rows: slice = _ALL) -> Arrays:
     """The cube -1..1, its sides evenly covered, by turns. rows: which points."""
     place, side = np.divmod(_numbers(count, rows), 6)
     every, axis = np.arange(len(side)), side // 2
@@ -62,7 +62,7 @@ def cube(count: int, rows: slice = _ALL) -> Arrays:
     return _points(positions, normals, np.sqrt(24 / count))
 
 
-def torus(count: int, rows: slice = _ALL, *, ring: float = 1.0, tube: float = 0.4) -> Arrays:
+def on_torus(count: int, rows: slice = _ALL, *, ring: float = 1.0, tube: float = 0.4) -> Arrays:
     """A torus about the y axis, evenly covered. rows: which points."""
     turn, place = evenly(_numbers(count, rows)).T
     # The area of a slice of the tube grows with its distance from the axis: invert its integral.

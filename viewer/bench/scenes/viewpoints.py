@@ -48,7 +48,7 @@ def viewpoints(
     )
 
 
-def coverage(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> float:
+def covered_share(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> float:
     """The share of a picture's pixels that a mesh covers, from a few thousand rays. size: pixels."""
     return float(trace(mesh, camera, _small(size)).covered.mean())
 
@@ -70,7 +70,7 @@ def _look(mesh: Mesh, direction: Rays, wanted: float, size: tuple[int, int], up:
     for _ in range(_HALVINGS):
         distance = np.exp((low + high) / 2)
         camera = Camera(eye=_vector(target + distance * direction), target=_vector(target), up=up_vector(up))
-        error = coverage(mesh, camera, size) - wanted
+        error = covered_share(mesh, camera, size) - wanted
         if abs(error) <= _CLOSE:
             return camera
         low, high = (np.log(distance), high) if error > 0 else (low, np.log(distance))

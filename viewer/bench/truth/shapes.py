@@ -22,7 +22,7 @@ _ROOT_STEPS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape(ABC):
+class AnalyticSurface(ABC):
     """One surface. center: (3,), scan units; color: '#rrggbb'. Its methods work relative to the centre."""
 
     center: Vector = (0.0, 0.0, 0.0)
@@ -43,10 +43,10 @@ class Shape(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Shapes:
+class AnalyticScene:
     """A scene of shapes; the face of a hit is the shape's place in the list."""
 
-    shapes: tuple[Shape, ...]
+    shapes: tuple[AnalyticSurface, ...]
 
     @property
     def origin(self) -> NDArray[np.float64]:
@@ -75,18 +75,18 @@ class Shapes:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere(Shape):
+class Sphere(AnalyticSurface):
     """A sphere; its normals point outwards."""
 
     radius: float = 1.0
 
     @property
     def reach(self) -> float:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return self.radius
 
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         a, b = _dot(steps, steps), _dot(starts, steps)
         nearest = starts - (b / a)[:, None] * steps
         root = (self.radius**2 - _dot(nearest, nearest)) / a
@@ -94,12 +94,12 @@ class Sphere(Shape):
         return np.where(root >= 0, _first(-b / a - half, -b / a + half), np.inf)
 
     def normal(self, points: Rays) -> Rays:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return points / self.radius
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plane(Shape):
+class Plane(AnalyticSurface):
     """A rectangle. right, up: (3,), from its centre to the middles of two sides, at right angles.
 
     Its normal is right x up.
@@ -110,11 +110,11 @@ class Plane(Shape):
 
     @property
     def reach(self) -> float:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return float(np.hypot(np.linalg.norm(self.right), np.linalg.norm(self.up)))
 
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         normal = np.cross(self.right, self.up)
         speed = steps @ normal
         crossing = speed != 0
@@ -128,24 +128,24 @@ class Plane(Shape):
         return np.where(hit, t, np.inf)
 
     def normal(self, points: Rays) -> Rays:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         normal = np.cross(self.right, self.up)
         return np.broadcast_to(normal / np.linalg.norm(normal), points.shape)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Box(Shape):
+class Cuboid(AnalyticSurface):
     """A box along the axes; half: (3,), half its edges. Its normals point outwards."""
 
     half: Vector = (1.0, 1.0, 1.0)
 
     @property
     def reach(self) -> float:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return float(np.linalg.norm(self.half))
 
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `Shape`. Slabs (Kay and Kajiya 1986)."""
+        """See `AnalyticSurface`. Slabs (Kay and Kajiya 1986)."""
         with np.errstate(over="ignore"):
             inverse = 1 / np.where(steps == 0, 1e-300, steps)
             low, high = (-np.array(self.half) - starts) * inverse, (np.array(self.half) - starts) * inverse
@@ -153,7 +153,7 @@ class Box(Shape):
         return np.where(enter <= leave, _first(enter, leave), np.inf)
 
     def normal(self, points: Rays) -> Rays:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         relative = points / np.array(self.half)
         axis = np.abs(relative).argmax(axis=1)
         rows = np.arange(len(points))
@@ -163,7 +163,7 @@ class Box(Shape):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Torus(Shape):
+class Torus(AnalyticSurface):
     """A torus about a unit axis; ring, tube: their radii."""
 
     ring: float = 1.0
@@ -172,7 +172,7 @@ class Torus(Shape):
 
     @property
     def reach(self) -> float:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return self.ring + self.tube
 
     def value(self, points: Rays) -> NDArray[np.float64]:
@@ -181,11 +181,11 @@ class Torus(Shape):
         return np.hypot(out - self.ring, along) - self.tube
 
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return first_zero(self.value, starts, steps, self.reach)
 
     def normal(self, points: Rays) -> Rays:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         flat, out, along = self._parts(points)
         normals = flat * ((out - self.ring) / out)[:, None] + along[:, None] * np.array(self.axis)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -197,7 +197,7 @@ class Torus(Shape):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DemoHead(Shape):
+class DemoHead(AnalyticSurface):
     """The subject of the demo scan at a time in seconds, in mm, uncoloured.
 
     About a millisecond a pixel: for small pictures.
@@ -207,18 +207,18 @@ class DemoHead(Shape):
 
     @property
     def reach(self) -> float:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         return 170.0
 
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         from ...scan.demo.motion import surface_value
 
         # Its value is a distance only roughly, and grows faster than one where the lips part.
         return first_zero(lambda points: surface_value(points, self.time), starts, steps, self.reach, 0.5)
 
     def normal(self, points: Rays) -> Rays:
-        """See `Shape`."""
+        """See `AnalyticSurface`."""
         from ...scan.demo.motion import surface_normal
 
         return surface_normal(points, self.time) if len(points) else points

@@ -17,12 +17,12 @@ _NONE = 1e-12  # of area
 _SIDES = [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
 
 
-def sphere() -> Mesh:
+def sphere_mesh() -> Mesh:
     """The unit sphere."""
     return _grid(lambda turn, tilt: (_around(turn, np.pi * tilt),) * 2)
 
 
-def torus(ring: float = 1.0, tube: float = 0.4) -> Mesh:
+def torus_mesh(ring: float = 1.0, tube: float = 0.4) -> Mesh:
     """A torus about the y axis."""
 
     def place(turn: NDArray, angle: NDArray) -> tuple[Rays, Rays]:
@@ -32,12 +32,12 @@ def torus(ring: float = 1.0, tube: float = 0.4) -> Mesh:
     return _grid(place)
 
 
-def square() -> Mesh:
+def square_mesh() -> Mesh:
     """The square -1..1 on z = 0, facing +z."""
     return _sides([(2, 1.0)], offset=0.0)
 
 
-def cube() -> Mesh:
+def cube_mesh() -> Mesh:
     """The cube -1..1."""
     return _sides(_SIDES, offset=1.0)
 

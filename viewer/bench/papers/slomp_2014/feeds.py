@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ....errors import InputError
 from ...baselines import FLOOR
-from ...report.measurement import Measurement, circumstances, count, table
-from ...report.page import number
+from ...report.measurement import Measurement, circumstances, markdown_table, spaced
+from ...report.page import three_digits
 from ...report.results import Row
 from . import surfels as slomp
 from .surfels import FEED, Scan
@@ -44,13 +44,13 @@ class FeedTable:
         feeds.sort(key=lambda feed: feed == FLOOR)
         rows, above = [], None
         for scan, line in lines:
-            head = ["", ""] if scan == above else [self.about(scan), count(line.points)]
+            head = ["", ""] if scan == above else [self.about(scan), spaced(line.points)]
             covered = "{:.0f} to {:.0f} %".format(*line.covered)
             cells = (cell(line, feed) if feed in line.times else "" for feed in feeds)
             rows.append([*head, covered, line.machine, *cells])
             above = scan
         head = ["scan", "points", "covered", "machine", *(f"`{feed}`" for feed in feeds)]
-        return table(head, rows, left=("scan", "machine"))
+        return markdown_table(head, rows, left=("scan", "machine"))
 
     def _lines(self, scan: Scan, measurements: Sequence[Measurement]) -> Iterator[_Line]:
         """The times of one scan: the paper's, and what each measurement has of it."""
@@ -83,10 +83,10 @@ class _Line:
     covered: tuple[float, float]
     machine: str
     times: dict[str, Values]
-    text: Callable[[float], str] = number
+    text: Callable[[float], str] = three_digits
 
 
-def title(scan: Scan) -> str:
+def scan_title(scan: Scan) -> str:
     """The paper's name of a scan, and of what stands in for it."""
     return f"{scan.name}, `{scan.scene}`" if scan.name else f"`{scan.scene}`"
 

@@ -87,7 +87,7 @@ def _pairs(data: Path | None) -> Iterator[tuple[str, PointCloud, PointCloud]]:
 
     The paper's stand-ins come as they are stored and with as many points as its scans have.
     """
-    missing = catalog.names(data)
+    missing = catalog.scene_names(data)
     theirs = [scan for scan in slomp.scans() if scan.name and not missing[scan.scene]]
     counts = [*((scan.scene, None) for scan in theirs), *((scan.scene, scan.points) for scan in theirs)]
     for scene, count in dict.fromkeys(counts):

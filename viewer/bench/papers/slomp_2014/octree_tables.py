@@ -13,8 +13,8 @@ import numpy as np
 
 from ....resources import resource_path
 from ...report import measurement
-from ...report.measurement import Measurement, count, machines, table, write_measurement
-from ...report.page import number
+from ...report.measurement import Measurement, machines, markdown_table, spaced, write_measurement
+from ...report.page import three_digits
 from ...report.results import OCTREE_SIZES, OCTREES, Row, read_rows
 from . import feeds, octrees
 from . import surfels as slomp
@@ -101,7 +101,7 @@ def _rounded(values: dict[str, float]) -> dict[str, float]:
 def page(measurements: Sequence[Measurement]) -> str:
     """The page in Markdown: the text of assets/octree-tables.md with tables."""
     text = resource_path("assets", f"{NAME}.md").read_text(encoding="utf-8")
-    fed = FeedTable("voxels_ms", lambda scan: f"{feeds.title(scan)}, level {octrees.depth_of(scan)}")
+    fed = FeedTable("voxels_ms", lambda scan: f"{feeds.scan_title(scan)}, level {octrees.depth_of(scan)}")
     sizes = [Sizes(**row) for row in next((each["sizes"] for each in measurements if each["sizes"]), [])]
     return text.format(
         trees=_trees(measurements),
@@ -119,12 +119,12 @@ def _sizes(rows: Sequence[Sizes]) -> str:
     head = ["scene", "points", "stop", "depth", "leaves", "loss", "D1, dB", *methods]
     lines = [
         [
-            row.scene, count(row.points), row.stop, str(row.depth), count(row.leaves),
+            row.scene, spaced(row.points), row.stop, str(row.depth), spaced(row.leaves),
             f"{100 * row.loss:.1f} %", f"{row.psnr:.1f}", *(f"{row.bits[method]:.2f}" for method in methods),
         ]
         for row in rows
     ]  # fmt: skip
-    return table(head, lines, left=["scene"])
+    return markdown_table(head, lines, left=["scene"])
 
 
 def _trees(measurements: Sequence[Measurement]) -> str:
@@ -137,10 +137,10 @@ def _trees(measurements: Sequence[Measurement]) -> str:
     for scan in slomp.scans():
         for delta in octrees.DELTAS:
             for points, line in _tree_lines(scan, delta, measurements):
-                named = ["", ""] if scan == above else [feeds.title(scan), count(points)]
+                named = ["", ""] if scan == above else [feeds.scan_title(scan), spaced(points)]
                 rows.append([*named, f"{delta} %", *line])
                 above = scan
-    return table(head, rows, left=("scan", "machine"))
+    return markdown_table(head, rows, left=("scan", "machine"))
 
 
 def _tree_lines(
@@ -149,7 +149,7 @@ def _tree_lines(
     """Points, and the cells from the machine on."""
     for theirs in slomp.paper()["octrees"].get(scan.name, []):
         if theirs["delta_percent"] == delta:
-            shape = [str(theirs["depth"]), count(theirs["nodes"]), count(theirs["leaves"])]
+            shape = [str(theirs["depth"]), spaced(theirs["nodes"]), spaced(theirs["leaves"])]
             times = [f"{theirs[_PAPERS[work]]:#.4g}" if work in _PAPERS else "" for work in _TIMED]
             loss = theirs["loss_percent"]
             yield scan.points or 0, ["2014", f"{loss:.{2 if loss < 10 else 1}f} %", *shape, *times, ""]
@@ -161,10 +161,10 @@ def _tree_lines(
 
 def _tree_cells(row: dict[str, Any]) -> list[str]:
     depths = " to ".join(map(str, dict.fromkeys((min(row["depths"]), max(row["depths"])))))
-    shape = [f"{number(100 * row['loss'])} %", depths, count(row["nodes"]), count(row["leaves"])]
+    shape = [f"{three_digits(100 * row['loss'])} %", depths, spaced(row["nodes"]), spaced(row["leaves"])]
     ms, sorts = row["ms"], row["sorts"]
-    times = [f"{number(ms[work])} ({sorts[work]:.2f})" for work in _TIMED]
-    return [*shape, *times, number(ms[octrees.SORT])]
+    times = [f"{three_digits(ms[work])} ({sorts[work]:.2f})" for work in _TIMED]
+    return [*shape, *times, three_digits(ms[octrees.SORT])]
 
 
 def _levels(measurements: Sequence[Measurement]) -> str:
@@ -179,8 +179,11 @@ def _levels(measurements: Sequence[Measurement]) -> str:
             cubes = "closed" if row["least"] else "octants"
             named = [f"`{row['scene']}`", cubes, each["device"]]
             busy = np.median(row["busy_ms"]) / each["processors"]
-            times = [number(np.median(row["gpu_ms"])), number(busy) if each["timer"] == "finish" else ""]
-            errors = [number(row["errors"][name]) for name in _ERRORS]
+            times = [
+                three_digits(np.median(row["gpu_ms"])),
+                three_digits(busy) if each["timer"] == "finish" else "",
+            ]
+            errors = [three_digits(row["errors"][name]) for name in _ERRORS]
             rows.append([*(["", "", ""] if named == above else named), str(row["level"]), *times, *errors])
             above = named
-    return table(head, rows, left=("scene", "cubes", "machine"))
+    return markdown_table(head, rows, left=("scene", "cubes", "machine"))

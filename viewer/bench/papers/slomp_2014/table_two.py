@@ -16,7 +16,7 @@ from .feeds import FeedTable
 NAME = "table-two"
 
 _SUITE = "slomp"
-_TABLE = FeedTable("surfels_ms", feeds.title)
+_TABLE = FeedTable("surfels_ms", feeds.scan_title)
 
 
 def write_table_two(folder: Path) -> Path:
