@@ -1,35 +1,8 @@
-// Scatter: each item goes to cells, the best per cell by an order-preserving uint key stays.
-// PASS 0 keeps the least key, PASS 1 the lowest item among those that have it, PASS 2 lists
-// the cells that were hit. Two 32-bit passes: 64-bit atomics are not everywhere.
+// Scatter: items go to cells. A file with `scatter(i)` says which an item visits; what becomes of a visit
+// says another: the best per cell (scatter/best.glsl), a list per cell (bins/lists.glsl).
 #include "common/item.glsl"
 
-#if PASS == 0
-layout(std430, binding = 0) buffer Keys { uint keys[]; };
-#else
-layout(binding = 10) uniform usamplerBuffer keys;
-#endif
-#if PASS == 1
-layout(std430, binding = 1) buffer Best { uint best[]; };
-#elif PASS == 2
-layout(binding = 11) uniform usamplerBuffer best;
-#include "common/list.glsl"
-#endif
-
-void visit(uint cell, uint key, uint item_id) {
-#if PASS == 0
-    atomicMin(keys[cell], key);
-#else
-    if (texelFetch(keys, int(cell)).r != key) return;
-#if PASS == 1
-    atomicMin(best[cell], item_id);
-#else
-    if (texelFetch(best, int(cell)).r != item_id) return;
-    list[reserve(1u)] = cell;
-#endif
-#endif
-}
-
-// Calls visit() for each cell of an item.
+#include <target>
 #include <cells>
 
 void main() {

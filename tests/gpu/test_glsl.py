@@ -14,13 +14,15 @@ import moderngl
 import numpy as np
 import pytest
 from scenes import sphere, sphere_mesh
+from test_bins import filled, some_visits
+from test_compact import flagged
 
 from viewer.backends import Backend, backend
 from viewer.bench import baselines
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
-from viewer.gpu.context import headless
+from viewer.gpu.context import Gpu, headless
 from viewer.gpu.present import Presenter
 from viewer.gpu.shader import Source
 from viewer.gpu.surface import Surface
@@ -30,6 +32,7 @@ from viewer.resources import resource_path
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
+TESTS_OWN = str(Path(__file__).resolve().parents[1])  # where tests have shaders of their own
 SIZE = (96, 64)
 PASSES = ("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted")
 CAMERA = {"azimuth": 30.0, "elevation": 20.0, "aspect": SIZE[0] / SIZE[1]}
@@ -106,21 +109,29 @@ def draw_all(renderer: Renderer) -> None:
     Presenter(renderer.gpu).release()
 
 
+def use_primitives(gpu: Gpu) -> None:
+    """What backends may use of each primitive, whether one does or not."""
+    flagged(gpu, np.arange(5000) % 3 == 0)
+    for ordered in (False, True):
+        filled(gpu, some_visits(100, 30), 30, ordered)
+
+
 @pytest.fixture(scope="module")
 def programs() -> list[list[Source]]:
-    """The stages of each program that pictures take."""
+    """The stages of each program that pictures take, and primitives."""
     renderer = Renderer(headless())
     draw_all(renderer)
+    use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader
     return [kept.extra for kept in renderer.gpu._kept.values() if isinstance(kept, built)]
 
 
-def test_every_shader_file_is_built_for_some_picture(programs: list[list[Source]]) -> None:
+def test_every_shader_file_is_built(programs: list[list[Source]]) -> None:
     folder = Path(str(resource_path("shaders")))
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     used = {file for program in programs for stage in program for file in stage.files}
-    assert {file for file in used if not file.startswith("<")} == files | {filling.SHADER}
+    assert {file for file in used if not file.startswith(("<", TESTS_OWN))} == files
 
 
 def test_the_reference_compiler_takes_every_program(programs: list[list[Source]], tmp_path: Path) -> None:

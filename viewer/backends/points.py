@@ -14,7 +14,7 @@ import numpy as np
 from ..gpu.bindings import Texture
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
-from ..gpu.scatter import scatter
+from ..gpu.scatter import Visits, scatter
 from ..gpu.surface import Surface
 from ..params import param
 from ..scan.points import PointCloud
@@ -66,17 +66,10 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         if rows is not None:
             rows.bind(Texture.DRAWN_ROWS)
 
-    scatter(
-        pose.gpu,
-        "points/cells.glsl",
-        count,
-        surface.depths,
-        surface.rows,
-        bind,
-        defines={"SINGLE": int(size == 1), "SAMPLED": int(rows is not None)},
-        params=replace(params, point_size=size),
-        listed=surface.take_covered() if sparse else None,
-    )
+    defines = {"SINGLE": int(size == 1), "SAMPLED": int(rows is not None)}
+    visits = Visits("points/cells.glsl", count, bind, defines, replace(params, point_size=size))
+    listed = surface.take_covered() if sparse else None
+    scatter(pose.gpu, visits, surface.depths, surface.rows, listed)
     if sparse:
         surface.stats.skipped["compact"] = "few points: they list the pixels themselves"
     return rows is not None

@@ -1,20 +1,26 @@
-"""Compact: lists of the items that need work, so that nothing is computed for the others."""
+"""Compact: prefix sums, and lists of the items that need work, so that nothing is computed for the others."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Mapping
 
 import moderngl
 
-from .context import GROUP, GROUP_LIMIT, Gpu
+from .context import GROUP, GROUP_LIMIT, Gpu, Program
 
-_RUN = 8  # pixels an invocation of compact/covered.comp looks at
+_RUN = 8  # pixels an invocation of compact/covered.comp looks at, words one of compact/sums.comp adds
+_BLOCK = GROUP * _RUN  # words of a work group of compact/sums.comp
+MOST_WORDS = 1 << 27  # that prefix sums are made of
+
+Bind = Callable[[Program], None]  # what a program reads: sets its uniforms, binds its buffers
 
 
 class IndexList:
     """Indices in a buffer, with an indirect dispatch of one invocation each (common/list.glsl)."""
 
     def __init__(self, gpu: Gpu, capacity: int) -> None:
+        self.capacity = capacity
         self.nbytes = 4 * capacity + 16
         self._indices = gpu.ctx.buffer(reserve=4 * capacity)
         # The three work group counts of an indirect dispatch, then the length of the list.
@@ -51,3 +57,83 @@ def list_covered(gpu: Gpu, pixels: int, listed: IndexList) -> None:
         listed.clear()
         listed.bind()
         gpu.dispatch(gpu.compute("compact/covered.comp"), -(-pixels // _RUN))
+
+
+def list_flagged(
+    gpu: Gpu,
+    flags: str,
+    count: int,
+    listed: IndexList,
+    bind: Bind,
+    defines: Mapping[str, object] | None = None,
+) -> None:
+    """List those of `count` items that a shader file says are needed (`is_listed(i)`), ascending.
+
+    As `scan_words`, with twice its reading of flags; nothing is read back. bind: from binding points 0, 1, 4
+    and 5. Where no order is needed and few items are listed, `reserve` of common/list.glsl reads flags once.
+    """
+    if count > listed.capacity:
+        raise ValueError(f"a list of {listed.capacity:,} has no room for {count:,} items")
+    listed.clear()
+
+    def bind_list(program: Program) -> None:
+        listed.bind()
+        bind(program)
+
+    scan_words(gpu, "compact/flagged.glsl", count, bind_list, defines, {"flags": flags})
+
+
+def prefix_sums(gpu: Gpu, words: moderngl.Buffer, count: int) -> None:
+    """Replace each of the first `count` words of a buffer by the sum of those before it, modulo 2^32."""
+    scan_words(gpu, "compact/words.glsl", count, lambda _: words.bind_to_storage_buffer(0))
+
+
+def scan_words(
+    gpu: Gpu,
+    words: str,
+    count: int,
+    bind: Bind,
+    defines: Mapping[str, object] | None = None,
+    parts: Mapping[str, str] | None = None,
+) -> None:
+    """Exclusive prefix sums of `count` words, at most 2^27, modulo 2^32: sums before each word in the
+    items' order, by sums of blocks of 2048 words, of blocks of those, and so on.
+
+    words: the shader file that gives an item's word and takes its sum (shaders/compact/sums.comp says how).
+    bind: sets what that file reads, from binding points 0 to 5. parts: what it includes in angle brackets.
+    Each word is asked for three times, once where there is one block.
+    """
+    if count > MOST_WORDS:
+        raise ValueError(f"prefix sums of {count:,} words; at most {MOST_WORDS:,}")
+    _scan_level(gpu, 1, words, count, bind, defines or {}, parts or {})
+
+
+def _scan_level(
+    gpu: Gpu,
+    level: int,
+    words: str,
+    count: int,
+    bind: Bind,
+    defines: Mapping[str, object],
+    parts: Mapping[str, str],
+) -> None:
+    """Sums of words (level 1), of the sums of their blocks (level 2), and so on."""
+    blocks = -(-count // _BLOCK)
+
+    def run(step: int) -> None:
+        given = {"STEP": step, "BLOCKS": int(blocks > 1), "RUN": f"{_RUN}u", **defines}
+        program = gpu.compute("compact/sums.comp", given, {"words": words, **parts})
+        bind(program)
+        if blocks > 1:
+            sums.bind_to_storage_buffer(6)
+        gpu.set(program, word_count=count)
+        gpu.dispatch(program, -(-count // _RUN))
+
+    if blocks > 1:
+        room = MOST_WORDS // _BLOCK**level
+        sums = gpu.keep(f"block sums {level}", lambda: gpu.ctx.buffer(reserve=4 * room))
+        run(0)
+        _scan_level(
+            gpu, level + 1, "compact/words.glsl", blocks, lambda _: sums.bind_to_storage_buffer(0), {}, {}
+        )
+    run(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from . import gl
 from .blocks import Values
@@ -13,37 +14,56 @@ _NO_KEY = 0x7F800000  # +inf as float bits: a key buffer of depths reads as floa
 _NO_ITEM = 0xFFFFFFFF
 
 
+@dataclass(frozen=True)
+class Visits:
+    """Which cells items go to, of which there may be any number: pixels, tiles, sectors, ...
+
+    cells: the shader file that says so; its `scatter(i)` calls `visit(cell, key, item)` for each cell that
+    the i-th of `count` items goes to. bind: sets what that file reads. defines: its macros. params: what it
+    finds in `<params>`.
+    """
+
+    cells: str
+    count: int
+    bind: Callable[[Program], None]
+    defines: Mapping[str, object] = field(default_factory=dict)
+    params: Values | None = None
+
+    def send(self, gpu: Gpu, target: str, bind: Callable[[Program], None], **defines: int) -> None:
+        """Send the items to their cells. target: the shader file that says what becomes of a visit; bind:
+        sets what that one reads and writes."""
+        parts = {"target": target, "cells": self.cells}
+        program = gpu.compute("scatter/scatter.comp", {**defines, **self.defines}, parts, self.params)
+        bind(program)
+        self.bind(program)
+        gpu.dispatch(program, self.count)
+
+
 def scatter(
     gpu: Gpu,
-    cells: str,
-    count: int,
+    visits: Visits,
     keys: gl.BufferTexture,
     best: gl.BufferTexture,
-    bind: Callable[[Program], None],
-    defines: Mapping[str, object] | None = None,
-    params: Values | None = None,
     listed: IndexList | None = None,
 ) -> None:
-    """Send `count` items to cells: the least key per cell, then the lowest item that has it.
+    """Keep the least key of those that visit a cell, then the lowest item that has it.
 
-    cells: the shader file that names an item's cells and key (it calls `visit`). keys,
-    best: one R32UI texel a cell; cells that nothing hit hold +inf bits and 0xFFFFFFFF.
-    bind: sets what `cells` reads. params: what it finds in `<params>`.
-    listed: filled with the cells that were hit.
+    visits: their keys are below +inf bits. keys, best: one R32UI texel a cell; +inf bits and 0xFFFFFFFF where
+    nothing went. listed: filled with the cells that were hit.
     """
     gl.clear_words(keys.buffer, _NO_KEY)
     gl.clear_words(best.buffer, _NO_ITEM)
     if listed is not None:
         listed.clear()
+
+    def bind(_: Program) -> None:
+        keys.buffer.bind_to_storage_buffer(0)
+        keys.bind(10)
+        best.buffer.bind_to_storage_buffer(1)
+        best.bind(11)
+        if listed is not None:
+            listed.bind()
+
     for number, name in enumerate(("depth", "id", "list") if listed is not None else ("depth", "id")):
-        defined = {"PASS": number, **(defines or {})}
-        program = gpu.compute("scatter/scatter.comp", defined, {"cells": cells}, params)
         with gpu.timers.measure(name):
-            keys.buffer.bind_to_storage_buffer(0)
-            keys.bind(10)
-            best.buffer.bind_to_storage_buffer(1)
-            best.bind(11)
-            if listed is not None:
-                listed.bind()
-            bind(program)
-            gpu.dispatch(program, count)
+            visits.send(gpu, "scatter/best.glsl", bind, PASS=number)

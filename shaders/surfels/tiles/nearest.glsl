@@ -6,7 +6,7 @@ layout(local_size_x = TILE, local_size_y = COLUMNS, local_size_z = TILES) in;
 
 layout(binding = 0) uniform samplerBuffer places;  // centre, pixels; key there; its step right
 layout(binding = 1) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
-layout(binding = 2) uniform usamplerBuffer ends;   // of each tile's part of the list
+layout(binding = 2) uniform usamplerBuffer starts;  // of each tile's part of the list
 layout(binding = 3) uniform usamplerBuffer listed;
 layout(binding = 8) uniform usamplerBuffer work;  // tiles that discs reach, after a dispatch and their number
 layout(std430, binding = 0) buffer Depths { uint depths[]; };
@@ -33,7 +33,7 @@ int this_tile() {
 // A tile's part of the list: first, and the one after the last.
 ivec2 part_of(int tile) {
     if (tile < 0) return ivec2(0);
-    return ivec2(tile == 0 ? 0 : int(texelFetch(ends, tile - 1).r), int(texelFetch(ends, tile).r));
+    return ivec2(texelFetch(starts, tile).r, texelFetch(starts, tile + 1).r);
 }
 
 struct Column { float center_y, key, key_step, form, skew, curve; };

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...gpu.amplify import Points
 from ...gpu.bindings import Storage
 from ...gpu.context import Gpu
-from ...gpu.scatter import scatter
+from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from .passes import bind_looks
@@ -82,16 +82,8 @@ def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
 
 def splat_subpixel(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel, by scatter: what `tiles.splat` draws, up to rounding."""
-    scatter(
-        surface.gpu,
-        "surfels/scatter.glsl",
-        points.count,
-        surface.depths,
-        surface.rows,
-        points.bind,
-        defines=points.defines,
-        params=splats,
-    )
+    visits = Visits("surfels/scatter.glsl", points.count, points.bind, points.defines, splats)
+    scatter(surface.gpu, visits, surface.depths, surface.rows)
 
 
 def average(points: Points, surface: Surface, splats: Splats) -> None:

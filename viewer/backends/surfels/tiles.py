@@ -15,12 +15,15 @@ import numpy as np
 
 from ...gpu import gl
 from ...gpu.amplify import Points, amplify
-from ...gpu.context import Gpu
+from ...gpu.bins import Bins
+from ...gpu.compact import scan_words
+from ...gpu.context import Gpu, Program
+from ...gpu.scatter import Visits
 from ...gpu.surface import Surface
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
 TILE = 8  # pixels of a tile's edge
-_MOST_TILES = 2048  # along an edge of the picture: what bin.comp's words have bits for
+_MOST_TILES = 2048  # along an edge of the picture: what cells.glsl's words have bits for
 _DISC_BYTES = 16  # of a point in each of two buffers
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
@@ -30,7 +33,7 @@ _LONGEST = 30_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
 _LARGE_HEAD = 16  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach
-ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of bin.comp
+ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
 FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 
 
@@ -48,7 +51,8 @@ class TileLists:
         self.away = False
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
-        self._textures = {name: self._texture(4 * words, gl.R32UI) for name in ("slots", "farthest")}
+        self._bins = Bins(gpu, words)
+        self._textures = {"farthest": self._texture(4 * words, gl.R32UI)}
         self._textures["work"] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
         self._large_rows: gl.BufferTexture | None = None
 
@@ -56,7 +60,7 @@ class TileLists:
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         textures = [*self._textures.values(), *([self._large_rows] if self._large_rows else [])]
-        return sum(texture.buffer.size for texture in textures)
+        return self._bins.nbytes + sum(texture.buffer.size for texture in textures)
 
     def fill(self, points: Points, splats: Splats, side: int = ALL) -> bool:
         """List the discs of points for the bound view; False where the lists would grow too long.
@@ -67,28 +71,35 @@ class TileLists:
         """
         gpu = self._gpu
         self._reserve(max(len(points.pose.cloud), 1))
-        with gpu.timers.measure("count"):
-            gl.clear_words(self._buffer("slots"), 0)
-            self._buffer("large").write(bytes(_LARGE_HEAD))
+        self._buffer("large").write(bytes(_LARGE_HEAD))
+
+        def bind(program: Program) -> None:
+            points.bind(program)
             self._textures["farthest"].bind(4)
-            self._bind_blocks("slots", "places", "forms", "reach", "large")
-            self._bin(0, points, splats, side)
-        with gpu.timers.measure("scan"):
-            scan = gpu.compute("surfels/tiles/scan.comp", {"TILE": TILE, "TILES": f"{_mapping(gpu)[1]}u"})
-            self._bind_blocks("slots", "large", "work", "farthest")
-            scan.run(1)
-            gpu.ctx.memory_barrier()
+            self._textures["reach"].bind(5)
+            self._bind_blocks("places", "forms", "reach", "large", first=2)
+
+        defines = {"SIDE": side, "TILE": TILE, **points.defines}
+        visits = Visits("surfels/tiles/cells.glsl", points.count, bind, defines, splats)
+        self._bins.count(visits)
+        with gpu.timers.measure("work"):
+            self._find_work()
             words = self._buffer("large").read(_LARGE_HEAD)
             self.large, self.length, self.away, longest = struct.unpack("2I?3xI", words)
         if self.length > gpu.max_storage_bytes // 4 or longest > _LONGEST:
             return False
-        with gpu.timers.measure("list"):
-            if 4 * self.length > self._buffer("list").size:
-                self._replace("list", min(4 * (self.length * 5 // 4), gpu.max_storage_bytes), gl.R32UI)
-            self._textures["reach"].bind(4)
-            self._bind_blocks("slots", "list")
-            self._bin(1, points, splats, side)
+        self._bins.fill(visits, self.length)
         return True
+
+    def _find_work(self) -> None:
+        """List the tiles that discs reach."""
+
+        def bind(_: Program) -> None:
+            self._bins.starts.buffer.bind_to_storage_buffer(0)
+            self._bind_blocks("large", "work", "farthest", first=1)
+
+        defines = {"TILES": f"{_mapping(self._gpu)[1]}u"}
+        scan_words(self._gpu, "surfels/tiles/work.glsl", self._bins.cells, bind, defines)
 
     def large_points(self, points: Points) -> Points:
         """Those that are left to the rasteriser."""
@@ -100,26 +111,21 @@ class TileLists:
 
     def run(self, program: moderngl.ComputeShader) -> None:
         """Run a program that includes surfels/tiles/nearest.glsl on the tiles that discs reach."""
-        for unit, name in enumerate(("places", "forms", "slots", "list")):
-            self._textures[name].bind(unit)
+        textures = (self._textures["places"], self._textures["forms"], self._bins.starts, self._bins.items)
+        for unit, texture in enumerate(textures):
+            texture.bind(unit)
         self._textures["work"].bind(8)
         program.run_indirect(self._buffer("work"))
         self._gpu.ctx.memory_barrier()
 
     def release(self) -> None:
         """Delete everything."""
-        self._gpu.discard(*self._textures.values(), self._large_rows)
+        self._gpu.discard(self._bins, *self._textures.values(), self._large_rows)
 
     @property
     def farthest(self) -> moderngl.Buffer:
         """The farthest depth shown in each tile, a word each: what FARTHEST of show.comp writes."""
         return self._buffer("farthest")
-
-    def _bin(self, number: int, points: Points, splats: Splats, side: int) -> None:
-        defines = {"PASS": number, "SIDE": side, "TILE": TILE, **points.defines}
-        program = self._gpu.compute("surfels/tiles/bin.comp", defines, params=splats)
-        points.bind(program)
-        self._gpu.dispatch(program, points.count)
 
     def _reserve(self, count: int) -> None:
         """Make room for so many points, and give up what a much larger pose has left."""
@@ -130,7 +136,7 @@ class TileLists:
         self._replace("forms", _DISC_BYTES * count, gl.RGBA32F)
         self._replace("reach", 4 * count, gl.R32UI)
         self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
-        self._replace("list", 4 * _ROOM * count, gl.R32UI)
+        self._bins.reserve(_ROOM * count)
 
     def _replace(self, name: str, nbytes: int, texel_format: int) -> None:
         self._gpu.discard(self._textures.pop(name, None))
@@ -142,8 +148,8 @@ class TileLists:
     def _buffer(self, name: str) -> moderngl.Buffer:
         return self._textures[name].buffer
 
-    def _bind_blocks(self, *names: str) -> None:
-        for number, name in enumerate(names):
+    def _bind_blocks(self, *names: str, first: int) -> None:
+        for number, name in enumerate(names, start=first):
             self._buffer(name).bind_to_storage_buffer(number)
 
 

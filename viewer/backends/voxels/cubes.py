@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...gpu import gl
 from ...gpu.amplify import Points, Shape, amplify
 from ...gpu.bindings import Texture
-from ...gpu.scatter import scatter
+from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
 
 CUBE = Shape("voxels/cube.glsl", corners=9)
@@ -67,12 +67,5 @@ def _part(points: Points, chosen: NDArray[np.bool_]) -> Points:
 
 
 def _scatter(points: Points, surface: Surface) -> None:
-    scatter(
-        surface.gpu,
-        "voxels/scatter.glsl",
-        points.count,
-        surface.depths,
-        surface.rows,
-        points.bind,
-        defines=points.defines,
-    )
+    visits = Visits("voxels/scatter.glsl", points.count, points.bind, points.defines)
+    scatter(surface.gpu, visits, surface.depths, surface.rows)

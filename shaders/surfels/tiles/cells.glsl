@@ -1,38 +1,30 @@
-// Which discs reach each tile of TILE x TILE pixels. PASS 0 counts them, PASS 1 lists them.
+// A disc's cells are the tiles of TILE x TILE pixels that it reaches: found in PASS 0, remembered for PASS 1.
 // Large discs, and those that cross the near plane, are listed to be rasterised.
 // SIDE 0: all discs; 1: those that face the eye; 2: the others, where `farthest` does not hide them;
 // 3: all that it does not hide.
-#include "common/item.glsl"
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
 #include "surfels/tiles/grid.glsl"
 
-layout(std430, binding = 0) buffer Slots { uint slots[]; };
 #if PASS == 0
-layout(std430, binding = 1) writeonly buffer Places { vec4 places[]; };
-layout(std430, binding = 2) writeonly buffer Forms { vec4 forms[]; };
-layout(std430, binding = 3) writeonly buffer Reach { uint reach[]; };
-layout(std430, binding = 4) buffer Large { uint large_count, list_length, away, longest, large[]; };
+layout(std430, binding = 2) writeonly buffer Places { vec4 places[]; };
+layout(std430, binding = 3) writeonly buffer Forms { vec4 forms[]; };
+layout(std430, binding = 4) writeonly buffer Reach { uint reach[]; };
+layout(std430, binding = 5) buffer Large { uint large_count, list_length, away, longest, large[]; };
 #if SIDE >= 2
 layout(binding = 4) uniform usamplerBuffer farthest;  // depth shown in each tile, float bits
 #endif
 #else
-layout(binding = 4) uniform usamplerBuffer known_reach;
-layout(std430, binding = 1) writeonly buffer List { uint list[]; };
+layout(binding = 5) uniform usamplerBuffer known_reach;
 #endif
 
 // First tile 11 + 11 bits, width and height 5 + 5: pictures up to 2048 tiles, discs up to 31.
 const int SPAN = 31;
 
-void visit(uint word, uint row) {
+void visit_tiles(uint word, uint row) {
     ivec2 first = ivec2(word & 0x7FFu, word >> 11 & 0x7FFu), span = ivec2(word >> 22 & 31u, word >> 27);
     for (int y = first.y; y < first.y + span.y; ++y)
-        for (int x = first.x; x < first.x + span.x; ++x) {
-            uint at = atomicAdd(slots[y * tiles.x + x], 1u);
-#if PASS == 1
-            if (at < uint(list.length())) list[at] = row;
-#endif
-        }
+        for (int x = first.x; x < first.x + span.x; ++x) visit(uint(y * tiles.x + x), 0u, row);
 }
 
 #if PASS == 0
@@ -86,9 +78,7 @@ uint tiles_of(Point point) {
 }
 #endif
 
-void main() {
-    uint i = item();
-    if (i >= item_count) return;
+void scatter(uint i) {
     int row = drawn_row(int(i));
 #if PASS == 0
     uint word = tiles_of(texel_point(row));
@@ -96,5 +86,5 @@ void main() {
 #else
     uint word = texelFetch(known_reach, int(i)).r;
 #endif
-    visit(word, uint(row));
+    visit_tiles(word, uint(row));
 }

@@ -1,0 +1,30 @@
+// A list of the visits of each cell. PASS 0 counts them; PASS 1 writes them down: anywhere in their cell's part, or,
+// ORDERED, as pairs that are sorted by cell afterwards.
+#if PASS == 0
+layout(std430, binding = 0) buffer Counts { uint counts[]; };
+#else
+layout(std430, binding = 0) buffer Cursors { uint cursors[]; };  // of cells; ORDERED: of items
+#endif
+#if PASS == 0 && ORDERED
+layout(std430, binding = 1) writeonly buffer Visits { uint visits[]; };
+uint visited = 0u;
+#elif PASS == 1 && ORDERED
+layout(std430, binding = 1) writeonly buffer Pairs { uvec2 pairs[]; };
+#elif PASS == 1
+layout(std430, binding = 1) writeonly buffer List { uint list[]; };
+#endif
+
+void visit(uint cell, uint key, uint item_id) {
+#if PASS == 0
+    atomicAdd(counts[cell], 1u);
+#if ORDERED
+    visits[item()] = ++visited;
+#endif
+#elif ORDERED
+    uint at = cursors[item()]++;
+    if (at < uint(pairs.length())) pairs[at] = uvec2(cell, item_id);
+#else
+    uint at = atomicAdd(cursors[cell], 1u);
+    if (at < uint(list.length())) list[at] = item_id;
+#endif
+}

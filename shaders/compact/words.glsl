@@ -1,0 +1,6 @@
+// Words in a buffer, which give way to the sums before them.
+layout(std430, binding = 0) buffer Words { uint words[]; };
+
+uint word_of(uint i) { return words[i]; }
+
+void take_sum(uint i, uint sum) { words[i] = sum; }

@@ -1,0 +1,28 @@
+// The best visit of each cell, by an order-preserving uint key. PASS 0 keeps the least key, PASS 1 the lowest
+// item among those that have it, PASS 2 lists the cells that were hit. Two 32-bit passes: 64-bit
+// atomics are not everywhere.
+#if PASS == 0
+layout(std430, binding = 0) buffer Keys { uint keys[]; };
+#else
+layout(binding = 10) uniform usamplerBuffer keys;
+#endif
+#if PASS == 1
+layout(std430, binding = 1) buffer Best { uint best[]; };
+#elif PASS == 2
+layout(binding = 11) uniform usamplerBuffer best;
+#include "common/list.glsl"
+#endif
+
+void visit(uint cell, uint key, uint item_id) {
+#if PASS == 0
+    atomicMin(keys[cell], key);
+#else
+    if (texelFetch(keys, int(cell)).r != key) return;
+#if PASS == 1
+    atomicMin(best[cell], item_id);
+#else
+    if (texelFetch(best, int(cell)).r != item_id) return;
+    list[reserve(1u)] = cell;
+#endif
+#endif
+}
