@@ -30,7 +30,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    """What the package gives, imported when it is first used.
+    """Import what the package gives when it is first used.
 
     So the command line, which is in this package, is there to take an interrupt before anything else is.
     """

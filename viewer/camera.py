@@ -28,7 +28,7 @@ _MOST_BYTES = 2**20  # of a file; ours have some 300
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the picture is taken from.
+    """A camera: where a picture is taken from.
 
     eye, target, up: scan units (up: any length). fov_y: degrees. height: scan units that
     the picture shows from bottom to top (orthographic only). near, far: scan units along
@@ -142,7 +142,7 @@ class Camera:
 
     @property
     def distance(self) -> float:
-        """From eye to target, scan units."""
+        """Distance from eye to target, scan units."""
         return math.dist(self.eye, self.target)
 
     @property
@@ -183,7 +183,7 @@ class Camera:
     # --- moving it --------------------------------------------------------------------
 
     def fit(self, bounds: Bounds, aspect: float = 1.0) -> Camera:
-        """The same direction, as near as shows the box of `bounds` whole, with a small margin."""
+        """Move along the direction to as near as shows the box of `bounds` whole, with a small margin."""
         bounds = _with_extent(bounds)
         x, y, z = self.rotation() @ (bounds.corners() - bounds.center).T
         tangent = math.tan(math.radians(self.fov_y) / 2) / _FIT_MARGIN
@@ -197,7 +197,7 @@ class Camera:
         return replace(self, eye=eye, target=_vector(bounds.center), height=height)
 
     def at_distance(self, distance: float) -> Camera:
-        """The same direction and target from another distance (scan units)."""
+        """Move to another distance from the target (scan units), in the same direction."""
         if not (math.isfinite(distance) and distance > 0):
             raise InputError(f"a camera's distance is positive, not {distance}")
         eye = np.array(self.target) + self.rotation()[2] * distance
@@ -205,7 +205,7 @@ class Camera:
         return replace(self, eye=_vector(eye), height=height)
 
     def orbited(self, azimuth: float, elevation: float, about: Vector | None = None) -> Camera:
-        """Turned about the target: azimuth about up, then elevation, in degrees.
+        """Turn about the target: azimuth about up, then elevation, in degrees.
 
         about: another point to turn about, scan units; it keeps its place in the picture.
         Elevation stops short of the poles, so that the picture never flips.
@@ -229,22 +229,22 @@ class Camera:
         return replace(self, eye=_vector(target + turn(arm)), target=_vector(target))
 
     def panned(self, right: float, up: float) -> Camera:
-        """Moved with its target along the picture's axes, in heights of the picture."""
+        """Move with its target along the picture's axes, in heights of the picture."""
         axes = self.rotation()
         shift = (axes[0] * right + axes[1] * up) * self.view_height
         eye, target = np.array(self.eye) + shift, np.array(self.target) + shift
         return replace(self, eye=_vector(eye), target=_vector(target))
 
     def moved(self, by: NDArray[np.float64]) -> Camera:
-        """Moved with its target along the world's axes. by: (3,) scan units."""
+        """Move with its target along the world's axes. by: (3,) scan units."""
         return replace(self, eye=_vector(np.add(self.eye, by)), target=_vector(np.add(self.target, by)))
 
     def zoomed(self, factor: float) -> Camera:
-        """Nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
+        """Zoom: nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
         return self.at_distance(self.distance / factor)
 
     def approached(self, point: Vector, factor: float) -> Camera:
-        """Nearer to a point for factor > 1, which keeps its place in the picture."""
+        """Approach a point, for factor > 1; it keeps its place in the picture."""
         about = np.array(point)
         eye, target = (about + (np.array(p) - about) / factor for p in (self.eye, self.target))
         return replace(
@@ -252,14 +252,14 @@ class Camera:
         )
 
     def projected(self, projection: str) -> Camera:
-        """The same view in the other projection: what is at the target keeps its size."""
+        """Change the projection: what is at the target keeps its size."""
         camera = replace(self, projection=projection, height=self.view_height)
         if projection == "orthographic":
             return camera
         return camera.at_distance(self.view_height / (2 * math.tan(math.radians(self.fov_y) / 2)))
 
     def focused(self, point: Vector) -> Camera:
-        """The same picture, its target moved along the view axis to the depth of a point.
+        """Move the target along the view axis to the depth of a point; the picture stays.
 
         Unchanged where the point is not in front of the eye.
         """
@@ -272,7 +272,7 @@ class Camera:
         return replace(self, target=target, height=height)
 
     def centered(self, point: Vector) -> Camera:
-        """The same direction and scale at the point's depth, with the point in the middle.
+        """Move sideways until the point is in the middle, at the same direction and scale at its depth.
 
         Unchanged where the point is not in front of the eye.
         """

@@ -30,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _end_quietly_when_interrupted() -> None:
-    """From now on an interrupt ends the process at once, as it does other programs.
+    """Have an interrupt end the process at once from now on, as it does other programs.
 
     While libraries are imported there is nothing to tidy up, and Python would show a traceback; commands
     take interrupts as exceptions while they work. Those that a library swallows meanwhile come again.

@@ -86,7 +86,7 @@ _CUT_SHORT = re.compile(r"[0-9]+ requested and [0-9]+ written")  # all that nump
 
 
 def explained(error: OSError, hint: str | None = None) -> tuple[str, str | None]:
-    """What the system refused, and what to try: "the disk is full", "Make room, or use another disk".
+    """Reason and advice where the system refused: "the disk is full", "Make room, or use another disk".
 
     hint: what to try where the cause is another one than those that are known.
     """

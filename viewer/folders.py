@@ -6,14 +6,14 @@ from pathlib import Path
 
 
 def user_folder() -> Path:
-    """Where the settings of this user are kept; it need not be there yet."""
+    """The folder of this user's settings; it need not be there yet."""
     import platformdirs
 
     return platformdirs.user_config_path("scan4d", appauthor=False)
 
 
 def cache_folder() -> Path:
-    """Where what was found out about this machine is kept for this user; it need not be there yet."""
+    """The folder of what was found out about this machine for this user; it need not be there yet."""
     import platformdirs
 
     return platformdirs.user_cache_path("scan4d", appauthor=False)

@@ -48,7 +48,7 @@ def start_python(code: str, *arguments: str, nice: int, **streams: Any) -> subpr
 
 
 def end_with(parent: int) -> None:
-    """From now on this process gets SIGTERM when the one that started it is gone, however that ended.
+    """Have this process get SIGTERM when the one that started it is gone, however that ended.
 
     parent: its number. Where the system forgets nothing of parents (Windows), nothing happens.
     """
@@ -62,7 +62,7 @@ def end_with(parent: int) -> None:
 
 
 class _Progress(NamedTuple):
-    """What the process sends while it works: how far it is, 0..1."""
+    """A message of the process while it works: how far it is, 0..1."""
 
     share: float
 
@@ -75,7 +75,7 @@ class Helper:
         self._lock = threading.Lock()
 
     def call(self, task: Task, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """What the function returns for these arguments, computed in the process; this waits for it.
+        """Call the function with these arguments in the process, and wait for its result.
 
         One call at a time. function: a public one of a module. Raises Cancelled as soon as the task
         is cancelled, which ends the process; Scan4DError where the function or the process fails.

@@ -58,7 +58,7 @@ class Look:
 
 
 def value_source(look: Look, scalars: Collection[str]) -> str | None:
-    """What the look colours by where that is a number: "depth", "height" or a scalar's name.
+    """Source of the number that the look colours by: "depth", "height" or a scalar's name.
 
     None where colours do not come from a number. Raises InputError for an unknown name.
     """
@@ -79,7 +79,7 @@ def drawable(look: Look, scalars: Collection[str]) -> Look:
 
 
 def unnamed(look: Look, scalars: Collection[str]) -> Look:
-    """The same look, which tells the number of the scalar that it colours by rather than its name."""
+    """The look with the number of the scalar that it colours by in place of its name."""
     if look.color_by in COLOR_BY or (scalar := _scalar(look, scalars)) is None:
         return look
     return replace(look, color_by=f"#{[*scalars].index(scalar) + 1}")

@@ -49,7 +49,7 @@ class Interrupts:
             self._open = False
 
     def take(self, number: int, frame: FrameType | None) -> None:
-        """What a signal does."""
+        """Handle a signal."""
         self.waiting = not self._open
         if self._open:
             self._open = False

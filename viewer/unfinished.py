@@ -75,7 +75,7 @@ def _folder() -> Path:
 
 
 class _Notes:
-    """What this process has not finished. Where nothing can be noted it works without."""
+    """Notes of what this process has not finished. Where nothing can be noted it works without."""
 
     def __init__(self) -> None:
         self.lock_file: Path | None = None

@@ -90,15 +90,15 @@ class View:
         return -(positions @ self.rotation[2] + self.translation[2])
 
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""
+        """Tell which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""
         with np.errstate(divide="ignore", invalid="ignore"):  # a point in the eye's plane is out of range
             pixels, depth = self.project(positions)
         in_picture = ((pixels >= 0) & (pixels < self.size)).all(axis=1)
         return in_picture & (depth >= self.near) & (depth <= self.far)
 
     def faces_away(self, positions: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Which points (N, 3), relative to the origin, have a normal (N, 3) away from the eye; those that
-        have none do not."""
+        """Tell which points (N, 3), relative to the origin, have a normal (N, 3) that points away from the
+        eye; those without one do not."""
         with np.errstate(invalid="ignore"):  # NaN is none
             if not self.perspective:
                 return normals @ self.rotation[2] < 0

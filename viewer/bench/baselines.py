@@ -26,7 +26,7 @@ FLOOR, CEILING = "gl-points", "mesh"
 
 @dataclass(frozen=True)
 class NoParams:
-    """They have no parameters."""
+    """Parameters of a baseline: none."""
 
 
 def gl_points() -> Backend:

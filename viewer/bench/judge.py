@@ -39,13 +39,13 @@ class Probes:
     seen: NDArray[np.bool_]
 
     def found(self, depth: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Which of them a picture of depths (H, W) does not hide; a hole hides nothing."""
+        """Tell which of them a picture of depths (H, W) does not hide; a hole hides nothing."""
         return depth.reshape(-1)[self.pixels] >= self.limit
 
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """What one view truly shows. Judges any Surface of that view.
+    """The truth of one view, which judges any Surface of it.
 
     image: (H, W, 4) uint8, the reference, shaded in `look`. steps: (H, W), how far depths of one
     sheet may lie apart, scan units.

@@ -52,20 +52,20 @@ class PointView:
         return PointCloud.from_arrays(**self.arrays)  # type: ignore[arg-type]
 
     def given(self, **arrays: NDArray | None) -> PointView:
-        """The same with these arrays in place of its own; None: without."""
+        """Replace some arrays; None: leave one out."""
         changed = {**self.arrays, **arrays}
         return replace(self, arrays={name: a for name, a in changed.items() if a is not None})
 
     def filled(self, name: str, value: ArrayLike) -> PointView:
-        """The same with one value in all rows of an array."""
+        """Give an array one value in all rows."""
         return self.given(**{name: np.broadcast_to(value, self.arrays[name].shape)})
 
     def picked(self, rows: NDArray) -> PointView:
-        """The same with these rows of every array."""
+        """Keep these rows of every array."""
         return self.given(**{name: a[rows] for name, a in self.arrays.items()})
 
     def joined(self, arrays: Arrays) -> PointView:
-        """The same with more points after its own."""
+        """Add points behind its own."""
         return self.given(**{name: np.concatenate([a, arrays[name]]) for name, a in self.arrays.items()})
 
     def moved(self, shift: ArrayLike = 0.0, scale: float = 1.0, turn: ArrayLike = _NO_TURN) -> PointView:
@@ -89,17 +89,17 @@ class PointView:
         return replace(moved, camera=camera)
 
     def depths(self) -> NDArray[np.float64]:
-        """Of the points, (N,), scan units along the view axis."""
+        """Depths of the points, (N,), scan units along the view axis."""
         return (np.array(self.camera.eye) - self.arrays["positions"]) @ self.camera.rotation()[2]
 
     def pixels_per_unit(self) -> float:
-        """At the depth of the camera's target."""
+        """Pixels of a scan unit at the depth of the camera's target."""
         return self.size[1] / self.camera.view_height
 
 
 @dataclass(frozen=True, eq=False)
 class RgbdImage:
-    """What is compared.
+    """A picture and its depths, as they are compared.
 
     depth: (H, W) float64, from the plane of the camera's target, in widths of a pixel there;
     +inf where nothing is. color: (H, W, 3) int, 255 sRGB levels.
@@ -193,7 +193,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a row.
+    """The result of a row.
 
     found: how far apart the pictures are. held: whether that is within the row's tolerance. limit: what
     holds in place of it; None: the tolerance must hold. coarse: the share of the pixels that are coarse
@@ -225,7 +225,7 @@ class Row:
     limit: Limit | None = None
 
     def limit_of(self, backend: Backend) -> Limit | None:
-        """What this backend holds instead, by its own declaration or the row's; None: it must hold it."""
+        """The bound of a backend that cannot hold the row, by its declaration or the row's; None: it must."""
         return backend.limits.get(self.name, self.limit)
 
     def compare(self, renderer: Renderer, backend: Backend, params: Any = None) -> Outcome:
@@ -299,7 +299,7 @@ def _placed() -> Iterator[Row]:
 
 
 def _fitted(shot: PointView | None = None) -> PointView:
-    """With the camera that a user gets."""
+    """Points before the camera that a user gets."""
     shot = shot or _body()
     return replace(shot, camera=Camera.orbit(shot.cloud().bounds(), 36, 34, aspect=4 / 3))
 
@@ -517,7 +517,7 @@ def _slanted() -> PointView:
 
 
 def _facing(shot: PointView) -> PointView:
-    """With normals that face the eye."""
+    """Points with normals that face the eye."""
     normals = np.array(shot.camera.eye) - shot.arrays["positions"]
     return shot.given(normals=normals / np.linalg.norm(normals, axis=1, keepdims=True))
 

@@ -69,13 +69,13 @@ class BenchSettings:
     data: Path | None = None
 
     def subject(self, group: Group) -> Subject:
-        """What a group looks at. Raises InputError."""
+        """Load what a group looks at. Raises InputError."""
         return catalog.subject(group.scene, self.data, count=group.count, noise=group.noise, seed=self.seed)
 
 
 @dataclass
 class _Tally:
-    """What was measured of one contender, a value a view; of a slow preparation, a value for the first."""
+    """Measurements of one contender, a value a view; of a slow preparation, a value for the first."""
 
     gpu_ms: list[float] = field(default_factory=list)
     cpu_ms: list[float] = field(default_factory=list)
@@ -96,7 +96,7 @@ class _Tally:
         return len(known) >= PREPARED and spread(known)["median"] > _SLOW
 
     def numbers(self, views: int) -> Row:
-        """What a row holds of the first views."""
+        """Values that a row holds of the first views."""
         runs = self.passes[:views]
         names = dict.fromkeys(name for run in runs for name in run)  # a view may need others than the first
         passes = {name: spread([run.get(name, 0.0) for run in runs]) for name in names}
@@ -207,7 +207,7 @@ class Bench:
             }
 
     def where(self) -> Row:
-        """What of a row says where and when it was measured."""
+        """The part of a row that says where and when it was measured."""
         gpu = self.renderer.gpu
         return {
             "timer": gpu.timers.kind,
@@ -274,7 +274,7 @@ class Bench:
         return moment, self._cameras(subject, moment)[view]
 
     def _cameras(self, subject: Subject, moment: Moment) -> list[Camera]:
-        """Where all views look from, to where the subject is at a moment."""
+        """Cameras of all views, which look to where the subject is at a moment."""
         if self._looked_at is None or self._looked_at[0] is not moment:
             views, size, seed = self.settings.views, self.settings.size, self.settings.seed
             try:
@@ -353,7 +353,7 @@ class Bench:
 
 
 def _request(contender: Contender, moment: Moment, camera: Camera) -> Request:
-    """What a contender is asked for."""
+    """The request that draws a contender."""
     if contender.backend == CEILING:
         pose = replace(moment.pose, cloud=moment.mesh.points, views=())
         return Request(pose, camera, baselines.mesh(moment.mesh), look=LOOK)

@@ -126,7 +126,7 @@ class PlainOutput:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """As of a stream."""
+        """Write as a stream does."""
         return self._do(lambda: self._stream.write(plain(text, keep="\n")))
 
     def write_name(self, path: Path) -> None:
@@ -135,7 +135,7 @@ class PlainOutput:
         self._do(lambda: self._stream.write(f"{path if is_exact else plain(str(path))}\n"))
 
     def flush(self) -> None:
-        """As of a stream."""
+        """Flush as a stream does."""
         self._do(self._stream.flush)
 
     def _do(self, action: Callable[[], Any]) -> Any:
@@ -155,7 +155,7 @@ class PlainOutput:
 
 
 def _bytes_of_names(error: UnicodeError) -> tuple[bytes, int]:
-    """What is written for characters that are no text: the bytes that they stand for in names, or escapes."""
+    """Bytes to write for characters that are no text: those that they stand for in names, or escapes."""
     assert isinstance(error, UnicodeEncodeError)
     letters = error.object[error.start : error.end]
     return b"".join(map(_byte_or_escape, letters)), error.end

@@ -51,7 +51,7 @@ def _run(words: Sequence[str]) -> int:
 
 
 class _Told(logging.Handler):
-    """What is logged, on standard error."""
+    """A handler that tells on standard error what is logged."""
 
     def emit(self, record: logging.LogRecord) -> None:
         complain(f"scan4d: {self.format(record)}")

@@ -53,7 +53,7 @@ class _Parser(ArgumentParser):
 
     @property
     def see(self) -> str:
-        """Where more is told."""
+        """The place where more is told."""
         return f"See '{self.prog} --help'"
 
     @property
@@ -63,7 +63,7 @@ class _Parser(ArgumentParser):
 
     @property
     def options(self) -> dict[str, Action]:
-        """What each option does."""
+        """Descriptions of what each option does."""
         return {name: action for action in self._actions for name in action.option_strings}
 
     def check_words(self, words: Sequence[str]) -> None:

@@ -57,7 +57,7 @@ def _points(surface: Surface) -> dict[str, Any]:
 def summary(
     renderer: Renderer, surface: Surface, request: Request, frames: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """All of --stats. request: one of those that were drawn."""
+    """The whole of --stats. request: one of those that were drawn."""
     return {
         "device": renderer.gpu.device,
         "timer": renderer.gpu.timers.kind,

@@ -77,7 +77,7 @@ def _value(value: object) -> str:
 
 
 def _domain(parameter: Parameter) -> str:
-    """What values it takes: its choices, or its type and range."""
+    """Values that a parameter takes: its choices, or its type and range."""
     if parameter.choices:
         return "|".join(parameter.choices)
     if parameter.low is None and parameter.high is None:

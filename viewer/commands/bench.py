@@ -177,7 +177,7 @@ def _report(args: Namespace) -> None:
 
 
 def _report_files(args: Namespace) -> list[Path]:
-    """What `_report` writes, and the plots that it replaces by its own."""
+    """The files that `_report` writes, and the plots that it replaces by its own."""
     names = [PAGE]
     if args.suite in _OF_THE_PAPER:
         *_, name = _OF_THE_PAPER[args.suite]
@@ -288,7 +288,7 @@ def _settings(args: Namespace) -> BenchSettings:
 
 
 def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> tuple[list[Group], list[str]]:
-    """What to measure, and what of all scenes cannot be had. Raises InputError for those that were named."""
+    """Groups to measure, and scenes that cannot be had. Raises InputError for those that were named."""
     if args.suite == "numerics":
         return [], []
     missing = {name: reason for name, reason in catalog.scene_names(settings.data).items() if reason}
@@ -310,7 +310,7 @@ def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> t
 
 
 def _left_out(missing: Mapping[str, str]) -> list[str]:
-    """What to say of scenes that cannot be had, by name with the reason."""
+    """Sentences on scenes that cannot be had, by name with the reason."""
     return [f"{name} is left out: {reason}" for name, reason in missing.items()]
 
 

@@ -62,7 +62,7 @@ def run(args: Namespace) -> int:
 
 
 def _stop(args: Namespace) -> Stop | None:
-    """Where octrees end; None: as they do by default. Raises InputError where there are none."""
+    """The rule by which octrees end; None: the default. Raises InputError where there are no octrees."""
     told: dict[str, Any] = {}
     if args.delta is not None:
         told = {"rule": "delta", "delta": args.delta}

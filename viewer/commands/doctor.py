@@ -121,7 +121,7 @@ def _devices() -> Iterator[tuple[str, str]]:
 
 
 def _software() -> list[tuple[str, str]]:
-    """This program, Python, and the libraries that it needs."""
+    """Versions of this program, of Python, and of the libraries that it needs."""
     return [
         ("scan4d", __version__),
         ("Python", f"{platform.python_version()} ({sys.executable})"),

@@ -32,7 +32,7 @@ def run(args: Namespace) -> int:
 
 
 def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
-    """What is known of a scan from one pose, as plain values. Lengths in scan units, times in seconds."""
+    """Facts of a scan from one pose, as plain values. Lengths in scan units, times in seconds."""
     cloud, times = pose.cloud, timeline.times
     steps = np.diff(times)
     low, high = ([float(f(column)) for column in cloud.positions.T] for f in (np.min, np.max))

@@ -191,7 +191,7 @@ def _requests(
     values: dict[str, object],
     camera: Camera | None,
 ) -> Iterator[tuple[Shot, Request]]:
-    """What to draw for each shot. The first pose settles the backend, several the camera if there is none.
+    """Requests for each shot. The first pose settles the backend, several the camera if there is none.
 
     A pose without the scalar that the look colours by is reported, and has colours of its own choice.
     """

@@ -104,7 +104,7 @@ def _stem(folder: Path, prefix: str, timeline: Timeline) -> str:
 
 
 def _files(folder: Path, prefix: str, timeline: Timeline) -> list[Path]:
-    """What `_play` writes."""
+    """The files that `_play` writes."""
     stem = _stem(folder, prefix, timeline)
     pictures = [f"{stem}_{index:04d}.png" for index in range(len(timeline))]
     return [Path(name) for name in (*pictures, f"{stem}.mp4", f"{stem}_contact_sheet.png")]

@@ -99,7 +99,7 @@ def trace(scene: Scene, camera: Camera, size: tuple[int, int]) -> Reference:
 def visible(
     scene: Scene, positions: NDArray[np.floating], camera: Camera, tolerance: float | None = None
 ) -> NDArray[np.bool_]:
-    """Which points nothing of the scene hides from the camera's eye, (N,).
+    """Tell which points nothing of the scene hides from the camera's eye, (N,).
 
     positions: (N, 3), relative to the scene's origin. tolerance: how far a hit may lie before the point,
     scan units; None: 32 float32 epsilons (3.8e-6) of the radius of the scene's bounds. Points behind the

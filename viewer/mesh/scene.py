@@ -18,7 +18,7 @@ Rays = NDArray[np.float64]  # (N, 3)
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Where each of N rays meets a scene first.
+    """Hits of N rays: where each meets a scene first.
 
     distance: (N,) float64, in lengths of the ray's step; +inf: nowhere. normal: (N, 3) float64, unit
     length, world space. color: (N, 3) float64, linear. face: (N,) uint32, 0xFFFFFFFF: none. What is not
@@ -53,7 +53,7 @@ class Scene(Protocol):
 
 
 def distance_to_ball(starts: Rays, steps: Rays, radius: float) -> NDArray[np.float64]:
-    """Where rays enter a ball about zero, (N,), in steps; 0 from inside it.
+    """Distances at which rays enter a ball about zero, (N,), in steps; 0 from inside it.
 
     A ray that misses gets its point nearest to zero. Rays that are cast from there keep their digits
     however far away the eye is.

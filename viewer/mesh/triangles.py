@@ -59,7 +59,7 @@ class Mesh:
         return scene
 
     def cast(self, starts: Rays, steps: Rays) -> Hits:
-        """See `Scene.cast`. float32 inside: distances are off by some 1e-7 of where the ray starts."""
+        """Cast rays as `Scene.cast` does, in float32: distances are off by 1e-7 of where rays start."""
         import open3d
 
         rays = np.concatenate([starts, steps], axis=1, dtype=np.float32)
@@ -75,7 +75,7 @@ class Mesh:
         return hits
 
     def carry(self, faces: NDArray[np.uint32], positions: Rays, moved: Mesh) -> Rays:
-        """Where points of this mesh are on the same faces of a moved one, (N, 3).
+        """Move points of this mesh with their faces to a moved one, (N, 3).
 
         faces: (N,), the face that each is on. positions: (N, 3) and the result, relative to the origins.
         """

@@ -37,7 +37,7 @@ _MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
 
 @dataclass(frozen=True)
 class Marks:
-    """What is drawn over a picture."""
+    """A choice of what is drawn over a picture."""
 
     scale_bar: bool = param(
         False, "A bar of a round length in scan units; in perspective at the depth of the camera's target"
@@ -53,13 +53,13 @@ MARKS = tuple(parameter.name for parameter in describe(Marks))
 
 
 def marks_of(names: Sequence[str] | None) -> Marks:
-    """These of MARKS."""
+    """The choice of these names of MARKS."""
     return Marks(**dict.fromkeys(names or (), True))
 
 
 @dataclass(frozen=True)
 class Legend:
-    """What the marks of a picture say.
+    """The words and numbers that the marks of a picture show.
 
     unit: of length. pose: its index, of `count`. time: the pose's, seconds.
     """
@@ -74,12 +74,12 @@ class Legend:
 
 
 class Canvas(Protocol):
-    """What marks are drawn with. Text is one line, `em` pixels high."""
+    """A surface that marks are drawn on. Text is one line, `em` pixels high."""
 
     em: float
 
     def width(self, text: str) -> float:
-        """Of a text, pixels."""
+        """Width of a text, pixels."""
 
     def text(self, left: float, top: float, text: str) -> None:
         """Write in INK."""
@@ -140,7 +140,7 @@ def stamp(legend: Legend) -> str:
 
 
 def text_height(size: tuple[int, int]) -> int:
-    """Of marks in a picture of (width, height) pixels: less in one that is small or narrow."""
+    """Height of marks' text in a picture of (width, height) pixels: less in one that is small or narrow."""
     extent = min(size[1], 0.75 * size[0])
     return max(1, round(max(extent / _LINES, min(_LEAST_TEXT, extent / 16))))
 
@@ -161,7 +161,7 @@ def draw(
 
 
 def scale_bar_box(canvas: Canvas, size: tuple[float, float], legend: Legend) -> Box:
-    """Where the scale bar's plate is."""
+    """The place of the scale bar's plate."""
     em = canvas.em
     _, pixels = scale_bar(legend.camera, size)
     width = max(round(pixels), canvas.width(_scale_text(canvas, size, legend))) + 2 * _PAD * em

@@ -29,7 +29,7 @@ def _linear_table() -> NDArray[np.float16]:
 
 @cache
 def _srgb8_table() -> NDArray[np.uint8]:
-    """By the bits of a half: a look-up is many times faster than a power for each pixel."""
+    """A table by the bits of a half: a look-up is many times faster than a power for each pixel."""
     with np.errstate(invalid="ignore"):  # of signalling NaN
         linear = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
     linear = np.clip(np.nan_to_num(linear), 0, 1)

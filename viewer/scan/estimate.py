@@ -135,7 +135,7 @@ def _facing(normals: Vectors, directions: NDArray[np.floating]) -> Vectors:
 
 
 def _seen_from(points: Vectors, reach: float) -> NDArray[np.float32]:
-    """For each point the sum of the directions from which nothing hides it, (N, 3)."""
+    """Sums for each point of the directions from which nothing hides it, (N, 3)."""
     center = np.median(points, axis=0)
     half = 2 * np.quantile(np.linalg.norm(points - center, axis=1), 0.98)  # strays beyond go to the rim
     cell = max(_CELL * reach, 2 * half / _GRID) or 1.0

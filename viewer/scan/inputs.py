@@ -20,14 +20,14 @@ def scan_inputs(timeline: Timeline) -> list[Path]:
 
 
 def found_among(paths: Iterable[Path], inputs: Iterable[Path]) -> list[Path]:
-    """Those of the paths that lead to one of the inputs, under whatever name: links as well."""
+    """The paths among these that lead to one of the inputs, under whatever name: links as well."""
     there = [(path, identity) for path in paths if (identity := _identity(path)) is not None]
     read = {_identity(path) for path in inputs} if there else set()
     return [path for path, identity in there if identity in read]
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
-    """What tells a file from all others; None where there is none."""
+    """Device and number that tell a file from all others; None where there is none."""
     with suppress(OSError):
         status = os.stat(path)
         return status.st_dev, status.st_ino

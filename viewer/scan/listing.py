@@ -34,7 +34,7 @@ class Listed:
 
 
 def list_folder(folder: Path | str) -> list[Listed]:
-    """What a folder offers: itself as one scan, folders, numbered sequences and files, each in natural order.
+    """Entries of a folder: itself as one scan, folders, numbered sequences and files, in natural order.
 
     Raises InputError where it cannot be listed.
     """
@@ -78,7 +78,7 @@ def scans_beside(scan: str) -> list[str]:
 
 
 def named_scans(names: Iterable[str]) -> tuple[list[str], list[InputError]]:
-    """Of the names of a user those that can be opened, and what is wrong with the others.
+    """The scans among a user's names that can be opened, and what is wrong with the others.
 
     A folder that is no scan itself stands for the scans in it.
     """

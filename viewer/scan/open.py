@@ -59,7 +59,7 @@ def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
 
 
 def find_source(path: str | os.PathLike[str]) -> FrameSource:
-    """Where the frames of the scan named `path` come from. Raises InputError."""
+    """Find where the frames of the scan named `path` come from. Raises InputError."""
     path = os.fspath(path)
     if path == DEMO:
         from .demo import DemoSource
@@ -161,7 +161,7 @@ def _nothing_there(path: str) -> InputError:
 
 
 def entries(folder: Path) -> list[Path]:
-    """What is in a folder, in no order. Raises InputError where it cannot be listed."""
+    """The contents of a folder, in no order. Raises InputError where it cannot be listed."""
     try:
         return list(folder.iterdir())
     except OSError as error:

@@ -142,7 +142,7 @@ class PointCloud:
         return np.where(longer > 0, longer, self.radii)
 
     def row_of(self, id: int) -> int | None:
-        """Where the arrays hold the point of this id; None where it is not there."""
+        """The row of the arrays that holds the point of this id; None where it is not there."""
         if self.ids is None:
             return id if 0 <= id < len(self) else None
         row = int(np.searchsorted(self.ids, id))
@@ -157,7 +157,7 @@ class PointCloud:
         return self.remember("bounds", self._find_bounds)
 
     def remember(self, key: str, make: Callable[[], T]) -> T:
-        """What `make` returned the first time for this key: small facts about the points."""
+        """Make a value once for this key and keep it: small facts about the points."""
         if key not in self._facts:
             self._facts[key] = make()
         return self._facts[key]
@@ -186,7 +186,7 @@ class PointCloud:
 
 
 def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:
-    """Which rows are finite in all columns, (N,) bool; None where all are.
+    """Mask of the rows that are finite in all columns, (N,) bool; None where all are.
 
     A coordinate of 1e18 or more counts as infinite: float32 cannot hold its square.
     """

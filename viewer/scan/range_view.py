@@ -108,7 +108,7 @@ class RangeView:
         return (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)
 
     def scaled(self, factor: float, unit: str) -> RangeView:
-        """The same view with all lengths times a factor, which makes them lengths in this unit."""
+        """Multiply all lengths by a factor, which makes them lengths in this unit."""
         to_camera = self.world_to_camera.copy()
         to_camera[:3, 3] *= factor
         depth = (self.depth * np.float64(factor)).astype(np.float32)
@@ -122,7 +122,7 @@ class RangeView:
         return np.linalg.inv(self.world_to_camera[:3, :3])
 
     def _from_eye(self) -> NDArray[np.float64]:
-        """From the pod to the point of each valid pixel in row order, along the world's axes, (N, 3)."""
+        """Offsets from the pod to the points of valid pixels in row order, along the world's axes, (N, 3)."""
         valid, turn = self.valid(), self._camera_to_world().T
         from_eye = np.empty((np.count_nonzero(valid), 3))
         done, height = 0, max(1, _AT_ONCE // valid.shape[1])

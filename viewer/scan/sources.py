@@ -24,11 +24,11 @@ FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces
 
 
 class FrameSource(Protocol):
-    """What a Timeline plays. Nothing is read before `load`, which several threads may call at once."""
+    """A source of frames for a Timeline. Nothing is read before `load`, which several threads may call."""
 
     @property
     def name(self) -> str:
-        """What a window's title calls the scan."""
+        """The name of the scan, as a window's title has it."""
 
     @property
     def unit(self) -> str | None:
@@ -55,7 +55,7 @@ class FrameSource(Protocol):
 
 
 class FileSequence:
-    """One frame a file, in the order given. paths: at least one."""
+    """A sequence of files, one frame each, in the order given. paths: at least one."""
 
     def __init__(self, paths: Sequence[Path], name: str) -> None:
         self.name = printable(name)
@@ -64,7 +64,7 @@ class FileSequence:
 
     @cached_property
     def unit(self) -> str | None:
-        """As the first file tells, where its format knows units."""
+        """The unit that the first file tells, where its format knows units."""
         try:
             return formats.read_unit(self.files[0])
         except InputError:  # asking for its pose will tell
@@ -78,7 +78,7 @@ class FileSequence:
         return printable(self.files[index].relative_to(self._folder).as_posix())
 
     def times(self) -> NDArray[np.float64] | None:
-        """From a times.csv beside the frames, or beside their folder where that is called `frames`."""
+        """Times of a times.csv beside the frames, or beside their folder where that is called `frames`."""
         if len(self) == 1:
             return None
         file = self._beside(TIMES_FILE)

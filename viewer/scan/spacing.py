@@ -78,7 +78,7 @@ def _spacings_at(points: NDArray[np.float32], rows: Sequence[int]) -> list[float
 
 
 def _spacing(distances: NDArray[np.float32]) -> float | None:
-    """From the squared distances to the nearest distinct points, ascending."""
+    """Spacings from the squared distances to the nearest distinct points, ascending."""
     k = min(_NEIGHBOR, len(distances))
     return float(np.sqrt(distances[k - 1] / (k / np.pi))) if k else None
 
@@ -90,7 +90,7 @@ def _distances(points: NDArray[np.float32], row: int, near: NDArray[np.intp]) ->
 
 
 def _nearest(points: NDArray[np.float32], rows: Sequence[int], count: int) -> list[NDArray[np.intp]]:
-    """For some points, the rows of the `count` points nearest to each, itself included, in any order.
+    """Rows of the `count` points nearest to each of some points, itself included, in any order.
 
     Each one's own surroundings in the file give a distance that nearly all others exceed, so that
     few remain to be compared with one another.
@@ -117,7 +117,7 @@ def _nearest(points: NDArray[np.float32], rows: Sequence[int], count: int) -> li
 def _least(
     rows: NDArray[np.intp], squared: NDArray[np.float32], count: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Those with the `count` least squared distances, in any order."""
+    """The entries with the `count` least squared distances, in any order."""
     kept = np.argpartition(squared, count - 1)[:count]
     return rows[kept], squared[kept]
 

@@ -263,7 +263,7 @@ class Timeline:
             del future  # it holds the pose
 
     def _next_task(self) -> tuple[int, bool] | None:
-        """What the worker should read, and whether it is read ahead or was requested; None: nothing."""
+        """The frame that the worker reads next, and whether ahead or as requested; None: nothing."""
         while self._requests:
             if self._is_missing(index := self._requests.pop()):
                 return index, False
@@ -274,7 +274,7 @@ class Timeline:
         return None
 
     def _upcoming(self) -> Iterator[int]:
-        """What playing reaches next and is missing, as far as the cache holds it; runs under the lock."""
+        """The missing frames that playing reaches next, as many as the cache holds; runs locked."""
         nearer_bytes = 0
         for step in range(len(self)):
             index = (self._playhead + self._direction * step) % len(self)
@@ -295,7 +295,7 @@ class Timeline:
         return (index - self._playhead) * self._direction % len(self)
 
     def _begin(self, index: int) -> Future[Pose]:
-        """From here on until `_load` is done, others wait for this future."""
+        """Have others wait for this future from here on, until `_load` is done."""
         future = self._loading[index] = Future()
         return future
 

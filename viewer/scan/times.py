@@ -112,7 +112,7 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _columns(path: Path, line: int, names: list[str]) -> tuple[int, int]:
-    """Where the frames and the times stand, from the row of names."""
+    """Places of the frames and the times, from the row of names."""
     frame = next((names.index(name) for name in ("file", "index") if name in names), None)
     if frame is None:
         raise _bad_row(path, line, "no column called 'file' or 'index'")

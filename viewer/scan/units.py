@@ -31,7 +31,7 @@ def is_length(name: str) -> bool:
 
 
 def conversion(given: str, wanted: str) -> float | None:
-    """What lengths in one unit are to be multiplied with; None where one of the two is no known length."""
+    """The factor from lengths in one unit to another; None where one of the two is no known length."""
     if given == wanted:
         return 1.0
     from_metres, to_metres = (_METRES.get(name.strip().replace("\u03bc", "µ")) for name in (given, wanted))

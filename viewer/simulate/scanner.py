@@ -29,7 +29,7 @@ _OUTLIERS = (0.5, 1.5)  # where they lie, in distances to the subject
 
 @dataclass(frozen=True)
 class Faults:
-    """What is wrong with what a pod measures.
+    """The faults of what a pod measures.
 
     noise: standard deviation of depth, scan units, where the surface faces the pod at the subject's distance.
     disparity: the step that disparity is rounded to, pixels; 0: exact. dropouts, outliers: fractions of the
@@ -109,7 +109,7 @@ def capture(
     frame: int = 0,
     unit: str = UNKNOWN_UNIT,
 ) -> tuple[RangeView, ...]:
-    """What each pod measures of one frame. size: (width, height), pixels. faults: one a pod.
+    """Measure one frame with each pod. size: (width, height), pixels. faults: one a pod.
 
     Depth is NaN and the mask False where nothing is measured; colour is that of the scene, confidence the
     cosine of the incidence. Raises InputError for sizes that are no picture or too large.

@@ -23,7 +23,7 @@ _TIMERS = {"query": "timer queries", "finish": "wall time between finishes"}
 
 
 def circumstances(rows: Sequence[Row]) -> Measurement:
-    """Where and how rows of one backend were measured. params: those that all have in common."""
+    """Place and manner of measuring rows of one backend. params: those that all have in common."""
     first, *others = rows
     params = first["params"].items()
     return {
@@ -82,7 +82,7 @@ def _paper() -> str:
 
 
 def _machine(measurement: Measurement, backend: str) -> str:
-    """Where and how a measurement was made."""
+    """Place and manner of a measurement, in words."""
     views = sorted(
         {len(row["gpu_ms"]) for row in measurement["rows"]}
     )  # fewer of a scan where it was stopped

@@ -58,7 +58,7 @@ _PICTURES = 4 << 20  # bytes of pictures in a page; more stay in their files
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands in a table: a text, a CSS class and a tooltip."""
+    """A cell of a table: a text, a CSS class and a tooltip."""
 
     text: str
     kind: str = ""
@@ -139,7 +139,7 @@ def three_digits(value: float) -> str:
 
 
 def about(rows: Sequence[Row]) -> list[tuple[str, str]]:
-    """What all of it was measured with: names and values, several where the rows differ."""
+    """Circumstances of the measuring: names and values, several where the rows differ."""
     fields = ("device", "driver", "timer", "size", "views", "seed", "version")
     return [
         (field, "; ".join(dict.fromkeys(_text(row.get(field, "unknown")) for row in rows)))
@@ -262,7 +262,7 @@ def _shown(metric: Metric, row: Row) -> str:
 
 
 def _notes(folder: Path) -> list[str]:
-    """What the run said that the numbers do not: scenes left out, that it was stopped."""
+    """Notes of the run that the numbers do not tell: scenes left out, that it was stopped."""
     path = folder / NOTES
     return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
 

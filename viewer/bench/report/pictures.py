@@ -34,7 +34,7 @@ _RANGE = 0.98  # the quantile of depth differences that the map ends at
 
 
 def picture_path(folder: Path, scene: str, backend: str) -> Path:
-    """Where the picture of a backend in a scene belongs, below a folder of results."""
+    """Path of the picture of a backend in a scene, below a folder of results."""
     safe = "".join(letter if letter.isalnum() or letter in "_-." else "-" for letter in scene)
     return folder / "pictures" / f"{safe}--{backend}.png"
 

@@ -166,7 +166,7 @@ def sweeps(rows: Sequence[Row]) -> list[list[Row]]:
 
 
 def distinct(rows: Iterable[Row], column: str) -> list[str]:
-    """What stands in a column, each once: backends by name between floor and ceiling, else as they come."""
+    """Values of a column, each once: backends by name between floor and ceiling, else as they come."""
     found = list(dict.fromkeys(row[column] for row in rows))
     if column == "backend":
         found.sort(key=rank)
@@ -174,7 +174,7 @@ def distinct(rows: Iterable[Row], column: str) -> list[str]:
 
 
 def magnitude(metric: Metric, row: Row) -> float:
-    """What is drawn of a metric: its value, of a signed one the magnitude."""
+    """The value of a metric as it is drawn: of a signed one the magnitude."""
     value = metric.of(row)
     return abs(value) if metric.best == "zero" else value
 

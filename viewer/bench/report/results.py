@@ -45,7 +45,7 @@ class Metric:
     best: str = "low"
 
     def of(self, row: Row) -> float:
-        """Its value in a row, the median of a spread; NaN where the row has none."""
+        """Value of the metric in a row, the median of a spread; NaN where the row has none."""
         if self.name == "prepare_ms":
             return sum(_number(row.get(part)) for part in ("derive_ms", "upload_ms"))
         return _number(row[self.name] if self.name in row else row["errors"].get(self.name))
@@ -136,7 +136,7 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 
 
 def _number(value: Any) -> float:
-    """Of a number, a spread (its median) or None (NaN)."""
+    """The number of a number, of a spread (its median) or of None (NaN)."""
     if isinstance(value, dict):
         value = value.get("median")
     return math.nan if value is None else float(value)
@@ -228,7 +228,7 @@ def row_title(row: Row) -> str:
 
 
 def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
-    """What got slower or worse, then faster or better, then what cannot be compared; a line each.
+    """Lines on what got slower or worse, then faster or better, then on what cannot be compared.
 
     Slower: by 10 % in the median of the views, and in 95 % of them. Preparations, which are not the views',
     are slower where each median is outside the other's 5th to 95th percentile. Worse: an error that grew by

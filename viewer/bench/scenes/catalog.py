@@ -39,7 +39,7 @@ Sweep = Literal["n", "noise"]  # what may vary of a scene
 
 @dataclass(frozen=True)
 class _Request:
-    """What is asked for. paths: what the scene needs; noise: in pixel footprints of the scanner."""
+    """A scene that is asked for. paths: what it needs; noise: in pixel footprints of the scanner."""
 
     name: str
     paths: tuple[Path, ...]
@@ -180,7 +180,7 @@ def _phone(request: _Request) -> Subject:
 
 
 def _simulated(name: str, scene: _Scene) -> _Scene:
-    """What a virtual scanner, four pods all round, sees of another scene."""
+    """A scene of what a virtual scanner, four pods all round, sees of another scene."""
 
     def make(request: _Request) -> Subject:
         return simulated(scene.make(replace(request, name=name)), request.noise, request.seed)
@@ -290,7 +290,7 @@ def _scene(name_or_file: str) -> _Scene:
 
 
 def _missing(scene: _Scene, data: Path | None) -> str:
-    """What a scene lacks; "": nothing."""
+    """The files that a scene lacks; "": none."""
     for need in scene.needs:
         if data is None:
             return f"needs {need} of the data folder"

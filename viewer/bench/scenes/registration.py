@@ -17,14 +17,14 @@ _STILL = 1e-6  # a step that moves nothing any more: radians, and scan units
 
 @dataclass(frozen=True, eq=False)
 class OrientedPoints:
-    """What is registered to. positions, normals: (N, 3), normals of unit length."""
+    """Points that others are registered to. positions, normals: (N, 3), normals of unit length."""
 
     positions: Rays
     normals: Rays
 
     @cached_property
     def tree(self) -> Any:
-        """For the nearest of its points."""
+        """A tree that finds the nearest of its points."""
         from scipy.spatial import cKDTree
 
         return cKDTree(self.positions)

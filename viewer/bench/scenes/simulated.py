@@ -46,5 +46,5 @@ def _framed(subject: Subject) -> Bounds:
 
 
 def _footprint(pod: Camera) -> float:
-    """What a pixel covers at the subject's distance, scan units."""
+    """Width of a pixel at the subject's distance, scan units."""
     return pod.view_height / _SIZE[1]

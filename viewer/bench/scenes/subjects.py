@@ -35,7 +35,7 @@ class Moment:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Subject:
-    """What a benchmark scans, at one or more moments; they are loaded when asked for.
+    """A subject of the benchmark, at one or more moments, which are loaded when asked for.
 
     moments: how many. load: makes one. noise: the standard deviation of depth that a virtual scanner
     added, in footprints of its pixels. up: the axis that is up in pictures, such as '+y'. tolerance: how
@@ -67,7 +67,7 @@ class Subject:
         return digest.hexdigest()[:16]
 
     def carry(self, source: int, target: int, reference: Reference) -> Rays | None:
-        """Where the hits of a reference picture of one moment are at another, (N, 3).
+        """Move the hits of a reference picture of one moment to where they are at another, (N, 3).
 
         Relative to the origin of the other's truth, in the order of the covered pixels. None where that
         is not known: where the faces of the two moments are not the same.

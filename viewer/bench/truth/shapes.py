@@ -35,7 +35,7 @@ class AnalyticSurface(ABC):
 
     @abstractmethod
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """Where rays (N, 3) first meet it, (N,), in steps; +inf: nowhere."""
+        """Distances at which rays (N, 3) first meet it, (N,), in steps; +inf: nowhere."""
 
     @abstractmethod
     def normal(self, points: Rays) -> Rays:
@@ -61,7 +61,7 @@ class AnalyticScene:
         return Bounds((centers - reach).min(axis=0), (centers + reach).max(axis=0))
 
     def cast(self, starts: Rays, steps: Rays) -> Hits:
-        """See `Scene.cast`."""
+        """Cast rays as `Scene.cast` does."""
         hits = Hits.none(len(starts))
         for number, shape in enumerate(self.shapes):
             local = starts - (np.array(shape.center) - self.origin)
@@ -145,7 +145,7 @@ class Cuboid(AnalyticSurface):
         return float(np.linalg.norm(self.half))
 
     def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `AnalyticSurface`. Slabs (Kay and Kajiya 1986)."""
+        """Distances along rays, by slabs (Kay and Kajiya 1986)."""
         with np.errstate(over="ignore"):
             inverse = 1 / np.where(steps == 0, 1e-300, steps)
             low, high = (-np.array(self.half) - starts) * inverse, (np.array(self.half) - starts) * inverse
@@ -231,7 +231,7 @@ def first_zero(
     reach: float,
     caution: float = 1.0,
 ) -> NDArray[np.float64]:
-    """Where rays first cross an implicit surface in the ball of radius `reach` about zero, (N,), in steps.
+    """Distances to an implicit surface in the ball of radius `reach` about zero, along rays, (N,), in steps.
 
     Sphere tracing (Hart 1996) that never steps less than a thousandth of `reach`, so that it ends by
     crossing, and then closes in on the zero. caution: the share of the value that is safe to step.

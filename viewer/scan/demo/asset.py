@@ -29,7 +29,7 @@ class RestPoints:
 
 
 def asset_path() -> Path:
-    """Where the points are shipped."""
+    """Path of the points that are shipped."""
     return resource_path("assets", "demo_head.npz")
 
 

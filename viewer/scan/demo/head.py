@@ -41,7 +41,7 @@ def skin(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
 
 
 def eyes(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
-    """Both eyeballs, with the flesh of the corners of the eye; negative inside."""
+    """The two eyeballs, with the flesh of the corners of the eye; negative inside."""
     side = np.absolute(x)
     ball = length(side - EYE[0], y - EYE[1], z - EYE[2]) - EYE_RADIUS
     return union(ball, ellipsoid(side, y, z, (30.5, 10.0, 62.0), (15.2, 7.5, 10.8)), 1.0)
@@ -67,7 +67,7 @@ def lid_margins(side: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def hair_region(side: Scalar, y: Scalar, z: Scalar) -> Scalar:
-    """Where the scalp bears hair: negative inside, in mm from the hairline."""
+    """The region where the scalp bears hair: negative inside, in mm from the hairline."""
     peak = 4.0 * bump(side, y, z, (0.0, 70.0, 75.0), (14.0, 20.0, 30.0))
     temple = 9.0 * bump(side, y, z, (46.0, 64.0, 58.0), (15.0, 18.0, 22.0))
     crown = 0.75 * (30.0 + 43.0 * ramp(z, 22.0, 84.0) + temple - peak - y)
@@ -103,7 +103,7 @@ def mouth_void(side: Scalar, y: Scalar, z: Scalar) -> Scalar:
 
 
 def teeth(side: Scalar, y: Scalar, z: Scalar) -> Scalar:
-    """Both rows, the lower one behind the upper one."""
+    """The two rows of teeth, the lower one behind the upper one."""
     sheet = mouth_sheet(side, z)
     depth = z - 80.0 + 0.026 * np.square(side)
     gaps = 0.35 * np.exp(-8.0 * np.square(np.sin(0.39 * side)))

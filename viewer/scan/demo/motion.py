@@ -52,7 +52,7 @@ class Twist:
         return moved, _rotate(self.axis, bent / stretch, angle), stretch
 
     def undo(self, points: NDArray, amount: float) -> NDArray:
-        """Where moved points (3, N) came from, (3, N), by bisection along their circles."""
+        """Points from which moved points (3, N) came, (3, N), by bisection along their circles."""
         center = _column(self.center, points)
         arm = points - center
         low, high = np.zeros(points.shape[1]), np.ones(points.shape[1])
@@ -154,7 +154,7 @@ def _twisted(
 
 
 def rest_of(points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-    """Where the skin at points (3, N) of a moment is at rest, (3, N): the inverse of `move`."""
+    """Places at rest of the skin at points (3, N) of a moment, (3, N): the inverse of `move`."""
     mirror = _mirror(points)
     points = points * mirror
     for twist, amount in reversed(amounts(time)):

@@ -45,13 +45,13 @@ def limb(
 
 
 def union(a: Scalar, b: Scalar, blend: float) -> Scalar:
-    """Both solids, their seam filled where they are within `blend` of each other (C2)."""
+    """The union of two solids, their seam filled where they are within `blend` of each other (C2)."""
     near = np.maximum(1.0 - np.absolute(a - b) / blend, 0.0)
     return np.minimum(a, b) - np.square(near) * near * (blend / 6.0)
 
 
 def intersection(a: Scalar, b: Scalar, blend: float) -> Scalar:
-    """What both solids share, its edge rounded over `blend`."""
+    """The intersection of two solids, its edge rounded over `blend`."""
     return -union(-a, -b, blend)
 
 
@@ -72,6 +72,6 @@ def bump(x: Scalar, y: Scalar, z: Scalar, center: Triple, widths: Triple) -> Sca
 
 
 def ramp(value: Scalar, low: float, high: float) -> Scalar:
-    """From 0 at `low` to 1 at `high`, smoothly."""
+    """A smooth ramp from 0 at `low` to 1 at `high`."""
     part = np.minimum(np.maximum((value - low) / (high - low), 0.0), 1.0)
     return np.square(part) * (3.0 - 2.0 * part)

@@ -122,7 +122,7 @@ def read_faces(path: Path | str, frame: int = 0) -> Faces:
 
 
 def frames(path: Path | str) -> Callable[[int], Scanned]:
-    """What reads the frames of one file, as `read` does, several of them in less time. Raises InputError."""
+    """A function that reads frames of one file as `read` does, several in less time. Raises InputError."""
     path = Path(path)
     module = _readable(path)
     if not hasattr(module, "Frames"):

@@ -11,7 +11,7 @@ _LAYOUTS = ((4, 4), (3, 4), (3, 3))  # of a matrix, the most certain one first
 
 
 def camera_matrices(table: NDArray[np.float64]) -> str | None:
-    """What a table without names, (N, C), is made of, where that is camera matrices; None where it is not.
+    """The matrices of a table without names, (N, C), that is made of camera matrices; None where it is not.
 
     They stand one below the other, or a row each. Poses are rotations with a translation beside them;
     intrinsics have focal lengths and the last row 0, 0, 1. Three or four points may happen to be

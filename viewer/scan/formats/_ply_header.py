@@ -66,7 +66,7 @@ class Element:
 
     @property
     def layout(self) -> Layout:
-        """What a row with lists is made of, property by property."""
+        """The layout of a row with lists, property by property."""
         of_items = [np.dtype(TYPES[p.type]).itemsize for p in self.properties]
         of_lengths = [
             np.dtype(TYPES[p.length_type]).itemsize if p.length_type else 0 for p in self.properties
@@ -80,7 +80,7 @@ class Element:
 
 
 class Layout(NamedTuple):
-    """What a binary row is made of, property by property.
+    """The layout of a binary row, property by property.
 
     sizes: (P,), bytes of the number, or of each in its list. lengths: (P,), bytes of the length in front of
     the list, 0: no list. signed: (P,), whether that length may be negative.

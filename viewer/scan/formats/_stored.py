@@ -60,12 +60,12 @@ class StoredArray:
 
     @property
     def nbytes(self) -> int:
-        """Of all values."""
+        """Bytes of all values."""
         return math.prod(self.shape) * self.dtype.itemsize
 
     @property
     def sequence(self) -> tuple[int, ...]:
-        """Of positions: (T,) where they are (T, N, 3), () where they are (N, 3). Else raises InputError."""
+        """Shape of a sequence: (T,) for positions (T, N, 3), () for (N, 3). Raises InputError for others."""
         self._check_type()
         if len(self.shape) not in (2, 3) or self.shape[-1] != 3:
             raise InputError(

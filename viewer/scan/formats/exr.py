@@ -79,7 +79,7 @@ class _OfOthers:
         self._stream, self._thread = stream, get_ident()
 
     def write(self, text: str) -> int:
-        """As a text stream does."""
+        """Write as a text stream does."""
         return len(text) if get_ident() == self._thread else self._stream.write(text)
 
     def __getattr__(self, name: str) -> Any:
@@ -109,7 +109,7 @@ def _headers(stream: BinaryIO) -> list[dict[str, Any]]:
 
 @contextmanager
 def _file(stream: BinaryIO, **how: bool) -> Iterator[Any]:
-    """What OpenEXR reads from the beginning of a stream; of names, it would take UTF-8 alone."""
+    """A file that OpenEXR reads from the beginning of a stream; of names, it would take UTF-8 alone."""
     import OpenEXR
 
     stream.seek(0)

@@ -102,7 +102,7 @@ def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
 def _shifted(
     positions: NDArray, stored: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """By how much, (3,), the stored origin is moved, so that float32 holds offsets from it, and where to.
+    """The move, (3,), of the stored origin with which float32 holds offsets from it, and where to.
 
     One that the positions are near to stays as it is.
     """

@@ -93,7 +93,7 @@ def _normals(text: TextIOWrapper, count: int) -> NDArray[np.float64] | None:
 
 
 def _lines(text: TextIOWrapper, keyword: str) -> Iterator[str]:
-    """What follows the keyword, of every line that starts with it; from the beginning of the file."""
+    """The rest of every line that starts with the keyword; from the beginning of the file."""
     starts = (keyword + " ", keyword + "\t")
     text.seek(0)
     for line in bounded_lines(text):

@@ -155,7 +155,7 @@ def _read_ascii(stream: BinaryIO, element: Element, encoding: str) -> Columns:
 
 
 def _walk_lines(lines: Iterable[str], element: Element) -> NDArray[np.float64]:
-    """What is no list of each row, (N, C); a row a line."""
+    """The numbers of each row that are in no list, (N, C); a row a line."""
     values, rows = array("d"), 0
     for row, line in enumerate(lines):
         if row % _ROWS_AT_ONCE == 0:

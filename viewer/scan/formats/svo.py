@@ -133,7 +133,7 @@ def _cube_for(cloud: PointCloud, cube: Cube | None) -> Cube:
 
 
 class _Place(NamedTuple):
-    """Where an octree is in the file. size: with its header, as far as the file reaches."""
+    """Place of an octree in the file. size: with its header, as far as the file reaches."""
 
     offset: int
     size: int

@@ -31,7 +31,7 @@ _NAMES_HELP = "Where they are points, put a line of names above them, such as: x
 
 @dataclass(frozen=True)
 class _Layout:
-    """What stands above the rows and how they are written."""
+    """The head of a file: what stands above the rows and how they are written."""
 
     skip: int  # lines above the first row
     columns: list[int]  # that are numbers

@@ -21,7 +21,7 @@ def attributes_of(
     ends: NDArray[np.uint8],
     counts: NDArray[np.int64],
 ) -> tuple[Attributes, ...]:
-    """For each level of a tree, from its points in their order (`build.Sorted`).
+    """Attributes of each level of a tree, from its points in their order (`build.Sorted`).
 
     ends: (N,), the level of each point's leaf. counts: (depth + 1,), the nodes of each level. Colours are
     means of the stored values, rounded half up; normals means of unit normals, summed in fixed point. Neither

@@ -24,7 +24,7 @@ _PARTS = 8  # for each thread, as they are of all sizes
 
 @dataclass(frozen=True)
 class Stop:
-    """Where subdivision ends. Raises InputError where a value is out of its range."""
+    """A rule where subdivision ends. Raises InputError where a value is out of its range."""
 
     rule: str = param(
         "delta",

@@ -27,7 +27,7 @@ _LZMA = {
 
 
 def pack(values: Bytes) -> bytes:
-    """As LZMA without a header; as they are where that is not shorter, or beyond `MOST_RATIO`."""
+    """Pack bytes as LZMA without a header; as they are where that is not shorter, or beyond `MOST_RATIO`."""
     plain = values.tobytes()
     packed = lzma.compress(plain, format=lzma.FORMAT_RAW, filters=[_LZMA])
     return packed if len(plain) <= MOST_RATIO * len(packed) and len(packed) < len(plain) else plain
@@ -58,7 +58,7 @@ class MaskCoder:
         self._counterparts = np.zeros(root, np.int32)  # the same octants in the tree before
 
     def sort(self, masks: Bytes, told: bool) -> Bytes:
-        """What is stored of this level, (n,). told: by the tree before."""
+        """Order the masks of this level as they are stored, (n,). told: by the tree before."""
         known, order = self._known(told)
         return (masks ^ known)[order]
 
@@ -90,7 +90,7 @@ class MaskCoder:
 
 
 def differences(values: Bytes, above: Bytes, masks: Bytes) -> Bytes:
-    """What is stored of (n, k) bytes of a level: how siblings differ from their parents, by columns.
+    """Differences that are stored of (n, k) bytes of a level: of siblings from their parents, by columns.
 
     above: (m, k), the parents'. masks: (m,). An only child has the points of its parent and so
     its values, which are not stored.

@@ -29,7 +29,7 @@ def compiled(function: F) -> F:
 
 
 class _Kept(FunctionCache):
-    """What was compiled, on disk: a damaged file is none, one that cannot be written is passed over."""
+    """A cache on disk of what was compiled: damaged files are none, unwritable ones are passed over."""
 
     def load_overload(self, *args: Any) -> Any:
         try:

@@ -17,7 +17,7 @@ _STEP_BITS = 20  # a cell of level 21 is so many bits of steps, see `Grid`
 
 
 class Cube(NamedTuple):
-    """Where an octree lies. low: (3,) float64, absolute; edge: both in scan units."""
+    """The cube of an octree. low: (3,) float64, absolute; edge: both in scan units."""
 
     low: NDArray[np.float64]
     edge: float
@@ -44,7 +44,7 @@ class Cube(NamedTuple):
         return cls.around(_sum_below(low, cloud.origin), -_sum_below(-high, -cloud.origin))
 
     def checked(self, cloud: PointCloud) -> Cube:
-        """This cube, its edge made a number of few bits; raises InputError where points lie outside."""
+        """The cube with its edge made a number of few bits; raises InputError where points lie outside."""
         if not (math.isfinite(self.edge) and self.edge > 0 and np.isfinite(self.low).all()):
             raise InputError(f"an octree's cube has an edge of {self.edge} from {self.low}")
         cell = 2**DEEPEST * _step(self.edge)

@@ -59,7 +59,7 @@ def leaf_points(octree: Octree) -> PointCloud:
 
 
 def closing_levels(octree: Octree) -> list[Bytes]:
-    """For each level, (n,): the level of the octant around each node that is as large as the gaps beside it:
+    """Levels for each level, (n,): of the octant around each node that is as large as the gaps beside it:
     nodes that are drawn so large close the surface, however small they are themselves."""
     return [_not_much_coarser(found) for found in _touching_levels(octree)]
 
@@ -69,7 +69,7 @@ def _not_much_coarser(found: NDArray) -> NDArray:
 
 
 def _touching_levels(octree: Octree) -> list[Bytes]:
-    """For each level, (n,): the deepest level at which a node, or one around it, touches enough others."""
+    """Levels for each level, (n,): the deepest at which a node, or one around it, touches enough others."""
     neighbors = Neighbors(int(octree.counts[0]))
     levels = [np.zeros(int(octree.counts[0]), np.uint8)]
     for number, masks in enumerate(octree.masks, 1):

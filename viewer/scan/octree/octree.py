@@ -20,7 +20,7 @@ _TOGETHER = (  # shifts and masks that bring every third bit together
 
 @dataclass(frozen=True, eq=False)
 class Attributes:
-    """What the nodes of one level show, means over all points below each.
+    """Attributes of the nodes of one level, means over all points below each.
 
     colors:  (n, 4) uint8, sRGB and alpha, or None
     normals: (n, 3) float32, unit length, or None; 0 where normals cancel
@@ -85,7 +85,7 @@ class Octree:
 
     @cached_property
     def first_child(self) -> tuple[NDArray[np.uint32], ...]:
-        """For each level above the deepest, (n,): where in the next level each node's children begin."""
+        """Rows for each level above the deepest, (n,): where in the next level each node's children begin."""
         ends = [np.cumsum(np.bitwise_count(masks), dtype=np.uint32) for masks in self.masks]
         return tuple(np.concatenate([np.zeros(1, np.uint32), end[:-1]]) for end in ends)
 

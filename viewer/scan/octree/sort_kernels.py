@@ -117,7 +117,7 @@ def _insertion_sort(codes: NDArray[np.uint64], rows: NDArray[np.uint32]) -> None
 
 @compiled
 def _first_digit(codes: NDArray[np.uint64]) -> tuple[np.uint64, int]:
-    """Where the highest bits that differ begin, and how many of them to divide by; 0: codes are equal."""
+    """Place of the highest bits that differ, and how many of them to divide by; 0: codes are equal."""
     differing = np.uint64(0)
     for i in range(len(codes)):
         differing |= codes[i] ^ codes[0]

@@ -37,7 +37,7 @@ LARGEST_HEADER = _FIXED.size + _MOST_UNIT + (DEEPEST + 1) * _LEVEL.size + _CHECK
 
 @dataclass(frozen=True)
 class Level:
-    """What a header says of a level: its nodes, bytes of masks and of attributes, CRC-32 of both.
+    """The entry of a level in a header: its nodes, bytes of masks and of attributes, CRC-32 of both.
 
     The masks are those of the level above, which tell where these nodes are.
     """
@@ -50,7 +50,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Header:
-    """What stands before the levels of a tree.
+    """The header of a tree, which stands before its levels.
 
     flags: 1: packed, 2: with colours, 4: with normals. before: how many trees have to be read before this
     one, each told by the one before it; 0: it stands alone. told: bit n: the masks of level n are told by the
@@ -79,7 +79,7 @@ class Header:
         return 4 * bool(self.flags & _COLORS) + 2 * bool(self.flags & _NORMALS)
 
     def to_bytes(self) -> bytes:
-        """As it stands before the levels."""
+        """The bytes that stand before the levels."""
         unit = self.unit.encode()
         kind = (MAGIC, VERSION, self.flags, self.before, len(self.levels) - 1, len(unit), 0)
         place = (self.told, self.time, *self.low.tolist(), self.edge, self.points, self.distinct)
@@ -209,7 +209,7 @@ def _same_cube(one: Octree | Header, other: Octree) -> bool:
 
 
 def _whole_levels(header: Header, data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """What is stored of each level, masks and attributes, as far as there are bytes."""
+    """Stored bytes of each level, masks and attributes, as far as there are any."""
     at = 0
     for number, level in enumerate(header.levels):
         if at == len(data) and number:
@@ -227,7 +227,7 @@ def _whole_levels(header: Header, data: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _store_masks(octree: Octree, previous: Octree | None, packed: bool) -> tuple[list[bytes], int]:
-    """What is stored of each level above the deepest; bit n: level n is told by the tree before."""
+    """Stored masks of each level above the deepest; bit n: level n is told by the tree before."""
     if not packed:
         return [masks.tobytes() for masks in octree.masks], 0
     coder = MaskCoder(int(octree.counts[0]), previous.masks if previous else ())

@@ -19,7 +19,7 @@ _CHUNK = 1 << 16  # nodes between two looks at the clock, about half a milliseco
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a cut has to know of a camera, in absolute scan units.
+    """A camera as a cut needs it, in absolute scan units.
 
     eye:         (3,) float64
     axes:        (3, 3) float64: the picture's right, up and backward axes, world to view
@@ -98,7 +98,7 @@ class _Nodes:
 
     @classmethod
     def room(cls, count: int) -> _Nodes:
-        """For so many."""
+        """Nodes with room for so many."""
         return cls(np.empty(count, np.uint64), np.empty(count, np.uint32))
 
     def __len__(self) -> int:
@@ -257,7 +257,7 @@ class Traversal:
             self._done.append((level, shown.part(0, kept)))
 
     def _lens(self) -> tuple[bool, float, float, float, float]:
-        """See `cut_kernels.descend`; the least size is 0, and not asked about, where no node is so small."""
+        """The camera as `cut_kernels.descend` takes it; least size 0: no node is so small."""
         least = self._threshold if self.octree.size(self._level) < self._least else 0.0
         return self._perspective, self._scale, self._near, least, self._margin
 

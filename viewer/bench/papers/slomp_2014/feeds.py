@@ -25,17 +25,17 @@ _FIRST = "gs"  # what the others are compared with
 
 @dataclass(frozen=True)
 class FeedTable:
-    """Which table it is. theirs: its name in the paper's figures. about: what to say of a scan."""
+    """A table of feeds. theirs: its name in the paper's figures. about: what to say of a scan."""
 
     theirs: str
     about: Callable[[Scan], str]
 
     def milliseconds(self, measurements: Sequence[Measurement]) -> str:
-        """In Markdown: the mean over the views of the time that each feed takes."""
+        """A Markdown table of the mean over the views of the time that each feed takes."""
         return self._table(measurements, lambda line, feed: line.text(line.times[feed].mean()))
 
     def ratios(self, measurements: Sequence[Measurement]) -> str:
-        """In Markdown: how many times as long as the first feed each takes, the median over the views."""
+        """A Markdown table of each feed's time in times of the first feed's, the median over the views."""
         return self._table(measurements, _ratio)
 
     def _table(self, measurements: Sequence[Measurement], cell: Callable[[_Line, str], str]) -> str:
@@ -92,12 +92,12 @@ def scan_title(scan: Scan) -> str:
 
 
 def of_scan(rows: Sequence[dict[str, Any]], scan: Scan) -> list[dict[str, Any]]:
-    """What a measurement has of a scan."""
+    """The rows of a measurement that are of a scan."""
     return [row for row in rows if row["scene"] == scan.scene and scan.points in (None, row["n"])]
 
 
 def digest(rows: Sequence[Row], backend: str, suite: str) -> Measurement:
-    """What the tables need of a run: how it was measured, and the times of each view.
+    """The part of a run that the tables need: how it was measured, and the times of each view.
 
     Raises InputError where the rows are of another suite.
     """
@@ -121,7 +121,7 @@ def digest(rows: Sequence[Row], backend: str, suite: str) -> Measurement:
 
 
 def times(row: Row) -> dict[str, list[float]]:
-    """Of each view, ms."""
+    """Times of each view, ms."""
     return {kind: [round(ms, 2) for ms in row["times_by_view"][kind]] for kind in ("gpu_ms", "busy_ms")}
 
 

@@ -40,7 +40,7 @@ _DRACO_LEVEL = 10  # its best
 
 @dataclass(frozen=True)
 class Sizes:
-    """One pose under one stop rule.
+    """Sizes of one pose under one stop rule.
 
     points: of the pose. depth, leaves, loss: of its octree. psnr: `d1_psnr` of the leaves' middles, dB.
     bits: for each point, by method: "masks" one byte for each inner node; "intra" the octree alone; "inter"

@@ -46,7 +46,7 @@ def write_octree_tables(folder: Path) -> Path:
 
 
 def digest(drawn: Sequence[Row], trees: Sequence[Row], sizes: Sequence[Row]) -> Measurement:
-    """What the page needs of a run: of pictures, of trees built and cut, of sizes on disk.
+    """The part of a run that the page needs: of pictures, of trees built and cut, of sizes on disk.
 
     Raises InputError where the rows are of another suite.
     """
@@ -67,7 +67,7 @@ def read_measurement(path: Path) -> Measurement:
 
 
 def _tree(row: Row) -> dict[str, Any]:
-    """Of a scan at one delta."""
+    """Values of a scan's trees at one delta."""
     kept = ("scene", "n", "delta", "poses", "depths")
     return {
         **{name: row[name] for name in kept},
@@ -80,7 +80,7 @@ def _tree(row: Row) -> dict[str, Any]:
 
 
 def _level(row: Row) -> dict[str, Any]:
-    """Of a scene down to one level."""
+    """Values of a scene down to one level."""
     return {
         "scene": row["scene"],
         "n": row["n"],

@@ -62,7 +62,7 @@ def depth_of(scan: Scan) -> int:
 
 @dataclass
 class _Found:
-    """What was found of one scan at one delta. trees, cut: a value for each pose; ms: one for each round."""
+    """Measurements of one scan at one delta. trees, cut: a value for each pose; ms: one for each round."""
 
     trees: list[Octree] = field(default_factory=list)
     cut: list[int] = field(default_factory=list)
@@ -131,7 +131,7 @@ def _measure(cloud: PointCloud, camera: Camera, delta: float, bench: Bench, foun
 
 
 def _works(cloud: PointCloud, tree: Octree, sight: Sight, stop: Stop) -> dict[str, Callable[[], int]]:
-    """What is timed, by name (`WORKS`); each gives how many nodes or points there are."""
+    """The works that are timed, by name (`WORKS`); each gives how many nodes or points there are."""
     if cloud.colors is None:  # which ones does not matter
         cloud = replace(cloud, colors=np.full((len(cloud), 4), 128, np.uint8))
     codes = _codes(cloud)
