@@ -14,9 +14,10 @@ from viewer.backends import points as plain
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.params import param
-from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 
 TITLE = "Filling"
+FILLS = True
 SHADER = str(Path(__file__).with_suffix(".comp").resolve())
 BACKEND = Backend("filling", sys.modules[__name__])
 CHANNELS = ("color", "normal", "value")
@@ -30,7 +31,7 @@ class Params(plain.Params):
     blends: bool = param(True, "Fill with what is around; off: with a depth alone")
 
 
-def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
     """Nothing but positions."""
     return ()
 

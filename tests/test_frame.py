@@ -10,7 +10,7 @@ import pytest
 from scenes import NOTHING, sphere
 
 import viewer
-from viewer.backends import Backend
+from viewer.backends import Backend, FrameView
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -23,7 +23,9 @@ from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.task import checkpoint
+from viewer.view import View
 
+SIZE = (64, 48)
 BARE = PointCloud.from_arrays(sphere(4000).positions)
 
 
@@ -45,11 +47,11 @@ def test_render_takes_parameters_by_name_and_explains_wrong_ones() -> None:
 
 
 def test_the_default_follows_what_the_scan_stores() -> None:
-    assert choose(sphere(10))[0] == "surfels"
-    assert choose(BARE)[0] == "points"
-    assert choose(BARE)[1].point_size == 0
-    assert choose(BARE, "points")[1].point_size == 1
-    assert choose(BARE, None, {"point_size": "3"})[1].point_size == 3
+    assert choose(_of(sphere(10)))[0] == "surfels"
+    assert choose(_of(BARE))[0] == "points"
+    assert choose(_of(BARE))[1].point_size == 0
+    assert choose(_of(BARE), "points")[1].point_size == 1
+    assert choose(_of(BARE), None, {"point_size": "3"})[1].point_size == 3
     assert viewer.render(sphere(10), size=(8, 8)).stats.backend == "surfels"
     assert viewer.render(BARE, size=(8, 8)).stats.backend == "points"
 
@@ -103,9 +105,20 @@ class _Uploaded:
         self.released = True
 
 
-def every_nth(cloud: PointCloud, params: _Params) -> tuple[np.ndarray, int]:
+def every_nth(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
     """Every n-th position, and the process that looked for them."""
-    return cloud.positions[:: params.step], os.getpid()
+    return pose.cloud.positions[:: params.step], os.getpid()
+
+
+def _of(cloud: PointCloud) -> Pose:
+    return Pose(0, 0.0, "x", cloud)
+
+
+def _view(azimuth: float = 0.0, size: tuple[int, int] = SIZE) -> View:
+    return View.of(Camera.orbit(BARE.bounds(), azimuth), size, BARE.origin, BARE.bounds())
+
+
+VIEW = _view()
 
 
 @pytest.fixture
@@ -115,7 +128,7 @@ def deriving() -> Backend:
     vars(module).update(
         TITLE="Deriving",
         Params=_Params,
-        needs=lambda cloud, params: (),
+        needs=lambda pose, params: (),
         derive=every_nth,
         upload=lambda gpu, arrays: _Uploaded(arrays),
     )
@@ -126,10 +139,11 @@ def test_derived_data_is_made_once_counted_and_evicted(renderer: Renderer, deriv
     own = Renderer(renderer.gpu, budget_bytes=1)
     pose = Pose(0, 0.0, "x", sphere(1000))
     resident = own.resident(pose)
-    first = own.prepare(resident, deriving, _Params(), Look(), wait=True)
+    first = own.prepare(resident, deriving, _Params(), Look(), wait=True, view=VIEW)
     assert first is not None
-    assert own.prepare(resident, deriving, _Params(shade=5), Look(), wait=True) is first, "draws only"
-    other = own.prepare(resident, deriving, _Params(step=5), Look(), wait=True)
+    drawn_alike = own.prepare(resident, deriving, _Params(shade=5), Look(), wait=True, view=VIEW)
+    assert drawn_alike is first
+    other = own.prepare(resident, deriving, _Params(step=5), Look(), wait=True, view=VIEW)
     assert other is not None
     assert first.derived.process == other.derived.process == os.getpid()
     assert own.nbytes == first.derived.nbytes + other.derived.nbytes == 12 * (500 + 200)
@@ -139,25 +153,95 @@ def test_derived_data_is_made_once_counted_and_evicted(renderer: Renderer, deriv
     own.release()
 
 
+def nearer_half(pose: Pose, params: _Params, view: View) -> tuple[np.ndarray, int]:
+    """The positions of the half that is nearer to the eye."""
+    depths = view.depths(pose.cloud.positions)
+    return pose.cloud.positions[depths <= np.median(depths)], os.getpid()
+
+
+def test_what_is_derived_by_camera_is_kept_for_the_last_views(renderer: Renderer, deriving: Backend) -> None:
+    vars(deriving.module).update(DERIVED_BY_CAMERA=True, derive=nearer_half)
+    own, pose = Renderer(renderer.gpu), _of(sphere(1000))
+    resident, views = own.resident(pose), [_view(azimuth) for azimuth in range(0, 60, 10)]
+
+    def derived(view: View, **params: int) -> _Uploaded:
+        prepared = own.prepare(resident, deriving, _Params(**params), Look(), wait=True, view=view)
+        assert prepared is not None
+        assert isinstance(prepared.derived, _Uploaded)
+        return prepared.derived
+
+    first = [derived(view) for view in views[:4]]
+    assert len({one.array.tobytes() for one in first}) == 4
+    assert derived(_view(0)) is first[0], "an equal view"
+    assert own.nbytes == 4 * 12 * 500
+    assert own.is_prepared(pose, deriving, _Params(), Look(), views[1])
+    assert not own.is_prepared(pose, deriving, _Params(), Look(), _view(0, size=(65, 48)))
+    derived(views[4])
+    assert [one.released for one in first] == [False, True, False, False], "the one that was used longest ago"
+    other = derived(views[0], step=5)
+    assert not any(one.released for one in (first[0], other)), "others are kept for other parameters"
+    assert own.nbytes == 5 * 12 * 500
+    own.release()
+    assert first[0].released
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a backend was told, and draws nothing."""
+
+    frames: list[FrameView]
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        self.frames.append(frame)
+        surface.clear()
+        return False
+
+
+def test_a_backend_is_told_what_changed_and_whether_more_will_follow(renderer: Renderer) -> None:
+    module, told = ModuleType("told"), _Told([])
+    vars(module).update(Params=_Params, needs=lambda pose, params: (), draw=told.draw)
+    listening, surface = Backend("told", module), Surface(renderer.gpu, SIZE)
+    first = Request(_of(BARE), Camera.orbit(BARE.bounds()), listening, _Params())
+    turned = replace(first, camera=Camera.orbit(BARE.bounds(), 10))
+    changed = replace(turned, params=_Params(shade=3))
+    another = replace(changed, pose=_of(BARE))
+    for request in (first, first, turned, changed, another, replace(another, look=Look(color_by="depth"))):
+        render_frame(renderer, request, surface)
+    render_frame(renderer, first, surface, moving=True)
+    render_frame(renderer, first, Surface(renderer.gpu, (65, 48)))
+    every = {"pose", "camera", "parameters", "size"}
+    expected = [every, set(), {"camera"}, {"parameters"}, {"pose"}, set(), every - {"size"}, every]
+    assert [set(frame.changed) for frame in told.frames] == expected
+    assert [frame.moving for frame in told.frames] == [False] * 6 + [True, False]
+
+
+def test_a_backend_of_range_views_is_refused_for_points(renderer: Renderer) -> None:
+    module = ModuleType("ranging")
+    vars(module).update(TITLE="Ranging", Params=_Params, needs=lambda pose, params: ("views",))
+    request = Request(_of(BARE), Camera.orbit(BARE.bounds()), Backend("ranging", module))
+    with pytest.raises(InputError, match="Ranging draws range views, and this scan has none"):
+        render_frame(renderer, request, Surface(renderer.gpu, SIZE))
+
+
 def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancelled(
     renderer: Renderer, deriving: Backend
 ) -> None:
     own = Renderer(renderer.gpu)
     pose = Pose(0, 0.0, "x", sphere(1000))
     resident = own.resident(pose)
-    assert not own.is_prepared(pose, deriving, _Params(), Look())
-    assert own.prepare(resident, deriving, _Params(), Look(), wait=False) is None
+    assert not own.is_prepared(pose, deriving, _Params(), Look(), VIEW)
+    assert own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW) is None
     task = own.preparing
     assert task is not None
     assert task.name == "Preparing Deriving"
     task.cancel()
     assert own.preparing is None
-    while (prepared := own.prepare(resident, deriving, _Params(), Look(), wait=False)) is None:
+    while (prepared := own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)) is None:
         assert own.preparing is not task, "what was cancelled begins anew"
         time.sleep(0.001)
     assert prepared.derived.process != os.getpid()
     np.testing.assert_array_equal(prepared.derived.array, pose.cloud.positions[::2])
-    assert own.is_prepared(pose, deriving, _Params(), Look())
+    assert own.is_prepared(pose, deriving, _Params(), Look(), VIEW)
     assert own.preparing is None
     own.release()
 
@@ -168,30 +252,30 @@ def test_what_a_thread_does_is_prepared_there_and_may_be_done_in_time(
     vars(deriving.module)["DERIVES_ON_THREAD"] = True
     own = Renderer(renderer.gpu)
     resident = own.resident(pose := Pose(0, 0.0, "x", sphere(1000)))
-    prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False)
+    prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
     while prepared is None:  # a busy machine
-        prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False)
+        prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
     assert prepared.derived.process == os.getpid()
-    assert own.is_prepared(pose, deriving, _Params(), Look())
+    assert own.is_prepared(pose, deriving, _Params(), Look(), VIEW)
     own.release()
 
 
 def test_work_on_a_thread_can_be_cancelled(renderer: Renderer, deriving: Backend) -> None:
-    def until_told(cloud: PointCloud, params: _Params) -> None:
+    def until_told(pose: Pose, params: _Params) -> None:
         while True:
             checkpoint(0.5)
 
     vars(deriving.module).update(DERIVES_ON_THREAD=True, derive=until_told)
     own = Renderer(renderer.gpu)
     resident = own.resident(Pose(0, 0.0, "x", sphere(1000)))
-    assert own.prepare(resident, deriving, _Params(), Look(), wait=False) is None
+    assert own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW) is None
     task = own.preparing
     assert task is not None
     task.cancel()
     own.release()  # waits for the thread
 
 
-def for_ever(cloud: PointCloud, params: _Params) -> None:
+def for_ever(pose: Pose, params: _Params) -> None:
     """Says which process it is by its progress, and never ends."""
     checkpoint(float(os.getpid()))
     while True:
@@ -203,7 +287,7 @@ def test_releasing_ends_what_is_being_prepared(renderer: Renderer, deriving: Bac
     vars(deriving.module)["derive"] = for_ever
     pose = Pose(0, 0.0, "x", sphere(1000))
     resident = own.resident(pose)
-    own.prepare(resident, deriving, _Params(), Look(), wait=False)
+    own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
     task = own.preparing
     assert task is not None
     while task.progress is None:
@@ -244,8 +328,8 @@ def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> N
     assert own.bytes_of(pose) == 1000 * (12 + 12), "positions and normals"
     bare = Request(Pose(0, 0.0, "x", BARE), request.camera, "surfels", look=Look(color_by="normal"))
     assert bring(own, bare, budget_ms=1000)
-    assert not is_prepared(own, bare)
-    assert is_prepared(own, fallback(bare))
+    assert not is_prepared(own, bare, SIZE)
+    assert is_prepared(own, fallback(bare), SIZE)
     own.release()
 
 
@@ -255,7 +339,7 @@ def test_estimates_are_the_same_whoever_makes_them(renderer: Renderer) -> None:
     for wait in (True, False):
         own = Renderer(renderer.gpu)
         resident = own.resident(pose)
-        while own.prepare(resident, surfels, surfels.params({"radius": "own"}), Look(), wait) is None:
+        while own.prepare(resident, surfels, surfels.params({"radius": "own"}), Look(), wait, VIEW) is None:
             time.sleep(0.01)
         clouds.append(resident.cloud)
         own.release()

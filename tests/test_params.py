@@ -66,13 +66,14 @@ def test_backends_keep_the_contract(name: str) -> None:
             assert p.parse(value) == value
         for choice in p.choices:
             assert p.parse(choice) == choice
-    assert all(n in ("normals", "radii", "colors") for n in chosen.needs(_cloud(), chosen.params()))
+    assert all(n in ("normals", "radii", "views") for n in chosen.needs(_pose(), chosen.params()))
 
 
-def _cloud() -> object:
+def _pose() -> object:
     from viewer.scan.points import PointCloud
+    from viewer.scan.pose import Pose
 
-    return PointCloud.from_arrays([[0.0, 0, 0]])
+    return Pose(0, 0.0, "", PointCloud.from_arrays([[0.0, 0, 0]]))
 
 
 def test_unknown_backend_lists_the_known() -> None:

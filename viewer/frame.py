@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
-from .backends import Backend, FrameView
+from .backends import Backend, FrameView, backends
 from .backends import backend as find_backend
 from .camera import Camera
+from .gpu.pose import GpuPose
 from .gpu.shade import shade
 from .gpu.surface import Surface
 from .look import Look
@@ -45,13 +46,14 @@ def render_frame(
     *,
     wait: bool = True,
     share: float = 1.0,
+    moving: bool = False,
 ) -> bool:
     """Draw what is asked for into `surface`; True if a later call would refine it.
 
     wait: whether to wait for estimated attributes and derived data; while they are made on
     a worker, plain points are drawn instead, and what a backend finds bit by bit is drawn as far as
     it is. share: of the points that need to be drawn; a preview with less than 1 is refined by a call
-    with 1. Raises InputError for what the scan
+    with 1. moving: whether other pictures will follow at once. Raises InputError for what the scan
     or the parameters do not allow.
     """
     start = time.perf_counter()
@@ -59,20 +61,23 @@ def render_frame(
     timers.start_frame()
 
     pose = renderer.resident(request.pose)
-    backend, params = _chosen(request, pose.stored)
-    prepared = renderer.prepare(pose, backend, params, request.look, wait)
+    backend, params = _chosen(request)
+    view = _view(request, pose, surface.size)
+    prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
     look = request.look
     if prepared is None:
         plain = fallback(request)
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
-    surface.start(pose, View.of(request.camera, surface.size, pose.cloud.origin, pose.bounds), look)
+    surface.start(pose, view, look)
     stats = surface.stats
     stats.backend = backend.name
     if prepared is None:
         stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
     budget_ms = None if wait else _BUDGET_MS
-    frame = FrameView(surface.view, params, prepared and prepared.derived, share, budget_ms)
+    drawn = {"pose": pose, "camera": view.key, "parameters": (backend, params), "size": surface.size}
+    changed = surface.note_changes(drawn)
+    frame = FrameView(view, params, prepared and prepared.derived, share, budget_ms, changed, moving)
     refinable = backend.draw(pose, frame, surface)
     shade(surface, look)
 
@@ -90,15 +95,15 @@ def bring(renderer: Renderer, request: Request, budget_ms: float) -> bool:
     A window calls it again and again before `render_frame`, so that it is not stopped by uploads.
     """
     pose = renderer.resident(request.pose)
-    backend, params = _chosen(request, pose.stored)
-    there = [name for name in backend.needs(pose.cloud, params) if getattr(pose.cloud, name) is not None]
-    return pose.upload(["positions", *there], budget_ms)
+    backend, params = _chosen(request)
+    return pose.upload(pose.names_of(backend.needs(request.pose, params)), budget_ms)
 
 
-def is_prepared(renderer: Renderer, request: Request) -> bool:
-    """Whether nothing has to be estimated or derived for it."""
-    backend, params = _chosen(request, renderer.resident(request.pose).stored)
-    return renderer.is_prepared(request.pose, backend, params, request.look)
+def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int]) -> bool:
+    """Whether nothing has to be estimated or derived for a picture of this size, pixels."""
+    backend, params = _chosen(request)
+    view = _view(request, renderer.resident(request.pose), size)
+    return renderer.is_prepared(request.pose, backend, params, request.look, view)
 
 
 def fallback(request: Request) -> Request:
@@ -108,12 +113,16 @@ def fallback(request: Request) -> Request:
     )
 
 
-def _chosen(request: Request, cloud: PointCloud) -> tuple[Backend, Any]:
+def _view(request: Request, pose: GpuPose, size: tuple[int, int]) -> View:
+    return View.of(request.camera, size, pose.cloud.origin, pose.bounds)
+
+
+def _chosen(request: Request) -> tuple[Backend, Any]:
     """The backend of a request and its parameters."""
     if isinstance(request.backend, Backend):
         backend, params = request.backend, request.backend.params()
     else:
-        name, params = choose(cloud, request.backend)
+        name, params = choose(request.pose, request.backend)
         backend = find_backend(name)
     return backend, params if request.params is None else request.params
 
@@ -125,19 +134,18 @@ def _unlit(look: Look) -> Look:
 
 
 def choose(
-    cloud: PointCloud, name: str | None = None, values: Mapping[str, object] | None = None
+    pose: Pose, name: str | None = None, values: Mapping[str, object] | None = None
 ) -> tuple[str, Any]:
     """(backend name, its parameters) for a scan: what the user named, the rest by default.
 
-    name: None takes surfels where the scan stores normals, else points as large as it takes
-    to touch their neighbours: a default never waits for an estimate. values: parameters by
-    name. Raises InputError for unknown names.
+    name: None takes the backend that says it suits the pose best, as it was read: a default never waits for
+    an estimate. values: parameters by name. Raises InputError for unknown names.
     """
     if name is not None:
         return name, find_backend(name).params(values)
-    if cloud.normals is not None:
-        return "surfels", find_backend("surfels").params(values)
-    return "points", find_backend("points").params({"point_size": 0, **(values or {})})
+    suited = [(one, found) for one in backends().values() if (found := one.suits(pose)) is not None]
+    best, (_, params) = max(suited, key=lambda each: each[1].rank)
+    return best.name, best.params({**params, **(values or {})})
 
 
 def render(
@@ -153,7 +161,7 @@ def render(
         pose = Pose(0, 0.0, "points", pose)
     renderer = shared_renderer()
     resident = renderer.resident(pose)
-    name, chosen = choose(pose.cloud, backend, params)
+    name, chosen = choose(pose, backend, params)
     request = Request(
         pose=pose,
         camera=camera or Camera.orbit(resident.bounds, aspect=size[0] / size[1]),

@@ -9,9 +9,10 @@ from collections.abc import Callable
 from concurrent import futures
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from .backends import Backend, Derived
+from .errors import InputError
 from .gpu.context import Gpu, headless
 from .gpu.pose import GpuPose
 from .helper import Helper
@@ -20,8 +21,10 @@ from .scan.estimate import estimate
 from .scan.points import PointCloud
 from .scan.pose import Pose
 from .task import Task
+from .view import View
 
 _MEGABYTE = 1 << 20
+_VIEWS = 4  # of a pose that what is derived by camera is kept for
 _PATIENCE = 0.05  # seconds: a picture late is better than one of points among others
 
 
@@ -30,6 +33,13 @@ class Prepared:
     """What a backend derived for a pose; None where it derives nothing."""
 
     derived: Derived | None
+
+
+class DerivedKey(NamedTuple):
+    """What derived data depend on. what: the backend and its parameters. view: None where on no camera."""
+
+    what: tuple[Any, ...]
+    view: tuple[object, ...] | None
 
 
 @dataclass
@@ -47,10 +57,20 @@ class _Job:
 
 @dataclass
 class _Resident:
+    """pose: as it was given, told: the same without keeping that alive."""
+
     pose: weakref.ref[Pose]
+    told: Pose
     gpu_pose: GpuPose
-    derived: dict[Any, Prepared] = field(default_factory=dict)
+    derived: OrderedDict[DerivedKey, Prepared] = field(default_factory=OrderedDict)  # last used last
     jobs: dict[Any, _Job] = field(default_factory=dict)
+
+    def keep(self, key: DerivedKey, prepared: Prepared) -> None:
+        """Keep what was derived, in place of what was for the view that was seen longest ago."""
+        self.derived[key] = prepared
+        of_views = [other for other in self.derived if other.what == key.what and other.view is not None]
+        for old in of_views[:-_VIEWS]:
+            _release(self.derived.pop(old))
 
     @property
     def nbytes(self) -> int:
@@ -63,12 +83,16 @@ class _Resident:
         """The same, and the estimates that it keeps on the CPU."""
         return self.nbytes + self.gpu_pose.cloud.nbytes - self.gpu_pose.stored.nbytes
 
+    @property
+    def current(self) -> Pose:
+        """The pose with what was estimated of it."""
+        return replace(self.told, cloud=self.gpu_pose.cloud)
+
     def release(self) -> None:
         for job in self.jobs.values():
             job.cancel()
         for prepared in self.derived.values():
-            if prepared.derived:
-                prepared.derived.release()
+            _release(prepared)
 
 
 class Renderer:
@@ -109,49 +133,52 @@ class Renderer:
         for gone in [k for k, r in self._resident.items() if r.pose() is None]:
             self._resident.pop(gone).release()
         if key not in self._resident:
-            self._resident[key] = _Resident(weakref.ref(pose), GpuPose(self.gpu, pose.cloud))
+            self._resident[key] = _Resident(
+                weakref.ref(pose), replace(pose), GpuPose(self.gpu, pose.cloud, pose.views)
+            )
         self._resident.move_to_end(key)
         while len(self._resident) > 1 and self._held_bytes > self.budget_bytes:
             self._resident.popitem(last=False)[1].release()
         return self._resident[key].gpu_pose
 
     def prepare(
-        self, gpu_pose: GpuPose, backend: Backend, params: Any, look: Look, wait: bool
+        self, gpu_pose: GpuPose, backend: Backend, params: Any, look: Look, wait: bool, view: View
     ) -> Prepared | None:
         """Make what a backend and a look need of a pose; None while a worker is still at it.
 
         First the attributes that the scan does not have are estimated, then the backend's
         derive function runs; only uploads happen on this thread. Without `wait`, both are done by a
-        `Helper`, so that nothing stops this thread. What was cancelled begins anew.
+        `Helper`, so that nothing stops this thread. What was cancelled begins anew. Raises InputError where
+        the pose has no range views and the backend needs them.
         """
         entry = self._entry(gpu_pose)
-        missing = _missing(gpu_pose.cloud, backend, params, look)
+        missing = _missing(entry.current, backend, params, look)
         if missing:
             name = f"Estimating {' and '.join(missing)}"
-            bare = PointCloud(gpu_pose.cloud.positions, gpu_pose.cloud.origin)
-            result = self._run(entry, missing, name, estimate, (bare, missing), wait)
+            result = self._run(entry, missing, name, estimate, (_bare(entry.current), missing), wait)
             if result is None:
                 return None
             gpu_pose.cloud = replace(gpu_pose.cloud, **result)
-        key = _derived_key(backend, params)
+        if backend.derive is None:
+            return Prepared(None)
+        key = _derived_key(backend, params, view)
         if key not in entry.derived:
-            if backend.derive is None:
-                return Prepared(None)
             name = f"Preparing {backend.title}"
-            args, on_thread = (gpu_pose.cloud, params), backend.derives_on_thread
-            result = self._run(entry, key, name, backend.derive, args, wait, on_thread)
+            args = (entry.current, params, *([view] if backend.derived_by_camera else []))
+            result = self._run(entry, key, name, backend.derive, args, wait, backend.derives_on_thread)
             if result is None:
                 return None
             with gpu_pose.preparing("upload"):
-                entry.derived[key] = Prepared(backend.upload(self.gpu, result))
+                entry.keep(key, Prepared(backend.upload(self.gpu, result)))
+        entry.derived.move_to_end(key)
         return entry.derived[key]
 
-    def is_prepared(self, pose: Pose, backend: Backend, params: Any, look: Look) -> bool:
+    def is_prepared(self, pose: Pose, backend: Backend, params: Any, look: Look, view: View) -> bool:
         """Whether `prepare` would have nothing to estimate or derive."""
-        gpu_pose = self.resident(pose)
-        if _missing(gpu_pose.cloud, backend, params, look):
+        entry = self._entry(self.resident(pose))
+        if _missing(entry.current, backend, params, look):
             return False
-        return backend.derive is None or _derived_key(backend, params) in self._entry(gpu_pose).derived
+        return backend.derive is None or _derived_key(backend, params, view) in entry.derived
 
     @property
     def preparing(self) -> Task | None:
@@ -212,13 +239,32 @@ class Renderer:
         self.gpu.collect()
 
 
-def _missing(cloud: PointCloud, backend: Backend, params: Any, look: Look) -> tuple[str, ...]:
-    wanted = {*backend.needs(cloud, params), *(("normals",) if wants_normals(look) else ())}
+def _missing(pose: Pose, backend: Backend, params: Any, look: Look) -> tuple[str, ...]:
+    """The attributes of the points to be estimated."""
+    wanted = {*backend.needs(pose, params), *(("normals",) if wants_normals(look) else ())}
+    if "views" in wanted and not pose.views:
+        raise InputError(f"{backend.title} draws range views, and this scan has none", hint="Choose another")
+    wanted.discard("views")
+    cloud = pose.cloud
     return tuple(sorted(name for name in wanted if getattr(cloud, name) is None)) if len(cloud) else ()
 
 
-def _derived_key(backend: Backend, params: Any) -> Any:
-    return (backend.name, *backend.derive_key(params))
+def _bare(pose: Pose) -> Pose:
+    """What estimates look at, which may have to go to another process."""
+    cloud = PointCloud(pose.cloud.positions, pose.cloud.origin, ids=pose.cloud.ids)
+    views = tuple(replace(view, color=None, confidence=None) for view in pose.views)
+    return replace(pose, cloud=cloud, views=views)
+
+
+def _derived_key(backend: Backend, params: Any, view: View) -> DerivedKey:
+    return DerivedKey(
+        (backend.name, *backend.derive_key(params)), view.key if backend.derived_by_camera else None
+    )
+
+
+def _release(prepared: Prepared) -> None:
+    if prepared.derived is not None:
+        prepared.derived.release()
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:

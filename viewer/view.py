@@ -52,6 +52,12 @@ class View:
             perspective=perspective,
         )
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal for views that show the same."""
+        lens = (self.size, self.scale, self.near, self.far, self.reach, self.perspective)
+        return (self.rotation.tobytes(), self.translation.tobytes(), *lens)
+
     def block(self) -> bytes:
         """The std140 block `View` of common/view.glsl."""
         matrix = np.zeros((4, 4), np.float32)  # columns, as GLSL stores them

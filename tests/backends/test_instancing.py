@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import BUFFERS, NOTHING, sphere
 
 from viewer.backends import backend
+from viewer.backends import surfels as surfels_backend
 from viewer.backends.surfels import tiles
 from viewer.backends.surfels.tiles import TileLists
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.amplify import FEEDS
+from viewer.gpu import gl
+from viewer.gpu.amplify import FEEDS, Points
+from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.view import View
 
 pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
@@ -215,3 +220,49 @@ def test_what_is_chosen_stands_in_the_statistics(renderer: Renderer, surfels: Dr
     assert chosen == "tiles" if renderer.gpu.software else chosen in ("tiles", *FEEDS)
     assert_equal(surface, surfels(CLOUD, CAMERAS["perspective"], instancing=chosen))
     assert "instancing" not in surfels(CLOUD, CAMERAS["perspective"], instancing="gs").stats.chosen
+
+
+_MAKING = """
+#include "common/item.glsl"
+layout(std430, binding = 0) readonly buffer Positions { float positions[]; };
+layout(std430, binding = 1) writeonly buffer Normals { float normals[]; };
+layout(std430, binding = 2) writeonly buffer Radii { float radii[]; };
+void main() {
+    uint i = item();
+    if (i >= uint(radii.length())) return;
+    vec3 normal = normalize(vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]));
+    for (uint k = 0u; k < 3u; ++k) normals[3u * i + k] = normal[k];
+    radii[i] = 0.03 + 0.01 * normal.x;
+}
+"""
+
+
+@pytest.mark.parametrize("feed", ["tiles", *FEEDS])
+def test_points_take_what_a_compute_pass_made(renderer: Renderer, tmp_path: Path, feed: str) -> None:
+    gpu, count = renderer.gpu, len(CLOUD)
+    (shader := tmp_path / "making.comp").write_text(_MAKING, encoding="utf-8")
+    bare = GpuPose(gpu, PointCloud.from_arrays(CLOUD.positions))
+    normals = gl.BufferTexture(gpu.ctx.buffer(reserve=12 * count), gl.RGB32F)
+    radii = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * count), gl.R32F)
+    for binding, made in enumerate((bare.array("positions"), normals, radii)):
+        made.buffer.bind_to_storage_buffer(binding)
+    gpu.dispatch(gpu.compute(str(shader)), count)
+    stored = replace(
+        bare.cloud,
+        normals=np.frombuffer(normals.buffer.read(), np.float32).reshape(-1, 3),
+        radii=np.frombuffer(radii.buffer.read(), np.float32),
+    )
+    splats = surfels_backend._splats(surfels_backend.Params(), 0.0)
+    buffers = {"normals": normals, "radii": radii}
+    pictures = []
+    for points in (
+        Points(bare, use_radii=True, count=count, buffers=buffers),
+        Points(GpuPose(gpu, stored), use_radii=True, count=count),
+    ):
+        surface = Surface(gpu, SIZE)
+        surface.start(points.pose, View.of(CAMERAS["inside"], SIZE, stored.origin, stored.bounds()))
+        surfels_backend._draw_nearest(points, surface, feed, splats)
+        pictures.append(surface)
+    assert (pictures[0].row != NOTHING).any()
+    assert_equal(*pictures)
+    assert bare.uploaded_bytes == 12 * count, "positions alone"

@@ -131,7 +131,7 @@ def test_what_is_seen_lies_within_a_cube_of_the_surface(draw: Draw, level: int) 
 def test_an_octant_is_as_large_as_the_picture_asks(draw: Draw) -> None:
     for threshold in (1.0, 6.0):
         surface = voxels(draw, CLOUD, CAMERAS["perspective"], least=0.0, pixel_threshold=threshold)
-        cubes, (octree, _) = surface.pose.cloud, derive(CLOUD, Params())
+        cubes, (octree, _) = surface.pose.cloud, derive(Pose(0, 0.0, "", CLOUD), Params())
         size = 2 * cubes.radii * surface.view.scale / surface.view.depths(cubes.positions)  # type: ignore[operator]
         inner = cubes.radii > 0.75 * octree.size(octree.depth)  # type: ignore[operator]
         assert inner.any() == (threshold > 1)
@@ -161,7 +161,7 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
         CLOUD.world(), normals=CLOUD.normals, colors=colors, scalars={"row": np.arange(len(CLOUD))}
     )
     surface = voxels(draw, cloud, CAMERAS["perspective"], max_depth=4, look=Look(color_by="row"))
-    octree, _ = derive(cloud, Params())
+    octree, _ = derive(Pose(0, 0.0, "", cloud), Params())
     starts = np.cumsum(octree.counts) - octree.counts
     shown = np.unique(surface.id[surface.id != NOTHING])
     assert shown.min() >= starts[4]

@@ -11,6 +11,7 @@ from range_scenes import sphere_view
 
 from viewer.errors import InputError
 from viewer.scan.colors import linear_from_srgb8, srgb8_from_linear
+from viewer.scan.estimate import estimate
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView, merge
 
@@ -134,6 +135,16 @@ def test_points_beyond_float32_are_dropped_and_ids_stay_right() -> None:
     largest = float(np.finfo(np.float32).max)
     points = flat([[1, largest, 2]], fx=0.5).points()
     assert (points.ids.tolist(), points.dropped) == ([0, 2], 1)
+
+
+def test_normals_that_a_pose_lacks_are_those_of_its_grids() -> None:
+    largest = float(np.finfo(np.float32).max)
+    dropping = flat([[1, largest, 2], [1, 1, np.nan]], fx=0.5)  # the points of largest do not fit
+    for views in ((sphere_view(EYE), sphere_view((-2, 0, 4))), (sphere_view(EYE), dropping)):
+        pose = Pose.of(0, 0.0, "x", views)
+        normals = estimate(pose, ["normals"])["normals"]
+        assert np.array_equal(normals, merge(views, normals=True).normals)
+        assert len(normals) == len(pose.cloud)
 
 
 def test_a_view_of_nothing_has_no_points() -> None:

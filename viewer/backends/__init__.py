@@ -5,22 +5,27 @@ A backend answers one question: which surface does each pixel see? Its module ha
     a docstring          the first line says in the panel what it is
     TITLE                its name in the panel
     Params               a frozen dataclass of parameters (see viewer/params.py)
-    needs(cloud, params) -> attributes the cloud must have; missing ones are estimated
-    draw(pose, frame, surface) -> bool
-                         on the GL thread: write `surface.depths` and `surface.rows`;
-                         True if a later call would refine the picture
+    needs(pose, params) -> what the pose must have: "normals" and "radii" of its points are estimated where
+                         they are missing; "views": range views, without which it cannot be drawn
+    draw(gpu_pose, frame, surface) -> bool
+                         on the GL thread: write `surface.depths` and `surface.rows`, and what it has of its
+                         own (`Surface.own`); True if a later call would refine the picture
 
 and, where it prepares something for a pose,
 
-    derive(cloud, params) -> arrays     CPU only, on any thread
+    derive(pose, params) -> arrays      CPU only, on any thread
     upload(gpu, arrays) -> derived      GL thread; `derived.nbytes` and `derived.release()`
 
 which `draw` then finds as `frame.derived`. A window runs `derive` in a process of its own, or, with
 DERIVES_ON_THREAD = True, on a thread, which is sooner done: for what lets go of the interpreter's lock.
+With DERIVED_BY_CAMERA = True it is derive(pose, params, view), and made for each view: the last few are kept.
 
 It may declare
 
     ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" where it says nothing
+    BLENDS               True: what a pixel shows may be of several points
+    FILLS                True: pixels may be filled that no point gave
+    suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
     LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`
 
 Names that begin with an underscore are no backends. No list of backends exists anywhere else.
@@ -33,17 +38,26 @@ import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from ..errors import unknown_name
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from ..params import Parameter, describe, parse
-from ..scan.points import PointCloud
+from ..scan.pose import Pose
 from ..view import View
 
 ROWS = ("points", "octants", "samples")
+CHANGES = ("pose", "camera", "parameters", "size")  # of one picture against the one before
+
+
+class Suited(NamedTuple):
+    """How well a backend does as the default for a scan. rank: against others, the highest is taken. params:
+    the values in place of its defaults with which it does, by name."""
+
+    rank: int
+    params: Mapping[str, object] = {}
 
 
 @dataclass(frozen=True)
@@ -75,6 +89,8 @@ class FrameView:
     take too long. A backend that leaves some out says that a later call would refine the picture,
     and counts them (`Points.of` does); one that is fast enough may draw all. budget_ms: after which a
     backend that can draw something coarser does, and says that a later call would refine it; None: never.
+    changed: what of `CHANGES` is another than in the call before for this surface; all in the first one.
+    moving: whether other pictures will follow at once.
     """
 
     view: View
@@ -82,6 +98,8 @@ class FrameView:
     derived: Any = None
     share: float = 1.0
     budget_ms: float | None = None
+    changed: frozenset[str] = frozenset(CHANGES)
+    moving: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +133,20 @@ class Backend:
         return getattr(self.module, "ROWS", "points")
 
     @property
+    def blends(self) -> bool:
+        """Whether what a pixel shows may be of several points."""
+        return getattr(self.module, "BLENDS", False)
+
+    @property
+    def fills(self) -> bool:
+        """Whether pixels may be filled that no point gave."""
+        return getattr(self.module, "FILLS", False)
+
+    def suits(self, pose: Pose) -> Suited | None:
+        """How well it does as the default for a scan, None where it does not."""
+        return self.module.suits(pose) if hasattr(self.module, "suits") else None
+
+    @property
     def limits(self) -> Mapping[str, Limit]:
         """What it cannot hold of the stability suite, by the suite's rows."""
         return getattr(self.module, "LIMITS", {})
@@ -123,16 +155,16 @@ class Backend:
         """Its parameters, with these values in place of defaults; raises InputError."""
         return parse(self.module.Params, values or {}, f"parameter of '{self.name}'")
 
-    def needs(self, cloud: PointCloud, params: Any) -> tuple[str, ...]:
-        """The attributes it needs of this cloud."""
-        return self.module.needs(cloud, params)
+    def needs(self, pose: Pose, params: Any) -> tuple[str, ...]:
+        """What it needs of this pose: "normals", "radii", "views"."""
+        return self.module.needs(pose, params)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw; True if a later call would refine the picture."""
         return self.module.draw(pose, frame, surface)
 
     @property
-    def derive(self) -> Callable[[PointCloud, Any], Any] | None:
+    def derive(self) -> Callable[..., Any] | None:
         """Its derive function, None where it prepares nothing."""
         return getattr(self.module, "derive", None)
 
@@ -140,6 +172,11 @@ class Backend:
     def derives_on_thread(self) -> bool:
         """Whether a thread does for `derive`, or it needs a process of its own."""
         return getattr(self.module, "DERIVES_ON_THREAD", False)
+
+    @property
+    def derived_by_camera(self) -> bool:
+        """Whether what it derives is of one view, which `derive` then gets too."""
+        return getattr(self.module, "DERIVED_BY_CAMERA", False)
 
     def upload(self, gpu: Gpu, arrays: Any) -> Derived:
         """Put what `derive` gave on the GPU."""

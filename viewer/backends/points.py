@@ -18,9 +18,10 @@ from ..gpu.scatter import Visits, scatter
 from ..gpu.surface import Surface
 from ..params import param
 from ..scan.points import PointCloud
+from ..scan.pose import Pose
 from ..scan.spacing import spacings
 from ..view import View
-from . import FrameView
+from . import FrameView, Suited
 
 TITLE = "Points"
 
@@ -47,9 +48,14 @@ class Params:
     )
 
 
-def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
     """Nothing but positions."""
     return ()
+
+
+def suits(pose: Pose) -> Suited:
+    """Any scan, with squares that touch: nothing has to be there, or estimated."""
+    return Suited(0, {"point_size": 0})
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:

@@ -19,7 +19,7 @@ from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from ..mesh.triangles import Mesh
 from ..scan.faces import Triangles
-from ..scan.points import PointCloud
+from ..scan.pose import Pose
 
 FLOOR, CEILING = "gl-points", "mesh"
 
@@ -45,7 +45,7 @@ class _Points:
     TITLE = "GL_POINTS"
     Params = NoParams
 
-    def needs(self, cloud: PointCloud, params: NoParams) -> tuple[str, ...]:
+    def needs(self, pose: Pose, params: NoParams) -> tuple[str, ...]:
         """Nothing but positions."""
         return ()
 
@@ -64,11 +64,11 @@ class _Triangles:
     def __init__(self, faces: Triangles) -> None:
         self._faces = faces
 
-    def needs(self, cloud: PointCloud, params: NoParams) -> tuple[str, ...]:
+    def needs(self, pose: Pose, params: NoParams) -> tuple[str, ...]:
         """The normals that it interpolates."""
         return ("normals",)
 
-    def derive(self, cloud: PointCloud, params: NoParams) -> Triangles:
+    def derive(self, pose: Pose, params: NoParams) -> Triangles:
         """The faces as they are."""
         return self._faces
 

@@ -13,9 +13,10 @@ from ..backends import backends as all_backends
 from ..errors import NoOpenGLError
 from ..params import Parameter
 from ..scan.points import PointCloud
+from ..scan.pose import Pose
 from . import _drawing as drawing
 
-_NO_POINTS = PointCloud.from_arrays(np.zeros((0, 3)))
+_NO_POINTS = Pose(0, 0.0, "", PointCloud.from_arrays(np.zeros((0, 3))))
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -42,6 +43,9 @@ def declaration(backend: Backend, obstacle: str | None) -> dict[str, Any]:
         "title": backend.title,
         "help": backend.help,
         "needs": list(backend.needs(_NO_POINTS, backend.params())),
+        "rows": backend.rows,
+        "blends": backend.blends,
+        "fills": backend.fills,
         "available": obstacle is None,
         "why_not": obstacle,
         "parameters": [_parameter(p) for p in backend.parameters],

@@ -198,7 +198,7 @@ def _requests(
     chosen = None
     camera_of = _camera(args, timeline, shots, size) if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
-        chosen = chosen or choose(pose.cloud, args.backend, values)
+        chosen = chosen or choose(pose, args.backend, values)
         own = drawable(look, pose.cloud.scalars)
         if own is not look:
             title = frame_title(timeline, pose.index)

@@ -67,9 +67,9 @@ class Document:
 
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""
-        name, defaults = choose(pose.cloud)
+        name, defaults = choose(pose)
         if self.backend not in (None, name):
-            name, defaults = choose(pose.cloud, self.backend)
+            name, defaults = choose(pose, self.backend)
         return name, self.params.get(name, defaults)
 
     def request(self, pose: Pose) -> Request:

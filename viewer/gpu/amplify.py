@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
@@ -53,6 +54,7 @@ class Points:
 
     use_radii: whether they bring their own radius, or half-axes. count: how many. rows: which,
     ascending; None: all. enlarged: the factor on their size with which they together cover what all do.
+    buffers: in place of the pose's arrays of these names, such as normals that a compute pass found.
     """
 
     pose: GpuPose
@@ -60,6 +62,7 @@ class Points:
     count: int
     rows: gl.BufferTexture | None = None
     enlarged: float = 1.0
+    buffers: Mapping[str, gl.BufferTexture] = field(default_factory=dict)
 
     @classmethod
     def of(cls, pose: GpuPose, surface: Surface, share: float, use_radii: bool) -> Points:
@@ -70,7 +73,12 @@ class Points:
     @property
     def use_axes(self) -> bool:
         """Whether there are ellipses among them."""
-        return self.use_radii and self.pose.cloud.axes is not None
+        given = "axes" in self.buffers if "radii" in self.buffers else self.pose.cloud.axes is not None
+        return self.use_radii and given
+
+    def array(self, name: str) -> gl.BufferTexture:
+        """positions, normals, radii or axes, indexed by row."""
+        return self.buffers.get(name) or self.pose.array(name)
 
     @property
     def attributes(self) -> tuple[tuple[str, str, int], ...]:
@@ -95,7 +103,7 @@ class Points:
         """Bind what amplify/texels.glsl reads."""
         self.pose.gpu.set(program, enlarged=self.enlarged)
         for name, _, _ in self.attributes:
-            self.pose.array(name).bind(Texture[name.upper()])
+            self.array(name).bind(Texture[name.upper()])
         if self.rows is not None:
             self.rows.bind(Texture.DRAWN_ROWS)
 
@@ -143,7 +151,7 @@ def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: 
     Where only some are drawn, `ubo` and `vbo` are replaced by `tbo`, which gives the same picture.
     """
     gpu = points.pose.gpu
-    if points.rows is not None and feed in _WHOLE:
+    if (points.rows is not None and feed in _WHOLE) or (points.buffers and feed == "ubo"):
         feed = "tbo"
     stages, parts = _FEEDS[feed]
     defines = {**points.defines, "CORNERS": shape.corners}
@@ -177,7 +185,7 @@ def _attributes(
 ) -> list[tuple[moderngl.Buffer, str, str]]:
     """What a vertex array is made of. advance: "/i" for the next value with each instance."""
     return [
-        (points.pose.array(name).buffer, f"{floats}f{advance}", attribute)
+        (points.array(name).buffer, f"{floats}f{advance}", attribute)
         for name, attribute, floats in points.attributes
         if attribute in program
     ]

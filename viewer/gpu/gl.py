@@ -86,9 +86,14 @@ def max_uniform_block_bytes() -> int:
     return integer(_MAX_UNIFORM_BLOCK_SIZE)
 
 
+def max_image_edge() -> int:
+    """How many pixels an edge of an image may have."""
+    return integer(_MAX_TEXTURE_SIZE)
+
+
 def max_raster_edge() -> int:
     """How many pixels an edge of a `Target` may have."""
-    return min(integer(_MAX_TEXTURE_SIZE), integer(_MAX_RENDERBUFFER_SIZE))
+    return min(max_image_edge(), integer(_MAX_RENDERBUFFER_SIZE))
 
 
 def reverse_depth() -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import product
 from typing import Any, TypeVar
 
 import moderngl
@@ -15,7 +18,9 @@ from numpy.typing import NDArray
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
 from ..geometry import up_vector
+from ..scan.colors import srgb8_from_linear
 from ..scan.points import PointCloud
+from ..scan.range_view import RangeView
 from . import gl
 from .context import Gpu
 
@@ -29,21 +34,30 @@ FORMATS = {
     "radii": gl.R32F,
     "axes": gl.RGBA32F,
 }
+# Components and type of a texel of each image of a range view, and how texels are made of its values.
+_IMAGES: dict[str, tuple[int, str, Callable[[NDArray], NDArray]]] = {
+    "depth": (1, "f4", lambda depth: depth),
+    "mask": (1, "f1", lambda mask: mask * np.uint8(255)),
+    "color": (4, "f1", lambda color: _opaque(srgb8_from_linear(color))),
+    "confidence": (1, "f4", lambda confidence: confidence),
+}
+_VIEW = "view:"  # that the keys of images begin with
 _SAMPLE = 1 << 13  # values that ranges look at
 _SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
 
 
 class GpuPose:
-    """The arrays of one point cloud as buffer textures, indexed by row.
+    """The arrays of one point cloud as buffer textures, indexed by row, and the images of its range views.
 
     A row is a point's place in the cloud's arrays; `cloud.ids` gives its index in the file.
     `stored` is the cloud as the scan has it, `cloud` the same with what was estimated since;
     whatever is chosen automatically looks at `stored`, so that it does not change by history.
     """
 
-    def __init__(self, gpu: Gpu, cloud: PointCloud) -> None:
+    def __init__(self, gpu: Gpu, cloud: PointCloud, views: tuple[RangeView, ...] = ()) -> None:
         self.gpu = gpu
         self._arrays: dict[str, gl.BufferTexture] = {}
+        self._images: dict[str, moderngl.Texture] = {}
         self._uploads: dict[str, _Upload] = {}  # that have begun
         if len(cloud) > gpu.max_points:
             raise InputError(
@@ -51,6 +65,7 @@ class GpuPose:
                 hint="Split the scan or thin it out",
             )
         self.stored = self.cloud = cloud
+        self.views = views
         self.uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._facts: dict[str, Any] = {}
@@ -70,9 +85,26 @@ class GpuPose:
         """The same; None where the scan has no such attribute and none was estimated."""
         return None if getattr(self.cloud, name) is None else self.array(name)
 
+    def image(self, view: int, name: str) -> moderngl.Texture:
+        """depth (float, as read), mask (0 or 1), color (RGBA8, sRGB), confidence (float) of the range view of
+        this number, row 0 at the top, without filtering; uploaded at the first call. Raises InputError where
+        the view has none, or is larger than the driver's images."""
+        key = _image_key(view, name)
+        self.upload([key])
+        return self._images[key]
+
+    def names_of(self, needs: Iterable[str]) -> list[str]:
+        """The arrays and images that a backend with these needs reads, of those that are there."""
+        names = [name for name in needs if name != "views" and getattr(self.cloud, name) is not None]
+        if "views" not in needs:
+            return ["positions", *names]
+        images = product(enumerate(self.views), _IMAGES)
+        there = [_image_key(i, name) for (i, view), name in images if getattr(view, name) is not None]
+        return [*names, *there]
+
     def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:
         """Upload what is missing of these arrays, in slices until the time is over; whether all is there."""
-        missing = [name for name in names if name not in self._arrays]
+        missing = [name for name in names if name not in self._arrays and name not in self._images]
         if not missing:
             return True
         with self.preparing("upload"):
@@ -87,23 +119,34 @@ class GpuPose:
         key = f"packed:{name}"
         if key not in self._arrays:
             with self.preparing("upload"):
-                upload = _Upload(self.gpu, pack())
+                upload = _array_upload(self.gpu, pack())
                 upload.go_on(np.inf)
-                self._keep(key, upload.buffer, texel_format)
+                self._keep_array(key, upload, texel_format)
         return self._arrays[key]
 
     def _upload(self, name: str, end: float) -> bool:
-        """Go on with an array until that time of the performance counter; whether it is there."""
+        """Go on with an array or image until that time of the performance counter; whether it is there."""
         if name not in self._uploads:
-            self._uploads[name] = _Upload(self.gpu, self._values(name))
+            self._uploads[name] = self._begin(name)
         if not self._uploads[name].go_on(end):
             return False
-        self._keep(name, self._uploads.pop(name).buffer, FORMATS.get(name, gl.R32F))
+        upload = self._uploads.pop(name)
+        if isinstance(upload.target, moderngl.Texture):
+            self._images[name] = upload.target
+            self.uploaded_bytes += upload.nbytes
+        else:
+            self._keep_array(name, upload, FORMATS.get(name, gl.R32F))
         return True
 
-    def _keep(self, name: str, buffer: moderngl.Buffer, texel_format: int) -> None:
-        self._arrays[name] = gl.BufferTexture(buffer, texel_format)
-        self.uploaded_bytes += buffer.size
+    def _begin(self, name: str) -> _Upload:
+        if not name.startswith(_VIEW):
+            return _array_upload(self.gpu, self._values(name))
+        number, image = name.removeprefix(_VIEW).split(":")
+        return _image_upload(self.gpu, self.views[int(number)], image)
+
+    def _keep_array(self, name: str, upload: _Upload, texel_format: int) -> None:
+        self._arrays[name] = gl.BufferTexture(upload.target, texel_format)
+        self.uploaded_bytes += upload.nbytes
 
     def _values(self, name: str) -> NDArray:
         if name.startswith("scalar:"):
@@ -167,27 +210,65 @@ class GpuPose:
         return taken
 
     def __del__(self) -> None:
-        self.gpu.discard(*self._arrays.values(), *(upload.buffer for upload in self._uploads.values()))
+        begun = (upload.target for upload in self._uploads.values())
+        self.gpu.discard(*self._arrays.values(), *self._images.values(), *begun)
 
 
+@dataclass
 class _Upload:
-    """An array on its way to the GPU."""
+    """A buffer or texture on its way to the GPU: what it will be, and what is to be done, a slice a step."""
 
-    def __init__(self, gpu: Gpu, values: NDArray) -> None:
-        # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
-        data = values if values.size else np.zeros(4, np.float32)
-        self._bytes = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
-        self._done = 0
-        self.buffer = gpu.ctx.buffer(reserve=len(self._bytes))
+    target: Any
+    nbytes: int
+    steps: deque[Callable[[], object]]
 
     def go_on(self, end: float) -> bool:
         """Upload slices until that time of the performance counter, at least one; whether all is there."""
-        while self._done < len(self._bytes):
-            self.buffer.write(self._bytes[self._done : self._done + _SLICE], offset=self._done)
-            self._done += _SLICE
+        while self.steps:
+            self.steps.popleft()()
             if time.perf_counter() > end:
                 break
-        return self._done >= len(self._bytes)
+        return not self.steps
+
+
+def _array_upload(gpu: Gpu, values: NDArray) -> _Upload:
+    # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
+    data = values if values.size else np.zeros(4, np.float32)
+    words = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
+    buffer = gpu.ctx.buffer(reserve=len(words))
+    slices = range(0, len(words), _SLICE)
+    steps = (partial(buffer.write, words[start : start + _SLICE], offset=start) for start in slices)
+    return _Upload(buffer, len(words), deque(steps))
+
+
+def _image_upload(gpu: Gpu, view: RangeView, name: str) -> _Upload:
+    values: NDArray | None = getattr(view, name)
+    components, dtype, texels = _IMAGES[name]
+    height, width = view.depth.shape
+    if values is None:
+        raise InputError(f"the range view '{view.name}' has no {name}")
+    if max(width, height) > gl.max_image_edge():
+        most = gl.max_image_edge()
+        raise InputError(f"a range view of {width}x{height} pixels; this driver takes {most:,} along an edge")
+    texture = gpu.ctx.texture((width, height), components, dtype=dtype, alignment=1)
+    texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.NEAREST, moderngl.NEAREST), False, False
+    row_bytes = width * components * int(dtype[1])
+    rows = max(1, _SLICE // row_bytes)
+
+    def write(top: int) -> None:
+        part = slice(top, min(top + rows, height))
+        place = (0, top, width, part.stop - top)
+        texture.write(np.ascontiguousarray(texels(values[part])), viewport=place, alignment=1)
+
+    return _Upload(texture, row_bytes * height, deque(partial(write, top) for top in range(0, height, rows)))
+
+
+def _image_key(view: int, name: str) -> str:
+    return f"{_VIEW}{view}:{name}"
+
+
+def _opaque(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.pad(rgb, ((0, 0), (0, 0), (0, 1)), constant_values=255)
 
 
 def _strided(values: NDArray) -> NDArray:

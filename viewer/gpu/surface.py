@@ -116,6 +116,7 @@ class Surface:
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
         self._written: set[str] = set()
+        self._noted: dict[str, object] = {}
         self._blended: tuple[str | None, str] | None = None  # the source that its own values are of, and up
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
@@ -129,6 +130,11 @@ class Surface:
         self._covered_known = False
         self._written.clear()
         self.stats = Stats()
+
+    def note_changes(self, drawn: dict[str, object]) -> frozenset[str]:
+        """The names of what is drawn that is another than at the call before; all at the first."""
+        before, self._noted = self._noted, drawn
+        return frozenset(name for name, value in drawn.items() if name not in before or before[name] != value)
 
     def bind_view(self) -> None:
         """Make this surface's view the one that shaders read."""

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..task import checkpoint
 from .points import PointCloud
+from .pose import Pose
+from .range_view import merged_normals
 
 Vectors = NDArray[np.float64]  # (N, 3)
 
@@ -28,10 +30,15 @@ _DEPTH = 1.8  # in reaches: so far behind the first point of its cell a point st
 _GRID = 1024  # cells along an axis at most
 
 
-def estimate(cloud: PointCloud, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
-    """The attributes named, "normals" and "radii", by name. See `estimate_normals`, `estimate_radii`."""
-    work = {"normals": estimate_normals, "radii": estimate_radii}
-    return {name: work[name](cloud) for name in names}
+def estimate(pose: Pose, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
+    """The attributes named, "normals" and "radii", by name. See `estimate_normals`, `estimate_radii`; the
+    normals of range views are those of their grids (`merged_normals`)."""
+    work = {"normals": _normals, "radii": lambda pose: estimate_radii(pose.cloud)}
+    return {name: work[name](pose) for name in names}
+
+
+def _normals(pose: Pose) -> NDArray[np.float32]:
+    return merged_normals(pose.views, pose.cloud) if pose.views else estimate_normals(pose.cloud)
 
 
 def estimate_normals(

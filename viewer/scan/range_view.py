@@ -172,6 +172,16 @@ def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
 
 
+def merged_normals(views: Sequence[RangeView], cloud: PointCloud) -> NDArray[np.float32]:
+    """The normals of the points that `merge` makes of the views, (N, 3); see `RangeView.normals`."""
+    normals = np.concatenate([view.normals() for view in views])
+    if len(normals) == len(cloud):
+        return normals
+    assert cloud.ids is not None  # some were dropped
+    seen = np.concatenate([view.valid().ravel() for view in views])
+    return normals[np.isin(np.flatnonzero(seen), cloud.ids)]
+
+
 def in_one_unit(views: Sequence[RangeView], unit: str) -> tuple[RangeView, ...]:
     """The views with their lengths in a unit, where both are known lengths; the others as they are."""
     factors = [conversion(view.unit, unit) for view in views]

@@ -92,9 +92,11 @@ class Viewport:
             self._drawn, self.request, self._picked = wanted, request, None
             self.problem, self._prepared_at = None, math.inf
             self.size = size
-            self._quality = self._detail(request).quality if playing or now < self._motion.ends else Quality()
+            moving = playing or now < self._motion.ends
+            self._quality = self._detail(request).quality if moving else Quality()
             self.surface = surface = self._surface_of(self._quality)
-            refinable = render_frame(self.renderer, request, surface, wait=False, share=self._quality.share)
+            share = self._quality.share
+            refinable = render_frame(self.renderer, request, surface, wait=False, share=share, moving=moving)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
@@ -119,7 +121,7 @@ class Viewport:
         """What to show instead, so that nothing has to be prepared: as it was before, or plain points."""
         if self._asked_for is not None:
             before = replace(self._asked_for, pose=request.pose, camera=request.camera)
-            if is_prepared(self.renderer, before):
+            if is_prepared(self.renderer, before, self.size):
                 return before
         return fallback(request)
 

@@ -18,15 +18,16 @@ from ...gpu.fastest import choose
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
-from ...scan.points import PointCloud
+from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
-from .. import FrameView
+from .. import FrameView, Suited
 from . import passes
 from .splats import FRAGMENT, SURFEL, Splats
 from .subpixel import LEAST_RADIUS, average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, splat
 
 TITLE = "Surfels"
+BLENDS = True
 
 _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
@@ -76,9 +77,14 @@ class Params:
     cull_back: bool = param(False, "Leave out surfels that face away")
 
 
-def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
     """Normals, and radii where they shall be the points' own."""
     return ("normals", "radii") if params.radius == "own" else ("normals",)
+
+
+def suits(pose: Pose) -> Suited | None:
+    """Scans that store normals."""
+    return None if pose.cloud.normals is None else Suited(1)
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:

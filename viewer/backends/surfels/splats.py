@@ -45,4 +45,4 @@ def bind_visible(points: Points, program: Program) -> None:
     """Bind what surfels/passes/limit.glsl reads of the points that were drawn first."""
     points.pose.gpu.set(program, enlarged=points.enlarged)
     if points.use_radii:
-        points.pose.array("radii").bind(Texture.RADII)
+        points.array("radii").bind(Texture.RADII)

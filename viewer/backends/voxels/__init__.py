@@ -25,6 +25,7 @@ from ...scan.octree.build import STOPS, Stop, build, shortfall
 from ...scan.octree.leaves import closing_levels
 from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import PointCloud
+from ...scan.pose import Pose
 from ...view import View
 from .. import FrameView, Limit
 from .cubes import draw_voxels, shade_flat
@@ -114,15 +115,15 @@ class Params:
     )
 
 
-def needs(cloud: PointCloud, params: Params) -> tuple[str, ...]:
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
     """Normals where they are to be lit."""
     return ("normals",) if params.normals == "smooth" else ()
 
 
-def derive(cloud: PointCloud, params: Params) -> tuple[Octree, list[NDArray[np.uint8]]]:
+def derive(pose: Pose, params: Params) -> tuple[Octree, list[NDArray[np.uint8]]]:
     """The octree of a pose, and for each level how large its nodes are drawn to close the surface."""
     stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
-    octree = build(cloud, stop)
+    octree = build(pose.cloud, stop)
     # The first cut of a process imports what it needs, of a machine compiles it: not while a window draws.
     traversal = Traversal(octree.prefix(1), _ANYWHERE)
     traversal.advance()
@@ -208,7 +209,7 @@ class Voxels:
         params: Params = frame.params
         threshold = params.pixel_threshold / math.sqrt(frame.share)  # four times the nodes at half the edge
         asked = (threshold, params.max_depth, params.least, params.cull_back, flat)
-        seen = (asked, _view_key(frame.view))
+        seen = (asked, frame.view.key)
         if self._shown is not None and self._seen == seen and self._shown.cut.complete:
             return self._shown
         sight = sight_of(frame.view, pose.cloud.origin)
@@ -257,11 +258,6 @@ def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
     """What a cut has to know of a view of a pose with this origin, (3,)."""
     eye = origin - view.rotation.T @ view.translation
     return Sight(eye, view.rotation, view.scale, view.size, view.near, view.far, view.perspective)
-
-
-def _view_key(view: View) -> tuple[object, ...]:
-    lens = (view.size, view.scale, view.near, view.far, view.perspective)
-    return (view.rotation.tobytes(), view.translation.tobytes(), *lens)
 
 
 def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:
