@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .colors import srgb8_from_linear
+from .grid_normals import normals_of_grid
 from .points import UNKNOWN_UNIT, PointCloud
 from .units import conversion
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _AT_ONCE = 1 << 17  # pixels worked on together
 _MERGED_BYTES, _MERGING_BYTES = 52, 20 << 20  # that `merge` takes for a point, and beside all points
-_STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,19 +93,11 @@ class RangeView:
     def normals(self) -> NDArray[np.float32]:
         """World normals of the valid pixels in row order, (N, 3), unit length, towards the pod.
 
-        From differences to the neighbours in the row and in the column: central ones, one-sided
-        beside a hole or an edge. A pixel without a neighbour on its surface faces the pod.
+        From the pixels around each on the same surface; see `normals_of_grid`.
         """
-        valid = self.valid()
-        from_eye, depth = np.full((*valid.shape, 3), np.nan), np.where(valid, self.depth, np.nan)
-        from_eye[valid] = self._from_eye()
-        down = _tangents(from_eye, depth, 0, _STEEPEST / self.fy)[valid]
-        right = _tangents(from_eye, depth, 1, _STEEPEST / self.fx)[valid]
-        normals, away = np.cross(down, right), from_eye[valid]
-        sides = np.einsum("ij,ij->i", normals, away)
-        normals[sides > 0] *= -1
-        normals[sides == 0] = -away[sides == 0]
-        return (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)
+        depth = np.where(self.valid(), self.depth, np.float32(np.nan))
+        normals = normals_of_grid(depth, (self.fx, self.fy), (self.cx, self.cy))
+        return (normals @ self._camera_to_world().T).astype(np.float32)
 
     def scaled(self, factor: float, unit: str) -> RangeView:
         """Multiply all lengths by a factor, which makes them lengths in this unit."""
@@ -207,18 +199,3 @@ def _is_rigid(matrix: NDArray[np.float64]) -> bool:
         and np.linalg.det(rotation) > 0
         and (matrix[3] == (0, 0, 0, 1)).all()
     )
-
-
-def _tangents(points: NDArray, depth: NDArray, axis: int, steepest: float) -> NDArray[np.float64]:
-    """The sum of the steps from the neighbour before and to the one behind, (H, W, 3); 0 across edges.
-
-    points: (H, W, 3), depth: (H, W), both NaN where there is none. steepest: the depth step that
-    is an edge, as a part of the depth.
-    """
-    before, behind = (depth[:-1], depth[1:]) if axis == 0 else (depth[:, :-1], depth[:, 1:])
-    same = np.abs(behind - before) <= steepest * np.minimum(before, behind)
-    steps = np.where(same[..., None], np.diff(points, axis=axis), 0.0)
-    ends = [(0, 0), (0, 0), (0, 0)]
-    ends[axis] = (1, 1)
-    steps = np.pad(steps, ends)
-    return steps[:-1] + steps[1:] if axis == 0 else steps[:, :-1] + steps[:, 1:]
