@@ -127,6 +127,9 @@ def libraries(names: Iterable[str]) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
+TOOLS_KNOW = {"commands", "desk", "ui", "widgets", "scene.canvas", "tools"}  # of the window
+
+
 def test_every_part_has_a_layer() -> None:
     assert {part_of(path) for path in modules()} <= set(LAYER_OF)
 
@@ -177,6 +180,26 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 def test_entries_have_no_underscore() -> None:
     assert {"_line", "_parsing"}.isdisjoint(command_names())
     assert not [name for name in (*backends(), *command_names()) if name.startswith("_")]
+
+
+def test_tools_know_their_desk_and_not_the_whole_window() -> None:
+    beyond = {
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for path in modules()
+        if name_of(path).startswith("viewer.app.tools.")
+        for name in all_imports(path)
+        if (inner := name.removeprefix("viewer.app.")) != name
+        and not any(f"{inner}.".startswith(f"{known}.") for known in TOOLS_KNOW)
+    }
+    private = {
+        f"{path.relative_to(PACKAGE)} reads {node.value.attr}.{node.attr}"
+        for path in modules()
+        if name_of(path).startswith("viewer.app.tools.")
+        for node in ast.walk(parse(path))
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute)
+        if node.value.attr == "desk" and node.attr.startswith("_")
+    }
+    assert beyond | private == set()
 
 
 def test_scan_and_plain_values_know_no_gl() -> None:

@@ -12,11 +12,12 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import imgui
 
-from viewer.app.commands import COMMANDS, MENUS, TOOLBAR, Command, Menu
+from viewer.app.commands import Command, Commands, Menu
 from viewer.app.keys import Keys, chord, chords, load, write_template
 from viewer.errors import InputError
 
-USUAL = {name: command.key for name, command in COMMANDS.items()}
+COMMANDS = Commands()
+USUAL = {name: command.key for name, command in COMMANDS.of.items()}
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def file(tmp_path: Path) -> Path:
 def load_text(file: Path, text: str) -> tuple[dict[str, str], list[str]]:
     file.parent.mkdir(exist_ok=True)
     file.write_text(text)
-    keys, problems = load(file)
+    keys, problems = load(file, COMMANDS)
     return keys.of, problems
 
 
@@ -39,11 +40,11 @@ def test_every_command_has_a_name_and_a_place_of_its_own_and_no_two_have_the_sam
             for entry in group
         )
 
-    assert sum(map(count, MENUS)) == len(COMMANDS)
+    assert sum(map(count, COMMANDS.menus)) == len(COMMANDS.of)
     every = [key for keys in USUAL.values() for key in chords(keys)]
     assert len(set(every)) == len(every)
-    for group in TOOLBAR:
-        assert all(COMMANDS[name].short for name in group)
+    for group in COMMANDS.toolbar:
+        assert all(COMMANDS.of[name].short for name in group)
 
 
 def test_keys_are_read_as_they_are_written() -> None:
@@ -60,13 +61,13 @@ def test_what_is_no_key_is_told_with_those_that_are(text: str) -> None:
 
 
 def test_without_a_file_the_usual_keys_hold(file: Path) -> None:
-    keys, problems = load(file)
+    keys, problems = load(file, COMMANDS)
     assert (keys.of, problems) == (USUAL, [])
 
 
 def test_the_template_changes_nothing_and_each_line_of_it_can_be_used(file: Path) -> None:
-    write_template(file)
-    keys, problems = load(file)
+    write_template(file, COMMANDS)
+    keys, problems = load(file, COMMANDS)
     assert (keys.of, problems) == (USUAL, [])
     head, mark, lines = file.read_text().partition("[keys]\n")
     assert load_text(file, head + mark + lines.replace("# ", "", 1).replace("\n# ", "\n")) == (USUAL, [])
@@ -109,21 +110,21 @@ def test_what_is_wrong_in_a_file_is_told_and_the_rest_of_it_holds(file: Path, te
 def test_a_damaged_file_is_told_and_the_usual_keys_hold(file: Path, content: bytes) -> None:
     file.parent.mkdir()
     file.write_bytes(content)
-    keys, problems = load(file)
+    keys, problems = load(file, COMMANDS)
     assert len(problems) == 1
     assert keys.of == USUAL
 
 
 def test_a_folder_in_its_place_is_told(file: Path) -> None:
     file.mkdir(parents=True)
-    keys, (problem,) = load(file)
+    keys, (problem,) = load(file, COMMANDS)
     assert "cannot be read" in problem
     assert keys.of == USUAL
 
 
 def test_commands_are_plain_data() -> None:
-    assert all(dataclasses.is_dataclass(command) for command in COMMANDS.values())
-    assert Keys({"fit": "F8"}).of["fit"] == "F8"
+    assert all(dataclasses.is_dataclass(command) for command in COMMANDS.of.values())
+    assert Keys(COMMANDS, {"fit": "F8"}).of["fit"] == "F8"
 
 
 def test_keys_nested_without_end_leave_the_usual_ones(file: Path) -> None:
@@ -135,13 +136,13 @@ def test_keys_nested_without_end_leave_the_usual_ones(file: Path) -> None:
 def test_a_pipe_or_a_huge_file_is_not_waited_for(file: Path) -> None:
     file.parent.mkdir(parents=True)
     os.mkfifo(file)
-    keys, (problem,) = load(file)
+    keys, (problem,) = load(file, COMMANDS)
     assert "cannot be read" in problem
     assert keys.of == USUAL
     file.unlink()
     file.touch()
     os.truncate(file, 400 * 2**20)  # a hole, which takes no room
-    keys, (problem,) = load(file)
+    keys, (problem,) = load(file, COMMANDS)
     assert "longer than" in problem
     assert keys.of == USUAL
 

@@ -46,6 +46,7 @@ FULL = Settings(
         "/scans/a": Left(unit="mm"),
         "/scans/b": Left(4, CAMERA, "cm", (Bookmark("nose", CAMERA),)),
     },
+    tools={"notes": {"texts": False}},
 )
 
 

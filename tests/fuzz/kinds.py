@@ -15,6 +15,7 @@ import lzf
 import numpy as np
 
 from viewer.app import keys, settings
+from viewer.app.commands import Commands
 from viewer.app.session import Left
 from viewer.backends import backend, backends
 from viewer.camera import Camera
@@ -122,7 +123,7 @@ def _write_choices(folder: Path) -> None:
     left = Left(3, camera, "mm", (Bookmark("front", camera),))
     kept = settings.Settings(look=Look(light="head"), recent=("demo",), places={"demo": left})
     (folder / "settings.json").write_text(json.dumps(kept.to_json()))
-    keys.write_template(folder / "keys.toml")
+    keys.write_template(folder / "keys.toml", Commands())
     text = (folder / "keys.toml").read_text()
     (folder / "keys.toml").write_text(text.replace("\n# ", "\n").split("[keys]")[1].join(["[keys]", ""]))
 
@@ -201,7 +202,7 @@ _CHOICES: dict[str, Callable[[Path], Any]] = {
     "recording.png": _recorded,
     "times.csv": _times,
     "settings.json": _settings,
-    "keys.toml": keys.load,
+    "keys.toml": lambda path: keys.load(path, Commands()),
     "planted.txt": _planted,
 }
 

@@ -25,6 +25,7 @@ from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
 from . import keys, settings, theme
+from .commands import Commands
 from .failures import Failures
 from .files.browser import Browser
 from .files.opening import Opened, Opening, begin
@@ -43,7 +44,7 @@ from .scene.steering import Steering
 from .scene.viewport import Viewport
 from .session import Left, Session, known_as
 from .settings import Keeper, Settings
-from .tools.measuring import Measuring
+from .toolbox import Toolbox
 from .window import Window
 
 log = logging.getLogger(__name__)
@@ -60,7 +61,7 @@ class App:
     pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
     rendering: which backend draws.
     scans: those to go to without a dialog. browser: the dialog that finds others.
-    full_view: whether the panels are hidden. measuring: distances.
+    full_view: whether the panels are hidden. tools: what is in their folder. commands: all that can be done.
     marks: what lies over the view. keeper: keeps what is to come back at the next start.
     """
 
@@ -82,7 +83,9 @@ class App:
         self.notices = Notices()
         self.failures = Failures(self.note)
         self.help: Help = Help()
-        self.keys, problems = keys.load(self._keys_file)
+        self.commands = Commands()
+        self.tools: Toolbox = Toolbox(self, self.commands, remembered.tools)
+        self.keys, problems = keys.load(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
         self.pointer: Pointer = Pointer(self)
@@ -91,7 +94,6 @@ class App:
         self.marks = remembered.marks
         self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
         self.full_view: FullView = FullView(self)
-        self.measuring: Measuring = Measuring(self)
         self.capture: Capture = Capture(self)
         self.counting = Counting()
         self.exporting: Exporting = Exporting(self, remembered.export, remembered.export_marks)
@@ -128,15 +130,15 @@ class App:
         self.session.change(name, *parts, merge=merge, **fields)
 
     def undo(self) -> None:
-        """Take back the last change of the document; first of all a measurement that was begun."""
-        if self.measuring.begun is not None:
-            self.measuring.begun = None
+        """Take back the last change of the document; first of all what a tool has begun."""
+        if self.tools.is_under_way:
+            self.tools.abandon()
         else:
             self.session.history.undo()
 
     def redo(self) -> None:
         """Make the change again that was undone last."""
-        self.measuring.begun = None
+        self.tools.abandon()
         self.session.history.redo()
 
     def quit(self) -> None:
@@ -210,7 +212,7 @@ class App:
         """Write the file of keys where there is none yet, and tell where it is."""
         try:
             if not os.path.exists(self._keys_file):
-                keys.write_template(self._keys_file)
+                keys.write_template(self._keys_file, self.commands)
             self.note(f"The keys are in {self._keys_file}; edit it and start Scan4D again.")
         except InputError as error:
             self.note(str(error))
@@ -229,7 +231,7 @@ class App:
     @property
     def tasks(self) -> list[Task]:
         """What goes on beside the window, the latest last."""
-        tasks = [self.exporting.task, self.renderer.preparing, self._opening.task]
+        tasks = [self.exporting.task, self.renderer.preparing, self._opening.task, *self.tools.tasks]
         if self.playback.pose is None:
             tasks.append(self.playback.timeline.reading)
         return [task for task in tasks if task is not None]
@@ -279,7 +281,7 @@ class App:
             self.session, window=self.window.place, theme=self.theme, text_scale=self.window.text_scale,
             marks=self.marks, cube=self.steering.cube.is_shown, turn_seconds=self.steering.turntable.seconds,
             recent=self.scans.recent, export=self.exporting.kept,
-            export_marks=self.exporting.marks,
+            export_marks=self.exporting.marks, tools=self.tools.remembered(),
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------
@@ -318,7 +320,7 @@ class App:
         if self._unit:
             self.session.amend(unit=self._unit)
         self.steering.begin_scan()
-        self.measuring.begun = None
+        self.tools.abandon()
         return Playback(timeline, self.session)
 
     def pass_on_messages(self) -> None:
@@ -348,6 +350,7 @@ class App:
             ("Keeping settings", self._keep_at_last),
             ("Saving pictures", self.capture.close),
             ("Counting", self.counting.cancel),
+            ("Putting tools away", self.tools.close),
             ("Exporting", self.exporting.close),
             ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop
             ("Opening", self._opening.cancel),

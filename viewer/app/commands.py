@@ -1,31 +1,38 @@
-"""All that the user can do: one table for the menus, the toolbar, the keys and the list of keys."""
+"""All that the user can do: one table for the menus, the toolbar, the keys and the list of keys.
+
+What a tool can do is declared in its folder and added to the table.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..backends import backends
+from ..errors import InputError, unknown_name
 from . import theme
+from .keys import chords
 from .scene import legend, navigation
 from .scene.levels import LEVELS
 
 if TYPE_CHECKING:
     from .app import App
 
+T = TypeVar("T")
 Item = tuple[str, Callable[[], object], bool]  # title, what it does, whether it is ticked
 
 
-def _always(app: App) -> bool:
+def _always(doer: Any) -> bool:
     return True
 
 
 @dataclass(frozen=True)
-class Command:
-    """Something to do. name: in the file of keys. title: in menus. short: on the toolbar.
+class Command(Generic[T]):
+    """Something to do. T is who does it: the app, or a tool.
 
+    name: in the file of keys. title: in menus. short: on the toolbar.
     key: its usual keys, such as "Ctrl+1", several with a space between; empty: none. repeats: again and again
     while they are held. is_on: whether to tick it, None for what is not on or off. can: whether it can be
     done now. title_now: what the menu says where that changes.
@@ -33,29 +40,32 @@ class Command:
 
     name: str
     title: str
-    act: Callable[[App], object]
+    act: Callable[[T], object]
     key: str = ""
     repeats: bool = False
-    is_on: Callable[[App], bool] | None = None
-    can: Callable[[App], bool] = _always
+    is_on: Callable[[T], bool] | None = None
+    can: Callable[[T], bool] = _always
     short: str = ""
-    title_now: Callable[[App], str] | None = None
+    title_now: Callable[[T], str] | None = None
 
 
 @dataclass(frozen=True)
-class Listing:
+class Listing(Generic[T]):
     """A menu of what is there at the moment."""
 
     title: str
-    items: Callable[[App], Iterable[Item]]
+    items: Callable[[T], Iterable[Item]]
 
 
 @dataclass(frozen=True)
-class Menu:
+class Menu(Generic[T]):
     """Groups of entries, with a line between them."""
 
     title: str
-    groups: tuple[tuple[Command | Listing | Menu, ...], ...]
+    groups: tuple[tuple[Command[T] | Listing[T] | Menu[T], ...], ...]
+
+
+Entry = Command[T] | Listing[T] | Menu[T]
 
 
 def _has_frames(app: App) -> bool:
@@ -75,19 +85,14 @@ def _has_bookmarks(app: App) -> bool:
 
 
 def _can_undo(app: App) -> bool:
-    return app.measuring.begun is not None or app.session.history.undoes is not None
+    return app.tools.is_under_way or app.session.history.undoes is not None
 
 
 def _can_redo(app: App) -> bool:
     return app.session.history.redoes is not None
 
 
-def _measured(name: str, title: str, act: Callable[[App], None]) -> Command:
-    """Does something with all measurements."""
-    return Command(f"{name}_measurements", title, act, can=lambda app: bool(app.measuring.made.all))
-
-
-def _pace(name: str, title: str, key: str) -> Command:
+def _pace(name: str, title: str, key: str) -> Command[App]:
     """Switches a field of the `Pace`."""
     return Command(
         name, title, lambda app: app.toggle_pace(name), key,
@@ -95,7 +100,7 @@ def _pace(name: str, title: str, key: str) -> Command:
     )  # fmt: skip
 
 
-def _view(number: int, side: str) -> Command:
+def _view(number: int, side: str) -> Command[App]:
     title = side.capitalize()
     return Command(
         f"view_{side}", title, lambda app: app.steering.look_from(*navigation.VIEWS[side]), f"Ctrl+{number}",
@@ -103,7 +108,7 @@ def _view(number: int, side: str) -> Command:
     )  # fmt: skip
 
 
-def _level(number: int) -> Command:
+def _level(number: int) -> Command[App]:
     title = f"Level {number}" if number else "Native level"
     return Command(
         f"level_{number}", title, lambda app: app.rendering.toggle_level(number), str(number),
@@ -112,7 +117,7 @@ def _level(number: int) -> Command:
     )  # fmt: skip
 
 
-def _mark(name: str, title: str, key: str) -> Command:
+def _mark(name: str, title: str, key: str) -> Command[App]:
     """Shows one of the marks over the view."""
     return Command(
         name, title, lambda app: legend.toggle(app, name), key, is_on=lambda app: getattr(app.marks, name)
@@ -129,7 +134,7 @@ def _themes(app: App) -> Iterator[Item]:
         yield name.capitalize(), partial(app.set_theme, name), name == app.theme
 
 
-_FILE = Menu("File", (
+_FILE: Menu[App] = Menu("File", (
     (
         Command("open", "Open...", lambda app: app.browser.show(), "Ctrl+O", short="Open"),
         Listing("Open recent", lambda app: app.scans.items(app.scans.lately)),
@@ -155,7 +160,7 @@ _FILE = Menu("File", (
     ),
     (Command("quit", "Quit", lambda app: app.quit(), "Ctrl+Q"),),
 ))  # fmt: skip
-_EDIT = Menu("Edit", (
+_EDIT: Menu[App] = Menu("Edit", (
     (
         Command(
             "undo", "Undo", lambda app: app.undo(), "Ctrl+Z", repeats=True, can=_can_undo,
@@ -167,7 +172,7 @@ _EDIT = Menu("Edit", (
         ),
     ),
 ))  # fmt: skip
-_TURNTABLE = Menu("Turntable", (
+_TURNTABLE: Menu[App] = Menu("Turntable", (
     (
         Command(
             "turntable", "Turn", lambda app: app.steering.toggle_turntable(), "Y",
@@ -176,7 +181,7 @@ _TURNTABLE = Menu("Turntable", (
     ),
     (Listing("Time for a turn", lambda app: app.steering.turntable.items()),),
 ))  # fmt: skip
-_BOOKMARKS = Menu("Bookmarks", (
+_BOOKMARKS: Menu[App] = Menu("Bookmarks", (
     (
         Command("bookmark_add", "Add this view", lambda app: app.bookmarks.add(), "Ctrl+B", can=_has_camera),
         Command("bookmark_next", "Next", lambda app: app.bookmarks.step(1), "N", can=_has_bookmarks),
@@ -187,7 +192,7 @@ _BOOKMARKS = Menu("Bookmarks", (
     ),
     (Listing("Go to", lambda app: app.bookmarks.items()),),
 ))  # fmt: skip
-_VIEW = Menu("View", (
+_VIEW: Menu[App] = Menu("View", (
     (
         Command("fit", "Fit", lambda app: app.steering.fit(), "F", can=_has_camera, short="Fit"),
         Command("center", "Centre the point", lambda app: app.steering.center(), "Z", can=_has_camera),
@@ -221,7 +226,7 @@ _VIEW = Menu("View", (
         Command("text_usual", "Usual text", lambda app: app.change_text(0), "Ctrl+0"),
     ),
 ))  # fmt: skip
-_LEVELS = Menu("Pyramid levels", (
+_LEVELS: Menu[App] = Menu("Pyramid levels", (
     tuple(_level(number) for number in LEVELS),
     (
         Command(
@@ -230,7 +235,7 @@ _LEVELS = Menu("Pyramid levels", (
         ),
     ),
 ))  # fmt: skip
-_PLAYBACK = Menu("Playback", (
+_PLAYBACK: Menu[App] = Menu("Playback", (
     (
         Command(
             "play", "Play", lambda app: app.toggle_play(), "Space",
@@ -252,21 +257,7 @@ _PLAYBACK = Menu("Playback", (
         _pace("every_frame", "Every frame", "E"),
     ),
 ))  # fmt: skip
-_MEASURING = (
-    Command(
-        "measure", "Measure", lambda app: app.measuring.toggle(), "M",
-        is_on=lambda app: app.measuring.active, can=_has_camera,
-    ),
-    Menu("Measurements", (
-        (
-            _measured("copy", "Copy as table", lambda app: app.measuring.copy()),
-            _measured("save", "Save CSV...", lambda app: app.measuring.ask_to_save()),
-            _measured("clear", "Clear", lambda app: app.measuring.clear()),
-        ),
-    )),
-)  # fmt: skip
-_TOOLS = Menu("Tools", (
-    _MEASURING,
+_TOOLS: Menu[App] = Menu("Tools", (
     (
         Listing("Renderer", _renderers),
         Command("backend", "Next renderer", lambda app: app.rendering.step(1), "B"),
@@ -275,7 +266,7 @@ _TOOLS = Menu("Tools", (
     ),
     (_PLAYBACK,),
 ))  # fmt: skip
-_HELP = Menu("Help", (
+_HELP: Menu[App] = Menu("Help", (
     (
         Command("keys", "Keys and mouse", lambda app: app.help.toggle("Keys and mouse"), "F1"),
         Command("edit_keys", "Change keys", lambda app: app.write_keys()),
@@ -285,10 +276,19 @@ _HELP = Menu("Help", (
         Command("about", "About", lambda app: app.help.toggle("About")),
     ),
 ))  # fmt: skip
-MENUS = (_FILE, _EDIT, _VIEW, _TOOLS, _HELP)
+_MENUS: tuple[Menu[App], ...] = (_FILE, _EDIT, _VIEW, _TOOLS, _HELP)
+_TOOLBAR: tuple[tuple[str, ...], ...] = (
+    ("open",), ("fit",), tuple(f"view_{side}" for side in navigation.VIEWS), ("screenshot", "record"),
+)  # fmt: skip
+_MOUSE: tuple[tuple[str, str], ...] = (
+    ("Left drag", "Orbit"),
+    ("Middle drag, Shift+left drag", "Pan"),
+    ("Wheel, right drag", "Zoom"),
+    ("Double click", "Turn about what is there"),
+)
 
 
-def _commands(entry: Any) -> Iterator[Command]:
+def _commands(entry: Entry[T]) -> Iterator[Command[T]]:
     """The commands of a menu and of those in it, in order."""
     if isinstance(entry, Command):
         yield entry
@@ -298,14 +298,39 @@ def _commands(entry: Any) -> Iterator[Command]:
                 yield from _commands(inner)
 
 
-COMMANDS = {command.name: command for menu in MENUS for command in _commands(menu)}
-TOOLBAR = (
-    ("open",), ("fit",), tuple(f"view_{side}" for side in navigation.VIEWS), ("screenshot", "record"),
-)  # fmt: skip
-MOUSE = (
-    ("Left drag", "Orbit"),
-    ("Middle drag, Shift+left drag", "Pan"),
-    ("Wheel, right drag", "Zoom"),
-    ("Double click", "Turn about what is there"),
-    ("Click while measuring", "Set an end"),
-)
+class Commands:
+    """The table: the window's own commands, and those that were added to it.
+
+    menus: in their order. toolbar: groups of names. mouse: how, and what it does. of: name -> command, the
+    window's own first.
+    """
+
+    def __init__(self) -> None:
+        self.menus = _MENUS
+        self.toolbar = _TOOLBAR
+        self.mouse = _MOUSE
+        self.of = {command.name: command for menu in _MENUS for command in _commands(menu)}
+
+    def add(self, menu: str, entries: Sequence[Entry[App]]) -> None:
+        """Add a group to a menu, and to the toolbar what has a `short` title.
+
+        Under Tools it comes first, in other menus last. Raises InputError for a menu or keys that are none,
+        and for names of commands that are taken.
+        """
+        titles = [there.title for there in self.menus]
+        if menu not in titles:
+            raise unknown_name("menu", menu, titles)
+        added = [command for entry in entries for command in _commands(entry)]
+        for command in added:
+            chords(command.key)
+            if command.name in self.of:
+                raise InputError(f"there is a command '{command.name}' already", hint="Name it otherwise")
+        self.of |= {command.name: command for command in added}
+        group = (tuple(entries),)
+        self.menus = tuple(
+            there if there.title != menu
+            else Menu(menu, group + there.groups if menu == _TOOLS.title else there.groups + group)
+            for there in self.menus
+        )  # fmt: skip
+        if short := tuple(command.name for command in added if command.short):
+            self.toolbar = (*self.toolbar, short)

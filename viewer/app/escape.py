@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
@@ -23,7 +23,12 @@ def handle(app: App) -> None:
         if not imgui.get_io().want_text_input:
             _close_list()
     elif not imgui.is_any_item_active():
-        next(end for goes_on, end in _takers(app) if goes_on)()
+        for ends in (
+            app.help.on_escape, app.tools.on_escape, app.capture.on_escape, partial(tasks.on_escape, app),
+            app.full_view.on_escape, app.notices.on_escape,
+        ):  # fmt: skip
+            if ends():
+                break
 
 
 def _close_list() -> None:
@@ -36,14 +41,3 @@ def _close_list() -> None:
         # So that the dialog below does not see it as well.
         lock = imgui.internal.InputFlagsPrivate_.lock_this_frame
         imgui.internal.set_key_owner(imgui.Key.escape, _OWNER, lock)
-
-
-def _takers(app: App) -> Iterator[tuple[bool, Callable[[], object]]]:
-    """(whether it goes on, what ends it), in their order."""
-    yield app.help.focused is not None, app.help.close_focused
-    yield app.measuring.active, app.measuring.toggle
-    yield app.capture.replaying is not None, app.capture.stop_replaying
-    lightly = tasks.end_by_escape(app)
-    yield bool(lightly), lambda: app.cancel(lightly[-1])
-    yield app.full_view.is_on, app.full_view.leave
-    yield True, app.notices.dismiss

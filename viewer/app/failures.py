@@ -30,29 +30,49 @@ class Failures:
     @contextmanager
     def told(self, what: str) -> Iterator[None]:
         """Whatever goes wrong inside is told; the widgets that were begun there are ended. what: goes on."""
-        state = _state_of_widgets()
         try:
-            yield
+            with widgets_ended():
+                yield
         except (Exception, Cancelled) as error:
-            if state is not None:
-                _end_widgets(state)
             self.tell(what, error)
 
-    def tell(self, what: str, error: BaseException) -> None:
-        """Tell what went wrong: once, however many frames in a row it does. what: was being done."""
+    def tell(self, what: str, error: BaseException, words: str = "") -> None:
+        """Tell what went wrong: once, however many frames in a row it does.
+
+        what: was being done. words: to tell it in; else those of `in_words`.
+        """
         now, self.count = time.monotonic(), self.count + 1
         before, self._last[what] = self._last.get(what, -math.inf), now
         if now - before > _PAUSE:
             log.error("%s failed", what, exc_info=error)
-            self._note(in_words(what, error))
+            self._note(words or in_words(what, error))
 
 
 def in_words(what: str, error: BaseException) -> str:
     """One line for users."""
     if isinstance(error, Scan4DError):
         return str(error)
+    return f"{what} failed ({reason(error)}); all else goes on."
+
+
+def reason(error: BaseException) -> str:
+    """What an error says, and of which kind it is unless it is meant for users."""
+    if isinstance(error, Scan4DError):
+        return str(error)
     said = " ".join(str(error).split())[:_LONGEST]
-    return f"{what} failed ({type(error).__name__}{': ' if said else ''}{said}); all else goes on."
+    return f"{type(error).__name__}{': ' if said else ''}{said}"
+
+
+@contextmanager
+def widgets_ended() -> Iterator[None]:
+    """Whatever goes wrong inside goes on from here, and the widgets that were begun there are ended."""
+    state = _state_of_widgets()
+    try:
+        yield
+    except BaseException:
+        if state is not None:
+            _end_widgets(state)
+        raise
 
 
 def _state_of_widgets() -> imgui.internal.ErrorRecoveryState | None:

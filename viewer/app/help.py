@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 
 from .. import __version__
-from .commands import COMMANDS, MENUS, MOUSE, Command, Menu
+from .commands import Command, Menu
 
 if TYPE_CHECKING:
     from .app import App
@@ -29,9 +29,10 @@ class Help:
         assert page in _PAGES
         self.open ^= {page}
 
-    def close_focused(self) -> None:
-        """Close the page that has the focus, if one has."""
+    def on_escape(self) -> bool:
+        """Close the page that has the focus; whether one has."""
         self.open.discard(self.focused or "")
+        return self.focused is not None
 
 
 def draw(app: App) -> None:
@@ -57,14 +58,14 @@ def draw(app: App) -> None:
 def _draw_keys(app: App) -> None:
     """The mouse, then every command in the order of the menus."""
     imgui.separator_text("Mouse")
-    for name, does in MOUSE:
+    for name, does in app.commands.mouse:
         _row(name, does)
-    for menu in MENUS:
+    for menu in app.commands.menus:
         imgui.separator_text(menu.title)
         _draw_commands(app, menu)
 
 
-def _draw_commands(app: App, menu: Menu, path: str = "") -> None:
+def _draw_commands(app: App, menu: Menu[App], path: str = "") -> None:
     for group in menu.groups:
         for entry in group:
             if isinstance(entry, Command):
@@ -97,4 +98,4 @@ def _draw_about(app: App) -> None:
     imgui.text_wrapped(f"Scan4D {__version__}: a viewer for 4D scans.")
     imgui.spacing()
     imgui.text_wrapped(f"OpenGL {gpu.driver} on {gpu.device}" + (", in software" if gpu.software else ""))
-    imgui.text_wrapped(f"{len(COMMANDS)} commands. {app.keys.hint('keys')}: all their keys.")
+    imgui.text_wrapped(f"{len(app.commands.of)} commands. {app.keys.hint('keys')}: all their keys.")

@@ -11,10 +11,10 @@ from imgui_bundle import imgui
 
 from ..errors import InputError, did_you_mean, shortened, unknown_name
 from ..files import read_text, whole_file
-from .commands import COMMANDS
 
 if TYPE_CHECKING:
     from .app import App
+    from .commands import Commands
 
 FILE = "keys.toml"
 _MOST_BYTES, _MOST_TOLD = 64 * 2**10, 5
@@ -64,13 +64,17 @@ def chords(text: str) -> list[int]:
 class Keys:
     """The keys of every command. of: command's name -> its keys as text, empty for none."""
 
-    def __init__(self, changes: Mapping[str, str] | None = None) -> None:
-        self.of = {name: command.key for name, command in COMMANDS.items()} | dict(changes or {})
-        self._chords = [(COMMANDS[name], keys) for name, text in self.of.items() for keys in chords(text)]
+    def __init__(self, commands: Commands, changes: Mapping[str, str] | None = None) -> None:
+        """changes: command's name -> its keys, where they are not the usual ones."""
+        self._commands = commands.of
+        self.of = {name: command.key for name, command in commands.of.items()} | dict(changes or {})
+        self._chords = [
+            (self._commands[name], keys) for name, text in self.of.items() for keys in chords(text)
+        ]
 
     def hint(self, name: str) -> str:
         """A command's title, and its keys where it has some."""
-        keys, title = self.of[name], COMMANDS[name].title
+        keys, title = self.of[name], self._commands[name].title
         return f"{title} ({keys})" if keys else title
 
     def handle(self, app: App) -> None:
@@ -84,37 +88,44 @@ class Keys:
                     command.act(app)
 
 
-def load(path: Path) -> tuple[Keys, list[str]]:
+def load(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
     """The keys that a TOML file gives, and what is wrong in it; the usual keys where there is no file.
 
-    What is wrong is left out: the usual keys hold for it.
+    What is wrong is left out: the usual keys hold for it. Of two commands whose usual keys are the same, as
+    tools may bring them, the later one has none.
     """
-    try:
-        given = tomllib.loads(read_text(path, _MOST_BYTES))
-    except FileNotFoundError:
-        return Keys(), []
-    except (OSError, ValueError, RecursionError) as error:  # of encoding and of TOML as well
-        nested = isinstance(error, RecursionError)
-        what = "it is nested too deeply" if nested else getattr(error, "strerror", None) or error
-        return Keys(), [str(InputError(f"cannot be read ({what})", path, "The usual keys hold"))]
-    changes, problems = _checked(given)
+    given, problems = _read(path)
+    changes = _checked(given, commands, problems)
     told = [str(InputError(problem.what, path, problem.hint)) for problem in problems[:_MOST_TOLD]]
     if len(problems) > _MOST_TOLD:
         told.append(f"{path}: {len(problems) - _MOST_TOLD} more lines cannot be used")
-    return Keys(changes), told
+    return Keys(commands, changes), told
 
 
-def _checked(given: Mapping[str, Any]) -> tuple[dict[str, str], list[InputError]]:
-    """The keys of a file that can be used, and what cannot."""
-    problems = [unknown_name("table", name, ["keys"]) for name in given if name != "keys"]
+def _read(path: Path) -> tuple[dict[str, Any], list[InputError]]:
+    """What a TOML file says, and why it cannot be read; nothing where there is no file."""
+    try:
+        return tomllib.loads(read_text(path, _MOST_BYTES)), []
+    except FileNotFoundError:
+        return {}, []
+    except (OSError, ValueError, RecursionError) as error:  # of encoding and of TOML as well
+        nested = isinstance(error, RecursionError)
+        what = "it is nested too deeply" if nested else getattr(error, "strerror", None) or error
+        return {}, [InputError(f"cannot be read ({what})", hint="The usual keys hold")]
+
+
+def _checked(given: Mapping[str, Any], commands: Commands, problems: list[InputError]) -> dict[str, str]:
+    """The keys of a file that can be used; what cannot is added to the problems."""
+    problems += [unknown_name("table", name, ["keys"]) for name in given if name != "keys"]
     table = given.get("keys", {})
     if not isinstance(table, dict):
-        return {}, [InputError("'keys' is not a table", hint="Write [keys] above the lines")]
+        problems.append(InputError("'keys' is not a table", hint="Write [keys] above the lines"))
+        table = {}
     changes = {}
     for name, text in table.items():
         try:
-            if name not in COMMANDS:
-                hint = f"{did_you_mean(name, COMMANDS)}F1 lists them"
+            if name not in commands.of:
+                hint = f"{did_you_mean(name, commands.of)}F1 lists them"
                 raise InputError(f"unknown command '{shortened(name)}'", hint=hint)
             if not isinstance(text, str):
                 raise InputError(f"the keys of '{name}' are not text", hint=f'Write {name} = "Ctrl+K"')
@@ -122,32 +133,36 @@ def _checked(given: Mapping[str, Any]) -> tuple[dict[str, str], list[InputError]
             changes[name] = text
         except InputError as problem:
             problems.append(problem)
-    return _without_clashes(changes, problems), problems
+    return _without_clashes(changes, commands, problems)
 
 
-def _without_clashes(changes: dict[str, str], problems: list[InputError]) -> dict[str, str]:
-    """Leave out changes, last first, until no keys do two things; the usual keys have none."""
+def _without_clashes(
+    changes: dict[str, str], commands: Commands, problems: list[InputError]
+) -> dict[str, str]:
+    """Leave out changes, last first, until no keys do two things."""
+    usual = {name: command.key for name, command in commands.of.items()}
     while True:
         taken: dict[int, str] = {}
-        texts = {n: c.key for n, c in COMMANDS.items()} | changes
-        for name, text in ((name, one) for name, several in texts.items() for one in several.split()):
+        for name, text in ((name, one) for name, keys in (usual | changes).items() for one in keys.split()):
             other = taken.setdefault(chord(text), name)
             if other != name:
-                guilty = next(n for n in reversed(changes) if n in (name, other))
                 what = f"{text} is to do both '{other}' and '{name}'"
-                problems.append(
-                    InputError(what, hint=f"Give one of them other keys. '{guilty}' keeps its usual ones")
-                )
-                del changes[guilty]
+                guilty = next((n for n in reversed(changes) if n in (name, other)), None)
+                left = f"'{guilty}' keeps its usual ones" if guilty else f"'{name}' has none"
+                problems.append(InputError(what, hint=f"Give one of them other keys. {left}"))
+                if guilty:
+                    del changes[guilty]
+                else:
+                    usual[name] = ""
                 break
         else:
-            return changes
+            return {name: text for name, text in (usual | changes).items() if text != commands.of[name].key}
 
 
-def write_template(path: Path) -> None:
+def write_template(path: Path, commands: Commands) -> None:
     """Write a file that names every command and its usual keys. Raises InputError where it cannot."""
     named = " ".join(_NAMED)
-    lines = [f"# {name} = {_quoted(command.key)}  # {command.title}" for name, command in COMMANDS.items()]
+    lines = [f"# {name} = {_quoted(command.key)}  # {command.title}" for name, command in commands.of.items()]
     with whole_file(path) as temporary:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_text(_HEAD.format(named=named) + "\n".join(lines) + "\n", encoding="utf-8")

@@ -10,7 +10,6 @@ from . import escape, help, menu, panel, tasks
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
-from .tools.measuring import panel as measuring_panel
 
 if TYPE_CHECKING:
     from .app import App
@@ -39,7 +38,7 @@ def draw(app: App) -> Place:
         ("Help", lambda: help.draw(app)),
         ("The dialog that opens scans", app.browser.draw),
         ("The export dialog", lambda: export_dialog.draw(app)),
-        ("The dialog that saves measurements", lambda: measuring_panel.draw_dialog(app)),
+        ("Dialogs of tools", app.tools.draw_dialogs),
     ):
         with told(name):
             draw_part()

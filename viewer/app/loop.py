@@ -92,6 +92,7 @@ class Loop:
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
             ("Keeping the history", lambda: app.settle(now)),
+            ("Advancing tools", app.tools.advance),
             ("Counting", lambda: app.counting.advance(app.viewport, not app.moving, now)),
         ):
             with app.failures.told(name):

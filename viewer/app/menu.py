@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 
 from . import theme
-from .commands import COMMANDS, MENUS, TOOLBAR, Command, Listing, Menu
+from .commands import Command, Entry, Listing, Menu
 
 if TYPE_CHECKING:
     from .app import App
@@ -19,7 +19,7 @@ def draw_bar(app: App) -> float:
     is_there = imgui.begin_main_menu_bar()
     imgui.pop_style_var()
     if is_there:
-        for menu in MENUS:
+        for menu in app.commands.menus:
             _draw(app, menu)
         imgui.end_main_menu_bar()
     return imgui.get_frame_height()
@@ -29,11 +29,11 @@ def draw_toolbar(app: App) -> None:
     """Declare the toolbar in the current ImGui window: as many buttons as there is room for."""
     gap = imgui.get_style().item_spacing.x
     room = imgui.get_content_region_avail().x
-    for group in TOOLBAR:
-        if group is not TOOLBAR[0]:
+    for group in app.commands.toolbar:
+        if group is not app.commands.toolbar[0]:
             _draw_line(gap)
         for name in group:
-            command = COMMANDS[name]
+            command = app.commands.of[name]
             width = imgui.calc_text_size(command.short).x + 2 * imgui.get_style().frame_padding.x
             if imgui.get_cursor_pos_x() + width > room:
                 return
@@ -49,7 +49,7 @@ def _draw_line(gap: float) -> None:
     imgui.get_window_draw_list().add_line(top, bottom, imgui.get_color_u32(imgui.Col_.separator))
 
 
-def _draw_button(app: App, command: Command) -> None:
+def _draw_button(app: App, command: Command[App]) -> None:
     is_on = command.is_on is not None and command.is_on(app)
     imgui.begin_disabled(not command.can(app))
     if is_on:
@@ -63,7 +63,7 @@ def _draw_button(app: App, command: Command) -> None:
     imgui.set_item_tooltip(app.keys.hint(command.name))
 
 
-def _draw(app: App, entry: Command | Listing | Menu) -> None:
+def _draw(app: App, entry: Entry[App]) -> None:
     if isinstance(entry, Command):
         is_on = entry.is_on is not None and entry.is_on(app)
         title = entry.title_now(app) if entry.title_now else entry.title
@@ -78,7 +78,7 @@ def _draw(app: App, entry: Command | Listing | Menu) -> None:
         imgui.end_menu()
 
 
-def _draw_groups(app: App, menu: Menu) -> None:
+def _draw_groups(app: App, menu: Menu[App]) -> None:
     for group in menu.groups:
         if group is not menu.groups[0]:
             imgui.separator()
@@ -86,7 +86,7 @@ def _draw_groups(app: App, menu: Menu) -> None:
             _draw(app, entry)
 
 
-def _draw_items(app: App, listing: Listing) -> None:
+def _draw_items(app: App, listing: Listing[App]) -> None:
     items = list(listing.items(app))
     for number, (title, act, is_on) in enumerate(items):
         if imgui.menu_item(f"{title}##{number}", "", is_on)[0]:

@@ -57,9 +57,10 @@ class Notices:
         """Seconds until one of those shown goes; infinite where none is shown."""
         return min((notice.until - now for notice in self.shown(now)), default=math.inf)
 
-    def dismiss(self) -> None:
+    def on_escape(self) -> bool:
         """Show none of them any longer."""
         self.all = [Notice(notice.text, notice.at, 0.0) for notice in self.all]
+        return True
 
 
 def draw(app: App, size: ImVec2) -> None:

@@ -14,7 +14,7 @@ from ..look import COLOR_BY, drawable
 from . import widgets
 from .files.scans import title
 from .scene import counting
-from .tools.measuring import panel as measuring_panel
+from .ui import Ui
 
 if TYPE_CHECKING:
     from ..gpu.surface import Stats
@@ -35,7 +35,7 @@ def draw(app: App) -> None:
     imgui.begin_child("settings", ImVec2(0, -height))
     if len(app.scans.listed) > 1:
         _draw_scans(app)
-    pose = app.playback.pose
+    pose, ui = app.playback.pose, Ui(app.keys)
     if pose is not None:
         if _section("Renderer"):
             _draw_renderer(app, pose)
@@ -43,11 +43,14 @@ def draw(app: App) -> None:
             app.rendering.edit_look(widgets.edit(app.document.look, {"color_by": _colors(app, pose)}))
             _draw_projection(app)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
-            app.bookmarks.draw(app)
-        if app.measuring.to_show:
-            imgui.set_next_item_open(True)
-        if _section("Measurements", is_open=False):
-            measuring_panel.draw(app)
+            app.bookmarks.draw(ui)
+        for title, is_revealed, declare in app.tools.sections():
+            if is_revealed:
+                imgui.set_next_item_open(True)
+            if _section(title, is_open=False):
+                declare(ui)
+                if is_revealed:
+                    imgui.set_scroll_here_y(1.0)
     imgui.end_child()
     imgui.separator()
     imgui.begin_child("statistics")

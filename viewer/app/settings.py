@@ -52,7 +52,8 @@ class Settings:
     window: None until it was open once. backend: None for the scan's own default. params: backend ->
     its `Params`. marks: over the view. cube: whether the orientation cube is shown. turn_seconds: of the
     turntable. export, export_marks: of the export dialog. recent: the scans opened last, newest first.
-    places: scan, as `known_as` has it -> how it was left, the last one at the end.
+    places: scan, as `known_as` has it -> how it was left, the last one at the end. tools: name of a tool ->
+    values of its `Settings` that are not the defaults.
     """
 
     window: Place | None = None
@@ -69,6 +70,7 @@ class Settings:
     export_marks: Marks = field(default_factory=Marks)
     recent: tuple[str, ...] = ()
     places: Mapping[str, Left] = field(default_factory=dict)
+    tools: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, session: Session, **others: Any) -> Settings:
@@ -90,8 +92,8 @@ class Settings:
         """A JSON object."""
         data = {"format": FORMAT} | asdict(self)
         data["places"] = dict(list(data["places"].items())[-_MOST_PLACES:])
-        data["params"] = {name: _chosen(values) for name, values in self.params.items()}
-        data["look"] = {k: value for k, value in _chosen(self.look).items() if k not in _OF_ONE_SCAN}
+        data["params"] = {name: chosen(values) for name, values in self.params.items()}
+        data["look"] = {k: value for k, value in chosen(self.look).items() if k not in _OF_ONE_SCAN}
         return data
 
     @classmethod
@@ -177,7 +179,7 @@ class Keeper:
         return None if error is None else f"Settings are not kept: {error}"
 
 
-def _chosen(values: Any) -> dict[str, Any]:
+def chosen(values: Any) -> dict[str, Any]:
     """The values of a declaration that are not its defaults, which a later version may change."""
     read = {parameter.name: getattr(values, parameter.name) for parameter in describe(type(values))}
     return {name: value for name, value in read.items() if value != getattr(type(values)(), name)}
@@ -204,7 +206,7 @@ def _usable(data: Mapping[str, Any], readers: Mapping[str, Callable[[Any], Any]]
     return values
 
 
-def _declared(cls: type[T], data: Mapping[str, Any], default: T | None = None) -> T:
+def declared(cls: type[T], data: Mapping[str, Any], default: T | None = None) -> T:
     """An instance of a declaration (see viewer/params.py) with those values that it takes."""
     values: Any = cls() if default is None else default
     for parameter in describe(cls):
@@ -214,7 +216,7 @@ def _declared(cls: type[T], data: Mapping[str, Any], default: T | None = None) -
 
 
 def _look(data: Mapping[str, Any]) -> Look:
-    look = _declared(Look, {name: value for name, value in data.items() if name not in _OF_ONE_SCAN})
+    look = declared(Look, {name: value for name, value in data.items() if name not in _OF_ONE_SCAN})
     return look if look.color_by in COLOR_BY else replace(look, color_by="auto")  # a scalar of one scan
 
 
@@ -222,7 +224,7 @@ def _params(data: Mapping[str, Any]) -> dict[str, Any]:
     read = {}
     for name, values in data.items():
         with suppress(*_WRONG):
-            read[name] = _declared(backend(name).module.Params, values)
+            read[name] = declared(backend(name).module.Params, values)
     return read
 
 
@@ -296,6 +298,11 @@ def _places(data: Any) -> dict[str, Left]:
     return places
 
 
+def _tools(data: Any) -> dict[str, dict[str, Any]]:
+    """As the file has them: each tool reads its own."""
+    return {_text(name): values for name, values in data.items() if isinstance(values, dict)}
+
+
 _READERS: dict[str, Callable[[Any], Any]] = {
     "window": _window,
     "theme": _theme,
@@ -303,14 +310,15 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "backend": lambda data: backend(data).name,
     "params": _params,
     "look": _look,
-    "pace": lambda data: _declared(Pace, data),
-    "marks": lambda data: _declared(Marks, data, legend.SHOWN_FIRST),
+    "pace": lambda data: declared(Pace, data),
+    "marks": lambda data: declared(Marks, data, legend.SHOWN_FIRST),
     "cube": lambda data: data is not False,
     "turn_seconds": _turn_seconds,
-    "export": lambda data: _declared(Choices, data),
-    "export_marks": lambda data: _declared(Marks, data),
+    "export": lambda data: declared(Choices, data),
+    "export_marks": lambda data: declared(Marks, data),
     "recent": _recent,
     "places": _places,
+    "tools": _tools,
 }
 _OF_A_SCAN: dict[str, Callable[[Any], Any]] = {
     "index": _index,

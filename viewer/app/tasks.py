@@ -56,6 +56,14 @@ def end_by_escape(app: App) -> list[Task]:
     return [task for task in shown(app) if task is not app.exporting.task]
 
 
+def on_escape(app: App) -> bool:
+    """Cancel the latest work that Escape cancels; whether there is any."""
+    lightly = end_by_escape(app)
+    if lightly:
+        app.cancel(lightly[-1])
+    return bool(lightly)
+
+
 def _draw_task(app: App, task: Task) -> None:
     gap = imgui.get_style().item_spacing.x
     width = imgui.get_content_region_avail().x

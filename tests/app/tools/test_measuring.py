@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pytest
 from imgui_bundle import ImVec2
 
 from viewer.analysis.measure import End, Measurement, Reading
+from viewer.app.desk import Desk
+from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
-from viewer.app.tools.measuring import Measuring, csv_file, snap_words
-from viewer.app.tools.measuring.overlay import ViewPlace
+from viewer.app.tools.measuring import Tool, csv_file
+from viewer.app.tools.measuring.words import snap_words
 from viewer.camera import Camera
 from viewer.errors import InputError
 
@@ -38,7 +40,7 @@ def test_it_says_what_the_ends_snapped_to(ids: tuple[int | None, int | None], wo
 
 def test_two_ends_make_a_measurement_of_the_document() -> None:
     session = Session("scan")
-    measuring: Any = Measuring(session)  # which has of the app what is needed here
+    measuring = Tool(Desk(SimpleNamespace(session=session), "measuring"))  # type: ignore[arg-type]
     first, second = end(3), replace(end(4), position=(1, 0, 0))
     measuring.set_end(first)
     assert (measuring.begun, measuring.made.all) == (first, ())

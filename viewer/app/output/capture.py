@@ -173,6 +173,12 @@ class Capture:
         """Stay at what is shown."""
         self.replaying = None
 
+    def on_escape(self) -> bool:
+        """End the replay; whether there is one."""
+        was_replaying = self.replaying is not None
+        self.stop_replaying()
+        return was_replaying
+
     def until_next(self, now: float) -> float:
         """Seconds until there is something to do; infinite where there is nothing."""
         soon = _LOOK if self._saving or self._looking else math.inf

@@ -10,7 +10,6 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from numpy.typing import NDArray
 
 from .. import theme, widgets
-from ..commands import COMMANDS
 from .player import SPEEDS
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ def _draw_steps(app: App) -> None:
 def _draw_button(app: App, icon: str, name: str, color: int | None = None, about: str = "") -> None:
     """The button of a command. about: what more its tooltip says."""
     if widgets.icon_button(icon, app.keys.hint(name) + about, color):
-        COMMANDS[name].act(app)
+        app.commands.of[name].act(app)
     imgui.same_line()
 
 

@@ -14,9 +14,9 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from ...document.document import Bookmark
 from .. import widgets
 from ..session import Session
+from ..ui import Ui
 
 if TYPE_CHECKING:
-    from ..app import App
     from ..commands import Item
 
 _LONGEST = 60  # letters of a name
@@ -87,7 +87,7 @@ class Bookmarks:
 
     # --- the section of the panel -----------------------------------------------------
 
-    def draw(self, app: App) -> None:
+    def draw(self, ui: Ui) -> None:
         """Declare the list: a click on a name goes there; buttons rename and delete."""
         deleted = None
         for number, bookmark in enumerate(self.all):
@@ -103,8 +103,7 @@ class Bookmarks:
         if imgui.button(f"{icons.ICON_FA_PLUS}  Add"):
             self.add()
         imgui.end_disabled()
-        keys = app.keys.of["bookmark_add"]
-        imgui.set_item_tooltip("Keep this view" + (f" ({keys})" if keys else ""))
+        ui.tooltip("Keep this view", "bookmark_add")
 
     def _draw_row(self, number: int, bookmark: Bookmark) -> bool:
         """One bookmark; True where it is to be deleted."""

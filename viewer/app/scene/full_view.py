@@ -30,11 +30,12 @@ class FullView:
         self.is_on = self._app.window.fullscreen = not self.on_screen
         self._tell("full_screen")
 
-    def leave(self) -> None:
-        """Back to the window with its panels; nothing where it is that already."""
-        self.is_on = False
+    def on_escape(self) -> bool:
+        """Back to the window with its panels; whether it was not that."""
+        was_on, self.is_on = self.is_on, False
         if self.on_screen:
             self._app.window.fullscreen = False
+        return was_on
 
     def _tell(self, command: str) -> None:
         """How to come back, as no menu says so."""

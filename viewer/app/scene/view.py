@@ -12,8 +12,8 @@ from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
 from .. import notices, theme
-from ..tools.measuring import overlay
 from . import cube, legend, navigation
+from .canvas import ViewPlace
 
 if TYPE_CHECKING:
     from ..app import App
@@ -40,14 +40,14 @@ def draw(app: App) -> float:
     if app.document.camera is not None and app.playback.pose is not None:
         with told("Moving the view"):
             _move(app, app.playback.pose, size)
-        with told("Measuring"):
-            overlay.draw(app, size)
+        with told("Tools"):
+            _serve_tools(app, size)
     with told("The cube"):
         cube.draw(app, size)
     with told("Scale bar and colour bar"):
         legend.draw(app, size)
     text = printable(_note(app) or "")
-    head = _draw_note(text, size) if text else overlay.draw_banner(app, size)
+    head = _draw_note(text, size) if text else _draw_prompt(app.tools.prompt, size)
     notices.draw(app, size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
@@ -56,7 +56,7 @@ def draw(app: App) -> float:
 
 def _move(app: App, pose: Pose, size: ImVec2) -> None:
     """Take what the mouse does to the camera."""
-    sets_pivot = imgui.is_mouse_double_clicked(0) and not app.measuring.active
+    sets_pivot = imgui.is_mouse_double_clicked(0) and not app.tools.takes_clicks
     if imgui.is_item_hovered() and sets_pivot:
         app.steering.set_pivot()
     radius = app.viewport.bounds(pose).radius
@@ -74,7 +74,7 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
     if imgui.is_item_activated():
         app.steering.gesture = _gesture(io)
         app.steering.turntable.stop()
-    elif gesture == "orbit" and app.measuring.active and overlay.may_click():
+    elif gesture == "orbit" and app.tools.clicking and _is_click():
         pass  # so that a click does not turn the view
     elif gesture:
         # The move that ends with the release counts as well, that of the press does not.
@@ -88,6 +88,25 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
         app.steering.move(gesture.capitalize(), camera)
     if not imgui.is_item_active():
         app.steering.gesture = None
+
+
+def _serve_tools(app: App, size: ImVec2) -> None:
+    """Let tools have their clicks, and draw over the picture."""
+    is_hovered = imgui.is_item_hovered()
+    if app.tools.clicking and is_hovered:
+        imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+        is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
+        is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click
+        if is_released and is_first and _is_click() and not imgui.get_io().key_shift:
+            app.tools.click(_pixel(app))
+    if camera := app.document.camera:
+        app.tools.draw_over(ViewPlace(camera, imgui.get_item_rect_min(), size, is_hovered))
+
+
+def _is_click() -> bool:
+    """Whether the left button has hardly been moved since it was pressed."""
+    moved = imgui.get_mouse_drag_delta(0)
+    return not (moved.x or moved.y)
 
 
 def _take_wheel(app: App, size: ImVec2, radius: float) -> None:
@@ -148,6 +167,16 @@ def _draw_note(text: str, size: ImVec2) -> float:
     corner = ImVec2((size.x - extent.x) / 2, 2 * em)
     notices.draw_text(text, corner, extent, wrap, ImVec2(em, 0.6 * em))
     return corner.y + extent.y + 0.6 * em
+
+
+def _draw_prompt(text: str, size: ImVec2) -> float:
+    """Say what a click does; returns where that ends, 0 where there is nothing to say."""
+    if not text:
+        return 0.0
+    em, extent = imgui.get_font_size(), imgui.calc_text_size(text)
+    corner = ImVec2((size.x - extent.x) / 2, 0.9 * em)
+    notices.draw_text(text, corner, extent, extent.x + em, ImVec2(0.8 * em, 0.4 * em))
+    return corner.y + extent.y + 0.4 * em
 
 
 def _draw_recording_mark() -> None:

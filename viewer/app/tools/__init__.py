@@ -1,1 +1,45 @@
-"""What is done with a picture: measuring, saving, recording, replaying, exporting."""
+"""The window's tools: what a user takes up to work on a scan; a folder or file each, found by scanning this.
+
+A tool's module has
+
+    a docstring         its first line says what the tool does
+    TITLE               its name, which its section in the panel has
+    Tool                a class, made with a `Desk` (see viewer/app/desk.py) when the window opens
+
+and, where it has some,
+
+    COMMANDS            title of a menu -> entries of that menu (see viewer/app/commands.py), whose functions
+                        take the Tool; those with a `short` title stand on the toolbar
+    MOUSE               (how, what) of the mouse, for the list of keys
+    Settings            a frozen dataclass (see viewer/params.py) of what comes back at the next start, as
+                        `desk.settings`
+
+The Tool has any of
+
+    panel(ui)               declares its section of the panel
+    overlay(canvas, view)   draws over the picture
+    dialog()                declares windows of its own, over everything
+    prompt()                what to say at the top of the view while it has the clicks
+    on_click(click)         a click in the view while it has the clicks (`desk.take_clicks`); False: it is not
+                            taken, and a double click turns the view about what is there, as without a tool
+    on_escape()             Escape was pressed; True: that has ended something
+    is_under_way()          whether something has begun that is in no document yet: undo takes that back first
+    abandon()               let go of it: for undo, and since another scan or document is shown from now on
+    advance(budget)         each turn of the window's loop, for so many milliseconds at most; True: to be
+                            drawn, and called again at once
+
+What a user would be sorry to lose is in the document (`desk.document`, `desk.change`), what is under way in
+the Tool. A tool that raises is told and switched off until the next start, all else goes on; only an
+InputError in a command or a click is the user's mistake, and told alone. Names that begin with an underscore
+are no tools. No list of tools exists anywhere else; a folder that is appended to this package's `__path__`
+is scanned too.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+
+
+def tool_names() -> tuple[str, ...]:
+    """The names of all tools, in alphabetical order in each folder. None of their modules is imported."""
+    return tuple({m.name: None for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")})

@@ -1,46 +1,45 @@
-"""Measuring in the window: clicks set the ends, and what was measured is kept with its scan."""
+"""Distances between places that are clicked; they follow their points, and are kept with the scan."""
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from ....analysis.measure import End, Measurement, Reading, in_words, read, save, table, to_text
-from ....analysis.pick import before_gap, is_seen, pick
+from ....analysis.measure import End, Measurement, Reading, read, save, table, to_text
+from ....analysis.pick import is_seen
 from ....document.measurements import Measurements
 from ....errors import InputError
 from ....files import absolute, free_file, working_folder
 from ....scan.inputs import found_among, scan_inputs
-
-if TYPE_CHECKING:
-    from ....scan.timeline import Timeline
-    from ...app import App
+from ....scan.timeline import Timeline
+from ...commands import Command, Menu
+from ...desk import Click, Desk
+from ...scene.canvas import Canvas, ViewPlace
+from ...ui import Ui
+from . import overlay, panel
+from .words import distance_words
 
 log = logging.getLogger(__name__)
+TITLE = "Measurements"
 _LONGEST_UNIT = 16  # letters
 _SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is before what it hides
 
 
-class Measuring:
-    """The tool that measures. What was measured is in the document.
+class Tool:
+    """What measures. What was measured is in the document.
 
-    active: whether clicks in the view set ends. begun: the first end of the one that is being made, None
-    where none is. filled: whether they may set them where holes are filled.
-    to_show: whether the panel has yet to show the list. saving: the file name in the dialog that saves, None
-    while it is closed; problem: why it could not be saved under that name; to_type: whether its field has yet
-    to take the keyboard.
+    begun: the first end of the one that is being made, None where none is. filled: whether ends may be set
+    where holes are filled. saving: the file name in the dialog that saves, None while it is closed; problem:
+    why it could not be saved under that name; to_type: whether its field has yet to take the keyboard.
     """
 
-    def __init__(self, app: App) -> None:
-        self.app = app
-        self.active = False
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
         self.filled = False
-        self.to_show = False
         self.saving: str | None = None
         self.problem = ""
         self.to_type = False
@@ -53,43 +52,75 @@ class Measuring:
     @property
     def made(self) -> Measurements:
         """Those of the scan that is open."""
-        return self.app.document.part(Measurements)
+        return self.desk.document.part(Measurements)
 
     def delete(self, number: int) -> None:
         """Take away the one at this place, counted from 0."""
-        self.app.change("Delete measurement", self.made.without(number))
+        self.desk.change("Delete measurement", self.made.without(number))
 
     def clear(self) -> None:
         """Take away all."""
-        self.app.change("Clear measurements", Measurements())
+        self.desk.change("Clear measurements", Measurements())
+
+    @property
+    def is_active(self) -> bool:
+        """Whether clicks in the view set ends."""
+        return self.desk.has_clicks
 
     def toggle(self) -> None:
         """Take up the tool or put it away; a measurement that was begun goes with it."""
-        self.active = self.to_show = not self.active
         self.begun = None
-        log.debug("measuring %s", "begins" if self.active else "ends")
+        if self.is_active:
+            self.desk.leave_clicks()
+        else:
+            self.desk.take_clicks()
+            self.desk.reveal()
+        log.debug("measuring %s", "begins" if self.is_active else "ends")
 
-    def click(self, pixel: tuple[int, int]) -> None:
-        """Set an end at what a pixel of the view shows, or say why it cannot be."""
-        self.app.viewport.finish()
-        surface, request = self.app.viewport.surface, self.app.viewport.request
-        if surface is None or request is None or not self.app.viewport.is_there:
-            return
-        meant = before_gap(surface, *pixel)
-        picked = pick(surface, *meant)
-        if picked is None:
-            self.app.note("There is nothing to measure here.")
-            return
-        try:
-            end = End.of(picked, request.pose, filled=self.filled)
-        except InputError as error:
-            self.app.note(str(error))
-            return
-        if meant != pixel:
-            self.app.note("That was seen through a gap: the end is at the point before it.")
+    def on_escape(self) -> bool:
+        """Put the tool away; whether it was taken up."""
+        was_active = self.is_active
+        if was_active:
+            self.toggle()
+        return was_active
+
+    def is_under_way(self) -> bool:
+        """Whether a measurement was begun."""
+        return self.begun is not None
+
+    def abandon(self) -> None:
+        """Let go of a measurement that was begun."""
+        self.begun = None
+
+    def prompt(self) -> str:
+        """What a click does."""
+        return f"Measuring: click the {'second' if self.begun else 'first'} place.  Esc ends."
+
+    def on_click(self, click: Click) -> bool:
+        """Set an end at what was clicked; raises InputError where it cannot be."""
+        if click.picked is None:
+            raise InputError("There is nothing to measure here.")
+        end = End.of(click.picked, click.pose, filled=self.filled)
+        if click.through_gap:
+            self.desk.note("That was seen through a gap: the end is at the point before it.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
         self.set_end(end)
-        _learn_topology(self.app.playback.timeline, request.pose.index)
+        _learn_topology(self.desk.timeline, click.pose.index)
+        return True
+
+    def panel(self, ui: Ui) -> None:
+        """Declare the section of the panel."""
+        panel.draw(self, ui)
+
+    def dialog(self) -> None:
+        """Declare the dialog that saves, while it is open."""
+        panel.draw_dialog(self)
+
+    def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
+        """Draw what was measured, and tell what changes by it."""
+        readings = self.readings()
+        self.watch(readings)
+        overlay.draw(self, readings, canvas, view)
 
     def set_end(self, end: End) -> None:
         """Begin a measurement, or complete the one that was begun.
@@ -102,61 +133,61 @@ class Measuring:
             self.begun = first or end
             return
         made = Measurement(first, end)
-        self.app.change("Measure", self.made.added(made))
-        self.to_show = True
+        self.desk.change("Measure", self.made.added(made))
+        self.desk.reveal()
         log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
 
     def readings(self) -> list[Reading]:
         """Them as they stand in the frame that is shown, in order; none before the first frame."""
-        pose, one_topology = self.app.playback.pose, self.app.playback.timeline.one_topology
+        pose, one_topology = self.desk.pose, self.desk.timeline.one_topology
         if pose is None:
             return []
         return [read(measurement, pose, one_topology) for measurement in self.made.all]
 
     def watch(self, readings: Sequence[Reading]) -> None:
         """Tell when measurements that followed their points no longer can; note in the log what they read."""
-        scan, timeline = self.app.session.scan, self.app.playback.timeline
+        scan, timeline = self.desk.scan, self.desk.timeline
         one_topology = timeline.one_topology
         if readings and self._learned is not timeline:  # opened again, with measurements of before
             self._learned = timeline
-            _learn_topology(timeline, self.app.session.index)
+            _learn_topology(timeline, self.desk.index)
         if one_topology:
             self._followed = scan
         elif self._followed == scan and one_topology is False:
             self._followed = ""
             if readings:
-                self.app.note("Not all frames have the same points: measurements stay fixed in space.")
-        told = [f"{distance_words(reading, self.app.unit)}, {reading.motion}" for reading in readings]
+                self.desk.note("Not all frames have the same points: measurements stay fixed in space.")
+        told = [f"{distance_words(reading, self.desk.unit)}, {reading.motion}" for reading in readings]
         if told != self._told:
             self._told = told
             log.debug("measurements: %s", "; ".join(told) or "none")
 
     def is_seen(self, end: End) -> bool:
         """Whether an end is in the picture and not behind what that shows; found once a picture."""
-        surface, shown = self.app.viewport.surface, self.app.viewport.request
-        if surface is None or shown is None or not self.app.viewport.is_there:
+        surface, shown = self.desk.viewport.surface, self.desk.viewport.request
+        if surface is None or shown is None or not self.desk.viewport.is_there:
             return True
         if self._seen[0] is not shown:
             self._seen = shown, {}
         known = self._seen[1]
         if end not in known:
             spacings, share = _SLACK
-            slack = spacings * (end.spacing or 0) + share * self.app.viewport.bounds(shown.pose).radius
+            slack = spacings * (end.spacing or 0) + share * self.desk.viewport.bounds(shown.pose).radius
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
 
     def name_unit(self, text: str) -> None:
         """Call the scan's unit of length so; an empty text leaves it unknown."""
         name = "".join(letter for letter in text if letter.isprintable())[:_LONGEST_UNIT]
-        self.app.change("Name unit", merge="unit", unit=name.strip() or None)
-        log.debug("unit %s", self.app.unit)
+        self.desk.change("Name unit", merge="unit", unit=name.strip() or None)
+        log.debug("unit %s", self.desk.unit)
 
     # --- out of the window ------------------------------------------------------------
 
     def copy(self) -> None:
         """Put a table of all into the clipboard, for spreadsheets."""
         imgui.set_clipboard_text(to_text(self._table(), "\t"))
-        self.app.note(f"Copied {len(self.made.all)} measurements as a table.")
+        self.desk.note(f"Copied {len(self.made.all)} measurements as a table.")
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
@@ -175,13 +206,13 @@ class Measuring:
         assert self.saving is not None
         try:
             file = csv_file(self.saving)
-            if found_among([file], scan_inputs(self.app.playback.timeline)):
+            if found_among([file], scan_inputs(self.desk.timeline)):
                 raise InputError("is a file of the scan, and is not replaced", file, "Use another name")
             save(file, self._table())
         except InputError as error:
             self.problem, self.to_type = str(error), True
         else:
-            self.app.note(f"Saved {file}")
+            self.desk.note(f"Saved {file}")
             self.saving = None
 
     def _table(self) -> list[list[object]]:
@@ -191,7 +222,7 @@ class Measuring:
             rows.append((number, Reading(made, reading.fixed)))
             if reading.measurement != made:
                 rows.append((number, reading))
-        return table(rows, self.app.playback.timeline.name, self.app.unit)
+        return table(rows, self.desk.timeline.name, self.desk.unit)
 
 
 def csv_file(text: str) -> Path:
@@ -208,19 +239,6 @@ def csv_file(text: str) -> Path:
     return path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv")
 
 
-def distance_words(reading: Reading, unit: str) -> str:
-    """The distance and its uncertainty."""
-    return in_words(reading.measurement.distance, reading.measurement.uncertainty, unit)
-
-
-def snap_words(reading: Reading) -> str:
-    """What the ends snapped to, such as "points 12 and 345"."""
-    ids = [end.id for end in reading.measurement.ends if end.id is not None]
-    if len(ids) == 2:
-        return f"points {ids[0]} and {ids[1]}"
-    return f"point {ids[0]} and surface" if ids else "surface"
-
-
 def _place_words(end: End) -> tuple[str, str]:
     return ", ".join(map(repr, end.position)), "surface" if end.id is None else f"point {end.id}"
 
@@ -230,3 +248,26 @@ def _learn_topology(timeline: Timeline, index: int) -> None:
     if timeline.one_topology is None and len(timeline) > 1:
         timeline.request((index + 1) % len(timeline))
         timeline.request(index)
+
+
+def _at_all(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:
+    """A command that does something with all measurements."""
+    return Command(f"{name}_measurements", title, act, can=lambda tool: bool(tool.made.all))
+
+
+COMMANDS = {
+    "Tools": (
+        Command(
+            "measure", "Measure", Tool.toggle, "M",
+            is_on=lambda tool: tool.is_active, can=lambda tool: tool.desk.document.camera is not None,
+        ),
+        Menu("Measurements", (
+            (
+                _at_all("copy", "Copy as table", Tool.copy),
+                _at_all("save", "Save CSV...", Tool.ask_to_save),
+                _at_all("clear", "Clear", Tool.clear),
+            ),
+        )),
+    )
+}  # fmt: skip
+MOUSE = (("Click while measuring", "Set an end"),)

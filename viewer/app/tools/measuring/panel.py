@@ -4,68 +4,63 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import imgui
 
 from ....analysis.measure import End, Reading
 from ....files import printable
 from ....scan.points import UNKNOWN_UNIT
 from ... import widgets
-from . import distance_words, snap_words
+from ...ui import Ui
+from .words import distance_words, snap_words
 
 if TYPE_CHECKING:
-    from ...app import App
+    from . import Tool
 
 _DIALOG = "Save measurements"
 
 
-def draw(app: App) -> None:
+def draw(measuring: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
-    measuring = app.measuring
-    half = ImVec2((imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2, 0)
-    if imgui.button("Stop measuring" if measuring.active else "Measure", half):
+    if imgui.button("Stop measuring" if measuring.is_active else "Measure", ui.button_size(2)):
         measuring.toggle()
-    keys = app.keys.of["measure"]
-    imgui.set_item_tooltip("Click two places in the view for their distance" + (f" ({keys})" if keys else ""))
+    ui.tooltip("Click two places in the view for their distance", "measure")
     imgui.same_line()
     measuring.filled = imgui.checkbox("Allow filled", measuring.filled)[1]
     imgui.set_item_tooltip("Also take places where the renderer has filled a hole, and no point was measured")
-    _draw_unit(app)
+    _draw_unit(measuring)
     for number, reading in enumerate(measuring.readings()):
         imgui.push_id(number)
-        if _draw_row(app, number, reading):
+        if _draw_row(measuring, number, reading):
             measuring.delete(number)
         imgui.pop_id()
     if measuring.made.all:
-        _draw_outlets(app)
-    if measuring.to_show:
-        measuring.to_show = False
-        imgui.set_scroll_here_y(1.0)
+        _draw_outlets(measuring, ui)
 
 
-def _draw_unit(app: App) -> None:
+def _draw_unit(measuring: Tool) -> None:
     widgets.label("Unit", "Of length. Where the scan does not tell, say it once; it stays with the scan")
-    if app.playback.timeline.unit != UNKNOWN_UNIT:
-        imgui.text(app.unit)
+    if measuring.desk.timeline.unit != UNKNOWN_UNIT:
+        imgui.text(measuring.desk.unit)
         return
-    changed, text = imgui.input_text_with_hint("##unit", UNKNOWN_UNIT, app.document.unit or "")
+    changed, text = imgui.input_text_with_hint("##unit", UNKNOWN_UNIT, measuring.desk.document.unit or "")
     if changed:
-        app.measuring.name_unit(text)
+        measuring.name_unit(text)
 
 
-def _draw_row(app: App, number: int, reading: Reading) -> bool:
+def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
     """Number and distance, what the ends snapped to below; whether it is to be deleted."""
     right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
-    imgui.text(f"{number + 1}:  {distance_words(reading, app.unit)}")
-    imgui.set_item_tooltip(_details(reading, app.unit))
+    imgui.text(f"{number + 1}:  {distance_words(reading, measuring.desk.unit)}")
+    imgui.set_item_tooltip(_details(reading, measuring.desk.unit))
     imgui.same_line(right - 1.3 * imgui.get_frame_height())
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
     words = snap_words(reading)
-    if len(app.playback.timeline) > 1:
+    if len(measuring.desk.timeline) > 1:
         words += f", {reading.motion}"
     imgui.text_disabled(widgets.shortened(words, imgui.get_content_region_avail().x))
-    if reading.fixed and len(app.playback.timeline) > 1:
+    if reading.fixed and len(measuring.desk.timeline) > 1:
         imgui.set_item_tooltip(f"Fixed in space: {reading.fixed}")
     return is_deleted
 
@@ -84,24 +79,22 @@ def _end_words(end: End, unit: str) -> str:
     return f"{what}, frame {end.frame + 1}: {place} {unit}, spacing {spacing}{seen}"
 
 
-def _draw_outlets(app: App) -> None:
-    gap = imgui.get_style().item_spacing.x
-    third = ImVec2((imgui.get_content_region_avail().x - 2 * gap) / 3, 0)
+def _draw_outlets(measuring: Tool, ui: Ui) -> None:
+    third = ui.button_size(3)
     if imgui.button("Copy", third):
-        app.measuring.copy()
+        measuring.copy()
     imgui.set_item_tooltip("As a table, into the clipboard")
     imgui.same_line()
     if imgui.button("Save CSV...", third):
-        app.measuring.ask_to_save()
+        measuring.ask_to_save()
     imgui.same_line()
     if imgui.button("Clear", third):
-        app.measuring.clear()
+        measuring.clear()
     imgui.set_item_tooltip("Delete all; undo brings them back")
 
 
-def draw_dialog(app: App) -> None:
+def draw_dialog(measuring: Tool) -> None:
     """Declare the dialog that saves, while it is open."""
-    measuring = app.measuring
     with widgets.modal(_DIALOG, measuring.saving is not None) as is_drawn:
         if not is_drawn or measuring.saving is None:
             return

@@ -1,0 +1,226 @@
+"""Tools out of folders of their own: the one of the documentation, and some that fail, in the real window."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+
+from viewer.scan import formats
+from viewer.scan.points import PointCloud
+
+SIZE = (1280, 720)
+YELLOW = (0xF2, 0xC1, 0x4E)
+USE = "import viewer.app.tools\nviewer.app.tools.__path__.append({!r})\n"
+
+
+@pytest.fixture(scope="module")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
+        yield screen
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    """A wall of points before the camera, so that a click anywhere near the middle hits."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 400), np.linspace(-1, 1, 400))
+    points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    formats.write(tmp_path / "wall.npz", PointCloud.from_arrays(points))
+    return tmp_path / "wall.npz"
+
+
+def middle(app: RunningApp) -> tuple[int, int]:
+    left, top, width, height = app.view()
+    return left + width // 2, top + height // 2
+
+
+def click(app: RunningApp, x: int, y: int) -> None:
+    """Click, and take the mouse out of the way."""
+    app.screen.do("mousemove", x, y, "sleep", 0.2, "click", 1, "sleep", 0.2, "mousemove", 2, SIZE[1] - 2)
+    app.settle()
+
+
+def count(app: RunningApp, color: tuple[int, int, int]) -> int:
+    """Pixels of the view in a colour."""
+    left, top, width, height = app.view()
+    picture = app.screen.picture()[top : top + height, left : left + width]
+    return int((picture == color).all(axis=2).sum())
+
+
+def write_settings(home: Path, tools: dict[str, dict[str, object]]) -> Path:
+    """What was remembered of tools at the last start."""
+    path = home / "config" / "scan4d" / "settings.json"
+    path.parent.mkdir(parents=True)
+    path.write_text(json.dumps({"format": 1, "tools": tools}))
+    return path
+
+
+def close(app: RunningApp) -> None:
+    app.process.terminate()
+    assert app.process.wait(PATIENCE) == 0
+
+
+def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "adding-a-tool.md").read_text(), re.DOTALL)
+    (tmp_path / "tools" / "notes").mkdir(parents=True)
+    (tmp_path / "tools" / "notes" / "__init__.py").write_text(code)
+    use = USE.format(str(tmp_path / "tools"))
+    settings = write_settings(tmp_path, {"notes": {"texts": False}})
+    with running_app(screen, tmp_path, scan, before=use) as app:
+        x, y = middle(app)
+        assert count(app, YELLOW) == 0
+        screen.do("key", "alt+n")
+        app.settle()
+        click(app, x, y)
+        one = count(app, YELLOW)
+        assert one > 20, "a note is pinned"
+        click(app, x + 100, y + 60)
+        assert count(app, YELLOW) == pytest.approx(2 * one, rel=0.2)
+        screen.do("key", "ctrl+z")
+        app.settle()
+        assert count(app, YELLOW) == one, "undo takes the second away"
+
+        screen.do("key", "m")
+        app.expect("measuring begins")
+        click(app, x - 60, y)
+        app.expect("end at")
+        assert count(app, YELLOW) == one, "the clicks are measuring's now"
+        screen.do("key", "Escape")
+        app.expect("measuring ends")
+        screen.do("key", "alt+n", "sleep", 0.2, "key", "Escape")
+        app.settle()
+        click(app, x + 100, y + 60)
+        assert count(app, YELLOW) == one, "Escape has put the notes away"
+        close(app)
+    assert "Traceback" not in app.log()
+    assert json.loads(settings.read_text())["tools"] == {"notes": {"texts": False}}
+
+
+FAILING = {
+    "at_import": "TITLE = 'At import'\nraise ValueError('import')\n",
+    "at_parsing": "TITLE = (\n",
+    "at_making": "TITLE = 'At making'\ndef Tool(desk): raise ValueError('making')\n",
+    "in_panel": """
+        def panel(self, ui):
+            imgui.begin_child("begun")
+            imgui.push_id("begun")
+            raise ValueError("panel")
+        """,
+    "in_overlay": "def overlay(self, canvas, view): raise ValueError('overlay')\n",
+    "in_dialog": """
+        def dialog(self):
+            imgui.begin("begun")
+            raise ValueError("dialog")
+        """,
+    "in_prompt": "def prompt(self): raise ValueError('prompt')\n",
+    "in_escape": "def on_escape(self): raise ValueError('escape')\n",
+    "in_advance": "def advance(self, budget): raise ValueError('advance')\n",
+    "in_click": "def on_click(self, click): raise ValueError('click')\n",
+    "in_command": "def act(self): raise ValueError('command')\n",
+    "in_work": """
+        def act(self): self.desk.run("Working", self.work, print)
+        def work(self): raise ValueError("work")
+        """,
+    "in_result": """
+        def act(self): self.desk.run("Working", lambda: 1, self.take)
+        def take(self, result): raise ValueError("result")
+        """,
+}  # fmt: skip
+HEAD = """
+from imgui_bundle import imgui
+from viewer.app.commands import Command
+from viewer.errors import InputError
+TITLE = {name!r}
+class Tool:
+    def __init__(self, desk):
+        self.desk = desk
+        desk.reveal()
+    def act(self): self.desk.take_clicks()
+"""
+TAIL = """
+COMMANDS = {{"Tools": (Command("act_{name}", "Act", lambda tool: tool.act(), {key!r}),)}}
+"""
+
+
+def write_failing(folder: Path) -> dict[str, str]:
+    """Write a tool for each of FAILING, with a key that has it act: tool's name -> key."""
+    folder.mkdir()
+    keys = {}
+    for number, (name, code) in enumerate(FAILING.items()):
+        if name.startswith("in_"):
+            lines = code.splitlines()
+            indent = min(len(line) - len(line.lstrip()) for line in lines if line.strip())
+            body = "\n".join("    " + line[indent:] for line in lines)
+            keys[name] = f"Alt+{'ABCDEFGHIJKLM'[number]}"
+            code = HEAD.format(name=name) + body + TAIL.format(name=name, key=keys[name])
+        (folder / f"{name}.py").write_text(code)
+    return keys
+
+
+def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    keys = write_failing(tmp_path / "tools")
+    before = {"at_import": {"kept": 1}, "gone": {"kept": 2}}
+    settings = write_settings(tmp_path, before)
+    with running_app(screen, tmp_path, scan, before=USE.format(str(tmp_path / "tools"))) as app:
+        x, y = middle(app)
+        for name in ("in_command", "in_work", "in_result"):
+            screen.do("key", keys[name].lower(), "sleep", 0.2)
+            app.expect(f"{name} is switched off")
+        screen.do("key", keys["in_escape"].lower(), "sleep", 0.2, "key", "Escape")
+        app.expect("in_escape is switched off")
+        screen.do("key", keys["in_prompt"].lower())
+        app.expect("in_prompt is switched off")
+        screen.do("key", keys["in_click"].lower(), "sleep", 0.2)
+        click(app, x, y)
+        app.expect("in_click is switched off")
+        click(app, x, y)
+
+        screen.do("key", keys["in_command"].lower(), "sleep", 0.2, "key", "m")
+        app.expect("measuring begins")
+        click(app, x, y)
+        app.expect("end at")
+        screen.do("key", "Escape")
+        app.expect("measuring ends")
+        close(app)
+    told = re.findall(r"^(\w+[\w ]*) is switched off until the next start: (.*)$", app.log(), re.MULTILINE)
+    assert len(told) == len(FAILING), "each once"
+    reasons = dict(told)
+    assert reasons["at_parsing"].startswith("SyntaxError")
+    assert reasons["at_import"] == "ValueError: import"
+    assert reasons["At making"] == "ValueError: making"
+    for name in keys:
+        assert reasons[name] == f"ValueError: {name.removeprefix('in_')}"
+    assert json.loads(settings.read_text())["tools"] == before
+
+
+def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    folder = tmp_path / "tools"
+    folder.mkdir()
+    body = "    def act(self): raise InputError('a mistake')\n"
+    for name, key in (("first", "Alt+A"), ("second", "M"), ("third", "Hyper+A")):
+        (folder / f"{name}.py").write_text(HEAD.format(name=name) + body + TAIL.format(name=name, key=key))
+    (folder / "fourth.py").write_text(
+        HEAD.format(name="fourth") + TAIL.replace("act_{name}", "measure").format(key="Alt+B")
+    )
+    (folder / "_hidden.py").write_text("raise ValueError('no tool')\n")
+    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
+        for _ in range(2):
+            screen.do("key", "alt+a", "sleep", 0.2)
+            app.expect("a mistake")
+        screen.do("key", "m")
+        app.expect("measuring begins")
+        close(app)
+    assert "M is to do both 'measure' and 'act_second'" in app.log()
+    assert "third is switched off until the next start: unknown modifier key 'Hyper'" in app.log()
+    assert "fourth is switched off until the next start: there is a command 'measure' already" in app.log()
+    assert "no tool" not in app.log()
+    assert "first is switched off" not in app.log()

@@ -1,0 +1,163 @@
+"""A desk: what a tool knows of the window, and can ask it for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ..analysis.pick import Picked
+from ..document.document import Document
+from ..document.part import Part
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
+from ..task import Task, in_background
+from .scene.viewport import Viewport
+
+if TYPE_CHECKING:
+    from .app import App
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Click:
+    """A click in the view.
+
+    picked: what is seen there, with its spacing; None where nothing is. pose: that the picture shows.
+    through_gap: whether the very pixel shows something farther, through a gap.
+    """
+
+    picked: Picked | None
+    pose: Pose
+    through_gap: bool = False
+
+
+@dataclass(frozen=True)
+class Work:
+    """What runs beside the window for a tool. then: takes its result."""
+
+    task: Task
+    future: Future[Any]
+    then: Callable[[Any], object]
+
+    def finish(self) -> None:
+        """Hand over the result, unless the work was cancelled; raises what that raised."""
+        if not self.task.cancelled:
+            self.then(self.future.result())
+
+
+class Desk:
+    """The window as one tool sees it.
+
+    name: of the tool's module. settings: the tool's `Settings`, which it replaces by others; None where it
+    declares none. works: what runs for it. is_revealed: whether the panel has yet to show its section.
+    """
+
+    def __init__(self, app: App, name: str) -> None:
+        self._app = app
+        self.name = name
+        self.settings: Any = None
+        self.works: list[Work] = []
+        self.is_revealed = False
+
+    # --- the scan ---------------------------------------------------------------------
+
+    @property
+    def timeline(self) -> Timeline:
+        """The scan that is open."""
+        return self._app.playback.timeline
+
+    @property
+    def scan(self) -> str:
+        """Its name, as the user gave it."""
+        return self._app.session.scan
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose that is shown; None before the first."""
+        return self._app.playback.pose
+
+    @property
+    def index(self) -> int:
+        """The frame that the user is at, whose pose may still be read."""
+        return self._app.session.index
+
+    @property
+    def unit(self) -> str:
+        """The unit of length: as the user calls it, else as the scan tells, else "units"."""
+        return self._app.unit
+
+    @property
+    def viewport(self) -> Viewport:
+        """The view of the scan: its picture, and what a pixel of it shows."""
+        return self._app.viewport
+
+    # --- the document -----------------------------------------------------------------
+
+    @property
+    def document(self) -> Document:
+        """What the user has chosen and made for the scan."""
+        return self._app.session.document
+
+    def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:
+        """Change the document: what a tool keeps, and fields by name. The user can undo it.
+
+        name: of the step, such as "Delete note". merge: with the step before where that had this key and has
+        not come to an end.
+        """
+        self._app.session.change(name, *parts, merge=merge, **fields)
+
+    # --- the window -------------------------------------------------------------------
+
+    @property
+    def has_clicks(self) -> bool:
+        """Whether clicks in the view come to this tool."""
+        return self._app.tools.clicking == self.name
+
+    def take_clicks(self) -> None:
+        """Have clicks in the view come to this tool, and to no other."""
+        self._app.tools.clicking = self.name
+        self.redraw()
+
+    def leave_clicks(self) -> None:
+        """Let clicks in the view be as without a tool."""
+        if self.has_clicks:
+            self._app.tools.clicking = None
+            self.redraw()
+
+    def note(self, text: str) -> None:
+        """Tell the user something."""
+        self._app.note(text)
+
+    def redraw(self) -> None:
+        """Draw the window again, since something that it shows has changed."""
+        self._app.window.touch()
+
+    def reveal(self) -> None:
+        """Open the tool's section of the panel, and scroll to its end."""
+        self.is_revealed = True
+
+    def run(self, name: str, work: Callable[[], T], then: Callable[[T], object]) -> Task:
+        """Do work on a thread of its own, which the user sees by this name and may cancel.
+
+        Long loops in it call `task.checkpoint`. then: takes the result, on the window's thread; it is not
+        called where the work was cancelled. An InputError that the work raises is told, anything else
+        switches the tool off.
+        """
+        task = Task(name)
+        self.works.append(Work(task, in_background(task, work), then))
+        return task
+
+    def take_done(self) -> list[Work]:
+        """The work that has ended, once."""
+        done = [work for work in self.works if work.future.done()]
+        self.works = [work for work in self.works if work not in done]
+        return done
+
+    def cancel_work(self) -> None:
+        """Stop all that runs for the tool."""
+        for work in self.works:
+            work.task.cancel()
+        self.works.clear()

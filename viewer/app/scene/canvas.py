@@ -1,0 +1,119 @@
+"""What tools draw over the picture: lines, points, labels; and where places of the scan are on the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from imgui_bundle import ImVec2, imgui
+
+from ...camera import Camera
+from ...geometry import Vector
+from .. import theme
+from . import navigation
+from .labels import Box, Line, free_place, usual_place
+
+_OUTLINE = 0x000000  # so that what is light is seen on any surface
+_POINT, _THICK = 0.28, 0.11  # radius, thickness; in heights of the font
+_GAP = 0.5  # between a line and its label
+_HEAD = 2.6  # of the view's head, where the prompt is
+
+
+class ViewPlace:
+    """Where places of the scan are on the screen.
+
+    box: the view. is_hovered: whether the mouse is over the view and nothing else. Places on the screen are
+    ImGui's.
+    """
+
+    def __init__(self, camera: Camera, corner: ImVec2, size: ImVec2, is_hovered: bool = False) -> None:
+        """corner: of the view, upper left."""
+        self.camera, self.corner, self.size = camera, corner, size
+        self.is_hovered = is_hovered
+        self.box = Box(corner, corner + size)
+
+    def on_screen(self, position: Vector) -> ImVec2 | None:
+        """None behind the eye. position: float64, scan units."""
+        place = navigation.place(self.camera, position)
+        if place is None:
+            return None
+        return self.corner + self.size * 0.5 + ImVec2(place[0] * self.size.y, -place[1] * self.size.y)
+
+
+class Label:
+    """Lines of text on a plate. line: beside which, on the screen. faint: whether it is dimmed."""
+
+    def __init__(self, texts: Sequence[str], line: Line, faint: bool = False) -> None:
+        self.texts, self.line, self.faint = texts, line, faint
+        em = imgui.get_font_size()
+        self._pad = ImVec2(0.4 * em, 0.2 * em)
+        extents = [imgui.calc_text_size(text) for text in texts]
+        self.size = ImVec2(max(e.x for e in extents), sum(e.y for e in extents)) + self._pad * 2
+
+    def in_short(self) -> Label:
+        """What stands before a colon alone, such as its number."""
+        return Label([self.texts[0].partition(":")[0]], self.line, self.faint)
+
+    def draw(self, box: Box) -> None:
+        """Text in the theme's colours on a plate of the theme, which is read on any picture."""
+        draw_list = imgui.get_window_draw_list()
+        draw_list.add_rect_filled(
+            box.low, box.high, imgui.get_color_u32(imgui.Col_.window_bg, 0.92), self._pad.x
+        )
+        at = box.low + self._pad
+        for number, text in enumerate(self.texts):
+            color = imgui.Col_.text_disabled if number or self.faint else imgui.Col_.text
+            draw_list.add_text(at, imgui.get_color_u32(color), text)
+            at.y += imgui.calc_text_size(text).y
+
+
+class Canvas:
+    """Draws over the picture, into the current ImGui window. Colours are 0xRRGGBB, alpha is 0..1.
+
+    One canvas serves all tools in a frame, so that labels keep off the points and labels of them all.
+    """
+
+    def __init__(self, view: ViewPlace) -> None:
+        self._view = view
+        self._taken: list[Box] = []
+        self._em = imgui.get_font_size()
+
+    def line(self, start: ImVec2, stop: ImVec2, color: int, alpha: float = 1.0) -> None:
+        """A line between two places on the screen."""
+        draw_list, thick = imgui.get_window_draw_list(), _THICK * self._em
+        draw_list.add_line(start, stop, theme.packed(_OUTLINE, 0.6 * alpha), thick + 2)
+        draw_list.add_line(start, stop, theme.packed(color, alpha), thick)
+
+    def point(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
+        """A disc at a place on the screen."""
+        draw_list, radius = imgui.get_window_draw_list(), _POINT * self._em
+        draw_list.add_circle_filled(place, radius + 1, theme.packed(_OUTLINE, 0.6 * alpha))
+        draw_list.add_circle_filled(place, radius, theme.packed(color, alpha))
+        self._take(place)
+
+    def ring(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
+        """A ring round a place on the screen."""
+        draw_list, radius, thick = imgui.get_window_draw_list(), _POINT * self._em, _THICK * self._em
+        draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
+        draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
+        self._take(place)
+
+    def _take(self, place: ImVec2) -> None:
+        side = 2 * _POINT * self._em + 2
+        self._taken.append(Box.around(place, ImVec2(side, side)))
+
+    def labels(self, labels: Sequence[Label]) -> None:
+        """Labels beside their lines, off each other and all points; in short where there is no room, and then
+        in full under the mouse."""
+        lines, view = [label.line for label in labels], self._view
+        area = Box(view.box.low + ImVec2(0, _HEAD * self._em), view.box.high)
+        for label in labels:
+            short, gap = label.in_short(), _GAP * self._em
+            if (box := free_place(label.size, label.line, gap, area, self._taken, lines)) is not None:
+                label.draw(box)
+            else:
+                box = free_place(short.size, label.line, gap, area, self._taken, lines)
+                box = box or usual_place(short.size, label.line, gap, area)
+                short.draw(box)
+                if view.is_hovered and imgui.is_mouse_hovering_rect(box.low, box.high):
+                    imgui.set_tooltip("\n".join(label.texts))
+            self._taken.append(box)

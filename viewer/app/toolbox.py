@@ -1,0 +1,214 @@
+"""The toolbox: all tools, made when the window opens; one that fails is told and switched off."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from ..analysis.pick import before_gap, pick
+from ..errors import InputError
+from ..task import Cancelled, Task
+from . import failures, tools
+from .commands import Command, Commands, Entry, Item, Listing, Menu
+from .desk import Click, Desk
+from .scene.canvas import Canvas, ViewPlace
+from .settings import chosen, declared
+from .ui import Ui
+
+if TYPE_CHECKING:
+    from .app import App
+
+_BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
+
+
+class Slot:
+    """The place of one tool. title: as users read it. tool: None while it is switched off."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.title = desk.name
+        self.tool: Any = None
+
+    def has(self, hook: str) -> bool:
+        """Whether the tool is on and does something there."""
+        return getattr(self.tool, hook, None) is not None
+
+
+class Toolbox:
+    """All tools of `tools.tool_names`.
+
+    clicking: the name of the tool that clicks in the view go to; None where they only move the view.
+    """
+
+    def __init__(self, app: App, commands: Commands, remembered: Mapping[str, Mapping[str, Any]]) -> None:
+        """commands: takes in those of the tools. remembered: tool's name -> values of its `Settings`."""
+        self._app = app
+        self._remembered = remembered
+        self.clicking: str | None = None
+        self._is_declined = False  # the last click, by the tool that had it
+        self._slots = {name: Slot(Desk(app, name)) for name in tools.tool_names()}
+        for slot in self._slots.values():
+            try:
+                self._open(slot, commands)
+            except Exception as error:  # whatever a tool's folder holds, the window stays
+                self._switch_off(slot, error)
+
+    def _open(self, slot: Slot, commands: Commands) -> None:
+        name = slot.desk.name
+        module = importlib.import_module(f"{tools.__name__}.{name}")
+        slot.title = module.TITLE
+        if hasattr(module, "Settings"):
+            slot.desk.settings = declared(module.Settings, self._remembered.get(name, {}))
+        for menu, entries in getattr(module, "COMMANDS", {}).items():
+            commands.add(menu, [self._bound(slot, entry) for entry in entries])
+        commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))
+        slot.tool = module.Tool(slot.desk)
+
+    def _bound(self, slot: Slot, entry: Entry[Any]) -> Entry[App]:
+        """An entry of a menu that speaks to the slot's tool, and does nothing while that is off."""
+        if isinstance(entry, Menu):
+            groups = (tuple(self._bound(slot, inner) for inner in group) for group in entry.groups)
+            return Menu(entry.title, tuple(groups))
+        if isinstance(entry, Listing):
+            return Listing(entry.title, lambda _: self._items(slot, entry))
+        is_on = entry.is_on
+        return Command(
+            entry.name, entry.title, lambda _: self._ask(slot, entry.act, is_users=True), entry.key,
+            entry.repeats, None if is_on is None else lambda _: bool(self._ask(slot, is_on)),
+            lambda _: bool(self._ask(slot, entry.can)), entry.short,
+        )  # fmt: skip
+
+    def _items(self, slot: Slot, listing: Listing[Any]) -> Iterator[Item]:
+        for title, act, is_on in self._ask(slot, lambda tool: list(listing.items(tool))) or ():
+            yield title, partial(self._do, slot, act), is_on
+
+    def _ask(self, slot: Slot, function: Callable[[Any], Any], is_users: bool = False) -> Any:
+        """What a function says of the slot's tool; None where that is off or fails.
+
+        is_users: whether an InputError is a mistake of the user's.
+        """
+        if slot.tool is None:
+            return None
+        try:
+            with failures.widgets_ended():
+                return function(slot.tool)
+        except (Exception, Cancelled) as error:
+            if is_users and isinstance(error, InputError):
+                self._app.note(str(error))
+            else:
+                self._switch_off(slot, error)
+        return None
+
+    def _do(self, slot: Slot, act: Callable[[], object]) -> None:
+        """Do something of the slot's tool that the user has asked for."""
+        self._ask(slot, lambda _: act(), is_users=True)
+
+    def _call(self, slot: Slot, hook: str, *arguments: Any) -> Any:
+        """What a hook of the slot's tool returns; None where the tool is off, lacks it or fails."""
+        return self._ask(slot, lambda tool: getattr(tool, hook)(*arguments)) if slot.has(hook) else None
+
+    def _switch_off(self, slot: Slot, error: BaseException) -> None:
+        slot.tool = None
+        if self.clicking == slot.desk.name:
+            self.clicking = None
+        slot.desk.cancel_work()
+        words = f"{slot.title} is switched off until the next start: {failures.reason(error)}"
+        self._app.failures.tell(f"The tool '{slot.desk.name}'", error, words)
+
+    # --- in the window ----------------------------------------------------------------
+
+    def sections(self) -> Iterator[tuple[str, bool, Callable[[Ui], object]]]:
+        """The sections of the panel: title, whether to open it and scroll to its end, what declares it."""
+        for name, slot in self._slots.items():
+            if slot.has("panel"):
+                is_revealed, slot.desk.is_revealed = slot.desk.is_revealed, False
+                yield f"{slot.title}###{name}", is_revealed, partial(self._call, slot, "panel")
+
+    def draw_over(self, view: ViewPlace) -> None:
+        """Have the tools draw over the picture."""
+        canvas = Canvas(view)
+        for slot in self._slots.values():
+            self._call(slot, "overlay", canvas, view)
+
+    def draw_dialogs(self) -> None:
+        """Have the tools declare windows of their own."""
+        for slot in self._slots.values():
+            self._call(slot, "dialog")
+
+    @property
+    def _first(self) -> Slot | None:
+        """The one that has the clicks."""
+        return None if self.clicking is None else self._slots[self.clicking]
+
+    @property
+    def prompt(self) -> str:
+        """What to say at the top of the view; empty: nothing."""
+        return str(self._call(self._first, "prompt") or "") if self._first else ""
+
+    @property
+    def takes_clicks(self) -> bool:
+        """Whether a click is a tool's, so that it must not move the view."""
+        return self.clicking is not None and not self._is_declined
+
+    def click(self, pixel: tuple[int, int]) -> None:
+        """Give the tool that has the clicks what a pixel of the view shows."""
+        viewport = self._app.viewport
+        viewport.finish()
+        surface, request = viewport.surface, viewport.request
+        if self._first is None or surface is None or request is None or not viewport.is_there:
+            return
+        meant = before_gap(surface, *pixel)
+        click = Click(pick(surface, *meant), request.pose, meant != pixel)
+        self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), is_users=True) is False
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether something is that undo would take back first."""
+        return any([self._call(slot, "is_under_way") for slot in self._slots.values()])
+
+    def abandon(self) -> None:
+        """Let go of what is under way, since the document or the scan changes."""
+        for slot in self._slots.values():
+            self._call(slot, "abandon")
+
+    def on_escape(self) -> bool:
+        """End one thing of a tool's, of the one that has the clicks first; whether there was any."""
+        in_order = sorted(self._slots.values(), key=lambda slot: slot is not self._first)
+        if any(self._call(slot, "on_escape") for slot in in_order):
+            return True
+        had_clicks, self.clicking = self.clicking is not None, None
+        return had_clicks
+
+    # --- in the loop ------------------------------------------------------------------
+
+    @property
+    def tasks(self) -> list[Task]:
+        """What runs beside the window for tools."""
+        return [work.task for slot in self._slots.values() for work in slot.desk.works]
+
+    def advance(self) -> bool:
+        """Let tools take in what was done for them, and go on; whether there is something to show."""
+        changed = False
+        for slot in self._slots.values():
+            for work in slot.desk.take_done():
+                changed = True
+                self._do(slot, work.finish)
+            if self._call(slot, "advance", _BUDGET_MS):
+                changed = True
+                slot.desk.redraw()
+        return changed
+
+    def remembered(self) -> dict[str, Mapping[str, Any]]:
+        """Tool's name -> values of its `Settings` that are not the defaults, as they were where it is off."""
+        kept = dict(self._remembered)
+        for name, slot in self._slots.items():
+            if slot.desk.settings is not None:
+                kept[name] = chosen(slot.desk.settings)
+        return {name: values for name, values in kept.items() if values}
+
+    def close(self) -> None:
+        """Cancel what runs for tools."""
+        for slot in self._slots.values():
+            slot.desk.cancel_work()

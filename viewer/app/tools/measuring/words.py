@@ -1,0 +1,18 @@
+"""What is said of a measurement."""
+
+from __future__ import annotations
+
+from ....analysis.measure import Reading, in_words
+
+
+def distance_words(reading: Reading, unit: str) -> str:
+    """The distance and its uncertainty."""
+    return in_words(reading.measurement.distance, reading.measurement.uncertainty, unit)
+
+
+def snap_words(reading: Reading) -> str:
+    """What the ends snapped to, such as "points 12 and 345"."""
+    ids = [end.id for end in reading.measurement.ends if end.id is not None]
+    if len(ids) == 2:
+        return f"points {ids[0]} and {ids[1]}"
+    return f"point {ids[0]} and surface" if ids else "surface"
