@@ -39,7 +39,7 @@ def normals_of_grid(
 def _normals(
     around: NDArray[np.float64], top: int, focal: tuple[float, float], center: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """Those of a strip of rows, the first of which is `top`. around: its depths, with a margin."""
+    """Normals of a strip of rows, the first of which is `top`. around: its depths, with a margin."""
     slope_x, slope_y, level, seen = _fit(around, _STEEPEST / min(focal))
     row, column = np.nonzero(seen)
     ray = np.stack([(column + 0.5 - center[0]) / focal[0], (center[1] - row - top - 0.5) / focal[1]], axis=1)
