@@ -16,6 +16,7 @@ import pytest
 from scenes import sphere, sphere_mesh
 from test_bins import filled, some_visits
 from test_compact import flagged
+from test_pyramid import FILTERS, chain, picture
 
 from viewer.backends import Backend, backend
 from viewer.bench import baselines
@@ -24,6 +25,7 @@ from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.context import Gpu, headless
 from viewer.gpu.present import Presenter
+from viewer.gpu.pyramid import Image, add_expanded, expand, subtract_expanded
 from viewer.gpu.shader import Source
 from viewer.gpu.surface import Surface
 from viewer.look import Look
@@ -114,6 +116,14 @@ def use_primitives(gpu: Gpu) -> None:
     flagged(gpu, np.arange(5000) % 3 == 0)
     for ordered in (False, True):
         filled(gpu, some_visits(100, 30), 30, ordered)
+    for channels, how in product(range(1, 5), FILTERS.values()):
+        levels = chain(gpu, *picture((5, 3), channels), how)
+        fine, coarse = levels.levels[:2]
+        result = Image(gpu, fine.size, channels)
+        expand(gpu, coarse, result, how)
+        subtract_expanded(gpu, fine, coarse, result, how)
+        add_expanded(gpu, fine, coarse, result, how)
+        gpu.discard(levels, result)
 
 
 @pytest.fixture(scope="module")

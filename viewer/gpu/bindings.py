@@ -37,6 +37,11 @@ class Texture(IntEnum):
     # Scatter.
     KEYS = auto()
     BEST = auto()
+    # A level of a pyramid that is read, and one that is added to it.
+    SAMPLES = auto()
+    WEIGHTS = auto()
+    DETAIL = auto()
+    DETAIL_WEIGHTS = auto()
     # Tiles of splats.
     PLACES = auto()
     FORMS = auto()
@@ -66,6 +71,9 @@ class Storage(IntEnum):
     # Scatter, beside a list.
     KEYS = 0
     BEST = 1
+    # A level of a pyramid that is written.
+    SAMPLES = 0
+    WEIGHTS = 1
     # Sums of splats, beside a Surface's colours, normals and lists.
     SUMS = 0
     # Tiles of splats; FARTHEST beside a Surface's depths and rows as well.

@@ -38,6 +38,7 @@ from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
 from .bindings import Texture  # noqa: E402
 
 RG32UI = 0x823C
+RG32F = 0x8230
 RGB32F = 0x8815
 R32F = 0x822E
 RGBA32F = 0x8814

@@ -1,0 +1,29 @@
+// A level from the next coarser one. SIGN 0: that alone; -1, 1: what a level of the same size has, less it or
+// with it, where that level has something.
+#include "pyramid/samples.glsl"
+
+#if SIGN
+layout(binding = TEXTURE_DETAIL) uniform samplerBuffer detail;
+layout(binding = TEXTURE_DETAIL_WEIGHTS) uniform samplerBuffer detail_weights;
+#endif
+
+void main() {
+    uint i = item();
+    if (i >= item_count) return;
+    ivec2 at = ivec2(int(i) % out_size.x, int(i) / out_size.x);
+    ivec2 low = max((at - FIRST - COUNT + 2) >> 1, 0), high = min((at - FIRST) >> 1, size - 1);
+    begin_sample();
+    for (int y = low.y; y <= high.y; ++y)
+        for (int x = low.x; x <= high.x; ++x) {
+            ivec2 tap = at - 2 * ivec2(x, y) - FIRST;
+            add_sample(ivec2(x, y), taps[tap.x] * taps[tap.y]);
+        }
+    precise vec4 value = mean_sample();
+#if SIGN
+    float its_weight = texelFetch(detail_weights, int(i)).r;
+    value = texelFetch(detail, int(i)) + float(SIGN) * value;
+    store_sample(i, its_weight > 0.0 ? value : vec4(0.0), max(its_weight, 0.0));
+#else
+    store_sample(i, value, weight / inside);
+#endif
+}

@@ -1,0 +1,39 @@
+// Samples of a level of a pyramid: values with a weight each, which is 0 where there is none, whatever the values.
+#include <bindings>
+#include "common/item.glsl"
+
+layout(binding = TEXTURE_SAMPLES) uniform samplerBuffer samples;  // of the level that is read
+layout(binding = TEXTURE_WEIGHTS) uniform samplerBuffer weights;
+layout(std430, binding = STORAGE_SAMPLES) writeonly buffer Samples { float out_samples[]; };
+layout(std430, binding = STORAGE_WEIGHTS) writeonly buffer Weights { float out_weights[]; };
+
+uniform ivec2 size;      // of the level that is read, and of the one that is written
+uniform ivec2 out_size;
+
+const float taps[] = TAPS;
+
+// What is known of a sample that is being made: sums of what is there, and of the taps inside the image.
+precise vec4 sum;
+precise float weight;
+precise float inside;
+
+void begin_sample() {
+    sum = vec4(0.0);
+    weight = inside = 0.0;
+}
+
+void add_sample(ivec2 at, float tap) {
+    int i = at.y * size.x + at.x;
+    float w = texelFetch(weights, i).r;
+    inside += tap;
+    if (!(w > 0.0)) return;
+    weight += tap * w;
+    sum += tap * w * texelFetch(samples, i);
+}
+
+vec4 mean_sample() { return weight > 0.0 ? sum / weight : vec4(0.0); }
+
+void store_sample(uint i, vec4 value, float its_weight) {
+    for (uint k = 0u; k < CHANNELS; ++k) out_samples[CHANNELS * i + k] = value[k];
+    out_weights[i] = its_weight;
+}

@@ -1,0 +1,186 @@
+"""Pyramid: images, each half the size of the one before, and the steps up and down between them.
+
+Burt and Adelson 1983, with weights: only samples that are there count, and what lies outside an image is not
+there either, so that one rule serves holes, masks and borders: sums of taps times weights times values are
+divided by the sums of taps times weights. A level's weights are those means of the finer level's inside the
+image: how much of a sample's surroundings is there.
+
+Costs: a step reads each finer sample about once (`BOX`) to six times (`BINOMIAL`) and keeps 4 bytes a channel
+and 4 for the weight; a whole chain has 4/3 of the samples of its first image.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from . import gl
+from .bindings import Storage, Texture
+from .context import Gpu
+
+_FORMATS = {1: gl.R32F, 2: gl.RG32F, 3: gl.RGB32F, 4: gl.RGBA32F}
+
+
+@dataclass(frozen=True)
+class Filter:
+    """What one sample of a level has to do with those of the next finer one, along either axis.
+
+    Coarse sample i is the mean of the fine samples 2 i + first and those that follow, weighted by taps. Fine
+    sample j is the mean of the coarse samples that it is part of, weighted by the same taps. With an even
+    number of taps a coarse pixel covers two fine ones: a place x, pixel centres at +0.5, is 2 x in the finer
+    image. With an odd number a coarse pixel lies at every other fine one: there it is 2 x - 0.5.
+
+    nearest: a coarse sample is not the mean, but that one of the fine samples in reach whose first channel is
+    least, whatever the taps, so that depths on either side of an outline are not mixed.
+    """
+
+    first: int
+    taps: tuple[float, ...]
+    nearest: bool = False
+
+
+BOX = Filter(0, (1.0, 1.0))  # means of 2 x 2, as mipmaps have them; expanded: each sample four times
+NEAREST = Filter(0, (1.0, 1.0), nearest=True)  # the nearest of 2 x 2
+TENT = Filter(-1, (1.0, 3.0, 3.0, 1.0))  # expanded: bilinear
+BINOMIAL = Filter(-2, (1.0, 4.0, 6.0, 4.0, 1.0))  # Burt and Adelson's, a = 0.375
+GAUSSIAN = Filter(-1, (math.exp(-2), 1.0, math.exp(-2)))  # 3 x 3, of spread 0.5 (Farooq 2013, 3.3.2)
+
+
+class Image:
+    """Samples in rows from the top on the GPU: 1 to 4 channels of float32, and a weight each.
+
+    A sample whose weight is not above 0 is not there, and its values, NaN and infinite ones too, are not
+    used; a step writes zeros for it. Raises InputError where the driver takes no so large image.
+    """
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int], channels: int) -> None:
+        width, height = size
+        nbytes = 4 * channels * width * height
+        if nbytes > gpu.max_storage_bytes or width * height > gpu.max_points:
+            raise InputError(f"an image of {width}x{height} samples is too large for this driver")
+        self._gpu = gpu
+        self.size = size
+        self.channels = channels
+        self.samples = gl.BufferTexture(gpu.ctx.buffer(reserve=nbytes), _FORMATS[channels])
+        self.weights = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32F)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.samples.buffer.size + self.weights.buffer.size
+
+    def write(self, samples: NDArray[np.float32], weights: NDArray[np.float32] | None = None) -> None:
+        """Set all samples, (H, W, channels), and weights, (H, W); None: 1 each."""
+        width, height = self.size
+        filled = np.ones((height, width), np.float32) if weights is None else weights
+        self.samples.buffer.write(
+            np.ascontiguousarray(samples.reshape(height, width, self.channels), np.float32)
+        )
+        self.weights.buffer.write(np.ascontiguousarray(filled.reshape(height, width), np.float32))
+
+    def read(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """All samples, (H, W, channels), and weights, (H, W); waits for the GPU."""
+        width, height = self.size
+        samples = np.frombuffer(self.samples.buffer.read(), np.float32)
+        weights = np.frombuffer(self.weights.buffer.read(), np.float32)
+        return samples.reshape(height, width, self.channels), weights.reshape(height, width)
+
+    def release(self) -> None:
+        """Delete it."""
+        self._gpu.discard(self.samples, self.weights)
+
+
+class Pyramid:
+    """Images with the same channels, the first of any size, each other half as wide and high as the one
+    before, rounded up: as many as are asked for, or down to a single sample."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int], channels: int, levels: int | None = None) -> None:
+        self._gpu = gpu
+        self.levels = [Image(gpu, each, channels) for each in sizes(size, levels)]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return sum(level.nbytes for level in self.levels)
+
+    def reduce(self, how: Filter) -> None:
+        """Make each level of the one before."""
+        for fine, coarse in pairwise(self.levels):
+            reduce(self._gpu, fine, coarse, how)
+
+    def release(self) -> None:
+        """Delete all levels."""
+        self._gpu.discard(*self.levels)
+
+
+def sizes(size: tuple[int, int], levels: int | None = None) -> list[tuple[int, int]]:
+    """The sizes of a pyramid's levels, (width, height)."""
+    most = max(size[0] - 1, size[1] - 1).bit_length() + 1
+    return [(-(-size[0] // 2**k), -(-size[1] // 2**k)) for k in range(most if levels is None else levels)]
+
+
+def reduce(gpu: Gpu, fine: Image, coarse: Image, how: Filter) -> None:
+    """Make a level of the next finer one."""
+    _step(gpu, "reduce", fine, coarse, how, {"NEAREST": int(how.nearest)})
+
+
+def expand(gpu: Gpu, coarse: Image, fine: Image, how: Filter) -> None:
+    """Make a level of the next coarser one."""
+    _step(gpu, "expand", coarse, fine, how, {"SIGN": 0})
+
+
+def subtract_expanded(gpu: Gpu, image: Image, coarse: Image, detail: Image, how: Filter) -> None:
+    """Make `detail` what an image has beyond the next coarser level, expanded.
+
+    It is a level of a Laplacian pyramid, with the image's weights; `add_expanded` gives the image again, but
+    for the rounding of float32.
+    """
+    _step(gpu, "expand", coarse, detail, how, {"SIGN": -1}, image)
+
+
+def add_expanded(gpu: Gpu, detail: Image, coarse: Image, image: Image, how: Filter) -> None:
+    """Make an image of its detail and of the next coarser level, expanded. It has the detail's weights."""
+    _step(gpu, "expand", coarse, image, how, {"SIGN": 1}, detail)
+
+
+def _step(
+    gpu: Gpu,
+    name: str,
+    source: Image,
+    result: Image,
+    how: Filter,
+    defines: dict[str, int],
+    detail: Image | None = None,
+) -> None:
+    """Run shaders/pyramid/NAME.comp for each sample of the result."""
+    _check(name, source, result, detail)
+    taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
+    taken = {"CHANNELS": f"{result.channels}u", "FIRST": how.first, "COUNT": len(how.taps)}
+    program = gpu.compute(f"pyramid/{name}.comp", {**defines, **taken, "TAPS": f"float[]({taps})"})
+    source.samples.bind(Texture.SAMPLES)
+    source.weights.bind(Texture.WEIGHTS)
+    if detail is not None:
+        detail.samples.bind(Texture.DETAIL)
+        detail.weights.bind(Texture.DETAIL_WEIGHTS)
+    result.samples.buffer.bind_to_storage_buffer(Storage.SAMPLES)
+    result.weights.buffer.bind_to_storage_buffer(Storage.WEIGHTS)
+    gpu.set(program, size=source.size, out_size=result.size)
+    with gpu.timers.measure(name):
+        gpu.dispatch(program, result.size[0] * result.size[1])
+
+
+def _check(name: str, source: Image, result: Image, detail: Image | None) -> None:
+    """Raise ValueError where images do not belong together."""
+    fine, coarse = (source, result) if name == "reduce" else (result, source)
+    images = [image for image in (source, result, detail) if image is not None]
+    if coarse.size != sizes(fine.size, 2)[1] or (detail is not None and detail.size != fine.size):
+        raise ValueError(f"no levels that follow one another: {[image.size for image in images]}")
+    if len({image.channels for image in images}) > 1:
+        raise ValueError("levels with different channels")
+    if result is detail or result is source:
+        raise ValueError("a level cannot be made in place")
