@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -61,7 +60,7 @@ def described(app: RunningApp) -> dict[str, Any]:
     from PIL import Image
 
     app.screen.do("key", "p")
-    with Image.open(app.expect(r"Saved (.+)")[1]) as file:
+    with Image.open(app.told(r"Saved (.+)")[1]) as file:
         return json.loads(file.text["scan4d"])  # type: ignore[attr-defined]
 
 
@@ -73,27 +72,27 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
         screen.do("key", "Down", "sleep", 0.1, "key", "Down")  # from the open scan past odd.npz
         app.settle()
         screen.do("key", "Return")
-        app.expect(r"opened \S+study/three\.npy\n")
+        app.see(scan=str(study / "three.npy"))
         ctrl(app, "o")
         app.settle()
         screen.do("key", "Tab", "sleep", 0.2, "type", "--delay", 15, study / "two.npy")
         app.settle()
         screen.do("key", "Return")
-        app.expect(r"opened \S+study/two\.npy\n")
+        app.see(scan=str(study / "two.npy"))
         screen.do("key", "Prior")
-        app.expect(r"opened \S+study/three\.npy\n")
+        app.see(scan=str(study / "three.npy"))
         screen.do("key", "Next")
-        app.expect(r"opened \S+study/two\.npy\n")
+        app.see(scan=str(study / "two.npy"))
         screen.do("key", "Next")
-        app.expect(r"Cannot open: \S+study/odd\.npz")
+        app.told(r"Cannot open: \S+study/odd\.npz")
         screen.do("key", "Next")
-        app.expect(r"opened \S+study/one\n")
+        app.see(scan=str(study / "one"))
         app.settle()
 
         screen.do(
             "key", "Right", "sleep", 0.2, "key", "b", "sleep", 0.2, "key", "t", "sleep", 0.2, "key", "e"
         )
-        app.expect("every_frame=True")
+        app.see(every_frame=True)
         screen.do("mousemove", 400, 300, "sleep", 0.2, "click", 4, "sleep", 0.2, "click", 4)
         app.settle()
         left = described(app)
@@ -109,18 +108,19 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
 
     np.save(study / "three.npy", np.random.default_rng(9).random((500, 3)) * 1e4 + 1e6)
     with running_app(screen, tmp_path, study / "one") as app:
-        assert "Place(left=40, top=30, width=1000, height=600, maximised=False)" in app.log()
+        place = {"left": 40, "top": 30, "width": 1000, "height": 600, "maximised": False}
+        assert app.states[0].place == place
         again = described(app)
         for name in ("pose", "camera", "backend", "params", "look"):
             assert again[name] == left[name], name
         screen.do("key", "Next")
-        app.expect(r"opened \S+three\.npy")
+        app.see(scan=str(study / "three.npy"))
         app.settle()
         assert described(app)["camera"]["target"][0] > 1e6, "a camera that shows nothing is not taken up"
         close(app)
     settings.write_text("{")
     with running_app(screen, tmp_path, study / "one") as app:
-        assert re.search(r"settings\.json: is damaged\. It is kept as settings\.old\.json", app.log())
+        app.told(r"settings\.json: is damaged\. It is kept as settings\.old\.json")
         assert described(app)["pose"] == 0
         close(app)
     assert settings.with_name("settings.old.json").read_text() == "{"
@@ -131,30 +131,31 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
     (study / "wrong.json").write_text("{}")
     (study / "worse 1%.ply").write_bytes(b"no array")
     with running_app(screen, tmp_path, study / "missing.npy", study) as app:
-        assert "missing.npy: no such file" in app.log(), "told, and the others are opened"
+        app.told(r"missing\.npy: no such file")  # and the others are opened
         drop(app, study / "one")
-        app.expect(r"opened \S+study/one\n")
+        app.see(scan=str(study / "one"))
         drop(app, *(study / "one" / f"{number}.npy" for number in range(3)))
-        app.expect(r"opened \S+study/one/%d\.npy\n")
+        app.see(scan=str(study / "one/%d.npy"))
         drop(app, study / "two.npy", study / "gone.ply", study / "three.npy")
-        app.expect("gone.ply: no such file")
-        app.expect(r"opened \S+study/two\.npy\n")
+        app.told("gone.ply: no such file")
+        app.see(scan=str(study / "two.npy"))
         app.settle()
         screen.do("key", "Next")
-        app.expect(r"opened \S+study/three\.npy\n")
+        app.see(scan=str(study / "three.npy"))
         drop(app, study / "wrong.json")
-        app.expect("wrong.json: is no recording")
+        app.told("wrong.json: is no recording")
         drop(app, study / "worse 1%.ply")
-        app.expect("Cannot open: .*worse 1%.ply")
+        app.told("Cannot open: .*worse 1%.ply")
         drop(app, study / "one", study / "wrong.json")
-        app.expect(r"Left out: wrong\.json")
-        app.expect(r"opened \S+study/one\n")
+        app.told(r"Left out: wrong\.json")
+        app.see(scan=str(study / "one"))
         screen.do("key", "r")
-        app.expect("Recording")
+        app.see(is_recording=True)
         app.settle()
         screen.do("key", "r")
-        recording = app.expect(r"Saved (.+\.json)")[1]
+        recording = app.told(r"Saved (.+\.json)")[1]
         drop(app, recording)
-        app.expect("replays frame 0")
+        app.see(is_replaying=True)
+        app.see(is_replaying=False)
         app.settle()
         close(app)

@@ -122,12 +122,12 @@ def told(tasks: str) -> dict[str, int]:
 
 def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
     person.press("shift", "b")  # points, which break apart
-    person.app.expect("with points")
+    person.app.see(backend="points")
     for _ in FACES:
         before = person.look()
         person.task = "A1"
         person.press("Next")
-        person.app.expect("drew frame 0 with points")
+        person.app.see(frame=0, backend="points")
         person.app.settle()
         assert person.look().description["scan"] != before.description["scan"]
         person.task = "A2"
@@ -151,7 +151,7 @@ def test_set_b_turn_pan_and_find_nose_eye_and_ear(person: Person) -> None:
     for _ in FACES:
         person.task = "B1"
         person.press("Next")
-        person.app.expect("drew frame 0 with surfels")
+        person.app.see(frame=0, backend="surfels")
         person.app.settle()
         start = person.look().camera
         person.task = "B2"

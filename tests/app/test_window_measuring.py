@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 from virtual_screen import RunningApp, Screen, running_app, virtual_screen
 from written import write_mesh
 
-from viewer.analysis.measure import in_words
 from viewer.camera import Camera
 from viewer.scan.points import PointCloud
 from viewer.view import View
@@ -60,17 +58,23 @@ def ctrl(screen: Screen, key: str) -> None:
 
 
 def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) -> tuple[float, float]:
-    """Click two points, the second one twice by habit; distance and uncertainty as the app logs them."""
-    for times, number in enumerate((one, other), 1):
-        click(app, pixel_of(app, points, number), times)
-        place = re.escape(", ".join(repr(float(v)) for v in points[number]))
-        app.expect(f"end at {place}: point {number}, frame 0")
-    distance, uncertainty = app.expect(r"measured (\S+), uncertainty (\S+)").groups()
-    return float(distance), float(uncertainty)
+    """Click two points, the second one twice by habit; distance and uncertainty as the app has them."""
+    click(app, pixel_of(app, points, one))
+    ends = [app.see(lambda state: state.begun).begun]
+    click(app, pixel_of(app, points, other), times=2)
+    measurement = app.see(lambda state: state.measurements).measurements[-1]
+    ends.append(measurement["ends"][1])
+    assert ends[0] == measurement["ends"][0]
+    assert [(end["position"], end["id"], end["frame"]) for end in ends] == [
+        (points[number].tolist(), number, 0) for number in (one, other)
+    ]
+    return measurement["distance"], measurement["uncertainty"]
 
 
-def expect_reading(app: RunningApp, *words: str) -> None:
-    app.expect(re.escape(f"measurements: {'; '.join(words)}\n"))
+def expect_reading(app: RunningApp, *distances: float, motion: str = "follows points") -> None:
+    """Wait until the measurements read so."""
+    wanted = [(distance, motion) for distance in distances]
+    app.see(lambda state: [(one["distance"], one["motion"]) for one in state.measurements] == wanted)
 
 
 def clipboard(screen: Screen) -> str:
@@ -87,7 +91,7 @@ def name_unit(app: RunningApp, name: str) -> None:
     app.screen.do("mousemove", x, int(np.flatnonzero(is_field)[-1]) - 5, "sleep", 0.2, "click", 1)
     app.settle()
     app.screen.do("type", "--delay", 40, name)
-    app.expect(f"unit {name}")
+    app.see(unit=name)
 
 
 @pytest.fixture(scope="module")
@@ -115,28 +119,28 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
     distances = [math.dist(points[34], points[128]) for points in frames]
     with running_app(screen, tmp_path, "scan.npz") as app:
         screen.do("key", "m")
-        app.expect("measuring begins")
+        app.see(is_measuring=True)
         name_unit(app, "cm")
         distance, uncertainty = measure(app, frames[0], 34, 128)
         assert distance == distances[0]
-        reading = [in_words(distance, uncertainty, "cm") + ", follows points" for distance in distances]
-        expect_reading(app, reading[0])
+        assert uncertainty > 0
+        expect_reading(app, distances[0])
 
         screen.do("key", "Right")
-        expect_reading(app, reading[1])
+        expect_reading(app, distances[1])
         ctrl(screen, "z")
-        expect_reading(app, "none")
+        expect_reading(app)
         ctrl(screen, "y")
-        expect_reading(app, reading[1])
+        expect_reading(app, distances[1])
 
         ctrl(screen, "c")
-        app.expect("Copied")
+        app.told("Copied")
         copied = list(csv.DictReader(io.StringIO(clipboard(screen)), delimiter="\t"))
         ctrl(screen, "s")
         app.settle()
         screen.do("key", "Escape")
         app.settle()
-        assert "measuring ends" not in app.log(), "Escape closes the dialog alone"
+        assert app.state.is_measuring, "Escape closes the dialog alone"
         ctrl(screen, "s")
         app.settle()
         screen.do("type", "--delay", 40, "nowhere/table")
@@ -145,7 +149,7 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         ctrl(screen, "a")  # the field has kept the keyboard
         screen.do("type", "--delay", 40, "table")
         screen.do("key", "Return")
-        file = app.expect("Saved (.*)").group(1)
+        file = app.told("Saved (.*)")[1]
         assert file == str(tmp_path / "table.csv")
         with open(file, newline="", encoding="utf-8") as stream:
             saved = list(csv.DictReader(stream))
@@ -160,16 +164,14 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         ctrl(screen, "o")
         app.settle()
         screen.do("key", "Return")
-        app.expect(f"opened {re.escape(str(tmp_path / 'scan.npz'))}")
-        app.settle()
-        told = re.findall(r"measurements: (.*)", app.log())[-1]
-        assert told == reading[1], "it is the same scan by another name"
+        app.see(scan=str(tmp_path / "scan.npz"))
+        expect_reading(app, distances[1])  # it is the same scan by another name
 
         screen.do("key", "Escape")
-        app.expect("measuring ends")
+        app.see(is_measuring=False)
         click(app, pixel_of(app, frames[0], 34))
-        app.settle()
-        assert app.log().count("end at") == 2, "clicks set no ends any longer"
+        after = app.settle()
+        assert (after.begun, len(after.measurements)) == (None, 1), "clicks set no ends any longer"
         assert "Traceback" not in app.log()
 
 
@@ -182,20 +184,20 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "m")
         click(app, (app.view()[0] + 10, app.view()[1] + 10))
-        app.expect("There is nothing to measure here")
-        distance, uncertainty = measure(app, points, 34, 128)
-        words = in_words(distance, uncertainty, "units")
-        expect_reading(app, f"{words}, follows points")
+        app.told("There is nothing to measure here")
+        distance, _ = measure(app, points, 34, 128)
+        expect_reading(app, distance)
         screen.do("key", "End")
-        app.expect("Not all frames have the same points")
-        expect_reading(app, f"{words}, fixed in space")
+        app.told("Not all frames have the same points")
+        expect_reading(app, distance, motion="fixed in space")
         screen.do("key", "Home")
-        app.expect("drew frame 0")
+        app.see(frame=0)
 
+        before = app.settle()
         start = pixel_of(app, points, 34)
         screen.do("mousemove", *start, "mousedown", 1, "sleep", 0.2, "mousemove", start[0] + 90, start[1])
         screen.do("sleep", 0.2, "mouseup", 1)
-        app.expect("drew frame 0")
-        app.settle()
-        assert app.log().count("end at") == 2, "a drag turns the view and sets no end"
+        after = app.settle()
+        assert after.camera != before.camera
+        assert (after.begun, len(after.measurements)) == (None, 1), "a drag turns the view and sets no end"
         assert "Traceback" not in app.log()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,7 +13,7 @@ COUNT = 7  # frames
 
 
 @pytest.fixture(scope="module")
-def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     scan = tmp_path_factory.mktemp("scan")
     for number in range(COUNT):
         np.save(scan / f"{number}.npy", np.random.default_rng(number).random((500, 3)))
@@ -25,6 +24,12 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
         yield app
 
 
+@pytest.fixture
+def app(running: RunningApp) -> RunningApp:
+    running.reset()
+    return running
+
+
 def shift_space(screen: Screen) -> None:
     """As fingers do it: one key after the other."""
     screen.do("keydown", "shift", "sleep", 0.1, "key", "space", "sleep", 0.1, "keyup", "shift")
@@ -33,9 +38,7 @@ def shift_space(screen: Screen) -> None:
 def wait_for_frames(app: RunningApp, count: int) -> list[int]:
     """The frame that is shown, and so many after it."""
     before = len(app.frames())
-    while len(app.frames()) < before + count:
-        assert app.process.poll() is None, app.log()
-        time.sleep(0.02)
+    app.see(lambda _: len(app.frames()) >= before + count)
     return app.frames()[before - 1 :]
 
 
@@ -47,29 +50,29 @@ def steps(frames: list[int]) -> set[int]:
 def test_every_frame_backward_faster_and_real_time(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "e")
-    app.expect("every_frame=True")
+    app.see(every_frame=True)
     screen.do("key", "space")
     assert steps(wait_for_frames(app, 2 * COUNT)) == {1}
 
     screen.do("key", "bracketleft")
-    app.expect("speed=0.5")
+    app.see(speed=0.5)
     shift_space(screen)
-    app.expect("reverse=True")
+    app.see(reverse=True)
     assert steps(wait_for_frames(app, COUNT)) == {COUNT - 1}
 
-    for speed in ("1.0", "2.0", "5.0", "10.0"):
+    for speed in (1, 2, 5, 10):
         screen.do("key", "bracketright")
-        app.expect(f"speed={speed}")
+        app.see(speed=speed)
     assert steps(wait_for_frames(app, 2 * COUNT)) == {COUNT - 1}
 
     screen.do("key", "e")  # 250 frames a second are due, more than any screen shows
-    app.expect("every_frame=False")
+    app.see(every_frame=False)
     assert steps(wait_for_frames(app, 2 * COUNT)) - {COUNT - 1}
 
     shift_space(screen)
-    app.expect("reverse=False")
+    app.see(reverse=False)
     screen.do("key", "BackSpace")
-    app.expect("speed=1.0")
+    app.see(speed=1)
     screen.do("key", "space")
     app.settle()
     assert "Traceback" not in app.log()
@@ -78,25 +81,22 @@ def test_every_frame_backward_faster_and_real_time(app: RunningApp) -> None:
 def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "l")
-    app.expect("loop=False")
+    app.see(loop=False)
     screen.do("key", "Home", "key", "space")
+    app.see(is_playing=True)
     app.settle()
     assert app.frames()[-1] == COUNT - 1
     shift_space(screen)
-    app.expect("reverse=True")
+    app.see(reverse=True)
     screen.do("key", "space")
+    app.see(is_playing=True)
     app.settle()
     assert app.frames()[-1] == 0
-    shift_space(screen)
-    screen.do("key", "l")
-    app.expect("loop=True")
-    app.settle()
 
 
 def test_the_theme_changes_the_panels_and_not_the_picture(app: RunningApp) -> None:
     screen = app.screen
-    screen.do("mousemove", *(v - 1 for v in SIZE), "key", "Escape")  # no note over the picture
-    app.settle()
+    app.see(counted=True)
     dark = screen.picture()
     screen.do("key", "t")
     app.settle()

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import RunningApp, running_app, virtual_screen
+from virtual_screen import RunningApp, State, running_app, virtual_screen
 from written import picture
 
 from viewer import cli
+from viewer.app.scene.motion import REST
 from viewer.document.recording import Recording
 from viewer.scan import formats
 
@@ -22,7 +23,7 @@ MIDDLE = np.s_[120:440, 300:640]  # of the view: no cube, scale bar or note ther
 
 
 @pytest.fixture(scope="module")
-def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     scan = tmp_path_factory.mktemp("scan")
     for number in range(FRAMES):
         formats.write(scan / f"{number}.npz", sphere(POINTS, radius=1 + 0.1 * number))
@@ -33,29 +34,32 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
         yield app
 
 
-def drawn(app: RunningApp) -> list[tuple[int, int]]:
-    """(pixels, points) of each picture so far."""
-    found = re.findall(r"drew frame \d+ with surfels, (\d+)x(\d+) pixels, (\d+) points", app.log())
-    return [(int(width) * int(height), int(points)) for width, height, points in found]
+@pytest.fixture
+def app(running: RunningApp) -> RunningApp:
+    running.reset()
+    return running
+
+
+def is_full(app: RunningApp, state: State) -> bool:
+    _, _, width, height = app.view()
+    return (state.pixels, state.points) == ([width, height], POINTS)
 
 
 def wait_for_preview(app: RunningApp) -> None:
-    if "Drawn in software" in app.log():  # a graphics card may need none
-        app.expect(r"drew frame \d+ with surfels, .* (?!200000)\d+ points")
+    if any("Drawn in software" in note for note in app.notes):  # a graphics card may need none
+        app.see(lambda state: state.points < POINTS, backend="surfels")
 
 
 def expect_full(app: RunningApp) -> None:
     """Wait for a picture in full, and see that it stays."""
-    _, _, width, height = app.view()
-    app.expect(rf"drew frame \d+ with surfels, {width}x{height} pixels, {POINTS} points")
-    app.settle()
-    assert drawn(app)[-1] == (width * height, POINTS)
+    app.see(lambda state: is_full(app, state))
+    assert is_full(app, app.settle())
 
 
 def saved(app: RunningApp) -> tuple[Path, np.ndarray]:
     """A screenshot, and what is drawn again from what it tells."""
     app.screen.do("key", "p")
-    path = Path(app.expect(r"Saved (.+\.png)")[1])
+    path = Path(app.told(r"Saved (.+\.png)")[1])
     again = path.with_name(f"again_{path.name}")
     assert cli.main(["render", "--replay", str(path), "-o", str(again)]) == 0
     return path, picture(again)
@@ -65,7 +69,7 @@ def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     screen = app.screen
     screen.do("mousemove", *(v - 1 for v in SIZE), "key", "r", "key", "space")
     wait_for_preview(app)
-    app.expect("drew frame 4")
+    app.see(frame=4)
     path, again = saved(app)
     np.testing.assert_array_equal(picture(path), again)
     wait_for_preview(app)
@@ -80,27 +84,25 @@ def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     assert np.abs(shown[MIDDLE].astype(int) - again[MIDDLE][..., :3]).max() <= 1
     np.testing.assert_array_equal(picture(path), again)
     screen.do("key", "r")
-    recording = Recording.load(Path(app.expect(r"Saved (.+\.json)")[1]))
+    recording = Recording.load(Path(app.told(r"Saved (.+\.json)")[1]))
     assert {entry.size for entry in recording.entries} == {(width, height)}, "recorded as asked for"
 
 
 def test_every_frame_leaves_none_out_and_real_time_does(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "e")
-    app.expect("every_frame=True")
+    app.see(every_frame=True)
     before = len(app.frames())
     screen.do("key", "space")
-    while len(app.frames()) < before + 12:
-        app.expect("drew frame")
+    app.see(lambda _: len(app.frames()) >= before + 12)
     assert set(np.diff(app.frames()[before - 1 :]) % FRAMES) == {1}
     screen.do("key", "e")
-    app.expect("every_frame=False")
-    for speed in ("2.0", "5.0", "10.0"):
+    app.see(every_frame=False)
+    for speed in (2, 5, 10):
         screen.do("key", "bracketright")
-        app.expect(f"speed={speed}")
+        app.see(speed=speed)
     before = len(app.frames())
-    while len(app.frames()) < before + 12:
-        app.expect("drew frame")
+    app.see(lambda _: len(app.frames()) >= before + 12)
     assert set(np.diff(app.frames()[before:]) % FRAMES) - {1}, "250 frames a second are due"
     screen.do("key", "space", "key", "BackSpace")
     expect_full(app)
@@ -117,8 +119,10 @@ def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: 
     screen.do("mouseup", 1, "click", "--repeat", 8, "--delay", 40, 4)
     wait_for_preview(app)
     expect_full(app)
-    before = len(drawn(app))
+    before = app.state.pictures
+    time.sleep(2 * REST)  # what comes sooner counts as moving
     screen.do("key", "f")
+    app.see(lambda state: state.pictures > before)
     expect_full(app)
-    assert len(drawn(app)) == before + 1, "a single change is drawn in full at once"
+    assert app.state.pictures == before + 1, "a single change is drawn in full at once"
     assert "Traceback" not in app.log()

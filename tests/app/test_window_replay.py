@@ -32,10 +32,18 @@ def press(app: RunningApp, *keys: str) -> None:
     app.screen.do(*down, "key", key, *up)
 
 
+def replay(app: RunningApp) -> None:
+    """The recording saved last, to its end."""
+    press(app, "shift", "r")
+    app.see(is_replaying=True)
+    app.see(is_replaying=False)
+    app.settle()
+
+
 def recorded(app: RunningApp) -> tuple[Path, tuple[Entry, ...]]:
     """Stop recording; what is in it."""
     press(app, "r")
-    path = Path(app.expect(r"Saved (.+\.json)")[1])
+    path = Path(app.told(r"Saved (.+\.json)")[1])
     return path, Recording.load(path).entries
 
 
@@ -67,25 +75,23 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         running_app(screen, tmp_path, tmp_path / "a", tmp_path / "b") as app,
     ):
         press(app, "r")
-        app.expect("Recording")
-        for key, line in (
-            ("Right", "frame 1"), ("b", "frame 1 with surfels"), ("o", "frame 1"), ("End", "frame 3"),
+        app.see(is_recording=True)
+        for key, wanted in (
+            ("Right", {"frame": 1}), ("b", {"backend": "surfels"}), ("o", {}), ("End", {"frame": 3}),
         ):  # fmt: skip
             press(app, key)
-            app.expect(f"drew {line}")
+            app.see(**wanted)
             app.settle()
         _, first = recorded(app)
         assert [entry.pose for entry in first] == sorted(entry.pose for entry in first)
         press(app, "Home")
-        press(app, "b")
-        app.expect("drew frame 0 with points")
+        press(app, "shift", "b")
+        app.see(frame=0, backend="points")
         app.settle()
 
         press(app, "r")
-        app.expect("Recording")
-        press(app, "shift", "r")
-        app.expect("replays frame 3")
-        app.settle(1.0)
+        app.see(is_recording=True)
+        replay(app)
         path, again = recorded(app)
         assert again[1:] == first, "the first is what was shown before"
 
@@ -96,11 +102,9 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
             path.write_text(text.replace(f'"scan": {json.dumps(str(tmp_path / "a"))}', f'"scan": {scan}'))
             press(app, "space")  # a scan that plays is stopped for it,
             press(app, "y")  # and the turntable
-            press(app, "shift", "r")
-            app.expect("replays frame 3")
-            app.settle()
+            replay(app)
             press(app, "p")
-            (shown,) = Recording.load(Path(app.expect(r"Saved (.+\.png)")[1])).entries
+            (shown,) = Recording.load(Path(app.told(r"Saved (.+\.png)")[1])).entries
             assert json.dumps(shown.scan) == other
             assert replace(shown, scan=first[-1].scan) == first[-1]
         path.write_text(text)
@@ -108,7 +112,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
             assert title == "a - Scan4D"
         path.write_text(text[:-100])
         press(app, "shift", "r")
-        app.expect("is not JSON")
+        app.told("is not JSON")
         assert "Traceback" not in app.log()
 
 
@@ -119,7 +123,7 @@ def test_an_anonymous_picture_is_shown_where_the_scan_stands(tmp_path: Path) -> 
     formats.write(scan, PointCloud.from_arrays(points, scalars={"q": np.arange(300, dtype=np.float32)}))
     with virtual_screen(tmp_path, SIZE) as screen, running_app(screen, tmp_path, scan) as app:
         press(app, "r")
-        app.expect("Recording")
+        app.see(is_recording=True)
         path, (shown,) = recorded(app)
         look = replace(shown.look, color_by="q", light="flat")
         wanted = replace(shown, camera=shown.camera.orbited(40, 0), look=look)
@@ -127,14 +131,14 @@ def test_an_anonymous_picture_is_shown_where_the_scan_stands(tmp_path: Path) -> 
         assert cli.main(["render", "--replay", str(path), "--anonymous", "-o", str(picture)]) == 0
         assert Recording.load(picture).entries[0].camera != wanted.camera
         path.write_text(read_description(picture))
-        press(app, "shift", "r")
-        app.expect("replays frame 0")
-        app.settle()
+        replay(app)
         press(app, "p")
-        (again,) = Recording.load(Path(app.expect(r"Saved (.+\.png)")[1])).entries
+        (again,) = Recording.load(Path(app.told(r"Saved (.+\.png)")[1])).entries
         assert np.allclose(again.camera.eye, wanted.camera.eye, atol=1e-6)
         assert again.look == wanted.look
-        assert "is not as it was" not in app.log(), "its hash is another one, of the same scan"
+        assert not any("is not as it was" in note for note in app.notes), (
+            "its hash is another one, of the same scan"
+        )
         formats.write(scan, PointCloud.from_arrays(points[:200]))
         press(app, "shift", "r")
-        app.expect("far.npz is not as it was")
+        app.told("far.npz is not as it was")

@@ -47,64 +47,70 @@ def app(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runn
 def press_until(app: RunningApp, key: str, words: str) -> None:
     """What goes on is shown, and can be cancelled, a moment after it has begun."""
     end = time.monotonic() + PATIENCE
-    before = app.log().count(words)
-    while app.log().count(words) == before:
+    while not any(words in note for note in app.notes):
         assert app.process.poll() is None, app.log()
         assert time.monotonic() < end, app.log()
         app.screen.do("key", key, "sleep", 0.1)
-    app.expect(words)
+    app.told(words)
 
 
-def test_opening_is_cancelled_replaced_and_done(app: RunningApp) -> None:
+def test_opening_is_cancelled_replaced_and_done(app: RunningApp, folder: Path) -> None:
+    small, text, bare, _ = names = [str(path) for path in sorted(folder.iterdir())]
     app.screen.do("key", "Next")
     press_until(app, "Escape", "Cancelled: Opening 1_text.xyz")
-    app.settle(1.0)
-    assert "opened" not in app.log()
+    assert app.settle().scan == small
     app.screen.do("key", "p")
-    assert Path(app.expect(r"Saved (.+)")[1]).exists(), "the scan before is still there"
+    assert Path(app.told(r"Saved (.+)")[1]).exists(), "the scan before is still there"
 
     app.screen.do("key", "Prior")
-    app.expect(r"opened \S+0_small.npy")
+    app.see(scan=small)
     app.screen.do("key", "Next", "key", "Next")  # the second instead of the first
-    app.expect(r"opened \S+2_bare.npz")
-    assert "1_text.xyz\n" not in app.log()
+    app.see(scan=bare)
+    assert text not in {state.scan for state in app.states}
     app.screen.do("key", "Next")
-    app.expect(r"Cannot open: \S+3_damaged.ply")
+    app.told(r"Cannot open: \S+3_damaged.ply")
     app.screen.do("key", "Prior", "key", "Prior")
-    app.expect(r"opened \S+1_text.xyz")
-    app.expect("drew frame 0 with points, .* 3000000 points")
+    app.see(scan=text, frame=0, backend="points", points=3_000_000)
+    assert names[3] not in {state.scan for state in app.states}
 
 
-def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningApp) -> None:
-    app.screen.do("key", "Next")
-    app.expect(r"opened \S+2_bare.npz")
-    app.expect("drew frame 0 with points")
-    app.settle()
+def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningApp, folder: Path) -> None:
+    go_to(app, folder / "2_bare.npz")
+    app.see(frame=0, backend="points")
     app.screen.do("mousemove", *(v - 1 for v in SIZE), "key", "Escape")  # away with the notes
-    app.settle(1.0)
+    app.settle()
     left, top, width, height = app.view()
     part = np.s_[top + 200 : top + height - 100, left : left + width]  # without marks
-    before = app.screen.picture()[part]
+    before, pictures = app.screen.picture()[part], app.state.pictures
     app.screen.do("key", "b")
-    app.expect("drew frame 0 with points")  # meanwhile
-    drawn = app.log().count("drew frame")
+    drawn = app.see(lambda state: state.pictures > pictures, backend="points").pictures  # meanwhile
     press_until(app, "Escape", "Cancelled: Estimating normals")
-    app.expect("drew frame 0 with points")
-    assert app.log().count("drew frame") <= drawn + 3, "the same picture is not drawn again and again"
     app.screen.do("key", "Escape")  # away with the note
-    app.settle()
+    after = app.settle()
+    assert (after.frame, after.backend) == (0, "points")
+    assert after.pictures <= drawn + 3, "the same picture is not drawn again and again"
     assert (app.screen.picture()[part] == before).all()
     app.screen.do("key", "b")
-    app.expect("drew frame 0 with surfels")
+    app.see(frame=0, backend="surfels")
     app.settle()
     assert (app.screen.picture()[part] != before).any()
     assert "Traceback" not in app.log()
 
 
-def test_closing_ends_the_process_while_a_scan_is_read(app: RunningApp) -> None:
-    opened = app.log().count("opened")
-    app.screen.do("key", "Prior", "sleep", 0.2)
+def go_to(app: RunningApp, scan: Path) -> None:
+    """Step through the list until the scan is there."""
+    for _ in range(4):
+        if app.settle().scan == str(scan):
+            return
+        app.screen.do("key", "Next")
+    raise AssertionError(f"{scan} is not in the list")
+
+
+def test_closing_ends_the_process_while_a_scan_is_read(app: RunningApp, folder: Path) -> None:
+    go_to(app, folder / "0_small.npy")
+    app.screen.do("key", "Next")
+    app.see(is_opening=True)
     app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
     assert app.process.wait(PATIENCE) == 0
-    assert app.log().count("opened") == opened
+    assert app.state.scan == str(folder / "0_small.npy")
     assert "Traceback" not in app.log()

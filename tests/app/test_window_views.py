@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_window import Screenshot, drag, shown
+from test_window import camera_of, drag, shown
 from virtual_screen import RunningApp, running_app, virtual_screen
 
 from viewer.camera import Camera
@@ -18,7 +18,7 @@ EM = 16.0  # the font's height
 
 
 @pytest.fixture(scope="module")
-def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     scan = tmp_path_factory.mktemp("scan") / "box.npy"
     np.save(scan, np.random.default_rng(0).uniform((-1, -2, -3), (1, 2, 3), (4000, 3)))
     with (
@@ -27,9 +27,15 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     ):
         window = screen.do("search", "--name", "Scan4D").split()[-1]
         screen.do("windowmove", window, 60, 30, "windowsize", window, *WINDOW)
-        app.expect(r"view at 0,56 .*")
+        app.see(size=[*WINDOW])
         app.settle()
         yield app
+
+
+@pytest.fixture
+def app(running: RunningApp) -> RunningApp:
+    running.reset()
+    return running
 
 
 def test_on_a_display_of_scale_2_all_is_twice_as_large(tmp_path: Path) -> None:
@@ -63,8 +69,7 @@ def on_cube(app: RunningApp, right: float, up: float) -> tuple[int, int]:
 
 def click_cube(app: RunningApp, right: float, up: float) -> Camera:
     app.screen.do("mousemove", *on_cube(app, right, up), "sleep", 0.2, "click", 1)
-    app.settle()
-    return Screenshot(app).camera
+    return camera_of(app)
 
 
 def back(camera: Camera) -> list[float]:
@@ -74,7 +79,7 @@ def back(camera: Camera) -> list[float]:
 
 @pytest.mark.slow
 def test_the_cube_is_clicked_and_dragged_and_keeps_the_mouse_from_the_view(app: RunningApp) -> None:
-    start = Screenshot(app).camera
+    start = camera_of(app)
     corner = 3**-0.5
     assert back(click_cube(app, 0.8, 0)) == pytest.approx([2**-0.5, 0, 2**-0.5], abs=1e-3), "its left side"
     assert back(click_cube(app, 0.7, 0)) == pytest.approx([1, 0, 0], abs=1e-3)
@@ -83,10 +88,9 @@ def test_the_cube_is_clicked_and_dragged_and_keeps_the_mouse_from_the_view(app: 
     chord(app, "ctrl", "1")
     place = on_cube(app, 0, 0)
     app.screen.do("mousemove", *place, "sleep", 0.2, "click", 4, "click", 4)
-    app.settle()
-    assert Screenshot(app).camera == start, "a wheel over the cube does nothing"
+    assert camera_of(app) == start, "a wheel over the cube does nothing"
     drag(app, 1, place, (place[0] - 60, place[1]))
-    dragged = Screenshot(app).camera
+    dragged = camera_of(app)
     assert dragged.target == start.target
     assert dragged.distance == pytest.approx(start.distance)
     assert np.degrees(np.arccos(np.dot(back(dragged), back(start)))) == pytest.approx(120, abs=15)
@@ -100,37 +104,33 @@ def test_bookmarks_come_back_by_key(app: RunningApp) -> None:
     for side in ("2", "5"):
         chord(app, "ctrl", side)
         chord(app, "ctrl", "b")
-        app.expect(r"Bookmark 'View \d' added")
-        cameras.append(Screenshot(app).camera)
+        app.told(r"Bookmark 'View \d' added")
+        cameras.append(camera_of(app))
     chord(app, "ctrl", "1")
     app.screen.do("key", "n")
-    app.settle()
-    assert Screenshot(app).camera == cameras[0]
+    assert camera_of(app) == cameras[0]
     chord(app, "shift", "n")
-    assert Screenshot(app).camera == cameras[1]
+    assert camera_of(app) == cameras[1]
 
 
 def test_keys_typed_in_haste_are_what_was_typed(app: RunningApp) -> None:
     """Key and modifier go down and up between two frames."""
-    app.settle()
-    before = app.log()
+    before, told = app.state, len(app.notes)
     app.screen.do("key", "--delay", 8, *["ctrl+b"] * 8)
-    app.settle()
-    new = app.log()[len(before) :]
-    assert new.count("Bookmark 'View") == 8
-    assert "drew frame" not in new, "not the next renderer"
+    after = app.settle()
+    assert sum("Bookmark 'View" in note for note in app.notes[told:]) == 8
+    assert after.pictures == before.pictures, "not the next renderer"
 
 
 def test_the_turntable_turns_until_a_key_or_the_mouse_stops_it(app: RunningApp) -> None:
     chord(app, "ctrl", "1")
-    cameras = [Screenshot(app).camera]
+    cameras = [camera_of(app)]
     for stop in (("key", "y"), ("mousemove", 300, 300, "sleep", 0.1, "click", 1)):
         app.screen.do("key", "y")
-        for _ in range(4):
-            app.expect("drew frame 0 ")
+        pictures = app.state.pictures
+        app.see(lambda state: state.pictures > pictures + 4)  # noqa: B023
         app.screen.do(*stop)
-        app.settle()  # it would never settle while it turns
-        cameras.append(Screenshot(app).camera)
+        cameras.append(camera_of(app))  # it would never settle while it turns
     angles = [float(np.degrees(np.arctan2(back(camera)[0], back(camera)[2]))) for camera in cameras]
     assert angles[0] == pytest.approx(0, abs=0.01)
     assert angles[0] < angles[1] < angles[2]
@@ -145,30 +145,28 @@ def test_full_screen_is_the_view_alone_and_goes_back(app: RunningApp) -> None:
     before, place = screen.do("getwindowgeometry", window), app.view()
     for leave in ("F11", "Escape"):
         screen.do("key", "F11")
-        app.expect(r"view at 0,0 1280x720")
+        app.see(view=[0, 0, *SCREEN])
         app.settle()
         screen.do("key", "p")
-        app.expect("Saved")
+        app.told("Saved")
         screen.do("key", leave)
-        app.expect(r"view at 0,56 .*")
+        app.see(view=[*place])
         app.settle()
         assert app.view() == place
         assert screen.do("getwindowgeometry", window) == before
     screen.do("key", "Tab")
-    app.expect(r"view at 0,0 1100x640")
+    app.see(view=[0, 0, *WINDOW])
     screen.do("key", "Tab")
-    app.expect(r"view at 0,56 .*")
+    app.see(view=[*place])
 
 
 def test_larger_text_takes_more_room(app: RunningApp) -> None:
     usual = app.view()
     chord(app, "ctrl", "equal")
-    app.expect("view at .*")
     larger = app.view()
     assert larger[1] > usual[1]
     assert larger[2] < usual[2]
     chord(app, "ctrl", "0")
-    app.expect("view at .*")
     assert app.view() == usual
     assert shown(app).size
     assert "Traceback" not in app.log()

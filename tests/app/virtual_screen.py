@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import json
 import os
 import re
 import shutil
 import struct
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TypeVar
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE = 120  # seconds until what does not come about counts as failed
+PATIENCE = 120.0  # seconds until what does not come about counts as failed
 
-_RUN = """
-import logging, sys
-logging.basicConfig(format="%(message)s")
-logging.getLogger("viewer").setLevel(logging.DEBUG)
-from viewer.app import run
-sys.exit(run(sys.argv[1:]))
-"""
+Found = TypeVar("Found")
 
 
 class Screen:
@@ -93,46 +91,126 @@ def virtual_screen(folder: Path, size: tuple[int, int], scale: float = 1) -> Ite
         server.wait()
 
 
-class RunningApp:
-    """The app as a process of its own."""
+class State(SimpleNamespace):
+    """What the app showed at the end of a turn of its loop, as observed.py has it."""
 
-    def __init__(self, screen: Screen, process: subprocess.Popen[bytes], log: Path) -> None:
+
+class RunningApp:
+    """The app as a process of its own. It tells what it shows by states, one after each turn of its loop."""
+
+    def __init__(self, screen: Screen, process: subprocess.Popen[bytes], states: int, log: Path) -> None:
         self.screen, self.process = screen, process
+        self.states: list[State] = []
+        self.notes: list[str] = []  # all that it has told its user
         self._log = log
-        self._read = 0
+        self._came = threading.Condition()
+        self._seen = self._told = 0  # how many of them were looked at
+        self._asked = 0
+        self._reader = threading.Thread(target=self._read, args=[states], daemon=True)
+        self._reader.start()
+
+    def _read(self, states: int) -> None:
+        with open(states) as lines:
+            for line in lines:
+                state = State(**json.loads(line))
+                with self._came:
+                    self.states.append(state)
+                    self.notes += state.notes
+                    self._came.notify_all()
+        with self._came:
+            self._came.notify_all()
 
     def log(self) -> str:
-        """All that it has reported so far."""
+        """All that it has written to standard error."""
         return self._log.read_text(errors="replace")
 
-    def expect(self, pattern: str) -> re.Match[str]:
-        """Wait until a line that was not expected before matches; fails when the app ends."""
+    @property
+    def state(self) -> State:
+        """The last one."""
+        return self.states[-1]
+
+    def see(self, what: Callable[[State], object] = lambda _: True, **wanted: object) -> State:
+        """Wait for a state of which this is true and that has these values.
+
+        None before the one that was seen last; fails when the app ends.
+        """
+
+        def find() -> State | None:
+            for index in range(self._seen, len(self.states)):
+                self._seen, state = index, self.states[index]
+                if all(getattr(state, name, None) == value for name, value in wanted.items()) and what(state):
+                    return state
+            return None
+
+        return self._wait(find, wanted or what)
+
+    def told(self, pattern: str) -> re.Match[str]:
+        """Wait for a note to the user, after the one that was found last, in which this is found."""
+
+        def find() -> re.Match[str] | None:
+            while self._told < len(self.notes):
+                self._told += 1
+                if found := re.search(pattern, self.notes[self._told - 1]):
+                    return found
+            return None
+
+        return self._wait(find, pattern)
+
+    def settle(self) -> State:
+        """Wait until all events so far were taken in, and nothing goes on any longer."""
+        assert self.process.stdin is not None
+        self._asked += 1
+        self.process.stdin.write(b"%d\n" % self._asked)
+        self.process.stdin.flush()
+        return self.see(lambda state: state.is_idle and state.answered == self._asked)
+
+    def _wait(self, find: Callable[[], Found | None], wanted: object) -> Found:
         deadline = time.monotonic() + PATIENCE
-        while time.monotonic() < deadline:
-            running = self.process.poll() is None
-            if found := re.compile(pattern).search(self.log(), self._read):
-                self._read = found.end()
-                return found
-            assert running, f"the app has ended:\n{self.log()}"
-            time.sleep(0.02)
-        raise AssertionError(f"no '{pattern}' in:\n{self.log()[self._read :]}")
+        with self._came:
+            while (found := find()) is None:
+                seconds = deadline - time.monotonic()
+                assert self._reader.is_alive(), f"the app has ended without {wanted}:\n{self.log()}"
+                assert seconds > 0, f"no {wanted} in time:\n{self.states[-1]}\n{self.log()}"
+                self._came.wait(seconds)
+            return found
+
+    def reset(self) -> None:
+        """Bring it back to how it was at its start: frame, renderer, camera, pace, theme; at rest."""
+
+        def press_while(keys: str, differs: Callable[[State], bool]) -> None:
+            while differs(self.settle()):
+                self.screen.do("key", keys)
+
+        first = next(state for state in self.states if state.pictures)
+        press_while("space", lambda state: state.is_playing)
+        press_while("Escape", lambda state: state.is_measuring or state.is_export_open)
+        for keys, field in (("e", "every_frame"), ("l", "loop"), ("shift+space", "reverse")):
+            press_while(keys, lambda state: getattr(state, field) != getattr(first, field))  # noqa: B023
+        press_while("t", lambda state: state.theme != first.theme)
+        press_while("o", lambda state: state.camera["projection"] != first.camera["projection"])
+        press_while("b", lambda state: state.backend != first.backend)
+        self.screen.do("key", "Home", "key", "ctrl+1", "key", "f", "key", "BackSpace", "key", "Escape")
+        width, height = first.size
+        self.screen.do("mousemove", width - 1, height - 1)
+        self.settle()
+
+    def pictures(self, since: int = 0) -> list[State]:
+        """The states that drew another picture; since: the number of the one before."""
+        drawn = {}
+        for state in reversed(self.states):
+            if state.pictures <= since:
+                break
+            drawn[state.pictures] = state
+        return [drawn[number] for number in sorted(drawn)]
 
     def frames(self) -> list[int]:
         """All frames drawn so far, each one once while it stays."""
-        drawn = re.findall(r"drew frame (\d+) ", self.log())
-        return [int(frame) for frame, _ in itertools.groupby(drawn)]
-
-    def settle(self, seconds: float = 0.4) -> None:
-        """Wait until it has drawn nothing for so long."""
-        drawn = -1
-        while (now := self.log().count("drawn")) != drawn:
-            drawn = now
-            time.sleep(seconds)
+        return [frame for frame, _ in itertools.groupby(state.frame for state in self.pictures())]
 
     def view(self) -> tuple[int, int, int, int]:
         """The 3D view on the screen: left, top, width, height."""
-        left, top, width, height = re.findall(r"view at (\d+),(\d+) (\d+)x(\d+)", self.log())[-1]
-        return int(left), int(top), int(width), int(height)
+        left, top, width, height = self.state.view
+        return left, top, width, height
 
     def cpu_seconds(self) -> float:
         """Processor time that it has taken."""
@@ -150,33 +228,38 @@ def running_app(
     are kept; else in the folder.
     """
     log, home = folder / "log", home or folder
+    reading, writing = os.pipe()
     with log.open("wb") as stream:
         process = subprocess.Popen(
-            [sys.executable, "-c", before + _RUN, *map(str, scans)],
+            [
+                sys.executable,
+                "-c",
+                f"{before}import observed; observed.main()",
+                str(writing),
+                *map(str, scans),
+            ],
             cwd=folder,
             env={
                 **screen.env,
-                "PYTHONPATH": str(ROOT),
+                "PYTHONPATH": os.pathsep.join((str(ROOT), str(Path(__file__).parent))),
                 "XDG_CONFIG_HOME": str(home / "config"),
                 "XDG_STATE_HOME": str(home / "state"),
             },
+            pass_fds=[writing],
+            stdin=subprocess.PIPE,
             stderr=stream,
         )
-    app = RunningApp(screen, process, log)
+    os.close(writing)
+    app = RunningApp(screen, process, reading, log)
     try:
-        app.expect("window drawn")
+        app.see()
         window = screen.do("search", "--name", "Scan4D").split()[-1]
-        width, height = screen.do("getdisplaygeometry").split()
-        is_full = {f"WIDTH={width}", f"HEIGHT={height}"} <= set(
-            screen.do("getwindowgeometry", "--shell", window).split()
-        )
+        width, height = (int(edge) for edge in screen.do("getdisplaygeometry").split())
         screen.do("windowmove", window, 0, 0, "windowsize", window, width, height)
-        if not is_full:
-            app.expect("view at")
-        if not (is_full and app.frames()):
-            app.expect("drew frame .*")
+        app.see(lambda state: state.size == [width, height] and state.pictures)
         app.settle()
         yield app
     finally:
         process.kill()
         process.wait()
+        process.stdin.close()

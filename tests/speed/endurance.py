@@ -24,7 +24,7 @@ def main() -> None:
         print(f"{'s':>6} {'own memory, MB':>15} {'pictures':>9}")
         for now, megabytes in endure(app, seconds):
             sizes.append(megabytes)
-            print(f"{now:6.0f} {megabytes:15} {app.log().count('drew frame'):9}", flush=True)
+            print(f"{now:6.0f} {megabytes:15} {app.state.pictures:9}", flush=True)
         lines = trouble(app)
     print(
         f"{before} MB before, then {min(sizes)} to {max(sizes)} MB; {len(lines)} lines of trouble in the log"

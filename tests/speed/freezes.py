@@ -119,12 +119,12 @@ class Watch:
         self._control.take()
         before, start = len(self._app.log()), time.monotonic()
         act()
-        self._app.settle(1.0)
+        self._app.settle()
         turns = [_parts(line) for line in _TURN.findall(self._app.log()[before:])]
         parts = max(turns, key=_freeze, default={})
         drawing = max((sum(turn.get(name, 0) for name in _DRAWING) for turn in turns), default=0)
         said = ", ".join(f"{part} {ms:.0f}" for part, ms in parts.items() if part not in _DRAWING)
-        seconds = time.monotonic() - start - 1
+        seconds = time.monotonic() - start
         times = f"{_freeze(parts):7.0f} {self._control.take():8.0f} {drawing:8.0f}"
         print(f"{name:44} {seconds:6.1f} {times}   {said}", flush=True)
         self.worst = max(self.worst, _freeze(parts))
@@ -159,14 +159,15 @@ def orbit(app: RunningApp) -> None:
 def open_next(app: RunningApp) -> None:
     """Go to the next scan, and wait until it is there or cannot be."""
     app.screen.do("key", "Next")
-    app.expect(r"Cannot open|opened ")
+    before, told = app.state.scan, len(app.notes)
+    app.see(lambda state: state.scan != before or any("Cannot open" in note for note in app.notes[told:]))
 
 
 def estimate(app: RunningApp) -> None:
     """Choose surfels, and orbit while normals are being estimated."""
     app.screen.do("key", "b")
     orbit(app)
-    app.expect("with surfels")
+    app.see(backend="surfels")
 
 
 def walk(app: RunningApp, names: list[str]) -> float:

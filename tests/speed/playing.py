@@ -12,8 +12,8 @@ a picture in full is there; the time counts from before the last event is sent.
 from __future__ import annotations
 
 import argparse
+import math
 import os
-import re
 import sys
 import tempfile
 import time
@@ -26,15 +26,14 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "app"))
-from virtual_screen import RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import RunningApp, Screen, State, running_app, virtual_screen
 
 from viewer.app.playing.player import Player
 from viewer.scan.open import open_scan
 
 BACKENDS = ("surfels", "points")
 MODES = ("real time", "every frame")
-_DREW = re.compile(r"drew frame (\d+) with (\w+), (\d+)x(\d+) pixels, (\d+) points\n")
-_POLL = 0.004  # seconds between looks at the log
+_POLL = 0.004  # seconds between looks at the window
 _PATIENCE = 30  # seconds
 _SETTLING = 6.0  # seconds of playing before measuring
 
@@ -48,27 +47,26 @@ class Drew(NamedTuple):
     pixels: int
     points: int
 
+    @classmethod
+    def of(cls, state: State) -> Drew:
+        """The picture that a state of the window shows."""
+        return cls(state.at, state.frame, state.backend, math.prod(state.pixels), state.points)
+
 
 class Watch:
-    """Follows the pictures in the log. last: the one drawn last."""
+    """Follows the pictures. last: the one drawn last."""
 
-    def __init__(self, log: Path) -> None:
-        self._stream = log.open()
-        self._rest = ""
+    def __init__(self, app: RunningApp) -> None:
+        self._app = app
+        self._number = 0
         self.last: Drew | None = None
 
     def new(self) -> list[Drew]:
         """The pictures since the last call."""
-        text = self._rest + self._stream.read()
-        whole = text.rfind("\n") + 1
-        self._rest = text[whole:]
-        now = time.monotonic()
-        drawn = [
-            Drew(now, int(frame), backend, int(width) * int(height), int(points))
-            for frame, backend, width, height, points in _DREW.findall(text[:whole])
-        ]
-        self.last = drawn[-1] if drawn else self.last
-        return drawn
+        states = self._app.pictures(since=self._number)
+        if states:
+            self._number, self.last = states[-1].pictures, Drew.of(states[-1])
+        return [Drew.of(state) for state in states]
 
     def pictures(self, seconds: float) -> list[Drew]:
         """Those that are drawn from now on, for so long."""
@@ -101,10 +99,9 @@ def playing(screen: Screen) -> Iterator[None]:
 def switch_to(app: RunningApp, backend: str) -> Drew:
     """Draw with this backend; returns the picture at rest."""
     while True:
-        app.settle(1.0)
-        frame, name, width, height, points = _DREW.findall(app.log())[-1]
-        if name == backend:
-            return Drew(time.monotonic(), int(frame), name, int(width) * int(height), int(points))
+        state = app.settle()
+        if state.backend == backend:
+            return Drew.of(state)
         app.screen.do("key", "b")
 
 
@@ -170,7 +167,7 @@ def main() -> None:
             virtual_screen(folders[0], (width, height)) as screen,
             running_app(screen, folders[1], options.scan) as app,
         ):
-            watch = Watch(folders[1] / "log")
+            watch = Watch(app)
             print(
                 f"{options.scan}, {len(player)} frames at {player.rate:.3g} a second, window {options.size}"
             )

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .app import App
 
 
 def run(
@@ -14,12 +18,14 @@ def run(
     up: str = "+y",
     device: int | None = None,
     replay: Path | None = None,
+    watch: Callable[[App], None] | None = None,
 ) -> int:
     """Open a window on the first of the scans and return 0 when it is closed, by a signal too.
 
     scans: as a user names them (see `named_scans`); the others can be chosen in the window, which tells
     what is wrong with those that cannot be opened. up: the up axis. device: has no effect on a window,
-    which says so. replay: a recording to show first. Raises InputError where no scan can be opened,
+    which says so. replay: a recording to show first. watch: called at the end of each turn of the window's
+    loop, with the app as it is then. Raises InputError where no scan can be opened,
     NoOpenGLError without a window.
     """
     from ..geometry import up_vector
@@ -56,7 +62,7 @@ def run(
                     app.note("The display's own GPU draws the window; a device number has no effect on it.")
                 if replay is not None:
                     app.capture.replay(replay)
-                Loop(app, signals).run()
+                Loop(app, signals, watch).run()
             finally:
                 app.close()
         finally:

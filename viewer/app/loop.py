@@ -11,6 +11,8 @@ from .files import dropping
 from .turns import Turns
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .app import App
     from .closing import Signals
 
@@ -25,11 +27,12 @@ _BUSY = 0.9  # of the time between pictures that the window may take over one
 
 
 class Loop:
-    """Runs an app until its window is closed, or a signal says so."""
+    """Runs an app until its window is closed, or a signal says so. watch: called at the end of each turn."""
 
-    def __init__(self, app: App, signals: Signals) -> None:
+    def __init__(self, app: App, signals: Signals, watch: Callable[[App], None] | None = None) -> None:
         self._app = app
         self._signals = signals
+        self._watch = watch
         self._turns = Turns()
         self._reported: Any = None
 
@@ -53,6 +56,8 @@ class Loop:
         if changed or self._app.window.due:
             self._draw()
         self._turns.end()
+        if self._watch is not None:
+            self._watch(self._app)
 
     def _ends(self) -> bool:
         """Whether the window is closed, and the user was asked where that cancels an export; a signal asks

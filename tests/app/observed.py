@@ -1,0 +1,119 @@
+"""The app as it is run by tests: it tells after each turn of its loop what it shows, as a line of JSON.
+
+`main` takes a file descriptor that the lines go to, and scans. A number on standard input
+comes back as `answered`, in a line that is written when all events before it have been taken in.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+import threading
+import time
+from dataclasses import asdict
+from typing import Any
+
+import glfw
+from imgui_bundle import imgui
+
+from viewer.app import run
+from viewer.app.app import App
+
+
+class Observer:
+    """Writes a line for each turn."""
+
+    def __init__(self, stream: int) -> None:
+        self._lines = os.fdopen(stream, "w", buffering=1)
+        self._asked = self._seen = self._answered = 0
+        self._told = 0
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        for line in sys.stdin:
+            self._asked = int(line)
+            glfw.post_empty_event()
+
+    def look(self, app: App) -> None:
+        """Write how it is now."""
+        # A turn that began before a question may have looked for events before they came: the next answers.
+        self._answered, self._seen = self._seen, self._asked
+        if self._answered != self._seen:
+            glfw.post_empty_event()
+        new = app.notices.count - self._told
+        self._told += new
+        notes = [note.text for note in app.notices.all[len(app.notices.all) - new :]]
+        state = {
+            "at": time.monotonic(),
+            "answered": self._answered,
+            "is_idle": is_idle(app),
+            "notes": notes,
+            **shown(app),
+        }
+        self._lines.write(json.dumps(state) + "\n")
+
+
+def is_idle(app: App) -> bool:
+    """Whether nothing goes on and all that was asked for is shown."""
+    playback = app.playback
+    goes_on = (
+        app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on, app.tasks,
+        app.scans.waits, app.browser.waits,
+        playback.pose is not None and not app.picture.is_complete,
+    )  # fmt: skip
+    return not any(goes_on)
+
+
+def shown(app: App) -> dict[str, Any]:
+    """What the window shows."""
+    picture, surface = app.picture, app.picture.surface
+    left, bottom, width, height = *app.view_corner, *app.view_size
+    state: dict[str, Any] = {
+        **asdict(app.session.pace),
+        "scan": app.session.scan,
+        "is_opening": app.opening is not None,
+        "view": (left, app.window.buffer_size[1] - bottom - height, width, height),
+        "place": app.window.place and asdict(app.window.place),
+        "size": app.window.buffer_size,
+        "windows": imgui.get_frame_count(),
+        "pictures": picture.number,
+        "counted": app.counting.counts is not None,
+        "is_playing": app.playback.player.playing,
+        "is_recording": app.capture.recorder is not None,
+        "pointed": app.pointer.words,
+        "unit": app.unit,
+        "theme": app.theme,
+        "is_replaying": app.capture.replaying is not None,
+        "is_export_open": app.exporting.is_open,
+        "is_exporting": app.exporting.task is not None,
+        "asks_before_closing": app.exporting.is_leaving,
+        "is_measuring": app.measuring.active,
+        "begun": app.measuring.here.begun and asdict(app.measuring.here.begun),
+        "measurements": [
+            {
+                "ends": [asdict(end) for end in reading.measurement.ends],
+                "distance": reading.measurement.distance,
+                "uncertainty": reading.measurement.uncertainty,
+                "motion": reading.motion,
+            }
+            for reading in app.measuring.readings()
+        ],
+        "camera": app.session.camera and app.session.camera.to_json(),
+    }
+    if picture.is_there and picture.request is not None and surface is not None:
+        state |= {
+            "frame": picture.request.pose.index,
+            "backend": surface.stats.backend,
+            "pixels": surface.size,
+            "points": len(picture.request.pose.cloud) - surface.stats.left_out,
+        }
+    return state
+
+
+def main() -> None:
+    """Run the window; the arguments are the file descriptor and the scans."""
+    logging.basicConfig(format="%(message)s")
+    logging.getLogger("viewer").setLevel(logging.DEBUG)
+    sys.exit(run(sys.argv[2:], watch=Observer(int(sys.argv[1])).look))
