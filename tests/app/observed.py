@@ -61,15 +61,15 @@ def is_idle(app: App) -> bool:
     goes_on = (
         app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on, app.tasks,
         app.scans.waits, app.browser.waits,
-        playback.pose is not None and not app.picture.is_complete,
+        playback.pose is not None and not app.viewport.is_complete,
     )  # fmt: skip
     return not any(goes_on)
 
 
 def shown(app: App) -> dict[str, Any]:
     """What the window shows."""
-    picture, surface = app.picture, app.picture.surface
-    left, bottom, width, height = *app.view_corner, *app.view_size
+    viewport, surface, document = app.viewport, app.viewport.surface, app.document
+    left, bottom, width, height = viewport.place
     state: dict[str, Any] = {
         **asdict(app.session.pace),
         "scan": app.session.scan,
@@ -78,7 +78,7 @@ def shown(app: App) -> dict[str, Any]:
         "place": app.window.place and asdict(app.window.place),
         "size": app.window.buffer_size,
         "windows": imgui.get_frame_count(),
-        "pictures": picture.number,
+        "pictures": viewport.number,
         "counted": app.counting.counts is not None,
         "is_playing": app.playback.player.playing,
         "is_recording": app.capture.recorder is not None,
@@ -90,7 +90,7 @@ def shown(app: App) -> dict[str, Any]:
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,
         "is_measuring": app.measuring.active,
-        "begun": app.measuring.here.begun and asdict(app.measuring.here.begun),
+        "begun": app.measuring.begun and asdict(app.measuring.begun),
         "measurements": [
             {
                 "ends": [asdict(end) for end in reading.measurement.ends],
@@ -100,14 +100,14 @@ def shown(app: App) -> dict[str, Any]:
             }
             for reading in app.measuring.readings()
         ],
-        "camera": app.session.camera and app.session.camera.to_json(),
+        "camera": document.camera and document.camera.to_json(),
     }
-    if picture.is_there and picture.request is not None and surface is not None:
+    if viewport.is_there and viewport.request is not None and surface is not None:
         state |= {
-            "frame": picture.request.pose.index,
+            "frame": viewport.request.pose.index,
             "backend": surface.stats.backend,
             "pixels": surface.size,
-            "points": len(picture.request.pose.cloud) - surface.stats.left_out,
+            "points": len(viewport.request.pose.cloud) - surface.stats.left_out,
         }
     return state
 

@@ -62,12 +62,6 @@ def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
 ) -> None:
     other = spheres(tmp_path / "other", 1)
     with running_app(screen, tmp_path, lacking, other) as app:
-        screen.do("key", "Page_Down")
-        app.see(scan=str(other))
-        app.settle()
-        screen.do("key", "Page_Up")
-        app.see(scan=str(lacking))
-        app.settle()
         top = 30  # the list of scans stands above
         for left, y in (COLOR_BY, Q):
             screen.do("mousemove", left, y + top, "sleep", 0.2, "click", 1, "sleep", 0.4)

@@ -49,7 +49,7 @@ def play_and_record(app: RunningApp) -> None:
 def wait_for_recording(folder: Path) -> Path:
     """Until a closing window has saved one."""
     end = time.monotonic() + PATIENCE
-    while not (found := list(folder.glob("*.json"))):
+    while not (found := list(folder.glob("scan4d_*.json"))):
         assert time.monotonic() < end
         time.sleep(0.01)
     return found[0]
