@@ -1,6 +1,6 @@
 """Marks on a picture: a scale bar, a colour bar and a stamp, laid out alike in files and in the window.
 
-A `Canvas` draws them: `marked` has one for images, the window has one of its own.
+A `MarkPainter` draws them: `marked` has one for images, the window has one of its own.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Legend:
     time: float
 
 
-class Canvas(Protocol):
+class MarkPainter(Protocol):
     """A surface that marks are drawn on. Text is one line, `em` pixels high."""
 
     em: float
@@ -146,81 +146,81 @@ def text_height(size: tuple[int, int]) -> int:
 
 
 def draw(
-    canvas: Canvas, size: tuple[float, float], legend: Legend, values: tuple[float, float] | None
+    painter: MarkPainter, size: tuple[float, float], legend: Legend, values: tuple[float, float] | None
 ) -> None:
     """Draw the legend's marks: scale bar lower left, colour bar lower right, stamp upper left.
 
     size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar.
     """
     if legend.marks.scale_bar:
-        _draw_scale_bar(canvas, size, legend)
+        _draw_scale_bar(painter, size, legend)
     if legend.marks.color_bar and values is not None:
-        _draw_color_bar(canvas, size, legend, values)
+        _draw_color_bar(painter, size, legend, values)
     if legend.marks.stamp:
-        _draw_stamp(canvas, size, legend)
+        _draw_stamp(painter, size, legend)
 
 
-def scale_bar_box(canvas: Canvas, size: tuple[float, float], legend: Legend) -> Box:
+def scale_bar_box(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> Box:
     """The place of the scale bar's plate."""
-    em = canvas.em
+    em = painter.em
     _, pixels = scale_bar(legend.camera, size)
-    width = max(round(pixels), canvas.width(_scale_text(canvas, size, legend))) + 2 * _PAD * em
+    width = max(round(pixels), painter.width(_scale_text(painter, size, legend))) + 2 * _PAD * em
     left, bottom = round(_MARGIN * em), round(size[1] - _MARGIN * em)
     return left, bottom - round((1 + _GAP + _TICK + 2 * _PAD) * em), left + width, bottom
 
 
-def _scale_text(canvas: Canvas, size: tuple[float, float], legend: Legend) -> str:
+def _scale_text(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> str:
     length, _ = scale_bar(legend.camera, size)
-    return _shortened(canvas, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
+    return _shortened(painter, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
 
 
-def _draw_scale_bar(canvas: Canvas, size: tuple[float, float], legend: Legend) -> None:
-    em = canvas.em
-    box = left, top, right, bottom = scale_bar_box(canvas, size, legend)
-    canvas.box(box, PLATE)
-    text, pixels = _scale_text(canvas, size, legend), round(scale_bar(legend.camera, size)[1])
-    canvas.text((left + right - canvas.width(text)) / 2, top + _PAD * em, text)
+def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> None:
+    em = painter.em
+    box = left, top, right, bottom = scale_bar_box(painter, size, legend)
+    painter.box(box, PLATE)
+    text, pixels = _scale_text(painter, size, legend), round(scale_bar(legend.camera, size)[1])
+    painter.text((left + right - painter.width(text)) / 2, top + _PAD * em, text)
     start, foot = round((left + right - pixels) / 2), round(bottom - _PAD * em)
     line, tick = max(1, round(_LINE * em)), max(2, round(_TICK * em))
     for x in (start, start + pixels - line):
-        canvas.box((x, foot - tick, x + line, foot), INK)
-    canvas.box((start + line, foot - line, start + pixels - line, foot), INK)
+        painter.box((x, foot - tick, x + line, foot), INK)
+    painter.box((start + line, foot - line, start + pixels - line, foot), INK)
 
 
 def _draw_color_bar(
-    canvas: Canvas, size: tuple[float, float], legend: Legend, values: tuple[float, float]
+    painter: MarkPainter, size: tuple[float, float], legend: Legend, values: tuple[float, float]
 ) -> None:
-    em, (low, high) = canvas.em, values
-    title = _shortened(canvas, quantity(legend.look, legend.unit), _TEXT_SHARE * size[0])
+    em, (low, high) = painter.em, values
+    title = _shortened(painter, quantity(legend.look, legend.unit), _TEXT_SHARE * size[0])
     shares = (0.0, 0.5, 1.0) if high != low else (0.0,)
     texts = [number(low + share * (high - low), abs(high - low)) for share in shares]
-    widest = (_MAP_WIDTH + _GAP) * em + max(map(canvas.width, texts))
+    widest = (_MAP_WIDTH + _GAP) * em + max(map(painter.width, texts))
     height = min(_MAP_HEIGHT * em, 0.6 * size[1])
     right, bottom = round(size[0] - _MARGIN * em), round(size[1] - _MARGIN * em)
-    left = round(right - max(widest, canvas.width(title)) - 2 * _PAD * em)
+    left = round(right - max(widest, painter.width(title)) - 2 * _PAD * em)
     top = round(bottom - height - (2.5 + 2 * _PAD) * em)
-    canvas.box((left, top, right, bottom), PLATE)
+    painter.box((left, top, right, bottom), PLATE)
     left, top = left + round(_PAD * em), top + round(_PAD * em)
-    canvas.text(left, top, title)
+    painter.text(left, top, title)
     foot = bottom - round((_PAD + 0.5) * em)
     colors = color_table(legend.look.color_map)
-    canvas.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
+    painter.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
     for share, text in zip(shares, texts, strict=True):
-        canvas.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
+        painter.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
 
 
-def _draw_stamp(canvas: Canvas, size: tuple[float, float], legend: Legend) -> None:
-    em, text = canvas.em, _shortened(canvas, stamp(legend), size[0] - 2 * (_MARGIN + _PAD) * canvas.em)
+def _draw_stamp(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> None:
+    em, text = painter.em, _shortened(painter, stamp(legend), size[0] - 2 * (_MARGIN + _PAD) * painter.em)
     left = top = round(_MARGIN * em)
-    right, bottom = left + canvas.width(text) + 2 * _PAD * em, top + round((1 + 2 * _PAD) * em)
-    canvas.box((left, top, right, bottom), PLATE)
-    canvas.text(left + _PAD * em, top + _PAD * em, text)
+    right, bottom = left + painter.width(text) + 2 * _PAD * em, top + round((1 + 2 * _PAD) * em)
+    painter.box((left, top, right, bottom), PLATE)
+    painter.text(left + _PAD * em, top + _PAD * em, text)
 
 
-def _shortened(canvas: Canvas, text: str, room: float) -> str:
-    if canvas.width(text) <= room:
+def _shortened(painter: MarkPainter, text: str, room: float) -> str:
+    if painter.width(text) <= room:
         return text
-    while text and canvas.width(text + "…") > room:
+    while text and painter.width(text + "…") > room:
         text = text[:-1]
     return text + "…"
 
@@ -238,13 +238,13 @@ def marked(image: NDArray[np.uint8], legend: Legend, values: tuple[float, float]
     if not legend.marks:
         return image
     below = Image.fromarray(image)
-    canvas = _Overlay(below.size)
-    draw(canvas, below.size, legend, values)
-    return np.asarray(Image.alpha_composite(below, canvas.image))
+    painter = _Overlay(below.size)
+    draw(painter, below.size, legend, values)
+    return np.asarray(Image.alpha_composite(below, painter.image))
 
 
 class _Overlay:
-    """A Canvas of transparent pixels."""
+    """A MarkPainter of transparent pixels."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         from PIL import Image, ImageDraw, ImageFont

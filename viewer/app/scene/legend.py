@@ -47,7 +47,7 @@ def _scale_bar_help(orthographic: bool) -> str:
 
 
 class _View:
-    """A Canvas over the current ImGui window. corner: its upper left one."""
+    """A `MarkPainter` over the current ImGui window. corner: its upper left one."""
 
     def __init__(self, corner: ImVec2) -> None:
         self.em = imgui.get_font_size()
