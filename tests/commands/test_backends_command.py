@@ -1,0 +1,33 @@
+"""`scan4d backends`."""
+
+from __future__ import annotations
+
+import json
+import re
+
+from command_line import Run
+
+from viewer.backends import backends
+
+
+def test_backends_as_json(run: Run) -> None:
+    listed = json.loads(run("backends", "--json").out)
+    assert [b["name"] for b in listed] == list(backends())
+    for facts, backend in zip(listed, backends().values(), strict=True):
+        assert (facts["title"], facts["help"]) == (backend.title, backend.help)
+        assert (facts["available"], facts["why_not"]) == (True, None)
+        assert [p["name"] for p in facts["parameters"]] == [p.name for p in backend.parameters]
+        for parameter in facts["parameters"]:
+            assert parameter.keys() >= {"type", "default", "range", "choices", "sweep", "affects", "help"}
+    by_name = {b["name"]: b for b in listed}
+    assert by_name["points"]["needs"] == []
+    assert by_name["surfels"]["needs"] == ["normals"]
+    assert by_name["points"]["parameters"][0]["range"] == [0, 32]
+
+
+def test_backends_as_text(run: Run) -> None:
+    out = run("backends").out
+    for backend in backends().values():
+        assert f"{backend.name}: {backend.help}" in out
+        for parameter in backend.parameters:
+            assert re.search(rf"^  {parameter.name} .*{re.escape(parameter.help)}$", out, re.M)

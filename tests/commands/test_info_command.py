@@ -1,0 +1,88 @@
+"""`scan4d info`."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from small_scans import ROOT, cloud_at
+
+from viewer.scan import formats
+from viewer.scan.points import PointCloud
+
+
+def test_info_as_json(run: Run, scans: Path) -> None:
+    done = run("info", scans / "sequence", "--json", "--unit", "mm", "--fps", 10)
+    assert (done.code, done.err) == (0, "")
+    facts = json.loads(done.out)
+    cloud = formats.read(scans / "sequence" / "f00.npz")
+    world = cloud.world()
+    assert facts["name"] == "sequence"
+    assert (facts["poses"], facts["unit"], facts["pose"], facts["label"]) == (5, "mm", 0, "f00.npz")
+    assert facts["times"] == {"first": 0, "last": 0.4, "median_step": pytest.approx(0.1)}
+    assert (facts["points"], facts["dropped"]) == (2000, 0)
+    assert np.allclose(facts["bounds"]["low"], world.min(axis=0))
+    assert np.allclose(facts["bounds"]["high"], world.max(axis=0))
+    assert facts["origin"] == cloud.origin.tolist()
+    assert list(facts["attributes"]) == ["normals", "colors", "radii", "height"]
+    assert facts["attributes"]["colors"] == {
+        "type": "uint8", "columns": 4, "range": [cloud.colors.min(), 255],
+    }  # fmt: skip
+    assert facts["attributes"]["height"]["range"] == [
+        pytest.approx(cloud.scalars["height"].min()), pytest.approx(cloud.scalars["height"].max()),
+    ]  # fmt: skip
+
+
+def test_info_as_text(run: Run, scans: Path) -> None:
+    done = run("info", scans / "sequence", "--unit", "mm")
+    lines = dict(re.split(" {2,}", line, maxsplit=1) for line in done.out.splitlines())
+    assert lines["poses"] == "5, 0 to 0.16 s, 25 a second"
+    assert lines["points"] == "2,000"
+    assert lines["unit"] == "mm"
+    assert lines["colors"].startswith("uint8 x 4")
+
+
+def test_info_reads_the_first_readable_pose_alone(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for index in range(4):
+        formats.write(tmp_path / f"f{index}.npz", cloud_at(index))
+    (tmp_path / "f0.npz").write_bytes(b"nothing")
+    read: list[str] = []
+    original = formats.read
+
+    def noted(path: Path, *rest: int) -> PointCloud:
+        read.append(path.name)
+        return original(path, *rest)
+
+    monkeypatch.setattr(formats, "read", noted)
+    done = run("info", tmp_path, "--json")
+    assert json.loads(done.out)["pose"] == 1
+    assert "f0.npz" in done.err
+    assert read == ["f1.npz"]
+
+
+def test_info_copes_with_values_that_are_not_finite(run: Run, tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", positions=np.eye(3), some=[1, np.nan, 2.5], none=np.full(3, np.inf))
+    attributes = json.loads(run("info", tmp_path / "a.npz", "--json").out)["attributes"]
+    assert attributes["some"]["range"] == [1, 2.5]
+    assert attributes["none"]["range"] is None
+    assert "no finite value" in run("info", tmp_path / "a.npz").out
+
+
+def test_info_and_convert_import_no_gl(scans: Path) -> None:
+    code = (
+        "import sys; from viewer.cli import main; main(sys.argv[1:]); "
+        "print(*{name.partition('.')[0] for name in sys.modules} & {'moderngl', 'OpenGL', 'PIL', 'tqdm'})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "info", str(scans / "ball.npz")],
+        capture_output=True, text=True, cwd=ROOT, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == ""

@@ -1,0 +1,296 @@
+"""`scan4d render`: pictures, films, turntables, broken frames, statistics."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from small_scans import FRAMES, SMALL, front, names, stored
+from written import bits, film, picture
+
+import viewer
+from viewer import frame
+from viewer.camera import Camera
+from viewer.gpu.surface import NOTHING
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan import formats
+
+
+def test_a_picture_is_what_the_library_draws(run: Run, scans: Path, tmp_path: Path) -> None:
+    done = run("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL)
+    assert done == (0, f"{tmp_path / 'a.png'}\n", "")
+    cloud = formats.read(scans / "ball.npz")
+    surface = viewer.render(cloud, front(cloud), (96, 64), "surfels")
+    assert np.array_equal(picture(tmp_path / "a.png"), surface.image())
+    assert names(tmp_path) == ["a.png"]
+
+
+def test_the_default_size(run: Run, scans: Path, tmp_path: Path) -> None:
+    assert run("render", scans / "ball.npz", "-o", tmp_path / "a.png").code == 0
+    assert picture(tmp_path / "a.png").shape == (1280, 1920, 4)
+
+
+def test_backend_parameters_and_look(run: Run, scans: Path, tmp_path: Path) -> None:
+    arguments = ["render", scans / "ball.npz", *SMALL, "--backend", "points"]
+    look = ("--look", "color_by=height", "low=-1", "--look", "background=#ff0000")
+    done = run(*arguments, "-o", tmp_path / "a.npz", "--set", "point_size=3", *look)
+    assert done.code == 0
+    cloud = formats.read(scans / "ball.npz")
+    expected = Look(color_by="height", low=-1.0, background="#ff0000")
+    surface = frame.render(cloud, front(cloud), (96, 64), "points", expected, {"point_size": 3})
+    for name, array in stored(tmp_path / "a.npz").items():
+        assert np.array_equal(bits(array), bits(surface.arrays()[name])), name
+    assert run(*arguments, "-o", tmp_path / "a.png", "--look", "background=#ff0000").code == 0
+    assert tuple(picture(tmp_path / "a.png")[0, 0]) == (255, 0, 0, 255)
+
+
+def test_exr_output(run: Run, scans: Path, tmp_path: Path) -> None:
+    import OpenEXR
+
+    assert run("render", scans / "ball.npz", "-o", tmp_path / "a.exr", *SMALL).code == 0
+    cloud = formats.read(scans / "ball.npz")
+    surface = viewer.render(cloud, front(cloud), (96, 64), "surfels")
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        assert np.array_equal(file.channels()["Z"].pixels, surface.depth)
+
+
+@pytest.mark.parametrize(
+    ("argument", "azimuth", "elevation", "distance"),
+    [("30,15", 30, 15, None), ("-30,15", -30, 15, None), ("-.5,-20,7.5", -0.5, -20, 7.5)],
+)
+@pytest.mark.parametrize("up", ["+y", "-z"])
+def test_orbit_and_up(
+    argument: str, azimuth: float, elevation: float, distance: float | None, up: str, run: Run, scans: Path,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL)
+    assert run(*ball, "--up", up, "--orbit", argument).code == 0
+    cloud = formats.read(scans / "ball.npz")
+    camera = front(cloud, azimuth=azimuth, elevation=elevation, distance=distance, up=up)
+    expected = viewer.render(cloud, camera, (96, 64), "surfels").image()
+    assert np.array_equal(picture(tmp_path / "a.png"), expected)
+    assert run(*ball, f"--up={up}", f"--orbit={argument}", "--force").code == 0
+    assert np.array_equal(picture(tmp_path / "a.png"), expected)
+
+
+def test_a_camera_file(run: Run, scans: Path, tmp_path: Path) -> None:
+    camera = Camera(eye=(2, 3, 4), target=(0, 0.1, 0), projection="orthographic", height=3.0)
+    camera.save(tmp_path / "camera.json")
+    done = run(
+        "render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--camera", tmp_path / "camera.json"
+    )
+    assert done.code == 0
+    cloud = formats.read(scans / "ball.npz")
+    expected = viewer.render(cloud, camera, (96, 64), "surfels").image()
+    assert np.array_equal(picture(tmp_path / "a.png"), expected)
+
+
+def test_a_pose_by_number_and_by_time(run: Run, scans: Path, tmp_path: Path) -> None:
+    sequence = ("render", scans / "sequence", *SMALL, "-o")
+    assert run(*sequence, tmp_path / "pose.png", "--pose", 3).code == 0
+    assert run(*sequence, tmp_path / "time.png", "--time", 0.31, "--fps", 10).code == 0
+    assert run(*sequence, tmp_path / "first.png").code == 0
+    cloud = formats.read(scans / "sequence" / "f03.npz")
+    expected = viewer.render(cloud, front(cloud), (96, 64), "surfels").image()
+    assert np.array_equal(picture(tmp_path / "pose.png"), expected)
+    assert np.array_equal(picture(tmp_path / "time.png"), expected)
+    assert not np.array_equal(picture(tmp_path / "first.png")[..., 3:], expected)
+
+
+def test_the_demo_is_drawn_where_no_scan_is_named(run: Run, tmp_path: Path) -> None:
+    assert run("render", "-o", tmp_path / "a.npz", *SMALL).code == 0
+    assert run("render", "demo", "-o", tmp_path / "b.npz", *SMALL).code == 0
+    a, b = stored(tmp_path / "a.npz"), stored(tmp_path / "b.npz")
+    assert (a["id"] != NOTHING).mean() > 0.1
+    assert all(np.array_equal(bits(a[name]), bits(b[name])) for name in a)
+
+
+@pytest.mark.parametrize(
+    ("choice", "numbers"),
+    [
+        (["--all"], [0, 1, 2, 3, 4]),
+        (["--poses", "1:4"], [1, 2, 3]),
+        (["--poses", ":"], [0, 1, 2, 3, 4]),
+        (["--poses", "0:99:2"], [0, 2, 4]),
+        (["--poses", "3:"], [3, 4]),
+        (["--pose", "2"], [2]),
+    ],
+)
+def test_numbered_pictures_bear_the_number_of_their_pose(
+    choice: list[str], numbers: list[int], run: Run, scans: Path, tmp_path: Path
+) -> None:
+    assert run("render", scans / "sequence", "-o", tmp_path / "p%03d.npz", *SMALL, *choice).code == 0
+    assert names(tmp_path) == [f"p{number:03d}.npz" for number in numbers]
+    # One camera for all, which shows the largest whole: the ball grows in the picture.
+    coverage = [stored(tmp_path / name)["coverage"].mean() for name in names(tmp_path)]
+    assert coverage == sorted(set(coverage))
+    last = formats.read(scans / "sequence" / f"f{numbers[-1]:02d}.npz")
+    expected = viewer.render(last, front(last), (96, 64), "surfels")
+    assert np.array_equal(stored(tmp_path / names(tmp_path)[-1])["depth"], expected.depth)
+
+
+@pytest.mark.parametrize(("options", "rate"), [([], 25), (["--fps", "10"], 10), (["--poses", "0:5:2"], 12.5)])
+def test_a_film_plays_at_the_pace_of_the_scan(
+    options: list[str], rate: float, run: Run, scans: Path, tmp_path: Path
+) -> None:
+    choice = options if "--poses" in options else [*options, "--all"]
+    done = run("render", scans / "sequence", "-o", tmp_path / "a.mp4", "--size", "95x63", *choice)
+    assert done.code == 0
+    frames, found = film(tmp_path / "a.mp4")
+    assert found == rate
+    assert len(frames) == (3 if "--poses" in options else FRAMES)
+    assert {frame.shape for frame in frames} == {(64, 96, 3)}
+    assert names(tmp_path) == ["a.mp4"]
+
+
+def test_a_turntable_goes_round_and_never_cuts(run: Run, tmp_path: Path) -> None:
+    # A plank: fitted from its narrow side alone, it would leave the picture from the broad one.
+    x, y = np.meshgrid(np.linspace(-5, 5, 100), np.linspace(-1, 1, 20))
+    plank = np.stack([np.zeros(x.size), y.ravel(), x.ravel()], axis=1)
+    np.savez(tmp_path / "plank.npz", positions=plank)
+    turn = ("--turntable", 4, "--backend", "points")
+    done = run("render", tmp_path / "plank.npz", "-o", tmp_path / "t%d.npz", *SMALL, *turn)
+    assert done.code == 0
+    surfaces = [stored(tmp_path / f"t{k}.npz") for k in range(4)]
+    seen = [surface["id"] != NOTHING for surface in surfaces]
+    for found in seen:
+        assert found.any()
+        edge = np.concatenate([found[0], found[-1], found[:, 0], found[:, -1]])
+        assert not edge.any()
+    assert seen[0].sum() < seen[1].sum()
+    # A quarter turn further, the eye has moved from +z to +x: the far end is now on the left.
+    ends = [surfaces[1]["id"][:, column] for column in np.flatnonzero(seen[1].any(axis=0))[[0, -1]]]
+    z = [plank[end[end != NOTHING], 2].mean() for end in ends]
+    assert z[0] > 4
+    assert z[1] < -4
+
+
+def test_a_turntable_while_playing(run: Run, scans: Path, tmp_path: Path) -> None:
+    sequence = ("render", scans / "sequence", *SMALL, "-o")
+    assert run(*sequence, tmp_path / "p%d.npz", "--all", "--turntable", 4).code == 0
+    assert names(tmp_path) == [f"p{k}.npz" for k in range(FRAMES)]
+    cloud = formats.read(scans / "sequence" / f"f{FRAMES - 1:02d}.npz")  # the largest
+    distance = max(front(cloud, azimuth=a).distance for a in (0, 90, 180, 270))
+    camera = front(cloud, azimuth=270, distance=distance)
+    expected = viewer.render(formats.read(scans / "sequence" / "f03.npz"), camera, (96, 64), "surfels")
+    assert np.array_equal(stored(tmp_path / "p3.npz")["depth"], expected.depth)
+
+
+def test_turntable_pictures_of_one_pose_are_counted(run: Run, scans: Path, tmp_path: Path) -> None:
+    done = run("render", scans / "sequence", "--pose", 2, "-o", tmp_path / "a.mp4", *SMALL, "--turntable", 6)
+    assert done.code == 0
+    frames, rate = film(tmp_path / "a.mp4")
+    assert (len(frames), rate) == (6, 25)
+
+
+def test_a_broken_frame_is_reported_and_the_rest_is_drawn(run: Run, scans: Path, tmp_path: Path) -> None:
+    done = run("render", scans / "broken", "-o", tmp_path / "p%d.png", *SMALL, "--all")
+    assert done.code == 0
+    assert names(tmp_path) == ["p0.png", "p1.png", "p3.png", "p4.png"]
+    assert re.fullmatch(r"scan4d: broken: frame 2 [^\n]*f02\.npz[^\n]*\n", done.err), done.err
+
+
+def test_a_broken_frame_alone_is_an_error(refused: Callable[..., str], scans: Path, tmp_path: Path) -> None:
+    assert "f02.npz" in refused("render", scans / "broken", "-o", tmp_path / "p.png", "--pose", 2)
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("out", ["p%d.png", "p.mp4"])
+def test_a_scan_of_broken_frames_alone_is_an_error(out: str, run: Run, tmp_path: Path) -> None:
+    (tmp_path / "scan").mkdir()
+    for index in range(3):
+        (tmp_path / "scan" / f"f{index}.ply").write_bytes(b"ply\nformat ascii 1.0\nend_header\n")
+    done = run("render", tmp_path / "scan", "-o", tmp_path / out, *SMALL, "--all")
+    assert done.code == 2
+    assert done.err.splitlines()[-1].endswith("none of its 3 frames can be read")
+    assert names(tmp_path) == ["scan"]
+    assert run("info", tmp_path / "scan").code == 2
+
+
+def test_dropped_points_are_reported(run: Run, tmp_path: Path) -> None:
+    positions = np.eye(3)
+    positions[1, 1] = np.nan
+    np.savez(tmp_path / "a.npz", positions=positions)
+    done = run("render", tmp_path / "a.npz", "-o", tmp_path / "a.png", *SMALL)
+    assert done.code == 0
+    assert re.fullmatch(r"scan4d: a\.npz: [^\n]*\b1\b[^\n]*\n", done.err), done.err
+    facts = json.loads(run("info", tmp_path / "a.npz", "--json").out)
+    assert (facts["points"], facts["dropped"]) == (2, 1)
+
+
+def test_a_scan_may_follow_parameters(run: Run, scans: Path, tmp_path: Path) -> None:
+    ball, out = scans / "ball.npz", ("-o", tmp_path / "a.npz", *SMALL, "--backend", "points", "--force")
+    assert run("render", ball, *out, "--set", "point_size=3", "--look", "light=flat", "up=+z").code == 0
+    before = stored(tmp_path / "a.npz")
+    assert run("render", *out, "--look", "light=flat", "up=+z", "--set", "point_size=3", ball).code == 0
+    assert all(np.array_equal(bits(before[name]), bits(stored(tmp_path / "a.npz")[name])) for name in before)
+
+
+def test_a_scan_may_follow_options_of_several_words(run: Run, scans: Path, tmp_path: Path) -> None:
+    ball = scans / "ball.npz"
+    marks = ("--marks", "stamp", "scale_bar")
+    assert run("render", *marks, ball, "-o", tmp_path / "a.png", *SMALL).code == 0
+    assert run("render", ball, "-o", tmp_path / "b.png", *SMALL, *marks).code == 0
+    assert np.array_equal(picture(tmp_path / "a.png"), picture(tmp_path / "b.png"))
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    pods = ("simulate", "--azimuths", -30, "10.5", tmp_path / "mesh.obj", "-o", tmp_path / "a.exr")
+    assert run(*pods, "--size", "9x9").code == 0
+    assert len(json.loads(run("info", tmp_path / "a.exr", "--json").out)["views"]) == 2
+
+
+@pytest.mark.parametrize("repeat", [None, 3])
+def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tmp_path: Path) -> None:
+    again = [] if repeat is None else ["--repeat", repeat]
+    points = ("--backend", "points", "--set", "point_size=2")
+    sequence = ("render", scans / "sequence", "--poses", "1:3", *SMALL, *points)
+    done = run(*sequence, "-o", tmp_path / "p%d.npz", "--stats", tmp_path / "stats.json", *again)
+    assert done.code == 0
+    stats = json.loads((tmp_path / "stats.json").read_text())
+    assert list(stats) == [
+        "device", "timer", "backend", "params", "size", "frames", "bytes_gpu", "peak_rss",
+    ]  # fmt: skip
+    assert stats["device"] == renderer.gpu.device
+    assert stats["timer"] in ("query", "finish")
+    assert (stats["backend"], stats["params"], stats["size"]) == ("points", {"point_size": 2}, [96, 64])
+    assert stats["bytes_gpu"] > 2000 * 12
+    assert stats["peak_rss"] > 10e6
+    assert [f["pose"] for f in stats["frames"]] == [1, 2]
+    for f in stats["frames"]:
+        assert list(f) == [
+            "pose", "gpu_ms", "cpu_ms", "upload_ms", "derive_ms", "passes", "points", "skipped", "chosen",
+        ]  # fmt: skip
+        assert f["upload_ms"] > 0
+        assert f["cpu_ms"] > 0
+        assert len(f["passes"]) >= 2
+        assert all(set(p) == {"name", "gpu_ms"} and p["gpu_ms"] >= 0 for p in f["passes"])
+        assert f["gpu_ms"] > 0
+        seen = stored(tmp_path / f"p{f['pose']}.npz")["id"]
+        assert f["points"]["drawn"] == len(np.unique(seen[seen != NOTHING]))
+        assert f["points"]["in"] == 2000
+        assert f["points"]["culled"].keys() == {"dropped", "outside", "hidden"}
+        assert f["points"]["in"] == f["points"]["drawn"] + sum(f["points"]["culled"].values())
+    assert not renderer.gpu.timers.enabled
+
+
+def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
+    run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from viewer import timing
+
+    drawn: list[bool] = []
+    draw = timing.draw
+
+    def counted(renderer: Renderer, *rest: object) -> object:
+        drawn.append(renderer.gpu.timers.enabled)
+        return draw(renderer, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(timing, "draw", counted)
+    ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--stats", tmp_path / "s.json")
+    assert run(*ball, "--repeat", 4).code == 0
+    assert drawn == [False] * (2 + 4) + [True] * 4

@@ -1,0 +1,104 @@
+"""`scan4d view` up to the window, and what it does without one."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from small_scans import names
+from written import film, picture
+
+from viewer.errors import NoOpenGLError
+
+
+@pytest.fixture
+def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+
+
+@pytest.mark.usefixtures("no_display")
+def test_view_without_a_display_is_code_3(run: Run, scans: Path) -> None:
+    done = run("view", scans / "ball.npz")
+    assert (done.code, done.out) == (3, "")
+    assert re.fullmatch("scan4d: [^\n]*DISPLAY[^\n]*--fallback[^\n]*\n", done.err)
+
+
+@pytest.mark.usefixtures("no_display")
+def test_view_falls_back_to_pictures(run: Run, scans: Path, tmp_path: Path) -> None:
+    out = tmp_path / "new" / "out"
+    done = run("view", scans / "broken", "--fallback", out)
+    assert done.code == 0
+    assert "f02.npz" in done.err
+    assert names(out) == [
+        "broken.mp4", "broken_0000.png", "broken_0001.png", "broken_0003.png", "broken_0004.png",
+        "broken_contact_sheet.png",
+    ]  # fmt: skip
+    assert "No window" in done.out
+    assert all(str(out / f"broken{name}") in done.out for name in ("_%04d.png", "_contact_sheet.png", ".mp4"))
+    frames, rate = film(out / "broken.mp4")
+    assert (len(frames), rate) == (4, 25)
+    shown = picture(out / "broken_0003.png")
+    assert shown.shape == (800, 1200, 4)
+    assert np.median(np.abs(frames[2].astype(int) - shown[..., :3])) <= 2
+    sheet = picture(out / "broken_contact_sheet.png")
+    assert sheet.shape[1] > 2 * 320
+
+
+@pytest.mark.usefixtures("no_display")
+def test_view_leaves_out_what_is_missing_among_several(run: Run, scans: Path, tmp_path: Path) -> None:
+    done = run("view", scans / "ball.npz", scans / "gone.npz", "--fallback", tmp_path)
+    assert done.code == 0
+    assert done.err.count("gone.npz: no such file") == 1
+    assert list(tmp_path.glob("*.mp4"))
+
+
+def test_the_fallback_keeps_several_scans_apart(run: Run, scans: Path, tmp_path: Path) -> None:
+    assert run("view", scans / "ball.npz", scans / "ball.npz", "--fallback", tmp_path).code == 0
+    assert [name for name in names(tmp_path) if name.endswith("mp4")] == ["0_ball_npz.mp4", "1_ball_npz.mp4"]
+
+
+@pytest.mark.usefixtures("no_display")
+def test_a_fallback_that_cannot_be_a_folder(refused: Callable[..., str], run: Run, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("view", "--fallback", tmp_path / "file")
+    assert done.code == 2
+    assert str(tmp_path / "file") in done.err
+
+
+def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from viewer import app
+
+    calls: list[tuple[object, dict[str, object]]] = []
+    monkeypatch.setattr(app, "run", lambda scans, **options: calls.append((scans, options)) or 0)
+    monkeypatch.setenv("DISPLAY", ":7")
+    ball = str(scans / "ball.npz")
+    assert run("view", ball, "demo", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
+    assert run("view").code == 0
+    assert calls == [
+        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, "replay": None}),
+        (["demo"], {"unit": None, "fps": None, "up": "+y", "device": None, "replay": None}),
+    ]
+
+
+def test_a_window_that_does_not_open_falls_back(
+    run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from viewer import app
+
+    def fail(*_: object, **__: object) -> int:
+        raise NoOpenGLError("the window did not open", hint="Try another display")
+
+    monkeypatch.setattr(app, "run", fail)
+    monkeypatch.setenv("DISPLAY", ":7")
+    assert run("view", scans / "ball.npz").code == 3
+    done = run("view", scans / "ball.npz", "--fallback", tmp_path)
+    assert done.code == 0
+    assert "the window did not open" in done.out
+    assert "ball_npz.mp4" in names(tmp_path)
