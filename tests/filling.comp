@@ -1,6 +1,5 @@
 // Fills pixels that no point covers with the mean of those at the least distance that some cover. Only pixels with a
 // row are read, only those without are written, so that the order does not matter.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include <params>
@@ -20,7 +19,7 @@ layout(std430, binding = STORAGE_VALUE) buffer Value { float own_values[]; };
 
 bool is_measured(ivec2 pixel) {
     if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, view_size))) return false;
-    return texelFetch(rows, pixel.y * view_size.x + pixel.x).r != NONE;
+    return texelFetch(rows, pixel.y * view_size.x + pixel.x).r != NOTHING;
 }
 
 void main() {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +14,13 @@ from .camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera at a picture size, seen from a pose's origin (the block of common/view.glsl).
+    """A camera at a picture size, seen from a pose's origin.
 
     rotation: (3, 3) float64, world to view. translation: (3,) float64, from the origin to
     view space. scale: pixels per unit of x/-z (perspective) or of x (orthographic).
     near, far: what is outside is not drawn. reach: the depth that an orthographic depth
     buffer ends at.
     """
-
-    BLOCK_BYTES: ClassVar[int] = 96
 
     size: tuple[int, int]
     rotation: NDArray[np.float64]
@@ -57,19 +54,6 @@ class View:
         """Equal for views that show the same."""
         lens = (self.size, self.scale, self.near, self.far, self.reach, self.perspective)
         return (self.rotation.tobytes(), self.translation.tobytes(), *lens)
-
-    def block(self) -> bytes:
-        """The std140 block `View` of common/view.glsl."""
-        matrix = np.zeros((4, 4), np.float32)  # columns, as GLSL stores them
-        matrix[:3, :3] = self.rotation.T
-        matrix[3, :3] = self.translation
-        matrix[3, 3] = 1
-        limits = np.array([self.scale, self.near, self.far, self.reach], np.float32)
-        return (
-            matrix.tobytes()
-            + limits.tobytes()
-            + np.array([*self.size, self.perspective, 0], np.int32).tobytes()
-        )
 
     def project(self, positions: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Pixel coordinates (N, 2), row 0 at the top, and depths (N,), in float64.

@@ -1,4 +1,4 @@
 // The points' own radii, where they have any.
-#include <bindings>
-
+#if HAS_RADIUS
 layout(binding = TEXTURE_RADII) uniform samplerBuffer radii;
+#endif

@@ -1,5 +1,4 @@
 // What the Surface holds, for the rasteriser to draw over.
-#include <bindings>
 #include "common/view.glsl"
 
 layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
@@ -13,5 +12,5 @@ void main() {
     int index = pixel.y * view_size.x + pixel.x;
     out_row = texelFetch(rows, index).r;
     out_depth = uintBitsToFloat(texelFetch(depths, index).r);
-    gl_FragDepth = out_row == NONE ? 0.0 : stored_depth(out_depth);
+    gl_FragDepth = out_row == NOTHING ? 0.0 : stored_depth(out_depth);
 }

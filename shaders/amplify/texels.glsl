@@ -1,12 +1,9 @@
 // Points from buffer textures. SAMPLED: only the listed rows are drawn.
-#include <bindings>
 #include "amplify/point.glsl"
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
-#if HAS_RADIUS
 #include "amplify/radii.glsl"
-#endif
 #if HAS_AXES
 layout(binding = TEXTURE_AXES) uniform samplerBuffer axes;
 #endif

@@ -1,6 +1,5 @@
 // What each covered pixel sees of its face: normal and colour, interpolated between the corners
 // by where the ray through the pixel's centre meets the face's plane.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/color.glsl"
 #include "common/item.glsl"

@@ -1,9 +1,12 @@
-// sRGB (IEC 61966-2-1) to linear and back.
+// sRGB (IEC 61966-2-1) to linear and back: viewer/srgb.py.
+
 vec3 to_linear(vec3 c) {
-    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
+    vec3 curve = pow((c + SRGB_OFFSET) / SRGB_SCALE, vec3(SRGB_POWER));
+    return mix(c / SRGB_SLOPE, curve, greaterThan(c, vec3(SRGB_ENCODED_KNEE)));
 }
 
 vec3 to_srgb(vec3 c) {
     c = clamp(c, 0.0, 1.0);
-    return mix(c * 12.92, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
+    vec3 curve = SRGB_SCALE * pow(c, vec3(1.0 / SRGB_POWER)) - SRGB_OFFSET;
+    return mix(c * SRGB_SLOPE, curve, greaterThan(c, vec3(SRGB_LINEAR_KNEE)));
 }

@@ -1,18 +1,5 @@
-// The camera as shaders see it: viewer/view.py fills this block.
-#include <bindings>
-
-layout(std140, binding = BLOCK_VIEW) uniform View {
-    mat4 world_to_view;  // from positions relative to the pose's origin
-    float view_scale;    // pixels per unit of x / depth, or of x
-    float view_near;     // scan units along the view axis
-    float view_far;      // infinite where nothing was said
-    float view_reach;    // what an orthographic depth buffer ends at
-    ivec2 view_size;     // pixels
-    bool view_perspective;
-};
-
-const uint NONE = 0xFFFFFFFFu;
-const uint INFINITE = 0x7F800000u;  // as float bits: the depth where nothing is
+// The camera (viewer/gpu/view.py), and from space to pixels and back.
+#include <view>
 
 // Several programs compute the same point's depth and pixel, and compare: without `precise`
 // each compiler run may contract or reorder as it likes, and they differ in the last bit.

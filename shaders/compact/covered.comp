@@ -1,6 +1,5 @@
 // Lists the pixels that show something, and a dispatch over the list. Its order does not
 // matter: each listed pixel is then worked on by itself.
-#include <bindings>
 #include "common/item.glsl"
 #include "common/view.glsl"
 
@@ -11,7 +10,7 @@ layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;  // float bits
 const int RUN = 8;
 
 bool is_covered(int pixel) {
-    return texelFetch(depths, pixel).r < INFINITE;
+    return texelFetch(depths, pixel).r < NO_DEPTH;
 }
 
 void main() {

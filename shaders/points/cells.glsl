@@ -1,6 +1,5 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
 // SINGLE: squares are of one pixel.
-#include <bindings>
 #include "common/view.glsl"
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;

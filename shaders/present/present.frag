@@ -1,5 +1,4 @@
 // The picture over the whole viewport. Where both have the same size, each pixel is its own.
-#include <bindings>
 
 layout(binding = TEXTURE_PICTURE) uniform sampler2D picture;  // sRGB as it is, row 0 at the top
 uniform ivec2 corner;  // of the viewport, pixels from the window's lower left

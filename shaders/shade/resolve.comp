@@ -1,6 +1,5 @@
 // Gives each covered pixel, as its own, what its row has. CHANNEL 0 colour, 1 normal, 2 value. HAS_ROWS: whether rows have
 // any. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 
@@ -18,9 +17,9 @@ layout(std430, binding = STORAGE_VALUE) writeonly buffer Value { float own[]; };
 
 void main() {
     int index = int(item());
-    if (index >= view_size.x * view_size.y || texelFetch(depths, index).r >= INFINITE) return;
+    if (index >= view_size.x * view_size.y || texelFetch(depths, index).r >= NO_DEPTH) return;
     uint row = texelFetch(rows, index).r;
-    bool known = HAS_ROWS != 0 && row != NONE;
+    bool known = HAS_ROWS != 0 && row != NOTHING;
     vec4 value = known ? texelFetch(values, int(row)) : vec4(0.0);
 #if CHANNEL == 0
     own[index] = packUnorm4x8(vec4(known ? value.rgb : plain, 1.0));

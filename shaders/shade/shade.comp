@@ -3,7 +3,6 @@
 // OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
 // filled have none. With its colour comes how much of the pixel is covered; the rest is background.
 // One invocation for each listed pixel; the others hold the background already.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/color.glsl"
 #include "common/item.glsl"
@@ -35,7 +34,7 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
     return 0.5 * normal + 0.5;
 #else
 #if !(COLOR_BY == 1 && OWN_COLOR) && !(COLOR_BY == 3 && (OWN_VALUE || VALUE == 0))
-    if (row == NONE) return plain.rgb;
+    if (row == NOTHING) return plain.rgb;
 #endif
 #if COLOR_BY == 1
     return texelFetch(colors, OWN_COLOR != 0 ? index : int(row)).rgb;
@@ -107,10 +106,10 @@ vec3 shade(int index) {
     float depth = uintBitsToFloat(texelFetch(depths, index).r);
     vec3 normal = vec3(0.0);
 #if LIGHT != 0 || COLOR_BY == 2
-    if (OWN_NORMAL != 0 || row != NONE) normal = texelFetch(normals, OWN_NORMAL != 0 ? index : int(row)).xyz;
+    if (OWN_NORMAL != 0 || row != NOTHING) normal = texelFetch(normals, OWN_NORMAL != 0 ? index : int(row)).xyz;
     float len = length(normal);
     // A missing normal faces the eye.
-    normal = len > 0.0 && len < 3e38
+    normal = len > 0.0 && len < UNKNOWN
         ? normal / len : transpose(mat3(world_to_view)) * eye_direction(pixel, depth);
 #endif
     vec3 color = base_color(index, row, depth, normal);

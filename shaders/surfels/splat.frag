@@ -2,9 +2,9 @@
 #include "common/view.glsl"
 #include <params>
 
-#ifndef BEHIND
-#define BEHIND 1.0  // what the depth buffer's values were divided by
-#define SIGN 1.0    // of the depth written
+#ifndef DIVISOR
+#define DIVISOR 1.0  // of the depth buffer's values
+#define SIGN 1.0     // of the depth written
 #endif
 
 flat in uint row;
@@ -14,7 +14,7 @@ layout(location = 0) out uint out_row;
 layout(location = 1) out float out_depth;
 
 void main() {
-    float depth = linear_depth(gl_FragCoord.z * BEHIND);
+    float depth = linear_depth(gl_FragCoord.z * DIVISOR);
     if (dot(local, local) > mask_limit || depth > view_far) discard;
     out_row = row;
     out_depth = SIGN * depth;

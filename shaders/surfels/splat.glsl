@@ -6,7 +6,7 @@
 
 // Scan units. Below the least one a splat can fall between pixel centres, and a far scan would flicker away.
 float splat_radius(float stored, float depth) {
-    float radius = stored > 0.0 && stored < 3e38 ? stored : uniform_radius;
+    float radius = stored > 0.0 && stored < UNKNOWN ? stored : uniform_radius;
     return max(radius * radius_scale * enlarged, least_radius / scale_at(max(depth, view_near)));
 }
 
@@ -18,7 +18,7 @@ vec3 towards_eye(vec3 center) {
 // Unit length, from the origin's axes; a missing normal faces the eye.
 vec3 splat_normal(Point point, vec3 to_eye) {
     float len = length(point.normal);
-    return len > 0.0 && len < 3e38 ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
+    return len > 0.0 && len < UNKNOWN ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
 }
 
 // The longer of its half-axes, scan units.

@@ -1,6 +1,5 @@
 // The normal of the face that a pixel shows, for flat shading: the axis along which the seen place is farthest
 // from its voxel's centre.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"

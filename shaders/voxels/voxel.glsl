@@ -4,7 +4,7 @@
 
 // Half of the edge, scan units. A cube of less can fall between pixel centres; the ball in one of this size cannot.
 float half_edge(Point point, float depth) {
-    return max(point.radius * enlarged, 0.7072 / scale_at(max(depth, view_near)));
+    return max(point.radius * enlarged, LEAST_RADIUS / scale_at(max(depth, view_near)));
 }
 
 // How far a cube reaches from its centre along the axes of the view.

@@ -77,12 +77,12 @@ def test_values_are_those_of_the_last_call(read) -> None:
 def test_what_did_not_change_is_not_written_again(renderer: Renderer) -> None:
     gpu = renderer.gpu
     gpu.activate()
-    buffer = BlockBuffer(gpu.ctx, Everything)
-    buffer.bind(Everything(), UniformBlock.PARAMS)
+    buffer = BlockBuffer(gpu.ctx, Everything, UniformBlock.PARAMS)
+    buffer.write(Everything())
     buffer._buffer.write(b"mark")
-    buffer.bind(Everything(word="another"), UniformBlock.PARAMS)
+    buffer.write(Everything(word="another"))
     assert buffer._buffer.read(4) == b"mark"
-    buffer.bind(Everything(on=False), UniformBlock.PARAMS)
+    buffer.write(Everything(on=False))
     assert buffer._buffer.read(4) == bytes(4)
     buffer.release()
 

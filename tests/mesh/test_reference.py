@@ -18,11 +18,11 @@ from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.look import Look
 from viewer.mesh.reference import both_see, footprint, trace, visible
-from viewer.mesh.scene import to_linear, to_srgb
 from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.formats import read, read_faces
 from viewer.scan.points import PointCloud
 from viewer.scan.spacing import typical_spacing
+from viewer.srgb import bytes_from_linear, linear_from_bytes
 
 if TYPE_CHECKING:
     from viewer.gpu.surface import Surface
@@ -33,7 +33,7 @@ CAMERA = Camera(eye=(2, 1.5, 3))
 
 
 def test_srgb_bytes_survive_linear_light() -> None:
-    assert (to_srgb(to_linear(np.arange(256, dtype=np.uint8))) == np.arange(256)).all()
+    assert (bytes_from_linear(linear_from_bytes(np.arange(256, dtype=np.uint8))) == np.arange(256)).all()
 
 
 def test_no_picture_is_one_message() -> None:
@@ -70,7 +70,7 @@ def test_a_head_light_shades_a_sphere_by_its_cosine(renderer: Renderer) -> None:
     to_eye = np.array(CAMERA.eye) - picture.positions() - picture.origin
     to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True)
     facing = (to_eye * picture.normal[picture.covered]).sum(axis=1, keepdims=True)
-    expected = to_srgb(to_linear(np.full(3, 0xC0, np.uint8)) * (0.25 + 0.75 * facing))
+    expected = bytes_from_linear(linear_from_bytes(np.full(3, 0xC0, np.uint8)) * (0.25 + 0.75 * facing))
     assert np.abs(image[picture.covered].astype(int) - expected).max() <= 1
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..geometry import Vector
-from ..gpu.surface import EMPTY, NOTHING, Surface
+from ..gpu.constants import EMPTY, NOTHING
+from ..gpu.surface import Surface
 from ..scan.spacing import spacing_at, typical_spacing
 
 _REACH = 4  # pixels round one that are looked at: gaps that are wider are seen as such

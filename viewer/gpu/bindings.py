@@ -1,6 +1,6 @@
 """Bindings: which number each thing that a shader reads or writes is bound to, by meaning.
 
-Shaders have them as TEXTURE_, STORAGE_ and BLOCK_ with the names below from `#include <bindings>`.
+Every shader has them as TEXTURE_, STORAGE_ and BLOCK_ with the names below.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class UniformBlock(IntEnum):
 
 
 def bindings_glsl() -> str:
-    """The numbers as macros: what `#include <bindings>` stands for."""
+    """The numbers as macros."""
     tables: tuple[tuple[str, type[IntEnum]], ...] = (
         ("TEXTURE", Texture),
         ("STORAGE", Storage),

@@ -98,18 +98,21 @@ def block_of(declaration: type[Values]) -> Block:
 class BlockBuffer:
     """The values of one block on the GPU."""
 
-    def __init__(self, ctx: moderngl.Context, declaration: type[Values]) -> None:
-        self._block = block_of(declaration)
+    def __init__(self, ctx: moderngl.Context, declaration: type[Values], binding: UniformBlock) -> None:
+        self._block, self._binding = block_of(declaration), binding
         self._held = b""
         self._buffer = ctx.buffer(reserve=ctypes.sizeof(self._block.words))
 
-    def bind(self, values: Values, binding: UniformBlock) -> None:
-        """Bind it with these values, which are written where they changed."""
+    def write(self, values: Values) -> None:
+        """Make these the values; nothing is sent where they have not changed."""
         packed = self._block.pack(values)
         if packed != self._held:
             self._buffer.write(packed)
             self._held = packed
-        self._buffer.bind_to_uniform_block(binding)
+
+    def bind(self) -> None:
+        """Make it the one that shaders read."""
+        self._buffer.bind_to_uniform_block(self._binding)
 
     def release(self) -> None:
         """Delete it."""

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 
 import moderngl
 
-from .context import GROUP, GROUP_LIMIT, Gpu, Program
+from .constants import GROUP, GROUP_LIMIT
+from .context import Gpu, Program
 
 _RUN = 8  # pixels an invocation of compact/covered.comp looks at, words one of compact/sums.comp adds
 _BLOCK = GROUP * _RUN  # words of a work group of compact/sums.comp

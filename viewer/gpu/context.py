@@ -16,6 +16,7 @@ from ..errors import InputError, NoOpenGLError
 from . import gl
 from .bindings import UniformBlock
 from .blocks import BlockBuffer, Values
+from .constants import GROUP, GROUP_LIMIT
 from .shader import ShaderError, Source, shader_error
 from .shader_cache import shader_cache
 from .timers import Timers
@@ -27,8 +28,6 @@ REQUIRED_VERSION = 430
 _OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
-GROUP = 256  # invocations of a work group (common/item.glsl)
-GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
 
 
 class Resource(Protocol):
@@ -111,8 +110,11 @@ class Gpu:
     ) -> Any:
         declared = None if params is None else type(params)
         if params is not None:
-            block = self.keep(("params", declared), lambda: BlockBuffer(self.ctx, type(params)))
-            block.bind(params, UniformBlock.PARAMS)
+            block = self.keep(
+                ("params", declared), lambda: BlockBuffer(self.ctx, type(params), UniformBlock.PARAMS)
+            )
+            block.write(params)
+            block.bind()
         key = (names, tuple((defines or {}).items()), tuple((parts or {}).items()), declared)
         return self.keep(
             key, lambda: self._compile([Source(name, defines, parts, declared) for name in names])

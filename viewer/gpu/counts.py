@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ..scan.points import PointCloud
 from ..task import checkpoint
 from ..view import View
+from .constants import NOTHING
 from .sample import is_sampled
 
-NOTHING = 0xFFFFFFFF
 _CHUNK = 1 << 20  # points counted at a time
 
 

@@ -36,6 +36,7 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
 from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
 
 from .bindings import Texture  # noqa: E402
+from .constants import NOTHING  # noqa: E402
 
 RG32UI = 0x823C
 RG32F = 0x8230
@@ -201,7 +202,7 @@ class Raster(Target):
     def clear(self) -> None:
         """Bind it and clear: no row anywhere, depth +inf, the depth buffer at its far end."""
         self.target.use()
-        none = (ctypes.c_uint * 4)(*[0xFFFFFFFF] * 4)
+        none = (ctypes.c_uint * 4)(*[NOTHING] * 4)
         infinite = (ctypes.c_float * 4)(*[float("inf")] * 4)
         far = (ctypes.c_float * 1)(0.0)
         GL_3_0.glClearBufferuiv(GL_1_1.GL_COLOR, 0, none)

@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 from . import gl
 from .blocks import Values
 from .compact import IndexList
+from .constants import NO_DEPTH, NOTHING
 from .context import Gpu, Program
-
-_NO_KEY = 0x7F800000  # +inf as float bits: a key buffer of depths reads as floats
-_NO_ITEM = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
@@ -51,8 +49,8 @@ def scatter(
     visits: their keys are below +inf bits. keys, best: one R32UI texel a cell; +inf bits and 0xFFFFFFFF where
     nothing went. listed: filled with the cells that were hit.
     """
-    gl.clear_words(keys.buffer, _NO_KEY)
-    gl.clear_words(best.buffer, _NO_ITEM)
+    gl.clear_words(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
+    gl.clear_words(best.buffer, NOTHING)
     if listed is not None:
         listed.clear()
 

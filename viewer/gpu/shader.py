@@ -10,12 +10,14 @@ from ..errors import Scan4DError
 from ..resources import resource_path
 from .bindings import bindings_glsl
 from .blocks import Values, block_of
+from .constants import constants_glsl
+from .view import ViewBlock
 
 _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 # "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (AMD, Intel)
 _PLACE = re.compile(r"\b(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
 _UNIFORM = re.compile(r"\buniform\s+\w+\s+(\w+)\s*[;\[]")
-_HEADER = "#version 430 core\n"
+_HEADER = "#version 430 core\n" + bindings_glsl() + constants_glsl()
 
 
 class ShaderError(Scan4DError):
@@ -28,8 +30,9 @@ class Source:
 
     name: path under `shaders/`, or an absolute one. defines: macro name -> value. parts: what a file in angle
     brackets stands for, so that one file can serve several shapes: `#include <shape>`. params: the dataclass
-    whose numbers `#include <params>` declares; `<bindings>` are those of gpu/bindings.py. files: what it is
-    made of, numbered as in a compiler's log.
+    whose numbers `#include <params>` declares; `<view>` is always there, and so are, without being included,
+    the macros of gpu/bindings.py and gpu/constants.py. files: what it is made of, numbered as in a compiler's
+    log.
     """
 
     def __init__(
@@ -58,11 +61,10 @@ class Source:
     def _expand_part(self, name: str) -> str:
         if name in self._parts:
             return self._expand(self._parts[name])
-        if name == "bindings":
-            return self._numbered("<bindings>", bindings_glsl())
-        if name == "params" and self._params is not None:
-            block = block_of(self._params)
-            return self._numbered(f"<params: {block.name}>", block.glsl(name))
+        declared = {"view": ViewBlock, "params": self._params}.get(name)
+        if declared is not None:
+            block = block_of(declared)
+            return self._numbered(f"<{name}: {block.name}>", block.glsl(name))
         raise ShaderError(f"nothing was given for <{name}>", f"shaders/{self.name}")
 
     def _numbered(self, name: str, text: str) -> str:

@@ -14,17 +14,19 @@ from ..errors import InputError
 from ..geometry import up_vector
 from ..look import Look, rgba, value_source
 from ..scan.points import PointCloud
+from ..srgb import linear_from_bytes
 from ..view import View
 from . import gl
 from .bindings import Storage, Texture, UniformBlock
+from .blocks import BlockBuffer
 from .compact import IndexList, list_covered
+from .constants import EMPTY, NO_DEPTH, NOTHING
 from .context import Gpu, Resource
-from .counts import NOTHING, count_points
+from .counts import count_points
 from .pose import GpuPose, as_float32
 from .sample import sample_of
+from .view import ViewBlock
 
-_NO_DEPTH = 0x7F800000  # +inf as float bits
-EMPTY = 255  # the level of a pixel that shows nothing
 _FEW = 1000  # points of which none is left out: it would gain nothing, and they would be missed
 # What a backend may write for each pixel: the format of a texel, and its bytes.
 _CHANNELS = {"color": (gl.RGBA8, 4), "normal": (gl.RGB32F, 12), "value": (gl.R32F, 4), "level": (gl.R32UI, 4)}
@@ -106,7 +108,7 @@ class Surface:
         self.depths = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
         self.rows = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
         self.picture = gpu.ctx.buffer(reserve=4 * width * height)
-        self._block = gpu.ctx.buffer(reserve=View.BLOCK_BYTES)
+        self._block = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._shown: tuple[GpuPose, View] | None = None
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
         self.look = Look()
@@ -125,7 +127,7 @@ class Surface:
     def start(self, pose: GpuPose, view: View, look: Look | None = None) -> None:
         """Begin a frame: what backends and shading read from now on."""
         self._shown, self._stood_for, self.look = (pose, view), None, look or Look()
-        self._block.write(view.block())
+        self._block.write(ViewBlock.of(view))
         self.bind_view()
         self._covered_known = False
         self._written.clear()
@@ -138,7 +140,7 @@ class Surface:
 
     def bind_view(self) -> None:
         """Make this surface's view the one that shaders read."""
-        self._block.bind_to_uniform_block(UniformBlock.VIEW)
+        self._block.bind()
 
     def bind_textures(self) -> None:
         """Bind depths and rows for shaders to fetch."""
@@ -181,7 +183,7 @@ class Surface:
 
     def clear(self) -> None:
         """Nothing anywhere."""
-        gl.clear_words(self.depths.buffer, _NO_DEPTH)
+        gl.clear_words(self.depths.buffer, NO_DEPTH)
         gl.clear_words(self.rows.buffer, NOTHING)
 
     def raster(self) -> gl.Raster:
@@ -469,9 +471,4 @@ def _levels(depths: Any, rows: Any, written: Any) -> NDArray[np.uint8]:
     return np.where(np.isfinite(depths), levels, EMPTY).astype(np.uint8)
 
 
-def _linear_table() -> NDArray[np.float32]:
-    c = np.arange(256) / 255
-    return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92).astype(np.float32)
-
-
-_LINEAR = _linear_table()
+_LINEAR = linear_from_bytes(np.arange(256, dtype=np.uint8)).astype(np.float32)

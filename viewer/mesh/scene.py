@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..look import Look, rgba
+from ..srgb import linear_from_bytes
 
 NOTHING = 0xFFFFFFFF
 PLAIN = Look().plain  # what a scan without colours is drawn in
@@ -67,17 +68,4 @@ def distance_to_ball(starts: Rays, steps: Rays, radius: float) -> NDArray[np.flo
 
 def linear(color: str) -> NDArray[np.float64]:
     """The linear colour (3,) of '#rrggbb'."""
-    return to_linear(np.array(rgba(color)[:3], np.uint8))
-
-
-def to_linear(srgb: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Linear colours 0..1 of sRGB bytes (IEC 61966-2-1)."""
-    c = np.arange(256) / 255
-    return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92)[srgb]
-
-
-def to_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """sRGB bytes of linear colours 0..1: the inverse of `to_linear`."""
-    c = np.clip(np.asarray(linear, np.float64), 0, 1)
-    encoded = np.where(c > 0.0031308, 1.055 * c ** (1 / 2.4) - 0.055, c * 12.92)
-    return np.rint(encoded * 255).astype(np.uint8)
+    return linear_from_bytes(np.array(rgba(color)[:3], np.uint8))

@@ -15,7 +15,8 @@ from ..errors import InputError
 from ..scan.faces import Triangles
 from ..scan.formats import read, read_faces
 from ..scan.points import PointCloud
-from .scene import PLAIN, Hits, Rays, linear, to_linear
+from ..srgb import linear_from_bytes
+from .scene import PLAIN, Hits, Rays, linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ class Mesh:
     def _colors(self, faces: NDArray, weights: Rays) -> Rays:
         if self.points.colors is None:
             return np.broadcast_to(linear(PLAIN), (len(faces), 3))
-        return _blend(to_linear(self.points.colors[self.faces[faces].T, :3]), weights)
+        return _blend(linear_from_bytes(self.points.colors[self.faces[faces].T, :3]), weights)
 
 
 def read_mesh(path: Path | str) -> Mesh:

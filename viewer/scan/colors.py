@@ -1,6 +1,6 @@
 """Colours between the 8-bit sRGB of files and points and the linear half of range views.
 
-sRGB: IEC 61966-2-1. Every 8-bit value survives the way to half and back.
+Every 8-bit value survives the way to half and back.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..srgb import bytes_from_linear, linear_from_bytes
 
 
 def linear_from_srgb8(colors: NDArray[np.uint8]) -> NDArray[np.float16]:
@@ -23,8 +25,7 @@ def srgb8_from_linear(colors: NDArray[np.float16]) -> NDArray[np.uint8]:
 
 @cache
 def _linear_table() -> NDArray[np.float16]:
-    c = np.arange(256) / 255
-    return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92).astype(np.float16)
+    return linear_from_bytes(np.arange(256, dtype=np.uint8)).astype(np.float16)
 
 
 @cache
@@ -32,6 +33,4 @@ def _srgb8_table() -> NDArray[np.uint8]:
     """A table by the bits of a half: a look-up is many times faster than a power for each pixel."""
     with np.errstate(invalid="ignore"):  # of signalling NaN
         linear = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
-    linear = np.clip(np.nan_to_num(linear), 0, 1)
-    srgb = np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
-    return np.rint(srgb * 255).astype(np.uint8)
+    return bytes_from_linear(np.nan_to_num(linear))

@@ -1,6 +1,5 @@
 // Feed: a range of one larger buffer as a uniform block. An array of anything but vec4 is padded to
 // it, so the attributes lie one after the other across vec4s.
-#include <bindings>
 #include "amplify/point.glsl"
 
 layout(std140, binding = BLOCK_POINTS) uniform Points { vec4 packed_points[POINTS * STRIDE / 4]; };

@@ -2,7 +2,6 @@
 // filled is taken back where nothing is shown at that distance: dilated, then eroded.
 // Filled pixels are listed and have a negative depth. STEP 0 says which are taken back, reading depths
 // alone, which change in STEP 1, so that the order does not matter.
-#include <bindings>
 #include "surfels/passes/limit.glsl"
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
@@ -12,13 +11,12 @@
 layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
 layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
 
-const uint EMPTY = 0x7F800000u;  // +inf
 const int DIRECTIONS = 16;
 const float SLACK = 0.75;  // pixels that the outline may grow by
 
 bool is_empty(ivec2 pixel) {
     if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, view_size))) return false;
-    return depths[pixel.y * view_size.x + pixel.x] == EMPTY;
+    return depths[pixel.y * view_size.x + pixel.x] == NO_DEPTH;
 }
 
 vec3 form;  // of the pixel's splat, 1 at its border (surfels/disc.glsl)
@@ -53,8 +51,8 @@ void main() {
 #if STEP == 0
     begin_splat(depth, rows[index]);
     vec2 center = vec2(index % view_size.x, index / view_size.x) + 0.5;
-    if (near_outline(center, depth)) rows[index] = NONE;
+    if (near_outline(center, depth)) rows[index] = NOTHING;
 #else
-    depths[index] = rows[index] == NONE ? EMPTY : floatBitsToUint(depth);
+    depths[index] = rows[index] == NOTHING ? NO_DEPTH : floatBitsToUint(depth);
 #endif
 }

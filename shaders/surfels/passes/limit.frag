@@ -1,6 +1,5 @@
 // The depth buffer of the second pass: what the first one found, pushed away from the eye.
 // Filled pixels have a negative depth.
-#include <bindings>
 #include "surfels/passes/limit.glsl"
 
 layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
@@ -10,5 +9,5 @@ void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     int index = pixel.y * view_size.x + pixel.x;
     uint row = texelFetch(rows, index).r;
-    gl_FragDepth = row == NONE ? 1.0 : limit_behind(abs(uintBitsToFloat(texelFetch(depths, index).r)), row);
+    gl_FragDepth = row == NOTHING ? 1.0 : limit_behind(abs(uintBitsToFloat(texelFetch(depths, index).r)), row);
 }

@@ -1,6 +1,5 @@
 // What a splat gives where splats are blended: colour, normal, and how much it counts, all of
 // them whole numbers, so that sums do not depend on the order as long as they stay below 2^24.
-#include <bindings>
 
 layout(binding = TEXTURE_LOOKS) uniform usamplerBuffer looks;  // colour, 3 x 8 bits; normal, 3 x 10 bits
 

@@ -2,7 +2,6 @@
 // the nearest alone would flicker, and a mask's shape cannot be seen. All count the same, as whole numbers, so that sums
 // do not depend on the order; NORMAL_DIVISOR and COLOR_DIVISOR keep them in range. STEP 0: listed pixels are set to
 // zero; 1: each splat is added to its pixels; 2: sums become means, in place.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "surfels/passes/limit.glsl"
@@ -16,7 +15,7 @@ layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 #if STEP == 1
 void visit(uint cell, uint key, uint item_id) {
     uint row = texelFetch(rows, int(cell)).r;
-    if (row == NONE) return;  // two programs round apart at a splat's border
+    if (row == NOTHING) return;  // two programs round apart at a splat's border
     float depth = uintBitsToFloat(texelFetch(depths, int(cell)).r);
     if (uintBitsToFloat(key) > depth + epsilon * visible_radius(depth, row)) return;
     uvec2 look = texelFetch(looks, int(item_id)).xy, shown = texelFetch(looks, int(row)).xy;

@@ -1,6 +1,5 @@
 // What the splats gave, divided by how much they counted. OVER: they were drawn over one another.
 // Pixels that were filled are listed for surfels/passes/close.comp.
-#include <bindings>
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "surfels/passes/look.glsl"
@@ -16,7 +15,7 @@ void main() {
     int index = int(item());
     if (index >= view_size.x * view_size.y) return;
     uint row = texelFetch(rows, index).r;
-    if (row == NONE) return;
+    if (row == NOTHING) return;
     ivec2 pixel = ivec2(index % view_size.x, index / view_size.x);
     vec4 color = texelFetch(color_sums, pixel, 0);
     vec3 normal = texelFetch(normal_sums, pixel, 0).xyz;

@@ -1,5 +1,4 @@
 // The blended colour and normal of a pixel, for Surface.own.
-#include <bindings>
 
 #if HAS_COLORS
 layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors[]; };

@@ -1,5 +1,4 @@
 // The first of two passes alone (Slomp 2014, Fig. 3c): depth and nothing else, pushed away from the eye, in grey.
-#include <bindings>
 #include "surfels/passes/limit.glsl"
 #include "common/item.glsl"
 
@@ -12,7 +11,7 @@ uniform vec2 depth_range;  // light to dark
 
 void main() {
     uint i = item();
-    if (i >= uint(view_size.x * view_size.y) || rows[i] == NONE) return;
+    if (i >= uint(view_size.x * view_size.y) || rows[i] == NOTHING) return;
     float depth = linear_depth(limit_behind(uintBitsToFloat(depths[i]), rows[i]));
     depths[i] = floatBitsToUint(depth);
     float t = clamp((depth - depth_range.x) / (depth_range.y - depth_range.x), 0.0, 1.0);

@@ -57,8 +57,8 @@ void main() {
         visible[k] = vec3(0.0);
         total[k] = 0;
         color[k] = normal[k] = ivec3(0);
-        shown[k] = in_picture(k) ? rows[index_of(k)] : NONE;
-        if (shown[k] != NONE) {
+        shown[k] = in_picture(k) ? rows[index_of(k)] : NOTHING;
+        if (shown[k] != NOTHING) {
             limit[k] = limit_behind(abs(uintBitsToFloat(depths[index_of(k)])), shown[k]);
             visible[k] = normal_of(texelFetch(looks, int(shown[k])).xy);
         }
@@ -72,7 +72,7 @@ void main() {
     for (int first = part.x; first < part.y; first += BLOCK) blend(first, min(first + BLOCK, part.y));
     if (tile < 0) return;
     for (int k = 0; k < ROWS; ++k)
-        if (shown[k] != NONE) {
+        if (shown[k] != NOTHING) {
             store_mean(index_of(k), vec3(color[k]), vec3(normal[k]), float(total[k]), 1.0, shown[k]);
         }
 }

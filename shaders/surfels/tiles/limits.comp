@@ -1,6 +1,5 @@
 // The farthest depth in each tile at which a splat still counts in the second pass; +inf where a pixel shows
 // nothing. An invocation goes down a column of a tile.
-#include <bindings>
 #include "surfels/passes/limit.glsl"
 #include "surfels/tiles/grid.glsl"
 #include "common/item.glsl"
@@ -17,7 +16,7 @@ void main() {
         int index = y * view_size.x + x;
         uint row = texelFetch(rows, index).r;
         float depth = uintBitsToFloat(texelFetch(depths, index).r);  // +inf where nothing is
-        most = max(most, row == NONE ? depth : depth + epsilon * visible_radius(depth, row));
+        most = max(most, row == NOTHING ? depth : depth + epsilon * visible_radius(depth, row));
     }
     atomicMax(farthest[tile * tiles.x + x / TILE], floatBitsToUint(most));
 }

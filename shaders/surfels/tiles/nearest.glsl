@@ -14,7 +14,7 @@ layout(std430, binding = 1) buffer Rows { uint rows[]; };
 
 // FILL: the best of pixels that stay as they are: nothing is better. No array of bool says which they are, as
 // Mesa's Zink cannot read one (docs/surfels.md).
-#define CLOSED uintBitsToFloat(0x7F800000u)  // +inf
+#define CLOSED uintBitsToFloat(NO_DEPTH)
 
 float best[ROWS];  // reversed depth-buffer values
 uint shown[ROWS];
@@ -92,19 +92,19 @@ layout(binding = 10) uniform sampler2D large_depths;  // negative, as surfels/pa
 void begin_pixels() {
     for (int k = 0; k < ROWS; ++k) {
         best[k] = view_perspective ? view_near / view_far : 0.0;
-        shown[k] = NONE;
+        shown[k] = NOTHING;
 #if FILL
         if (!in_picture(k)) best[k] = CLOSED;
 #endif
 #if FOUND
-        if (in_picture(k) && rows[index_of(k)] != NONE) {
+        if (in_picture(k) && rows[index_of(k)] != NOTHING) {
             shown[k] = rows[index_of(k)];
             best[k] = FILL != 0 ? CLOSED : stored_depth(uintBitsToFloat(depths[index_of(k)]));
         }
 #endif
 #if FILL && LARGE
         ivec2 at = pixel + ivec2(0, k);
-        if (best[k] != CLOSED && texelFetch(large_rows, at, 0).r != NONE) {
+        if (best[k] != CLOSED && texelFetch(large_rows, at, 0).r != NOTHING) {
             shown[k] = texelFetch(large_rows, at, 0).r;
             best[k] = stored_depth(-texelFetch(large_depths, at, 0).r);
         }
@@ -114,7 +114,7 @@ void begin_pixels() {
 
 // Of the depth that is shown; +inf where nothing is.
 uint depth_bits(int k) {
-    return shown[k] == NONE ? 0x7F800000u : floatBitsToUint(linear_depth(best[k]));
+    return shown[k] == NOTHING ? NO_DEPTH : floatBitsToUint(linear_depth(best[k]));
 }
 
 void store_pixel(int k) {

@@ -22,7 +22,7 @@ void main() {
     if (tile < 0) return;
 #if FILL
     for (int k = 0; k < ROWS; ++k)
-        if (best[k] != CLOSED && shown[k] != NONE) {
+        if (best[k] != CLOSED && shown[k] != NOTHING) {
             depths[index_of(k)] = floatBitsToUint(-linear_depth(best[k]));
             rows[index_of(k)] = shown[k];
             list[reserve(1u)] = uint(index_of(k));

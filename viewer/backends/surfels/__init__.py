@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from ...gpu.amplify import FEEDS, Points, amplify
+from ...gpu.constants import LEAST_RADIUS, UNKNOWN
 from ...gpu.fastest import choose
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
@@ -23,7 +24,7 @@ from ...scan.spacing import typical_spacing
 from .. import FrameView, Suited
 from . import passes
 from .splats import FRAGMENT, SURFEL, Splats
-from .subpixel import LEAST_RADIUS, average, splat_subpixel, subpixel_share
+from .subpixel import average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, splat
 
 TITLE = "Surfels"
@@ -33,7 +34,6 @@ _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
 # A uniform radius of 1.5 times the spacing closes the surface.
 _RADIUS_PER_SPACING = 1.5
-_LARGEST_RADIUS = np.float32(3e38)  # beyond it the shader takes a radius as unknown
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _instancing(params: Params, surface: Surface) -> str:
 def _radii_suffice(pose: GpuPose) -> bool:
     """Whether each point has a radius that the shader takes."""
     radii = pose.cloud.radii
-    return radii is not None and bool(((radii > 0) & (radii < _LARGEST_RADIUS)).all())
+    return radii is not None and bool(((radii > 0) & (radii < np.float32(UNKNOWN))).all())
 
 
 def _uniform_radius(pose: GpuPose) -> float:

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from ...gpu import gl
 from ...gpu.amplify import Points, draw_shapes
 from ...gpu.bindings import Storage, Texture
+from ...gpu.constants import BEHIND
 from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import FALLBACK, NOT_HIDDEN, TILE, TileLists, run, show_all, splat, tile_lists
 
-_BEHIND = 2.0**64  # as surfels/passes/fill.frag has it
 _CHUNK = 1 << 20  # points packed at a time
 
 
@@ -50,7 +50,7 @@ def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> N
 
 def _draw_fill(larger: Points, feed: str, splats: Splats) -> None:
     """Enlarged splats behind all that the first pass found."""
-    gl.divide_depth(_BEHIND)
+    gl.divide_depth(BEHIND)
     draw_shapes(larger, feed, SURFEL, "surfels/passes/fill.frag", splats)
     gl.divide_depth(1)
 

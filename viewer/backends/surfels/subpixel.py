@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...gpu.amplify import Points
 from ...gpu.bindings import Storage
+from ...gpu.constants import LEAST_RADIUS
 from ...gpu.context import Gpu
 from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
@@ -20,7 +21,6 @@ from ...scan.points import PointCloud
 from .passes import bind_looks
 from .splats import Splats, bind_visible
 
-LEAST_RADIUS = 0.7072  # pixels, of what the mask leaves of a disc: a smaller one may miss all pixel centres
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
 _SAMPLE = 1 << 13
 

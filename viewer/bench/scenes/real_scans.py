@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...mesh.scene import Rays, to_linear, to_srgb
+from ...mesh.scene import Rays
 from ...mesh.triangles import Mesh
 from ...scan.formats import read
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.range_view import RangeView
 from ...scan.times import natural_key
+from ...srgb import bytes_from_linear, linear_from_bytes
 from ..truth.isosurface import isosurface
 from .registration import OrientedPoints, register
 from .subjects import Moment
@@ -185,7 +186,7 @@ def blended(surfels: PointCloud) -> Mesh:
 
     assert surfels.normals is not None and surfels.colors is not None
     positions, normals = surfels.positions.astype(np.float64), surfels.normals.astype(np.float64)
-    colors = to_linear(surfels.colors[:, :3])
+    colors = linear_from_bytes(surfels.colors[:, :3])
     tree = cKDTree(positions)
 
     def shares(points: Rays) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
@@ -211,7 +212,7 @@ def blended(surfels: PointCloud) -> Mesh:
     cloud = PointCloud.from_arrays(
         vertices + surfels.origin,
         normals=blend[:, 0, :3] / np.linalg.norm(blend[:, 0, :3], axis=1, keepdims=True),
-        colors=to_srgb(blend[:, 0, 3:]),
+        colors=bytes_from_linear(blend[:, 0, 3:]),
         origin=surfels.origin,
     )
     return Mesh(cloud, faces[(gap[faces] < _EDGE).all(axis=1)])

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mesh.scene import to_linear, to_srgb
 from ...mesh.triangles import Mesh
 from ...scan.points import PointCloud
+from ...srgb import bytes_from_linear, linear_from_bytes
 
 Arrays = dict[str, NDArray]
 Sampler = Callable[[int, slice], Arrays]  # some rows of a number of points
@@ -136,7 +136,9 @@ def _at(mesh: Mesh, faces: NDArray, weights: NDArray) -> tuple[NDArray, NDArray,
     return (
         _blend(points.positions, corners, weights) + mesh.origin,
         normals / np.linalg.norm(normals, axis=1, keepdims=True),
-        None if points.colors is None else to_srgb(_blend(to_linear(points.colors[:, :3]), corners, weights)),
+        None
+        if points.colors is None
+        else bytes_from_linear(_blend(linear_from_bytes(points.colors[:, :3]), corners, weights)),
     )
 
 

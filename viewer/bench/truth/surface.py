@@ -10,8 +10,9 @@ from ...gpu.shade import shade
 from ...gpu.surface import Surface
 from ...look import Look
 from ...mesh.reference import Reference
-from ...mesh.scene import NOTHING, to_srgb
+from ...mesh.scene import NOTHING
 from ...scan.points import PointCloud
+from ...srgb import bytes_from_linear
 
 
 def reference_surface(reference: Reference, gpu: Gpu, look: Look | None = None) -> Surface:
@@ -24,7 +25,9 @@ def reference_surface(reference: Reference, gpu: Gpu, look: Look | None = None) 
         positions=reference.positions().astype(np.float32),
         origin=reference.origin,
         normals=reference.normal[reference.covered],
-        colors=np.pad(to_srgb(reference.color[reference.covered]), ((0, 0), (0, 1)), constant_values=255),
+        colors=np.pad(
+            bytes_from_linear(reference.color[reference.covered]), ((0, 0), (0, 1)), constant_values=255
+        ),
         ids=reference.id[reference.covered],
     )
     rows = np.full(reference.depth.shape, NOTHING, np.uint32)

@@ -1,0 +1,31 @@
+"""Constants that Python and shaders share: every shader has all of these under the same names."""
+
+from __future__ import annotations
+
+from .. import srgb
+
+NOTHING = 0xFFFFFFFF  # the row, or the item, where there is none
+NO_DEPTH = 0x7F800000  # +inf as float bits: the depth where nothing is
+EMPTY = 255  # the level of a pixel that shows nothing
+UNKNOWN = 3e38  # a radius, or a normal's length, that is not less says nothing
+LEAST_RADIUS = 0.7072  # pixels: a smaller disc or ball may miss all pixel centres
+BEHIND = 2.0**64  # what depth-buffer values are divided by of splats that fill, behind all others
+GROUP = 256  # invocations of a work group
+GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
+
+SRGB_SLOPE = srgb.SLOPE
+SRGB_OFFSET = srgb.OFFSET
+SRGB_SCALE = srgb.SCALE
+SRGB_POWER = srgb.POWER
+SRGB_LINEAR_KNEE = srgb.LINEAR_KNEE
+SRGB_ENCODED_KNEE = srgb.ENCODED_KNEE
+
+
+def constants_glsl() -> str:
+    """The constants as macros; bit patterns are unsigned."""
+    constants = {name: value for name, value in globals().items() if name.isupper()}
+    return "".join(f"#define {name} {_literal(value)}\n" for name, value in constants.items())
+
+
+def _literal(value: float) -> str:
+    return f"0x{value:08X}u" if isinstance(value, int) and value >> 16 else repr(value)
