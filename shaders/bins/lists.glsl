@@ -1,17 +1,17 @@
 // A list of the visits of each cell. PASS 0 counts them; PASS 1 writes them down: anywhere in their cell's part, or,
 // ORDERED, as pairs that are sorted by cell afterwards.
 #if PASS == 0
-layout(std430, binding = 0) buffer Counts { uint counts[]; };
+layout(std430, binding = STORAGE_CURSORS) buffer Counts { uint counts[]; };
 #else
-layout(std430, binding = 0) buffer Cursors { uint cursors[]; };  // of cells; ORDERED: of items
+layout(std430, binding = STORAGE_CURSORS) buffer Cursors { uint cursors[]; };  // of cells; ORDERED: of items
 #endif
 #if PASS == 0 && ORDERED
-layout(std430, binding = 1) writeonly buffer Visits { uint visits[]; };
+layout(std430, binding = STORAGE_VISITS) writeonly buffer Visits { uint visits[]; };
 uint visited = 0u;
 #elif PASS == 1 && ORDERED
-layout(std430, binding = 1) writeonly buffer Pairs { uvec2 pairs[]; };
+layout(std430, binding = STORAGE_VISITS) writeonly buffer Pairs { uvec2 pairs[]; };
 #elif PASS == 1
-layout(std430, binding = 1) writeonly buffer List { uint list[]; };
+layout(std430, binding = STORAGE_VISITS) writeonly buffer List { uint list[]; };
 #endif
 
 void visit(uint cell, uint key, uint item_id) {

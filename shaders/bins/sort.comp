@@ -3,12 +3,12 @@
 // them in their order, so that no order is lost. LAST: second words alone are written.
 #include "common/item.glsl"
 
-layout(binding = 0) uniform usamplerBuffer pairs;
-layout(std430, binding = 0) buffer Places { uint places[]; };  // of each digit, for each run
+layout(binding = TEXTURE_PAIRS) uniform usamplerBuffer pairs;
+layout(std430, binding = STORAGE_DIGITS) buffer Places { uint places[]; };  // of each digit, for each run
 #if STEP == 1 && LAST
-layout(std430, binding = 1) writeonly buffer Sorted { uint sorted[]; };
+layout(std430, binding = STORAGE_SORTED) writeonly buffer Sorted { uint sorted[]; };
 #elif STEP == 1
-layout(std430, binding = 1) writeonly buffer Sorted { uvec2 sorted[]; };
+layout(std430, binding = STORAGE_SORTED) writeonly buffer Sorted { uvec2 sorted[]; };
 #endif
 
 uniform uint pair_count;

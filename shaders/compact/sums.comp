@@ -7,14 +7,14 @@
 uniform uint word_count;
 
 #if BLOCKS
-layout(std430, binding = 6) buffer BlockSums { uint block_sums[]; };
+layout(std430, binding = STORAGE_BLOCK_SUMS) buffer BlockSums { uint block_sums[]; };
 #endif
 #include <words>
 
 #if STEP == 0
 shared uint total;
 #else
-shared uint sums[256];
+shared uint sums[GROUP];
 #endif
 
 void meet() {
@@ -23,7 +23,7 @@ void meet() {
 }
 
 void main() {
-    uint me = gl_LocalInvocationID.x, block = item() / 256u;
+    uint me = gl_LocalInvocationID.x, block = item() / uint(GROUP);
     uint first = min(item() * RUN, word_count), last = min(first + RUN, word_count);
     uint sum = 0u;
     for (uint i = first; i < last; ++i) sum += word_of(i);
@@ -36,7 +36,7 @@ void main() {
 #else
     sums[me] = sum;
     meet();
-    for (uint step = 1u; step < 256u; step *= 2u) {
+    for (uint step = 1u; step < uint(GROUP); step *= 2u) {
         uint before = me >= step ? sums[me - step] : 0u;
         meet();
         sums[me] += before;

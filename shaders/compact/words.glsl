@@ -1,5 +1,5 @@
 // Words in a buffer, which give way to the sums before them.
-layout(std430, binding = 0) buffer Words { uint words[]; };
+layout(std430, binding = STORAGE_WORDS) buffer Words { uint words[]; };
 
 uint word_of(uint i) { return words[i]; }
 

@@ -2,14 +2,14 @@
 // item among those that have it, PASS 2 lists the cells that were hit. Two 32-bit passes: 64-bit
 // atomics are not everywhere.
 #if PASS == 0
-layout(std430, binding = 0) buffer Keys { uint keys[]; };
+layout(std430, binding = STORAGE_KEYS) buffer Keys { uint keys[]; };
 #else
-layout(binding = 10) uniform usamplerBuffer keys;
+layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;
 #endif
 #if PASS == 1
-layout(std430, binding = 1) buffer Best { uint best[]; };
+layout(std430, binding = STORAGE_BEST) buffer Best { uint best[]; };
 #elif PASS == 2
-layout(binding = 11) uniform usamplerBuffer best;
+layout(binding = TEXTURE_BEST) uniform usamplerBuffer best;
 #include "common/list.glsl"
 #endif
 

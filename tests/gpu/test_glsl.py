@@ -23,6 +23,7 @@ from viewer.bench import baselines
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
+from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
 from viewer.gpu.present import Presenter
 from viewer.gpu.pyramid import Image, add_expanded, expand, subtract_expanded
@@ -168,6 +169,22 @@ def test_the_reference_compiler_takes_every_program(programs: list[list[Source]]
             if line.startswith(("ERROR", "WARNING")):
                 complaints.add(f"{stage.name}: {stage.explain(line)}")
     assert not complaints
+
+
+def test_no_program_uses_a_binding_for_two_things(programs: list[list[Source]]) -> None:
+    """Of all that its stages name, in parts that were compiled or not."""
+    for program in programs:
+        text = "".join(stage.body for stage in program)
+        for kind, table in (("TEXTURE", Texture), ("STORAGE", Storage), ("BLOCK", UniformBlock)):
+            names = set(re.findall(rf"\bbinding = {kind}_(\w+)", text))
+            numbers = {table[name] for name in names}
+            assert len(numbers) == len(names), f"{[stage.name for stage in program]}: {sorted(names)}"
+
+
+def test_no_stage_reads_more_textures_than_every_driver_has(programs: list[list[Source]]) -> None:
+    for stage in {stage.text: stage for program in programs for stage in program}.values():
+        names = set(re.findall(r"\bbinding = TEXTURE_(\w+)", stage.body))
+        assert len(names) <= 16, f"{stage.name}: {sorted(names)}"
 
 
 def test_no_shader_has_an_array_of_bool(programs: list[list[Source]]) -> None:

@@ -34,9 +34,12 @@ class Texture(IntEnum):
     DRAWN_ROWS = auto()  # the list of those that are drawn
     CORNERS = auto()  # of faces
     COLOR_MAP = auto()
-    # Scatter.
+    # Scatter and bins.
     KEYS = auto()
     BEST = auto()
+    PAIRS = auto()
+    STARTS = auto()
+    LISTED = auto()
     # A level of a pyramid that is read, and one that is added to it.
     SAMPLES = auto()
     WEIGHTS = auto()
@@ -46,8 +49,6 @@ class Texture(IntEnum):
     PLACES = auto()
     FORMS = auto()
     REACH = auto()
-    ENDS = auto()
-    LISTED = auto()
     WORK = auto()
     FARTHEST = auto()
     SCRATCH = auto()  # where buffers become textures
@@ -68,22 +69,30 @@ class Storage(IntEnum):
     LEVEL = 7
     # Shading, beside a list.
     PICTURE = 0
-    # Scatter, beside a list.
+    # Scatter, beside a list; what says which cells are visited has those from 4 on, without a list from 2 on.
     KEYS = 0
     BEST = 1
+    # Bins, beside what says which cells are visited, which has those from 2 on.
+    CURSORS = 0
+    VISITS = 1
+    # Their sorting.
+    DIGITS = 0
+    SORTED = 1
+    # Prefix sums; what says the words has those up to 5.
+    WORDS = 0
+    BLOCK_SUMS = 6
     # A level of a pyramid that is written.
     SAMPLES = 0
     WEIGHTS = 1
     # Sums of splats, beside a Surface's colours, normals and lists.
     SUMS = 0
-    # Tiles of splats; FARTHEST beside a Surface's depths and rows as well.
-    SLOTS = 0
-    PLACES = 1
-    FORMS = 2
-    REACH = 3
-    LARGE = 4
-    LISTED = 5
-    WORK = 6
+    # Tiles of splats, beside bins, prefix sums and a Surface's depths, rows and lists.
+    STARTS = 0
+    WORK = 1
+    PLACES = 2
+    FORMS = 3
+    REACH = 4
+    LARGE = 5
     FARTHEST = 7
 
 

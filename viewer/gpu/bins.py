@@ -6,6 +6,7 @@ import moderngl
 
 from ..errors import InputError
 from . import gl
+from .bindings import Storage, Texture
 from .compact import prefix_sums
 from .context import Gpu, Program
 from .scatter import Visits
@@ -94,10 +95,10 @@ class Bins:
         """Delete everything."""
         self._gpu.discard(self.starts, self.items, self._cursors)
 
-    def _send(self, visits: Visits, number: int, *blocks: moderngl.Buffer) -> None:
+    def _send(self, visits: Visits, number: int, cursors: moderngl.Buffer, written: moderngl.Buffer) -> None:
         def bind(_: Program) -> None:
-            for binding, block in enumerate(blocks):
-                block.bind_to_storage_buffer(binding)
+            cursors.bind_to_storage_buffer(Storage.CURSORS)
+            written.bind_to_storage_buffer(Storage.VISITS)
 
         visits.send(self._gpu, "bins/lists.glsl", bind, PASS=number, ORDERED=int(self.ordered))
 
@@ -115,9 +116,9 @@ class Bins:
             for step in range(2):
                 program = gpu.compute("bins/sort.comp", {"STEP": step, "LAST": int(last), "RUN": f"{_RUN}u"})
                 gpu.set(program, pair_count=length, shift=shift)
-                pairs.bind(0)
-                places.bind_to_storage_buffer(0)
-                (self.items if last else other).buffer.bind_to_storage_buffer(1)
+                pairs.bind(Texture.PAIRS)
+                places.bind_to_storage_buffer(Storage.DIGITS)
+                (self.items if last else other).buffer.bind_to_storage_buffer(Storage.SORTED)
                 gpu.dispatch(program, runs)
                 if step == 0:
                     prefix_sums(gpu, places, digits * runs)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 import moderngl
 
+from .bindings import Storage
 from .constants import GROUP, GROUP_LIMIT
 from .context import Gpu, Program
 
@@ -34,8 +35,8 @@ class IndexList:
 
     def bind(self) -> None:
         """Bind where shaders that include common/list.glsl find it."""
-        self._indices.bind_to_storage_buffer(2)
-        self._dispatch.bind_to_storage_buffer(3)
+        self._indices.bind_to_storage_buffer(Storage.LIST)
+        self._dispatch.bind_to_storage_buffer(Storage.DISPATCH)
 
     def run(self, program: moderngl.ComputeShader) -> None:
         """Run one invocation for each index, without the CPU knowing how many there are."""
@@ -86,7 +87,7 @@ def list_flagged(
 
 def prefix_sums(gpu: Gpu, words: moderngl.Buffer, count: int) -> None:
     """Replace each of the first `count` words of a buffer by the sum of those before it, modulo 2^32."""
-    scan_words(gpu, "compact/words.glsl", count, lambda _: words.bind_to_storage_buffer(0))
+    scan_words(gpu, "compact/words.glsl", count, lambda _: words.bind_to_storage_buffer(Storage.WORDS))
 
 
 def scan_words(
@@ -126,7 +127,7 @@ def _scan_level(
         program = gpu.compute("compact/sums.comp", given, {"words": words, **parts})
         bind(program)
         if blocks > 1:
-            sums.bind_to_storage_buffer(6)
+            sums.bind_to_storage_buffer(Storage.BLOCK_SUMS)
         gpu.set(program, word_count=count)
         gpu.dispatch(program, -(-count // _RUN))
 
@@ -134,7 +135,9 @@ def _scan_level(
         room = MOST_WORDS // _BLOCK**level
         sums = gpu.keep(f"block sums {level}", lambda: gpu.ctx.buffer(reserve=4 * room))
         run(0)
-        _scan_level(
-            gpu, level + 1, "compact/words.glsl", blocks, lambda _: sums.bind_to_storage_buffer(0), {}, {}
-        )
+
+        def bind_sums(_: Program) -> None:
+            sums.bind_to_storage_buffer(Storage.WORDS)
+
+        _scan_level(gpu, level + 1, "compact/words.glsl", blocks, bind_sums, {}, {})
     run(1)

@@ -176,6 +176,11 @@ class Target:
         self._renderbuffer, self._framebuffer = renderbuffer, framebuffer
         self.target = ctx.detect_framebuffer(framebuffer.value)
 
+    def bind_images(self, *units: int) -> None:
+        """Bind each image to its texture unit."""
+        for unit, image in zip(units, self.images, strict=True):
+            image.use(unit)
+
     def depth_is_float32(self) -> bool:
         """Whether the driver really stores 32-bit float depth."""
         GL_3_0.glBindRenderbuffer(_RENDERBUFFER, self._renderbuffer.value)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from . import gl
+from .bindings import Storage, Texture
 from .blocks import Values
 from .compact import IndexList
 from .constants import NO_DEPTH, NOTHING
@@ -55,10 +56,10 @@ def scatter(
         listed.clear()
 
     def bind(_: Program) -> None:
-        keys.buffer.bind_to_storage_buffer(0)
-        keys.bind(10)
-        best.buffer.bind_to_storage_buffer(1)
-        best.bind(11)
+        keys.buffer.bind_to_storage_buffer(Storage.KEYS)
+        keys.bind(Texture.KEYS)
+        best.buffer.bind_to_storage_buffer(Storage.BEST)
+        best.bind(Texture.BEST)
         if listed is not None:
             listed.bind()
 

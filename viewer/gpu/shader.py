@@ -31,8 +31,8 @@ class Source:
     name: path under `shaders/`, or an absolute one. defines: macro name -> value. parts: what a file in angle
     brackets stands for, so that one file can serve several shapes: `#include <shape>`. params: the dataclass
     whose numbers `#include <params>` declares; `<view>` is always there, and so are, without being included,
-    the macros of gpu/bindings.py and gpu/constants.py. files: what it is made of, numbered as in a compiler's
-    log.
+    the macros of gpu/bindings.py and gpu/constants.py. text: all of it; body: without macros. files: what it
+    is made of, numbered as in a compiler's log.
     """
 
     def __init__(
@@ -47,7 +47,8 @@ class Source:
         self._parts = parts or {}
         self._params = params
         macros = "".join(f"#define {key} {value}\n" for key, value in (defines or {}).items())
-        self.text = _HEADER + macros + self._expand(name)
+        self.body = self._expand(name)
+        self.text = _HEADER + macros + self.body
 
     @cached_property
     def uniforms(self) -> frozenset[str]:

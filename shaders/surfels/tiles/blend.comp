@@ -11,8 +11,8 @@
 const int BLOCK = 256;
 
 #if LARGE
-layout(binding = 9) uniform sampler2D color_sums;  // and weight
-layout(binding = 10) uniform sampler2D normal_sums;
+layout(binding = TEXTURE_COLOR_SUMS) uniform sampler2D color_sums;  // and weight
+layout(binding = TEXTURE_NORMAL_SUMS) uniform sampler2D normal_sums;
 #endif
 
 float limit[ROWS];

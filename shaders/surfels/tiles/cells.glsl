@@ -7,15 +7,15 @@
 #include "surfels/tiles/grid.glsl"
 
 #if PASS == 0
-layout(std430, binding = 2) writeonly buffer Places { vec4 places[]; };
-layout(std430, binding = 3) writeonly buffer Forms { vec4 forms[]; };
-layout(std430, binding = 4) writeonly buffer Reach { uint reach[]; };
-layout(std430, binding = 5) buffer Large { uint large_count, list_length, away, longest, large[]; };
+layout(std430, binding = STORAGE_PLACES) writeonly buffer Places { vec4 places[]; };
+layout(std430, binding = STORAGE_FORMS) writeonly buffer Forms { vec4 forms[]; };
+layout(std430, binding = STORAGE_REACH) writeonly buffer Reach { uint reach[]; };
+layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, large[]; };
 #if SIDE >= 2
-layout(binding = 4) uniform usamplerBuffer farthest;  // depth shown in each tile, float bits
+layout(binding = TEXTURE_FARTHEST) uniform usamplerBuffer farthest;  // depth shown in each tile, float bits
 #endif
 #else
-layout(binding = 5) uniform usamplerBuffer known_reach;
+layout(binding = TEXTURE_REACH) uniform usamplerBuffer reach;
 #endif
 
 // First tile 11 + 11 bits, width and height 5 + 5: pictures up to 2048 tiles, discs up to 31.
@@ -84,7 +84,7 @@ void scatter(uint i) {
     uint word = tiles_of(texel_point(row));
     reach[i] = word;
 #else
-    uint word = texelFetch(known_reach, int(i)).r;
+    uint word = texelFetch(reach, int(i)).r;
 #endif
     visit_tiles(word, uint(row));
 }

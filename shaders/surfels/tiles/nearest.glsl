@@ -4,13 +4,13 @@
 
 layout(local_size_x = TILE, local_size_y = COLUMNS, local_size_z = TILES) in;
 
-layout(binding = 0) uniform samplerBuffer places;  // centre, pixels; key there; its step right
-layout(binding = 1) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
-layout(binding = 2) uniform usamplerBuffer starts;  // of each tile's part of the list
-layout(binding = 3) uniform usamplerBuffer listed;
-layout(binding = 8) uniform usamplerBuffer work;  // tiles that discs reach, after a dispatch and their number
-layout(std430, binding = 0) buffer Depths { uint depths[]; };
-layout(std430, binding = 1) buffer Rows { uint rows[]; };
+layout(binding = TEXTURE_PLACES) uniform samplerBuffer places;  // centre, pixels; key there; its step right
+layout(binding = TEXTURE_FORMS) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
+layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;  // of each tile's part of the list
+layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;
+layout(binding = TEXTURE_WORK) uniform usamplerBuffer work;  // tiles that discs reach, after a dispatch and their number
+layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
+layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
 
 // FILL: the best of pixels that stay as they are: nothing is better. No array of bool says which they are, as
 // Mesa's Zink cannot read one (docs/surfels.md).
@@ -83,8 +83,8 @@ bool in_picture(int k) { return pixel.x < view_size.x && pixel.y + k < view_size
 int index_of(int k) { return (pixel.y + k) * view_size.x + pixel.x; }
 
 #if FILL && LARGE
-layout(binding = 9) uniform usampler2D large_rows;
-layout(binding = 10) uniform sampler2D large_depths;  // negative, as surfels/passes/fill.frag has it
+layout(binding = TEXTURE_LARGE_ROWS) uniform usampler2D large_rows;
+layout(binding = TEXTURE_LARGE_DEPTHS) uniform sampler2D large_depths;  // negative, as surfels/passes/fill.frag has it
 #endif
 
 // FOUND: the Surface holds something already. FILL: only where it does not, this is to change; LARGE: the

@@ -4,7 +4,7 @@
 #include "surfels/tiles/nearest.glsl"
 
 #if FARTHEST
-layout(std430, binding = 2) buffer Farthest { uint farthest[]; };
+layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };
 #elif FILL
 #include "common/list.glsl"
 #endif

@@ -1,9 +1,9 @@
 // Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where large discs, which
 // reach anywhere, are rasterised.
-layout(std430, binding = 0) readonly buffer Starts { uint starts[]; };
-layout(std430, binding = 1) buffer Large { uint large_count, list_length, away, longest, large[]; };
-layout(std430, binding = 2) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
-layout(std430, binding = 3) writeonly buffer Farthest { uint farthest[]; };
+layout(std430, binding = STORAGE_STARTS) readonly buffer Starts { uint starts[]; };
+layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, large[]; };
+layout(std430, binding = STORAGE_WORK) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
+layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { uint farthest[]; };
 
 uint entries_of(uint tile) { return starts[tile + 1u] - starts[tile]; }
 
@@ -12,7 +12,7 @@ uint word_of(uint tile) { return entries_of(tile) > 0u || large_count > 0u ? 1u 
 void take_sum(uint tile, uint sum) {
     uint entries = entries_of(tile), is_worked = word_of(tile);
     if (is_worked > 0u) work[sum] = tile;
-    farthest[tile] = entries > 0u ? 0u : 0x7F800000u;  // +inf: through such a tile everything is seen
+    farthest[tile] = entries > 0u ? 0u : NO_DEPTH;  // through such a tile everything is seen
     if (entries > longest) atomicMax(longest, entries);
     if (tile + 1u < word_count) return;
     list_length = starts[word_count];

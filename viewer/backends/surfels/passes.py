@@ -128,13 +128,12 @@ def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
     large = lists.large_points(splats.larger(points)) if lists.large else None
     if splats.enlarge > 1:
         _fill_by_tiles(surface, lists, large, splats)
-    sums: tuple[moderngl.Texture, ...] = ()
     if large is not None:
-        sums = _add(points, large, surface, FALLBACK, splats).images
+        sums = _add(points, large, surface, FALLBACK, splats)
+        sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)
     defines = {"FOUND": 1, "FILL": 0, "LARGE": int(lists.large > 0), **points.defines}
     defines |= bind_looks(points, surface)
-    blocks = (surface.depths.buffer, surface.rows.buffer)
-    run("blend", surface, lists, defines, blocks, sums, points, splats)
+    run("blend", surface, lists, defines, points, splats)
     if splats.enlarge > 1:
         _close(points, surface, splats)
 
@@ -152,18 +151,16 @@ def _first_by_tiles(points: Points, surface: Surface, splats: Splats) -> TileLis
 
 def _fill_by_tiles(surface: Surface, lists: TileLists, large: Points | None, splats: Splats) -> None:
     """The nearest of the enlarged splats where the first pass found nothing. large: those not in lists."""
-    blocks = (surface.depths.buffer, surface.rows.buffer)
-    images: tuple[moderngl.Texture, ...] = ()
     if large is not None:
         surface.raster().clear()
-        images = surface.raster().images
         surface.gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         surface.gpu.ctx.depth_func = ">"
         _draw_fill(large, FALLBACK, splats)
+        surface.raster().bind_images(Texture.LARGE_ROWS, Texture.LARGE_DEPTHS)
     surface.covered.clear()
     surface.covered.bind()
     defines = {"FOUND": 1, "FARTHEST": 0, "FILL": 1, "LARGE": int(large is not None)}
-    run("show", surface, lists, defines, blocks, images)
+    run("show", surface, lists, defines)
 
 
 def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
@@ -214,8 +211,7 @@ def _resolve(points: Points, surface: Surface, over: bool) -> None:
     with gpu.timers.measure("resolve"):
         defines = bind_looks(points, surface)
         program = gpu.compute("surfels/passes/resolve.comp", {**defines, "OVER": int(over)})
-        for unit, image in zip((Texture.COLOR_SUMS, Texture.NORMAL_SUMS), sums.images, strict=True):
-            image.use(unit)
+        sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)
         surface.bind_textures()
         surface.covered.clear()
         surface.covered.bind()

@@ -7,7 +7,7 @@ lists does not matter. Splats that are too large for lists go through the raster
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import moderngl
@@ -15,6 +15,7 @@ import numpy as np
 
 from ...gpu import gl
 from ...gpu.amplify import Points, amplify
+from ...gpu.bindings import Storage, Texture
 from ...gpu.bins import Bins
 from ...gpu.compact import scan_words
 from ...gpu.context import Gpu, Program
@@ -75,9 +76,9 @@ class TileLists:
 
         def bind(program: Program) -> None:
             points.bind(program)
-            self._textures["farthest"].bind(4)
-            self._textures["reach"].bind(5)
-            self._bind_blocks("places", "forms", "reach", "large", first=2)
+            self._textures["farthest"].bind(Texture.FARTHEST)
+            self._textures["reach"].bind(Texture.REACH)
+            self._bind_storage("places", "forms", "reach", "large")
 
         defines = {"SIDE": side, "TILE": TILE, **points.defines}
         visits = Visits("surfels/tiles/cells.glsl", points.count, bind, defines, splats)
@@ -95,8 +96,8 @@ class TileLists:
         """List the tiles that discs reach."""
 
         def bind(_: Program) -> None:
-            self._bins.starts.buffer.bind_to_storage_buffer(0)
-            self._bind_blocks("large", "work", "farthest", first=1)
+            self._bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
+            self._bind_storage("large", "work", "farthest")
 
         defines = {"TILES": f"{_mapping(self._gpu)[1]}u"}
         scan_words(self._gpu, "surfels/tiles/work.glsl", self._bins.cells, bind, defines)
@@ -111,10 +112,11 @@ class TileLists:
 
     def run(self, program: moderngl.ComputeShader) -> None:
         """Run a program that includes surfels/tiles/nearest.glsl on the tiles that discs reach."""
-        textures = (self._textures["places"], self._textures["forms"], self._bins.starts, self._bins.items)
-        for unit, texture in enumerate(textures):
-            texture.bind(unit)
-        self._textures["work"].bind(8)
+        for name in ("places", "forms", "work"):
+            self._textures[name].bind(Texture[name.upper()])
+        self._bins.starts.bind(Texture.STARTS)
+        self._bins.items.bind(Texture.LISTED)
+        self._bind_storage("farthest")
         program.run_indirect(self._buffer("work"))
         self._gpu.ctx.memory_barrier()
 
@@ -148,9 +150,9 @@ class TileLists:
     def _buffer(self, name: str) -> moderngl.Buffer:
         return self._textures[name].buffer
 
-    def _bind_blocks(self, *names: str, first: int) -> None:
-        for number, name in enumerate(names, start=first):
-            self._buffer(name).bind_to_storage_buffer(number)
+    def _bind_storage(self, *names: str) -> None:
+        for name in names:
+            self._buffer(name).bind_to_storage_buffer(Storage[name.upper()])
 
 
 def splat(points: Points, surface: Surface, splats: Splats) -> None:
@@ -213,9 +215,8 @@ def show(surface: Surface, lists: TileLists, found: bool = False, farthest: bool
     """
     if not found:
         surface.clear()
-    blocks = [surface.depths.buffer, surface.rows.buffer, *([lists.farthest] if farthest else [])]
     defines = {"FOUND": int(found), "FARTHEST": int(farthest), "FILL": 0, "LARGE": 0}
-    run("show", surface, lists, defines, blocks)
+    run("show", surface, lists, defines)
 
 
 def run(
@@ -223,13 +224,10 @@ def run(
     surface: Surface,
     lists: TileLists,
     defines: Mapping[str, object],
-    blocks: Sequence[moderngl.Buffer],
-    rastered: Sequence[moderngl.Texture] = (),
     first: Points | None = None,
     splats: Splats | None = None,
 ) -> None:
-    """Run surfels/tiles/NAME.comp on the tiles that have lists. blocks: its storage blocks, from 0 on.
-    rastered: two images of what the large discs gave (LARGE). first: the points of the first pass, where it
+    """Run surfels/tiles/NAME.comp on the tiles that have lists. first: the points of the first pass, where it
     reads their radii, and splats: how they were drawn."""
     gpu = surface.gpu
     rows, tiles = _mapping(gpu)
@@ -239,10 +237,7 @@ def run(
         program = gpu.compute(f"surfels/tiles/{name}.comp", {**defines, **layout}, params=splats)
         if first is not None:
             bind_visible(first, program)
-        for number, block in enumerate(blocks):
-            block.bind_to_storage_buffer(number)
-        for unit, image in enumerate(rastered, start=9):
-            image.use(unit)
+        surface.bind_storage()
         lists.run(program)
 
 
