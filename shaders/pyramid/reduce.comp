@@ -9,7 +9,7 @@ void main() {
     ivec2 first = 2 * at + FIRST, low = max(first, 0), high = min(first + COUNT, size);
     begin_sample();
 #if NEAREST
-    vec4 nearest = vec4(uintBitsToFloat(0x7F800000u));
+    vec4 nearest = vec4(uintBitsToFloat(NO_DEPTH));
     bool found = false;
 #endif
     for (int y = low.y; y < high.y; ++y)

@@ -1,5 +1,4 @@
 // Samples of a level of a pyramid: values with a weight each, which is 0 where there is none, whatever the values.
-#include <bindings>
 #include "common/item.glsl"
 
 layout(binding = TEXTURE_SAMPLES) uniform samplerBuffer samples;  // of the level that is read
