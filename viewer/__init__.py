@@ -10,20 +10,27 @@ if TYPE_CHECKING:
     from .errors import Scan4DError
     from .gpu.surface import Surface
     from .look import Look
+    from .rigid import Rigid
+    from .scan.layers import Layers
     from .scan.open import open_scan
     from .scan.points import PointCloud
     from .scan.pose import Pose
     from .scan.range_view import RangeView
 
 __version__ = "0.1.0"
-__all__ = ["Camera", "Look", "PointCloud", "Pose", "RangeView", "Scan4DError", "open_scan", "render"]
+__all__ = [
+    "Camera", "Layers", "Look", "PointCloud", "Pose", "RangeView", "Rigid", "Scan4DError", "open_scan",
+    "render",
+]  # fmt: skip
 
 _HOMES = {
     "Camera": "camera",
+    "Layers": "scan.layers",
     "Look": "look",
     "PointCloud": "scan.points",
     "Pose": "scan.pose",
     "RangeView": "scan.range_view",
+    "Rigid": "rigid",
     "Scan4DError": "errors",
     "open_scan": "scan.open",
 }
@@ -48,13 +55,15 @@ def render(
     size: tuple[int, int] = (1920, 1280),
     backend: str | None = None,
     look: Look | None = None,
+    layers: Layers | None = None,
     **params: Any,
 ) -> Surface:
     """Draw one pose without a window and return its Surface (`.image()` is the picture).
 
     camera: None fits the pose from the front. backend: None for the default of the scan.
-    params: the backend's parameters. Raises InputError, NoOpenGLError.
+    layers: numbers over its points, and where it is moved to. params: the backend's parameters. Raises
+    InputError, NoOpenGLError.
     """
     from . import frame
 
-    return frame.render(pose, camera, size, backend, look, params)
+    return frame.render(pose, camera, size, backend, look, params, layers)

@@ -16,6 +16,7 @@ from .gpu.shade import shade
 from .gpu.surface import Surface
 from .look import Look
 from .renderer import Renderer
+from .scan.layers import NO_LAYERS, Layers
 from .scan.points import PointCloud
 from .scan.pose import Pose
 from .view import View
@@ -29,7 +30,7 @@ class Request:
     """What a picture shows. backend: a name, or one that is not in the folder of backends; None
     for the default of the scan (see `choose`).
 
-    params: the backend's own `Params`; None for its defaults.
+    params: the backend's own `Params`; None for its defaults. layers: over the pose.
     """
 
     pose: Pose
@@ -37,6 +38,7 @@ class Request:
     backend: str | Backend | None = None
     params: Any = None
     look: Look = field(default_factory=Look)
+    layers: Layers = NO_LAYERS
 
 
 def render_frame(
@@ -61,6 +63,7 @@ def render_frame(
     timers.start_frame()
 
     pose = renderer.resident(request.pose)
+    request.layers.check(pose.stored)
     backend, params = _chosen(request)
     view = _view(request, pose, surface.size)
     prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
@@ -69,7 +72,7 @@ def render_frame(
         plain = fallback(request)
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
-    surface.start(pose, view, look)
+    surface.start(pose, view, look, request.layers)
     stats = surface.stats
     stats.backend = backend.name
     if prepared is None:
@@ -114,7 +117,7 @@ def fallback(request: Request) -> Request:
 
 
 def _view(request: Request, pose: GpuPose, size: tuple[int, int]) -> View:
-    return View.of(request.camera, size, pose.cloud.origin, pose.bounds)
+    return View.of(request.camera, size, pose.cloud.origin, pose.bounds, request.layers.place)
 
 
 def _chosen(request: Request) -> tuple[Backend, Any]:
@@ -155,19 +158,21 @@ def render(
     backend: str | None,
     look: Look | None,
     params: dict[str, Any],
+    layers: Layers | None = None,
 ) -> Surface:
     """The work of `viewer.render`: one picture, on a headless context that later calls share."""
     if isinstance(pose, PointCloud):
         pose = Pose(0, 0.0, "points", pose)
-    renderer = shared_renderer()
+    renderer, layers = shared_renderer(), layers or NO_LAYERS
     resident = renderer.resident(pose)
     name, chosen = choose(pose, backend, params)
     request = Request(
         pose=pose,
-        camera=camera or Camera.orbit(resident.bounds, aspect=size[0] / size[1]),
+        camera=camera or Camera.orbit(layers.place.bounds(resident.bounds), aspect=size[0] / size[1]),
         backend=name,
         params=chosen,
         look=look or Look(),
+        layers=layers,
     )
     surface = Surface(renderer.gpu, size)
     while render_frame(renderer, request, surface):

@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from .bounds import Bounds
 from .camera import Camera
+from .rigid import STILL, Rigid
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """A camera at a picture size, seen from a pose's origin.
 
-    rotation: (3, 3) float64, world to view. translation: (3,) float64, from the origin to
-    view space. scale: pixels per unit of x/-z (perspective) or of x (orthographic).
+    rotation: (3, 3) float64, from the pose's axes, which are the world's unless it is moved, to view.
+    translation: (3,) float64, from the origin to view space. scale: pixels per unit of x/-z (perspective) or
+    of x (orthographic).
     near, far: what is outside is not drawn. reach: the depth that an orthographic depth
     buffer ends at.
     """
@@ -32,20 +34,29 @@ class View:
     perspective: bool
 
     @classmethod
-    def of(cls, camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], bounds: Bounds) -> View:
-        """Combine camera and origin in float64, so that the GPU sees only small numbers."""
-        rotation = camera.rotation()
+    def of(
+        cls,
+        camera: Camera,
+        size: tuple[int, int],
+        origin: NDArray[np.float64],
+        bounds: Bounds,
+        place: Rigid = STILL,
+    ) -> View:
+        """Combine camera, origin and the place that a pose is moved to in float64, so that the GPU sees only
+        small numbers. bounds: of the pose, where it is not moved."""
+        to_view = camera.rotation()
+        rotation = to_view if place.is_identity else to_view @ place.rotation
         perspective = camera.projection == "perspective"
         extent = 2 * math.tan(math.radians(camera.fov_y) / 2) if perspective else camera.view_height
         near, far = camera.clip_range()
         return cls(
             size=size,
             rotation=rotation,
-            translation=rotation @ (origin - np.array(camera.eye)),
+            translation=to_view @ (place.points(origin) - np.array(camera.eye)),
             scale=size[1] / extent,
             near=near,
             far=far,
-            reach=min(far, camera.reach(bounds)),
+            reach=min(far, camera.reach(place.bounds(bounds))),
             perspective=perspective,
         )
 

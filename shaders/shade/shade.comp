@@ -1,7 +1,7 @@
 // From a Surface to a picture: colour, light, eye-dome lighting, background.
 // COLOR_BY 0 plain, 1 own, 2 normal, 3 value, 4 id. LIGHT 0 flat, 1 head, 2 fixed.
 // OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
-// filled have none. With its colour comes how much of the pixel is covered; the rest is background.
+// filled have none. TURNED: the pose is, so that its axes are not the world's. With its colour comes how much of the pixel is covered; the rest is background.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -31,6 +31,9 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #if COLOR_BY == 0
     return plain.rgb;
 #elif COLOR_BY == 2
+#if TURNED
+    normal = mat3(to_world) * normal;
+#endif
     return 0.5 * normal + 0.5;
 #else
 #if !(COLOR_BY == 1 && OWN_COLOR) && !(COLOR_BY == 3 && (OWN_VALUE || VALUE == 0))

@@ -20,6 +20,7 @@ import numpy as np
 from ..errors import InputError
 from ..files import whole_file
 from ..geometry import Vector
+from ..rigid import STILL, Rigid
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import nearest_row, spacing_at
@@ -46,8 +47,9 @@ class End:
     level: int
 
     @classmethod
-    def of(cls, picked: Picked, pose: Pose, *, filled: bool = False) -> End:
-        """The end at a place that was picked, with its spacing, in the picture of a pose.
+    def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> End:
+        """The end at a place that was picked, with its spacing, in the picture of a pose that is moved to a
+        place.
 
         filled: whether a place may be taken that no point shows. Such a place is at least as uncertain
         as the nearest point is far. Raises InputError for one where it may not.
@@ -56,10 +58,11 @@ class End:
             hint = "Click where points are, or allow filled places"
             raise InputError("nothing was measured here, the hole is filled", hint=hint)
         if picked.point is not None:
-            place, snapped, spacing = picked.point, "point", picked.spacing
+            end, snapped, spacing = picked.point, "point", picked.spacing
         else:
-            place, snapped, spacing = picked.position, "surface", _spacing_near(pose.cloud, picked.position)
-        x, y, z = (float(v) for v in place)
+            unmoved = place.inverse.points(picked.position)
+            end, snapped, spacing = picked.position, "surface", _spacing_near(pose.cloud, unmoved)
+        x, y, z = (float(v) for v in end)
         return cls(pose.index, float(pose.time), (x, y, z), snapped, picked.id, spacing, picked.level)  # type: ignore[arg-type]
 
 
@@ -110,10 +113,11 @@ class Reading:
         return "fixed in space" if self.fixed else "follows points"
 
 
-def read(measurement: Measurement, pose: Pose, one_topology: bool | None) -> Reading:
+def read(measurement: Measurement, pose: Pose, one_topology: bool | None, place: Rigid = STILL) -> Reading:
     """The measurement in a pose: its ends at the places of their points there, or where they were.
 
-    one_topology: as the `Timeline` says. Spacings stay those of the frame in which it was made.
+    place: that the pose is moved to. one_topology: as the `Timeline` says. Spacings stay those of the frame
+    in which it was made.
     """
     moved = []
     for end in measurement.ends:
@@ -125,7 +129,8 @@ def read(measurement: Measurement, pose: Pose, one_topology: bool | None) -> Rea
             return Reading(measurement, "the scan does not tell which points are the same in other frames")
         if (row := pose.cloud.row_of(end.id)) is None:
             return Reading(measurement, f"point {end.id} is missing in this frame")
-        x, y, z = (float(v) for v in pose.cloud.positions[row] + pose.cloud.origin)
+        point = place.points(pose.cloud.positions[row] + pose.cloud.origin)
+        x, y, z = (float(v) for v in point)
         moved.append(replace(end, frame=pose.index, time=float(pose.time), position=(x, y, z)))
     return Reading(Measurement(*moved), None)
 

@@ -22,13 +22,14 @@ _WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
 class Picked:
     """What a pixel shows: a place on the surface, and the point of the scan that gave it.
 
-    position: (3,) float64, scan units: the surface at the pixel's centre.
+    position: (3,) float64, scan units: the surface at the pixel's centre. Places and normals are the world's,
+    into which the layers of the picture may have moved the scan.
     level: 0 measured, n filled from level n; the fields below are empty where it was filled.
     row: the point's place in the cloud's arrays; the first of several that are shown as one. id: its index
     in the file.
     point: (3,) float64, scan units: the point itself. color: (4,) uint8, sRGB and alpha.
     normal: (3,) float32. These two are the scan's own, None where it has none.
-    scalars: name -> number.
+    scalars: name -> number, of the scan and of layers.
     spacing: distance between the points around it, scan units: how uncertain `point` is as a
     place on the body. None where it was not asked for or all points coincide.
     """
@@ -68,19 +69,20 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
         return None
     cloud = surface.scan
     center = np.array([[x + 0.5, y + 0.5]])
-    position = surface.view.unproject(center, np.array([depth]))[0] + cloud.origin
+    place = surface.layers.place
+    position = place.points(surface.view.unproject(center, np.array([depth]))[0] + cloud.origin)
     if row == NOTHING:
         return Picked(position, level)
-    row = surface.point_of(row)
+    row, scalars = surface.point_of(row), {**cloud.scalars, **surface.layers.scalars}
     return Picked(
         position,
         level,
         row,
         id=row if cloud.ids is None else int(cloud.ids[row]),
-        point=cloud.positions[row] + cloud.origin,
+        point=place.points(cloud.positions[row] + cloud.origin),
         color=None if cloud.colors is None else cloud.colors[row].copy(),
-        normal=None if cloud.normals is None else cloud.normals[row].copy(),
-        scalars={name: values[row].item() for name, values in cloud.scalars.items()},
+        normal=None if cloud.normals is None else place.directions(cloud.normals[row].copy()),
+        scalars={name: values[row].item() for name, values in scalars.items()},
         spacing=spacing_at(cloud, row) if spacing else None,
     )
 
@@ -123,7 +125,8 @@ def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:
     Reads one pixel from the GPU. position: (3,), scan units. slack: how far before the place, scan units, the
     surface may be that still is the place's own.
     """
-    offset = np.subtract(position, surface.pose.cloud.origin)[None]
+    unmoved = surface.layers.place.inverse.points(np.asarray(position, np.float64))
+    offset = (unmoved - surface.pose.cloud.origin)[None]
     if not surface.view.contains(offset)[0]:
         return False
     pixels, depths = surface.view.project(offset)

@@ -33,8 +33,10 @@ def anonymous_request(request: Request, start: float) -> Request:
     """
     pose = request.pose
     middle = middle_of(pose)
-    look = raised(unnamed(request.look, pose.cloud.scalars), -middle)
-    return replace(request, pose=anonymous_pose(pose, start), camera=request.camera.moved(-middle), look=look)
+    look = raised(unnamed(request.look, request.layers.names(pose.cloud.scalars)), -middle)
+    layers = replace(request.layers, place=request.layers.place.in_frame(middle))
+    anonymous, camera = anonymous_pose(pose, start), request.camera.moved(-middle)
+    return replace(request, pose=anonymous, camera=camera, look=look, layers=layers)
 
 
 @lru_cache(maxsize=1)  # several pictures of one pose share what is uploaded of it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -17,7 +18,6 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
-from ..geometry import up_vector
 from ..scan.colors import srgb8_from_linear
 from ..scan.points import PointCloud
 from ..scan.range_view import RangeView
@@ -69,6 +69,8 @@ class GpuPose:
         self.uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._facts: dict[str, Any] = {}
+        self._layers: dict[int, Layer] = {}
+        self._height_axis: tuple[float, ...] | None = None
 
     @property
     def bounds(self) -> Bounds:
@@ -176,17 +178,38 @@ class GpuPose:
         """The 2 % and 98 % quantiles of a scalar's finite values."""
         return self.remember(f"range of {name}", lambda: robust_range(_strided(self.scalar(name))))
 
-    def value_zero(self, source: str, up: str) -> float:
-        """What "depth", "height" along an axis or a scalar is relative to on the GPU. It is taken off in
-        float64, so that heights and times far from zero keep their steps."""
-        if source == "height":
-            return float(self.cloud.origin @ up_vector(up))
-        return 0.0 if source == "depth" else self.scalar_range(source)[0]
+    def layer(self, values: NDArray) -> Layer:
+        """Numbers of the scan's points that are not part of it, (N,): kept, where they are uploaded, for as
+        long as somebody holds this array."""
+        for key in [key for key, layer in self._layers.items() if layer.values() is None]:
+            gone = self._layers.pop(key)
+            if gone.texels is not None:
+                self.uploaded_bytes -= gone.texels.buffer.size
+                self.gpu.discard(gone.texels)
+        if id(values) not in self._layers:
+            self._layers[id(values)] = Layer(weakref.ref(values), robust_range(_strided(values)))
+        return self._layers[id(values)]
 
-    def heights(self, up: str) -> gl.BufferTexture:
-        """The height of each point along `up`, relative to the origin; for what cannot go by positions."""
-        axis = np.array(up_vector(up), np.float32)
-        return self.packed(f"heights along {up}", lambda: self.cloud.positions @ axis)
+    def layer_texels(self, values: NDArray, zero: float, rows: NDArray[np.uint32] | None) -> gl.BufferTexture:
+        """Texels of a layer, relative to zero, uploaded at the first call. rows: those of the layer that this
+        pose's points stand for; None where they are the scan's."""
+        layer = self.layer(values)
+        if layer.texels is None:
+            with self.preparing("upload"):
+                upload = _array_upload(self.gpu, as_float32(values if rows is None else values[rows], zero))
+                upload.go_on(np.inf)
+                layer.texels = gl.BufferTexture(upload.target, gl.R32F)
+                self.uploaded_bytes += upload.nbytes
+        return layer.texels
+
+    def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
+        """The height of each point along an axis, relative to the origin; for what cannot go by positions."""
+        if self._height_axis not in (None, axis):  # of the last axis alone: it turns with the pose
+            gone = self._arrays.pop("packed:heights")
+            self.uploaded_bytes -= gone.buffer.size
+            self.gpu.discard(gone)
+        self._height_axis = axis
+        return self.packed("heights", lambda: self.cloud.positions @ np.array(axis, np.float32))
 
     @cached_property
     def sample(self) -> NDArray[np.float64]:
@@ -211,7 +234,17 @@ class GpuPose:
 
     def __del__(self) -> None:
         begun = (upload.target for upload in self._uploads.values())
-        self.gpu.discard(*self._arrays.values(), *self._images.values(), *begun)
+        layers = (layer.texels for layer in self._layers.values())
+        self.gpu.discard(*self._arrays.values(), *self._images.values(), *layers, *begun)
+
+
+@dataclass
+class Layer:
+    """Numbers that lie over a pose. range: their 2 % and 98 % quantiles. texels: on the GPU, None before."""
+
+    values: weakref.ref[NDArray]
+    range: tuple[float, float]
+    texels: gl.BufferTexture | None = None
 
 
 @dataclass

@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry import up_vector
 from ..look import Look, color_table, rgba, value_source
 from . import gl
 from .bindings import Storage, Texture
-from .blocks import Vec4
+from .blocks import Mat4, Vec4
 from .context import Gpu
 from .pose import robust_range
 from .surface import Surface
@@ -27,14 +28,15 @@ _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
 class _Shading:
     """What shade.comp is told of a look.
 
-    plain, background: sRGB and alpha. height_axis: up. light: towards it, view space. phong: ambient,
-    diffuse, specular, shininess. value_range: of the colour map, relative to the zero that values are
-    stored from.
+    plain, background: sRGB and alpha. height_axis: up, along the pose's axes. to_world: turns these. light:
+    towards it, view space. phong: ambient, diffuse, specular, shininess. value_range: of the colour map,
+    relative to the zero that values are stored from.
     """
 
     plain: Vec4
     background: Vec4
     height_axis: Vec4
+    to_world: Mat4
     light: Vec4
     phong: Vec4
     value_range: tuple[float, float]
@@ -46,7 +48,7 @@ def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
     pose, gpu = surface.pose, surface.gpu
     cloud = pose.cloud
-    source, surface.look = value_source(look, cloud.scalars), look
+    source, surface.look = value_source(look, surface.layers.names(cloud.scalars)), look
     value = source if source in (None, "depth", "height") else "scalar"
     color = "value" if source is not None else "own" if look.color_by == "auto" else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
@@ -61,6 +63,7 @@ def shade(surface: Surface, look: Look) -> None:
             "VALUE": _VALUE_CODES[value or "scalar"],
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
+            "TURNED": int(not surface.layers.place.is_identity),
             "HAS_IDS": int(cloud.ids is not None),
             **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
         },
@@ -79,7 +82,7 @@ def shade(surface: Surface, look: Look) -> None:
         if surface.is_own("value"):
             surface.own("value").bind(Texture.VALUES)
         elif value == "scalar":
-            pose.array(f"scalar:{source}").bind(Texture.VALUES)
+            surface.scalar_texels(source or "").bind(Texture.VALUES)
         elif value == "height":
             pose.array("positions").bind(Texture.POSITIONS)
         if color == "id" and cloud.ids is not None:
@@ -99,13 +102,21 @@ def _shading(surface: Surface, look: Look) -> _Shading:
     return _Shading(
         plain=_fractions(look.plain),
         background=_fractions(look.background),
-        height_axis=(*up_vector(look.up), 0.0),
+        height_axis=(*surface.height_axis, 0.0),
+        to_world=_columns(surface.layers.place.rotation),
         light=(*_direction(look.azimuth, look.elevation), 0.0),
         phong=(look.ambient, look.diffuse, look.specular, look.shininess),
         value_range=(_finite(low - zero), _finite(high - zero)),
         eye_dome_strength=look.eye_dome_strength,
         eye_dome_radius=look.eye_dome_radius,
     )
+
+
+def _columns(rotation: NDArray[np.float64]) -> Mat4:
+    """A rotation, (3, 3), as shaders hold it."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.T
+    return tuple(tuple(float(v) for v in column) for column in matrix)  # type: ignore[return-value]
 
 
 def _finite(value: float) -> float:
@@ -130,9 +141,10 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     if source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample))
     elif source == "height":
-        low, high = robust_range((pose.sample + pose.cloud.origin) @ up_vector(look.up))
+        world = surface.layers.place.points(pose.sample + pose.cloud.origin)
+        low, high = robust_range(world @ up_vector(look.up))
     else:
-        low, high = pose.scalar_range(source or "")
+        low, high = surface.scalar_range(source or "", pose)
     return (low if look.low is None else look.low, high if look.high is None else look.high)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry import up_vector
 from ..look import Look, rgba, value_source
+from ..scan.layers import NO_LAYERS, Layers
 from ..scan.points import PointCloud
 from ..srgb import linear_from_bytes
 from ..view import View
@@ -84,7 +85,8 @@ class Surface:
     shows, 0xFFFFFFFF: none), one word a pixel. A pixel is covered where its depth is finite. Colour,
     normal and value are those of the row, unless the backend wrote its `own`; a pixel without a row is
     filled, and what the backend did not write of it is unknown. Reading a property copies it to the CPU.
-    look: what it is drawn for, and shaded in last; shaded_by: what did it, None before.
+    look: what it is drawn for, and shaded in last; shaded_by: what did it, None before. layers: over the
+    pose.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
     """
 
@@ -112,6 +114,7 @@ class Surface:
         self._shown: tuple[GpuPose, View] | None = None
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
         self.look = Look()
+        self.layers = NO_LAYERS
         self.shaded_by: Callable[[Surface, Look], None] | None = None
         self.color_range: tuple[float, float] | None = None
         self.stats = Stats()
@@ -124,9 +127,9 @@ class Surface:
 
     # --- for backends -----------------------------------------------------------------
 
-    def start(self, pose: GpuPose, view: View, look: Look | None = None) -> None:
+    def start(self, pose: GpuPose, view: View, look: Look | None = None, layers: Layers = NO_LAYERS) -> None:
         """Begin a frame: what backends and shading read from now on."""
-        self._shown, self._stood_for, self.look = (pose, view), None, look or Look()
+        self._shown, self._stood_for, self.look, self.layers = (pose, view), None, look or Look(), layers
         self._block.write(ViewBlock.of(view))
         self.bind_view()
         self._covered_known = False
@@ -218,7 +221,7 @@ class Surface:
         place of what the row has. Where nothing is, it is unread. As buffers:
 
         color: RGBA8, sRGB, the alpha being what it covers of the pixel
-        normal: 3 floats, world space, of any length; 0: unknown
+        normal: 3 floats, along the pose's axes, of any length; 0: unknown
         value: float, the number that is coloured by, in the terms of `row_values`; NaN: unknown
         level: uint32, 0 where measured; n, up to 254, where filled from level n, with a depth and no row
         """
@@ -263,13 +266,36 @@ class Surface:
     @property
     def value_source(self) -> str | None:
         """What the look colours by where that is a number ("depth", "height", a scalar's name), else None."""
-        return value_source(self.look, self._cloud.scalars)
+        return value_source(self.look, self.layers.names(self._cloud.scalars))
 
     @property
     def value_zero(self) -> float:
-        """What values on the GPU are relative to."""
+        """What values on the GPU are relative to. It is taken off in float64, so that heights and times far
+        from zero keep their steps."""
         source = self.value_source
-        return 0.0 if source is None else self.pose.value_zero(source, self.look.up)
+        if source == "height":
+            return float(self.layers.place.points(self._cloud.origin) @ up_vector(self.look.up))
+        return 0.0 if source in (None, "depth") else self.scalar_range(source, self.pose)[0]
+
+    def scalar_range(self, name: str, pose: GpuPose) -> tuple[float, float]:
+        """The 2 % and 98 % quantiles of a layer's or else a pose's finite numbers."""
+        layer = self.layers.scalars.get(name)
+        return pose.scalar_range(name) if layer is None else self.scanned.layer(layer).range
+
+    def scalar_texels(self, name: str) -> gl.BufferTexture:
+        """The numbers of each row, of a layer or the scan, relative to `value_zero`."""
+        layer = self.layers.scalars.get(name)
+        if layer is None:
+            return self.pose.array(f"scalar:{name}")
+        rows = self._stood_for[1] if self._stood_for else None
+        return self.pose.layer_texels(layer, self.scalar_range(name, self.pose)[0], rows)
+
+    @property
+    def height_axis(self) -> tuple[float, float, float]:
+        """The look's up along the pose's axes."""
+        up = np.array(up_vector(self.look.up), np.float64)
+        x, y, z = (float(v) for v in self.layers.place.inverse.directions(up))
+        return x, y, z
 
     @property
     def row_values(self) -> gl.BufferTexture | None:
@@ -278,7 +304,7 @@ class Surface:
         source = self.value_source
         if source in (None, "depth"):
             return None
-        return self.pose.heights(self.look.up) if source == "height" else self.pose.array(f"scalar:{source}")
+        return self.pose.heights(self.height_axis) if source == "height" else self.scalar_texels(source)
 
     @property
     def nbytes(self) -> int:
@@ -350,7 +376,8 @@ class Surface:
             fetched = self._fetch(self._cloud.normals, np.zeros(3, np.float32))
         length = np.linalg.norm(fetched, axis=2, keepdims=True)
         usable = np.isfinite(length) & (length > 0)
-        return np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
+        along_pose = np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
+        return self.layers.place.directions(along_pose)
 
     @property
     def coverage(self) -> NDArray[np.float32]:
@@ -397,11 +424,17 @@ class Surface:
             return np.where(self._covered, as_float32(written, -self.value_zero), unknown)
         if source == "depth":
             return np.where(self._covered, self.depth, unknown)
-        values = None
-        if source is not None:
-            exact = cloud.world() @ up_vector(self.look.up) if source == "height" else cloud.scalars[source]
-            values = as_float32(exact)
-        return self._fetch(values, unknown)
+        if source is None:
+            return self._fetch(None, unknown)
+        values: NDArray
+        if source == "height":
+            values = self.layers.place.points(cloud.world()) @ up_vector(self.look.up)
+        elif source in self.layers.scalars:
+            layer = self.layers.scalars[source]
+            values = layer[self._stood_for[1]] if self._stood_for else layer
+        else:
+            values = cloud.scalars[source]
+        return self._fetch(as_float32(values), unknown)
 
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""

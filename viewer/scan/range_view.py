@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..rigid import is_rigid
 from .colors import srgb8_from_linear
 from .grid_normals import normals_of_grid
 from .points import UNKNOWN_UNIT, PointCloud
@@ -66,7 +67,7 @@ class RangeView:
         if not (np.isfinite([self.fx, self.fy, self.cx, self.cy]).all() and self.fx > 0 and self.fy > 0):
             given = f"fx {self.fx:g}, fy {self.fy:g}, cx {self.cx:g}, cy {self.cy:g}"
             raise InputError(f"a range view's calibration is unusable: {given}")
-        if not _is_rigid(self.world_to_camera):
+        if not is_rigid(self.world_to_camera, _RIGID):
             raise InputError("a range view's world_to_camera is not a rotation and a translation")
 
     @property
@@ -188,14 +189,3 @@ def memory_of_merging(views: Sequence[RangeView]) -> int:
     points = sum(int(np.count_nonzero(view.valid())) for view in views)
     images = sum(view.nbytes + view.mask.size for view in views)
     return images + points * _MERGED_BYTES + _MERGING_BYTES
-
-
-def _is_rigid(matrix: NDArray[np.float64]) -> bool:
-    rotation = matrix[:3, :3]
-    return bool(
-        np.isfinite(matrix).all()
-        and (np.abs(rotation) < 2).all()
-        and np.allclose(rotation @ rotation.T, np.eye(3), rtol=0, atol=_RIGID)
-        and np.linalg.det(rotation) > 0
-        and (matrix[3] == (0, 0, 0, 1)).all()
-    )

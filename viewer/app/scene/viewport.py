@@ -74,7 +74,7 @@ class Viewport:
         """
         size = self.place[2:]
         wanted = (
-            request.pose, request.camera, request.backend, request.params, request.look, size,
+            request.pose, request.camera, request.backend, request.params, request.look, request.layers, size,
             self.renderer.gpu.timers.enabled,
         )  # fmt: skip
         now, before = time.monotonic(), self.surface

@@ -1,0 +1,84 @@
+"""Rigid motions: a rotation and a translation, by which a scan is moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bounds import Bounds
+from .errors import InputError
+
+_EXACT = 1e-6  # how far the rotation of a `Rigid` may be from orthonormal
+
+
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """A rotation and a translation of column vectors, in float64.
+
+    matrix: (4, 4). What is moved by the identity stays the very same, bit for bit. Raises InputError for
+    any other matrix than a rotation and a translation.
+    """
+
+    matrix: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    is_identity: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        matrix = np.array(self.matrix, np.float64)
+        if matrix.shape != (4, 4) or not is_rigid(matrix, _EXACT):
+            raise InputError("a transform is not a rotation and a translation", hint="Give a 4 x 4 matrix")
+        matrix.setflags(write=False)
+        object.__setattr__(self, "matrix", matrix)
+        object.__setattr__(self, "is_identity", bool((matrix == np.eye(4)).all()))
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """(3, 3)."""
+        return self.matrix[:3, :3]
+
+    @property
+    def inverse(self) -> Rigid:
+        """The motion back."""
+        back = np.eye(4)
+        back[:3, :3] = self.rotation.T
+        back[:3, 3] = -self.rotation.T @ self.matrix[:3, 3]
+        return Rigid(back)
+
+    def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Moved points, (..., 3)."""
+        return points if self.is_identity else points @ self.rotation.T + self.matrix[:3, 3]
+
+    def directions(self, vectors: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Turned vectors (..., 3), of their own type."""
+        return vectors if self.is_identity else (vectors @ self.rotation.T).astype(vectors.dtype)
+
+    def bounds(self, bounds: Bounds) -> Bounds:
+        """The upright box around a moved one."""
+        if self.is_identity:
+            return bounds
+        corners = self.points(bounds.corners())
+        return Bounds(corners.min(axis=0), corners.max(axis=0))
+
+    def in_frame(self, origin: NDArray[np.float64]) -> Rigid:
+        """A motion that is the same in coordinates that count from an origin, (3,)."""
+        if self.is_identity:
+            return self
+        moved = self.matrix.copy()
+        moved[:3, 3] += self.rotation @ origin - origin
+        return Rigid(moved)
+
+
+def is_rigid(matrix: NDArray[np.float64], tolerance: float) -> bool:
+    """Whether a (4, 4) matrix is a rotation and a translation. tolerance: from orthonormal."""
+    rotation = matrix[:3, :3]
+    return bool(
+        np.isfinite(matrix).all()
+        and (np.abs(rotation) < 2).all()
+        and np.allclose(rotation @ rotation.T, np.eye(3), rtol=0, atol=tolerance)
+        and np.linalg.det(rotation) > 0
+        and (matrix[3] == (0, 0, 0, 1)).all()
+    )
+
+
+STILL = Rigid()
