@@ -18,8 +18,10 @@ from typing import Any
 import glfw
 from imgui_bundle import imgui
 
+from viewer.analysis.measure import Measurement, Reading, read
 from viewer.app import run
 from viewer.app.app import App
+from viewer.document.measurements import Measurements
 
 
 class Observer:
@@ -89,17 +91,9 @@ def shown(app: App) -> dict[str, Any]:
         "is_export_open": app.exporting.is_open,
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,
-        "is_measuring": app.measuring.active,
-        "begun": app.measuring.begun and asdict(app.measuring.begun),
-        "measurements": [
-            {
-                "ends": [asdict(end) for end in reading.measurement.ends],
-                "distance": reading.measurement.distance,
-                "uncertainty": reading.measurement.uncertainty,
-                "motion": reading.motion,
-            }
-            for reading in app.measuring.readings()
-        ],
+        "clicking": app.tools.clicking,
+        "is_under_way": app.tools.is_under_way,
+        "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
         "camera": document.camera and document.camera.to_json(),
     }
     if viewport.is_there and viewport.request is not None and surface is not None:
@@ -110,6 +104,18 @@ def shown(app: App) -> dict[str, Any]:
             "points": len(viewport.request.pose.cloud) - surface.stats.left_out,
         }
     return state
+
+
+def told(measurement: Measurement, app: App) -> dict[str, Any]:
+    """A measurement as it stands in the frame that is shown."""
+    pose, one_topology = app.playback.pose, app.playback.timeline.one_topology
+    reading = read(measurement, pose, one_topology) if pose is not None else Reading(measurement, None)
+    return {
+        "ends": [asdict(end) for end in reading.measurement.ends],
+        "distance": reading.measurement.distance,
+        "uncertainty": reading.measurement.uncertainty,
+        "motion": reading.motion,
+    }
 
 
 def main() -> None:

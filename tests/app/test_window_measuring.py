@@ -60,12 +60,10 @@ def ctrl(screen: Screen, key: str) -> None:
 def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) -> tuple[float, float]:
     """Click two points, the second one twice by habit; distance and uncertainty as the app has them."""
     click(app, pixel_of(app, points, one))
-    ends = [app.see(lambda state: state.begun).begun]
+    app.see(is_under_way=True)
     click(app, pixel_of(app, points, other), times=2)
     measurement = app.see(lambda state: state.measurements).measurements[-1]
-    ends.append(measurement["ends"][1])
-    assert ends[0] == measurement["ends"][0]
-    assert [(end["position"], end["id"], end["frame"]) for end in ends] == [
+    assert [(end["position"], end["id"], end["frame"]) for end in measurement["ends"]] == [
         (points[number].tolist(), number, 0) for number in (one, other)
     ]
     return measurement["distance"], measurement["uncertainty"]
@@ -119,7 +117,7 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
     distances = [math.dist(points[34], points[128]) for points in frames]
     with running_app(screen, tmp_path, "scan.npz") as app:
         screen.do("key", "m")
-        app.see(is_measuring=True)
+        app.see(clicking="measuring")
         name_unit(app, "cm")
         distance, uncertainty = measure(app, frames[0], 34, 128)
         assert distance == distances[0]
@@ -140,7 +138,7 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         app.settle()
         screen.do("key", "Escape")
         app.settle()
-        assert app.state.is_measuring, "Escape closes the dialog alone"
+        assert app.state.clicking == "measuring", "Escape closes the dialog alone"
         ctrl(screen, "s")
         app.settle()
         screen.do("type", "--delay", 40, "nowhere/table")
@@ -168,10 +166,10 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         expect_reading(app, distances[1])  # it is the same scan by another name
 
         screen.do("key", "Escape")
-        app.see(is_measuring=False)
+        app.see(clicking=None)
         click(app, pixel_of(app, frames[0], 34))
         after = app.settle()
-        assert (after.begun, len(after.measurements)) == (None, 1), "clicks set no ends any longer"
+        assert (after.is_under_way, len(after.measurements)) == (False, 1), "clicks set no ends any longer"
         assert "Traceback" not in app.log()
 
 
@@ -199,5 +197,7 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
         screen.do("sleep", 0.2, "mouseup", 1)
         after = app.settle()
         assert after.camera != before.camera
-        assert (after.begun, len(after.measurements)) == (None, 1), "a drag turns the view and sets no end"
+        assert (after.is_under_way, len(after.measurements)) == (False, 1), (
+            "a drag turns the view and sets no end"
+        )
         assert "Traceback" not in app.log()

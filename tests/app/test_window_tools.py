@@ -86,12 +86,12 @@ def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Pat
         assert count(app, YELLOW) == one, "undo takes the second away"
 
         screen.do("key", "m")
-        app.expect("measuring begins")
+        app.see(clicking="measuring")
         click(app, x - 60, y)
-        app.expect("end at")
+        app.see(is_under_way=True)
         assert count(app, YELLOW) == one, "the clicks are measuring's now"
         screen.do("key", "Escape")
-        app.expect("measuring ends")
+        app.see(clicking=None)
         screen.do("key", "alt+n", "sleep", 0.2, "key", "Escape")
         app.settle()
         click(app, x + 100, y + 60)
@@ -172,24 +172,27 @@ def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
         x, y = middle(app)
         for name in ("in_command", "in_work", "in_result"):
             screen.do("key", keys[name].lower(), "sleep", 0.2)
-            app.expect(f"{name} is switched off")
+            app.told(f"{name} is switched off")
         screen.do("key", keys["in_escape"].lower(), "sleep", 0.2, "key", "Escape")
-        app.expect("in_escape is switched off")
+        app.told("in_escape is switched off")
         screen.do("key", keys["in_prompt"].lower())
-        app.expect("in_prompt is switched off")
+        app.told("in_prompt is switched off")
         screen.do("key", keys["in_click"].lower(), "sleep", 0.2)
         click(app, x, y)
-        app.expect("in_click is switched off")
+        app.told("in_click is switched off")
         click(app, x, y)
 
         screen.do("key", keys["in_command"].lower(), "sleep", 0.2, "key", "m")
-        app.expect("measuring begins")
+        app.see(clicking="measuring")
         click(app, x, y)
-        app.expect("end at")
+        app.see(is_under_way=True)
         screen.do("key", "Escape")
-        app.expect("measuring ends")
+        app.see(clicking=None)
         close(app)
-    told = re.findall(r"^(\w+[\w ]*) is switched off until the next start: (.*)$", app.log(), re.MULTILINE)
+    found = (
+        re.fullmatch(r"(\w+[\w ]*) is switched off until the next start: (.*)", note) for note in app.notes
+    )
+    told = [match.groups() for match in found if match]
     assert len(told) == len(FAILING), "each once"
     reasons = dict(told)
     assert reasons["at_parsing"].startswith("SyntaxError")
@@ -215,12 +218,13 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
         for _ in range(2):
             screen.do("key", "alt+a", "sleep", 0.2)
-            app.expect("a mistake")
+            app.told("a mistake")
         screen.do("key", "m")
-        app.expect("measuring begins")
+        app.see(clicking="measuring")
         close(app)
-    assert "M is to do both 'measure' and 'act_second'" in app.log()
-    assert "third is switched off until the next start: unknown modifier key 'Hyper'" in app.log()
-    assert "fourth is switched off until the next start: there is a command 'measure' already" in app.log()
-    assert "no tool" not in app.log()
-    assert "first is switched off" not in app.log()
+    told = "\n".join(app.notes)
+    assert "M is to do both 'measure' and 'act_second'" in told
+    assert "third is switched off until the next start: unknown modifier key 'Hyper'" in told
+    assert "fourth is switched off until the next start: there is a command 'measure' already" in told
+    assert "no tool" not in told
+    assert "first is switched off" not in told

@@ -170,7 +170,7 @@ class RunningApp:
             while (found := find()) is None:
                 seconds = deadline - time.monotonic()
                 assert self._reader.is_alive(), f"the app has ended without {wanted}:\n{self.log()}"
-                assert seconds > 0, f"no {wanted} in time:\n{self.states[-1]}\n{self.log()}"
+                assert seconds > 0, f"no {wanted} in time:\n{self.states[-1:]}\n{self.log()}"
                 self._came.wait(seconds)
             return found
 
@@ -183,7 +183,7 @@ class RunningApp:
 
         first = next(state for state in self.states if state.pictures)
         press_while("space", lambda state: state.is_playing)
-        press_while("Escape", lambda state: state.is_measuring or state.is_export_open)
+        press_while("Escape", lambda state: state.clicking or state.is_export_open)
         for keys, field in (("e", "every_frame"), ("l", "loop"), ("shift+space", "reverse")):
             press_while(keys, lambda state: getattr(state, field) != getattr(first, field))  # noqa: B023
         press_while("t", lambda state: state.theme != first.theme)
