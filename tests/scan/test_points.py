@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 import warnings
 
 import numpy as np
@@ -86,3 +87,18 @@ def test_splats_far_larger_than_the_scan_are_shortened_and_counted(length: float
 def test_a_splat_of_a_single_point_keeps_its_size() -> None:
     cloud = PointCloud.from_arrays(np.ones((1, 3)), radii=np.array([5.0]))
     assert (cloud.radii[0], cloud.shortened) == (5, 0)
+
+
+def test_facts_are_found_once_and_stay_where_they_were_found() -> None:
+    cloud, found = PointCloud.from_arrays([[0.0, 0, 0], [1, 2, 3]]), []
+
+    def count(points: PointCloud, times: int) -> int:
+        found.append(times)
+        return times * len(points)
+
+    assert [cloud.remember(count, times) for times in (2, 3, 2, 3)] == [4, 6, 4, 6]
+    assert found == [2, 3]
+    copy = pickle.loads(pickle.dumps(cloud))  # as it goes to another process, though `count` could not
+    assert np.array_equal(copy.positions, cloud.positions)
+    assert copy.remember(count, 2) == 4
+    assert found == [2, 3, 2]

@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scan.points import PointCloud
 from . import gl
 from .bindings import Texture, UniformBlock
 from .blocks import Values
@@ -30,6 +31,7 @@ FEEDS = tuple(_FEEDS)
 _WHOLE = ("ubo", "vbo")  # feeds that bring a pose's points one after the other, without choice
 _BLOCK_BYTES = 1 << 16  # of a uniform block; some drivers allow less or more
 _BLOCK_POINTS = 64  # ranges begin at multiples of 256 bytes, whatever a point takes
+Attributes = tuple[tuple[str, str, int], ...]
 # What a point has: name of the pose's array, of the vertex attribute, floats. The first two always, radii
 # where points bring their own, half-axes where these are elliptical.
 _ATTRIBUTES = (
@@ -81,7 +83,7 @@ class Points:
         return self.buffers.get(name) or self.pose.array(name)
 
     @property
-    def attributes(self) -> tuple[tuple[str, str, int], ...]:
+    def attributes(self) -> Attributes:
         """What is read of each: (name of the pose's array, of the vertex attribute, floats)."""
         return _ATTRIBUTES[: 4 if self.use_axes else 3 if self.use_radii else 2]
 
@@ -195,7 +197,7 @@ def _draw_blocks(program: moderngl.Program, points: Points, shape: Shape) -> Non
     """Range after range of one buffer as a uniform block, a draw call each."""
     gpu, size = points.pose.gpu, _block_points(points)
     point_bytes = 4 * points.stride
-    packed = points.pose.packed(f"block of {points.stride}", lambda: _pack(points)).buffer
+    packed = points.pose.packed(_pack, points.attributes, size).buffer
     vertices = gpu.ctx.vertex_array(program, [])
     for first in range(0, points.count, size):
         packed.bind_to_uniform_block(UniformBlock.POINTS, offset=first * point_bytes, size=size * point_bytes)
@@ -213,10 +215,9 @@ def _block_points(points: Points) -> int:
     return fitting - fitting % _BLOCK_POINTS
 
 
-def _pack(points: Points) -> NDArray[np.float32]:
+def _pack(cloud: PointCloud, attributes: Attributes, size: int) -> NDArray[np.float32]:
     """The attributes of each point one after the other, (ranges x points of a block, floats)."""
-    cloud, size = points.pose.cloud, _block_points(points)
-    packed = np.zeros((-(-len(cloud) // size) * size, points.stride), np.float32)
-    arrays = [getattr(cloud, name).reshape(len(cloud), -1) for name, _, _ in points.attributes]
+    packed = np.zeros((-(-len(cloud) // size) * size, sum(floats for *_, floats in attributes)), np.float32)
+    arrays = [getattr(cloud, name).reshape(len(cloud), -1) for name, _, _ in attributes]
     packed[: len(cloud)] = np.concatenate(arrays, axis=1)
     return packed

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
-from typing import Any, TypeVar
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -24,7 +24,6 @@ from ..scan.range_view import RangeView
 from . import gl
 from .context import Gpu
 
-T = TypeVar("T")
 # What one texel of each array is.
 FORMATS = {
     "positions": gl.RGB32F,
@@ -56,7 +55,7 @@ class GpuPose:
 
     def __init__(self, gpu: Gpu, cloud: PointCloud, views: tuple[RangeView, ...] = ()) -> None:
         self.gpu = gpu
-        self._arrays: dict[str, gl.BufferTexture] = {}
+        self._arrays: dict[Hashable, gl.BufferTexture] = {}  # by name; what is packed, by how
         self._images: dict[str, moderngl.Texture] = {}
         self._uploads: dict[str, _Upload] = {}  # that have begun
         if len(cloud) > gpu.max_points:
@@ -68,7 +67,6 @@ class GpuPose:
         self.views = views
         self.uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
-        self._facts: dict[str, Any] = {}
         self._layers: dict[int, Layer] = {}
         self._height_axis: tuple[float, ...] | None = None
 
@@ -113,15 +111,15 @@ class GpuPose:
             end = time.perf_counter() + budget_ms / 1e3
             return all(self._upload(name, end) for name in missing)
 
-    def packed(self, name: str, pack: Callable[[], NDArray], texel_format: int = gl.R32F) -> gl.BufferTexture:
-        """The pose's arrays arranged in another way, which `pack` does at the first call for this name.
-
-        Counted, kept and deleted with the arrays.
-        """
-        key = f"packed:{name}"
+    def packed(
+        self, pack: Callable[..., NDArray], *args: Hashable, texel_format: int = gl.R32F
+    ) -> gl.BufferTexture:
+        """Another arrangement of the pose's arrays, which `pack` makes of its cloud and the arguments at the
+        first call for these. Counted, kept and deleted with the arrays."""
+        key = (pack, *args)
         if key not in self._arrays:
             with self.preparing("upload"):
-                upload = _array_upload(self.gpu, pack())
+                upload = _array_upload(self.gpu, pack(self.cloud, *args))
                 upload.go_on(np.inf)
                 self._keep_array(key, upload, texel_format)
         return self._arrays[key]
@@ -146,8 +144,8 @@ class GpuPose:
         number, image = name.removeprefix(_VIEW).split(":")
         return _image_upload(self.gpu, self.views[int(number)], image)
 
-    def _keep_array(self, name: str, upload: _Upload, texel_format: int) -> None:
-        self._arrays[name] = gl.BufferTexture(upload.target, texel_format)
+    def _keep_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
+        self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
         self.uploaded_bytes += upload.nbytes
 
     def _values(self, name: str) -> NDArray:
@@ -168,15 +166,10 @@ class GpuPose:
             raise unknown_name("scalar", name, list(self.cloud.scalars))
         return self.cloud.scalars[name]
 
-    def remember(self, key: str, make: Callable[[], T]) -> T:
-        """What `make` returned the first time for this key: small facts about the pose."""
-        if key not in self._facts:
-            self._facts[key] = make()
-        return self._facts[key]
-
     def scalar_range(self, name: str) -> tuple[float, float]:
         """The 2 % and 98 % quantiles of a scalar's finite values."""
-        return self.remember(f"range of {name}", lambda: robust_range(_strided(self.scalar(name))))
+        self.scalar(name)  # raises for one that is not there
+        return self.cloud.remember(_scalar_range, name)
 
     def layer(self, values: NDArray) -> Layer:
         """Numbers of the scan's points that are not part of it, (N,): kept, where they are uploaded, for as
@@ -205,11 +198,11 @@ class GpuPose:
     def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
         """The height of each point along an axis, relative to the origin; for what cannot go by positions."""
         if self._height_axis not in (None, axis):  # of the last axis alone: it turns with the pose
-            gone = self._arrays.pop("packed:heights")
+            gone = self._arrays.pop((_heights, self._height_axis))
             self.uploaded_bytes -= gone.buffer.size
             self.gpu.discard(gone)
         self._height_axis = axis
-        return self.packed("heights", lambda: self.cloud.positions @ np.array(axis, np.float32))
+        return self.packed(_heights, axis)
 
     @cached_property
     def sample(self) -> NDArray[np.float64]:
@@ -302,6 +295,14 @@ def _image_key(view: int, name: str) -> str:
 
 def _opaque(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.pad(rgb, ((0, 0), (0, 0), (0, 1)), constant_values=255)
+
+
+def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:
+    return robust_range(_strided(cloud.scalars[name]))
+
+
+def _heights(cloud: PointCloud, axis: tuple[float, ...]) -> NDArray[np.float32]:
+    return cloud.positions @ np.array(axis, np.float32)
 
 
 def _strided(values: NDArray) -> NDArray:

@@ -94,7 +94,7 @@ class Surface:
         self.gpu = gpu
         self._resources: tuple[Resource, ...] = ()
         self._own: dict[str, gl.BufferTexture] = {}
-        self._kept: dict[str, Workspace] = {}
+        self._kept: dict[Callable[..., Workspace], Workspace] = {}
         self._raster: gl.Raster | None = None
         width, height = size
         if width < 1 or height < 1:
@@ -209,12 +209,12 @@ class Surface:
         """Copy what was rasterised into the Surface."""
         self.raster().copy_to(self.rows.buffer, self.depths.buffer)
 
-    def keep(self, name: str, make: Callable[[], W]) -> W:
-        """What `make` returned the first time for this name: what a backend works with from picture to
-        picture and does not want to make anew. Counted and deleted with the surface."""
-        if name not in self._kept:
-            self._kept[name] = make()
-        return self._kept[name]  # type: ignore[return-value]
+    def keep(self, make: Callable[[Gpu, tuple[int, int]], W]) -> W:
+        """Make, once, of the context and the size, what a backend works with from picture to picture. Counted
+        and deleted with the surface."""
+        if make not in self._kept:
+            self._kept[make] = make(self.gpu, self.size)
+        return self._kept[make]  # type: ignore[return-value]
 
     def own(self, name: str) -> gl.BufferTexture:
         """A channel that the backend writes itself in this frame for every covered pixel: it is shown in

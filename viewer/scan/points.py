@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from ..bounds import Bounds
 from ..errors import InputError
 from ..task import checkpoint
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 _CHUNK = 1 << 18  # points converted at a time, so that float64 copies stay small
@@ -54,7 +55,7 @@ class PointCloud:
     dropped: int = 0
     shortened: int = 0
     topology: str | None = None
-    _facts: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _facts: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def from_arrays(
@@ -154,13 +155,18 @@ class PointCloud:
         The 2 % to 98 % quantile box, grown on every side by half of its longest edge, and
         then shrunk to the points inside. Found once. Raises InputError where there is no point.
         """
-        return self.remember("bounds", self._find_bounds)
+        return self.remember(PointCloud._find_bounds)
 
-    def remember(self, key: str, make: Callable[[], T]) -> T:
-        """Make a value once for this key and keep it: small facts about the points."""
+    def remember(self, find: Callable[Concatenate[PointCloud, P], T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Find a small fact about the points, once for the same arguments, and keep it."""
+        key = (find, *args, *kwargs.items())
         if key not in self._facts:
-            self._facts[key] = make()
+            self._facts[key] = find(self, *args, **kwargs)
         return self._facts[key]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the facts, which another process finds again where it needs them."""
+        return {**self.__dict__, "_facts": {}}
 
     def _find_bounds(self) -> Bounds:
         if not len(self):

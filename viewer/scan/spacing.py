@@ -33,7 +33,7 @@ def spacings(cloud: PointCloud) -> NDArray[np.float64]:
     k points within s sqrt(k / pi), so the distance to the sixth neighbour gives s; copies of
     a point do not count. Found once for each cloud.
     """
-    return cloud.remember("spacings", lambda: _spacings(cloud))
+    return cloud.remember(_spacings)
 
 
 def spacing_at(cloud: PointCloud, row: int) -> float | None:

@@ -19,6 +19,7 @@ from ...gpu.fastest import choose
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
 from .. import FrameView, Suited
@@ -95,7 +96,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         return False
     own = {"auto": pose.stored.radii is not None, "own": True, "uniform": False}[params.radius]
     # The spacing takes longer to find than many a pose takes to draw.
-    suffices = own and pose.remember("radii suffice", lambda: _radii_suffice(pose))
+    suffices = own and pose.cloud.remember(_radii_suffice)
     points = Points.of(pose, surface, frame.share, use_radii=own)
     instancing = _instancing(params, surface)
     surface.stats.faces_away = params.cull_back
@@ -189,11 +190,11 @@ def _instancing(params: Params, surface: Surface) -> str:
     return choose(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
 
 
-def _radii_suffice(pose: GpuPose) -> bool:
+def _radii_suffice(cloud: PointCloud) -> bool:
     """Whether each point has a radius that the shader takes."""
-    radii = pose.cloud.radii
+    radii = cloud.radii
     return radii is not None and bool(((radii > 0) & (radii < np.float32(UNKNOWN))).all())
 
 
 def _uniform_radius(pose: GpuPose) -> float:
-    return _RADIUS_PER_SPACING * pose.remember("spacing", lambda: typical_spacing(pose.stored))
+    return _RADIUS_PER_SPACING * pose.stored.remember(typical_spacing)

@@ -17,6 +17,7 @@ from ...gpu import gl
 from ...gpu.amplify import Points, draw_shapes
 from ...gpu.bindings import Storage, Texture
 from ...gpu.constants import BEHIND
+from ...gpu.context import Gpu
 from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
@@ -166,7 +167,7 @@ def _fill_by_tiles(surface: Surface, lists: TileLists, large: Points | None, spl
 def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
     """The lists of the second pass, without the splats that all lie too far behind what the first found."""
     gpu = surface.gpu
-    lists = surface.keep("tiles", lambda: TileLists(gpu, surface.size))
+    lists = surface.keep(TileLists)
     program = gpu.compute("surfels/tiles/limits.comp", {"TILE": TILE, **points.defines}, params=splats)
     with gpu.timers.measure("limits"):
         gl.clear_words(lists.farthest, 0)
@@ -181,7 +182,7 @@ def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileL
 def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
     """What is added up for each pixel, bound, and what its fragment stages read; ends blending."""
     gpu = surface.gpu
-    sums = surface.keep("sums", lambda: gl.Sums(gpu.ctx, surface.size))
+    sums = surface.keep(_new_sums)
     sums.target.use()
     bind_looks(points, surface)
     surface.rows.bind(Texture.ROWS)
@@ -207,7 +208,7 @@ def _limit(points: Points, surface: Surface, splats: Splats) -> None:
 def _resolve(points: Points, surface: Surface, over: bool) -> None:
     """From sums to the surface's own colours and normals."""
     gpu = surface.gpu
-    sums = surface.keep("sums", lambda: gl.Sums(gpu.ctx, surface.size))
+    sums = surface.keep(_new_sums)
     with gpu.timers.measure("resolve"):
         defines = bind_looks(points, surface)
         program = gpu.compute("surfels/passes/resolve.comp", {**defines, "OVER": int(over)})
@@ -233,10 +234,14 @@ def _close(points: Points, surface: Surface, splats: Splats) -> None:
             gpu.ctx.memory_barrier()
 
 
+def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:
+    return gl.Sums(gpu.ctx, size)
+
+
 def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     """Bind what surfels/passes/look.glsl reads and store.glsl writes; the defines that say so."""
     cloud = points.pose.cloud
-    points.pose.packed("looks", lambda: _pack_looks(cloud), gl.RG32UI).bind(Texture.LOOKS)
+    points.pose.packed(_pack_looks, texel_format=gl.RG32UI).bind(Texture.LOOKS)
     if cloud.colors is not None:
         surface.bind_own("color")
     surface.bind_own("normal")

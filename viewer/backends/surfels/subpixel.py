@@ -28,9 +28,8 @@ _SAMPLE = 1 << 13
 class _Sums:
     """Four words a pixel."""
 
-    def __init__(self, gpu: Gpu, pixels: int) -> None:
-        self._gpu = gpu
-        self.buffer = gpu.ctx.buffer(reserve=16 * pixels)
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self.buffer = gpu.ctx.buffer(reserve=16 * size[0] * size[1])
 
     @property
     def nbytes(self) -> int:
@@ -49,13 +48,13 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     Outliers count for what none may be.
     """
     pose, view = points.pose, surface.view
-    nearest = float(view.depths(pose.remember("box", lambda: _box(pose.cloud))).min())
+    nearest = float(view.depths(pose.cloud.remember(_box)).min())
     usually_nearest = float(view.depths(pose.bounds.corners() - pose.cloud.origin).min())
     if view.perspective and min(nearest, usually_nearest) <= view.near:
         return 0.0
     usual = largest = splats.uniform_radius
     if points.use_radii:
-        own = pose.remember("radii up to", lambda: _radii_up_to(pose.cloud))
+        own = pose.cloud.remember(_radii_up_to)
         usual, largest = max(usual, own[0]), max(largest, own[1])
     pixels = splats.radius_scale * math.sqrt(splats.mask_limit) * points.enlarged * view.scale
     if view.perspective:
@@ -91,7 +90,7 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
     what it shows, as far as `mean_share` says."""
     gpu = surface.gpu
     covered = surface.list_covered()
-    sums = surface.keep("mean", lambda: _Sums(gpu, surface.size[0] * surface.size[1]))
+    sums = surface.keep(_Sums)
     bound = bind_looks(points, surface)
     # All splats may share a pixel: normals of up to 511, with sign, and colours of up to 255 add up there.
     bound |= {"NORMAL_DIVISOR": (points.count >> 22) + 1, "COLOR_DIVISOR": f"{(points.count >> 24) + 1}u"}

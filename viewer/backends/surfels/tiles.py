@@ -180,7 +180,7 @@ def tile_lists(points: Points, surface: Surface, splats: Splats, side: int = ALL
     """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner."""
     reason = _unfit(points, surface)
     if not reason:
-        lists = surface.keep("tiles", lambda: TileLists(surface.gpu, surface.size))
+        lists = surface.keep(TileLists)
         if not lists.fill(points, splats, side):
             reason = f"too long lists, {lists.length:,} entries"
         elif lists.large * _LARGE_COST > lists.length:
