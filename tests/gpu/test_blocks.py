@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -95,11 +94,10 @@ def test_the_declaration_is_readable() -> None:
     assert not any("word" in line for line in lines)
 
 
-def test_a_block_is_whole_vec4s_and_holds_members_in_order() -> None:
-    words = block_of(Everything).words
-    offsets = [getattr(words, name).offset for _, name, _ in block_of(Everything).members]
-    assert all(before < after for before, after in pairwise(offsets))
-    assert len(block_of(Everything).pack(Everything())) % 16 == 0
+def test_a_block_is_whole_vec4s() -> None:
+    packed = block_of(Everything).pack(Everything())
+    assert len(packed) == 10 * 16
+    assert np.frombuffer(packed, np.int32)[[0, 2, 3, 4]].tolist() == [1, 3, -4, -5]
 
 
 def test_what_a_block_cannot_hold_is_named() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass, fields
 from functools import cache
+from itertools import chain
 from typing import Any, ClassVar, Protocol, get_type_hints
 
 import moderngl
@@ -13,16 +14,16 @@ from .bindings import UniformBlock
 
 Vec4 = tuple[float, float, float, float]
 Mat4 = tuple[Vec4, Vec4, Vec4, Vec4]  # columns
-_VEC4 = ctypes.c_float * 4
-# Annotation of a field -> its GLSL type, its words, and what its place is a multiple of, bytes.
-_KINDS: dict[Any, tuple[str, Any, int]] = {
-    bool: ("bool", ctypes.c_uint32, 4),
-    int: ("int", ctypes.c_int32, 4),
-    float: ("float", ctypes.c_float, 4),
-    tuple[float, float]: ("vec2", ctypes.c_float * 2, 8),
-    tuple[int, int]: ("ivec2", ctypes.c_int32 * 2, 8),
-    Vec4: ("vec4", _VEC4, 16),
-    Mat4: ("mat4", _VEC4 * 4, 16),
+_INT, _UINT, _FLOAT = ctypes.c_int32, ctypes.c_uint32, ctypes.c_float
+# Annotation of a field -> its GLSL type, what a word of it is, how many, what its place is a multiple of.
+_KINDS: dict[Any, tuple[str, Any, int, int]] = {
+    bool: ("bool", _UINT, 1, 1),
+    int: ("int", _INT, 1, 1),
+    float: ("float", _FLOAT, 1, 1),
+    tuple[float, float]: ("vec2", _FLOAT, 2, 2),
+    tuple[int, int]: ("ivec2", _INT, 2, 2),
+    Vec4: ("vec4", _FLOAT, 4, 4),
+    Mat4: ("mat4", _FLOAT, 16, 4),
 }
 
 
@@ -33,14 +34,24 @@ class Values(Protocol):
 
 
 @dataclass(frozen=True)
-class Block:
-    """A dataclass as a std140 block (OpenGL 4.3, 7.6.2.2).
+class Member:
+    """A number or several in a block.
 
-    declaration: the dataclass. members: (GLSL type, name, what is said of it). words: how they lie in memory.
+    kind: its GLSL type. help: what its declaration says of it. gap: words that are left free before it.
     """
 
+    kind: str
+    name: str
+    help: str
+    gap: int
+
+
+@dataclass(frozen=True)
+class Block:
+    """A dataclass as a std140 block (OpenGL 4.3, 7.6.2.2). words: what it is in memory."""
+
     declaration: type[Values]
-    members: tuple[tuple[str, str, str], ...]
+    members: tuple[Member, ...]
     words: type[ctypes.Structure]
 
     @property
@@ -51,12 +62,22 @@ class Block:
     def glsl(self, name: str) -> str:
         """What shaders include. name: one of `UniformBlock`, in lower case."""
         lines = [f"layout(std140, binding = {UniformBlock[name.upper()]}) uniform {name.title()} {{"]
-        lines += [f"    {kind} {member};{help and f'  // {help}'}" for kind, member, help in self.members]
+        lines += [f"    {m.kind} {m.name};{m.help and f'  // {m.help}'}" for m in self.members]
         return "\n".join([*lines, "};"])
 
     def pack(self, values: Values) -> bytes:
         """The values as the GPU reads them; floats beyond its range are infinite there."""
-        return bytes(self.words(**{name: getattr(values, name) for _, name, _ in self.members}))
+        numbers: list[float] = []
+        for member in self.members:
+            numbers += (0,) * member.gap
+            value = getattr(values, member.name)
+            if member.kind == "mat4":
+                numbers += chain.from_iterable(value)
+            elif isinstance(value, tuple):
+                numbers += value
+            else:
+                numbers.append(value)
+        return bytes(self.words(*numbers))
 
 
 @cache
@@ -67,32 +88,23 @@ def block_of(declaration: type[Values]) -> Block:
     Raises TypeError for any other field, and where there is no number.
     """
     hints = get_type_hints(declaration)
-    members: list[tuple[str, str, str]] = []
-    words: list[tuple[str, Any]] = []
-    size = 0
-
-    def place(multiple: int) -> None:
-        nonlocal size
-        if gap := -size % multiple:
-            words.append((f"_{size}", ctypes.c_uint8 * gap))
-            size += gap
-
+    members: list[Member] = []
+    words: list[Any] = []
     for field in fields(declaration):
         kind = hints[field.name]
         if kind is str:
             continue
         if kind not in _KINDS:
             raise TypeError(f"{declaration.__qualname__}.{field.name}: a block holds no {kind}")
-        glsl, word, multiple = _KINDS[kind]
-        place(multiple)
-        words.append((field.name, word))
-        size += ctypes.sizeof(word)
-        members.append((glsl, field.name, field.metadata.get("help", "")))
+        glsl, word, count, multiple = _KINDS[kind]
+        gap = -len(words) % multiple
+        members.append(Member(glsl, field.name, field.metadata.get("help", ""), gap))
+        words += [_UINT] * gap + [word] * count
     if not members:
         raise TypeError(f"{declaration.__qualname__} has no number")
-    place(16)
-    structure = type(declaration.__name__, (ctypes.Structure,), {"_fields_": words})
-    return Block(declaration, tuple(members), structure)
+    words += [_UINT] * (-len(words) % 4)
+    named = [(f"word_{number}", word) for number, word in enumerate(words)]
+    return Block(declaration, tuple(members), type("Words", (ctypes.Structure,), {"_fields_": named}))
 
 
 class BlockBuffer:
