@@ -420,8 +420,8 @@ class Surface:
         """(H, W) float32, the number that the look colours by; NaN where there is none."""
         source, cloud, unknown = self.value_source, self._cloud, np.float32(np.nan)
         if source is not None and self.is_own("value"):
-            written = self._read(self._own["value"].buffer, np.float32).astype(np.float64)
-            return np.where(self._covered, as_float32(written, -self.value_zero), unknown)
+            written = np.where(self._covered, self._read(self._own["value"].buffer, np.float32), unknown)
+            return as_float32(written.astype(np.float64), -self.value_zero)
         if source == "depth":
             return np.where(self._covered, self.depth, unknown)
         if source is None:
