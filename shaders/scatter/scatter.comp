@@ -1,5 +1,5 @@
 // Scatter: items go to cells. A file with `scatter(i)` says which an item visits; what becomes of a visit
-// says another: the best per cell (scatter/best.glsl), a list per cell (bins/lists.glsl).
+// says another: the best per cell (scatter/best.glsl), sums (scatter/sums.glsl), a list (bins/lists.glsl).
 #include "common/item.glsl"
 
 #include <target>

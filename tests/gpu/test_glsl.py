@@ -114,6 +114,7 @@ def draw_all(renderer: Renderer) -> None:
 
 def use_primitives(gpu: Gpu) -> None:
     """What backends may use of each primitive, whether one does or not."""
+    gpu.activate()
     flagged(gpu, np.arange(5000) % 3 == 0)
     for ordered in (False, True):
         filled(gpu, some_visits(100, 30), 30, ordered)

@@ -76,7 +76,6 @@ def picture(size: tuple[int, int], channels: int, seed: int = 0) -> tuple[Array,
 
 
 def image(gpu: Gpu, values: Array, weights: Array | None = None) -> Image:
-    gpu.activate()  # other tests leave contexts of their own current
     out = Image(gpu, values.shape[1::-1], values.shape[2])
     out.write(values, weights)
     return out

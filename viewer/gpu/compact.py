@@ -133,7 +133,7 @@ def _scan_level(
 
     if blocks > 1:
         room = MOST_WORDS // _BLOCK**level
-        sums = gpu.keep(f"block sums {level}", lambda: gpu.ctx.buffer(reserve=4 * room))
+        sums = gpu.keep((_scan_level, level), lambda: gpu.ctx.buffer(reserve=4 * room))
         run(0)
 
         def bind_sums(_: Program) -> None:

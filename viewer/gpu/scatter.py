@@ -1,16 +1,23 @@
-"""Scatter: a compute shader sends items to cells and keeps the best per cell."""
+"""Scatter: a compute shader sends items to cells, and keeps the best per cell or adds up what they give."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
 from . import gl
 from .bindings import Storage, Texture
 from .blocks import Values
 from .compact import IndexList
 from .constants import NO_DEPTH, NOTHING
 from .context import Gpu, Program
+
+_LARGEST_SUM = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -28,7 +35,7 @@ class Visits:
     defines: Mapping[str, object] = field(default_factory=dict)
     params: Values | None = None
 
-    def send(self, gpu: Gpu, target: str, bind: Callable[[Program], None], **defines: int) -> None:
+    def send(self, gpu: Gpu, target: str, bind: Callable[[Program], None], **defines: object) -> None:
         """Send the items to their cells. target: the shader file that says what becomes of a visit; bind:
         sets what that one reads and writes."""
         parts = {"target": target, "cells": self.cells}
@@ -66,3 +73,96 @@ def scatter(
     for number, name in enumerate(("depth", "id", "list") if listed is not None else ("depth", "id")):
         with gpu.timers.measure(name):
             visits.send(gpu, "scatter/best.glsl", bind, PASS=number)
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """How numbers of several channels are added up as whole numbers of steps, with sign, in 32 bits.
+
+    limits: the largest absolute number of each channel; larger ones count as that. finest: the least step of
+    each channel. most: how many numbers a cell may be given. Raises InputError where so many do not fit even
+    in steps as large as a limit, ValueError for limits or steps that are none.
+    """
+
+    limits: tuple[float, ...]
+    finest: tuple[float, ...]
+    most: int
+
+    def __post_init__(self) -> None:
+        _ = self.steps
+
+    @cached_property
+    def steps(self) -> tuple[float, ...]:
+        """The step of each channel: the least power of two, not below the finest, with which `most` numbers
+        of the limit sum to less than 2^31."""
+        pairs = zip(self.limits, self.finest, strict=True)
+        return tuple(_step(limit, finest, self.most) for limit, finest in pairs)
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """What scatter/sums.glsl is told."""
+        limits, steps = (", ".join(map(str, map(np.float32, each))) for each in (self.limits, self.steps))
+        return {
+            "CHANNELS": f"{len(self.limits)}u",
+            "LIMITS": f"float[]({limits})",
+            "STEPS": f"float[]({steps})",
+        }
+
+
+def _step(limit: float, finest: float, most: int) -> float:
+    if not (0 < finest <= limit < np.inf):
+        raise ValueError(f"no limit and step of a channel: {limit}, {finest}")
+    step = float(2.0 ** np.ceil(np.log2(finest)))
+    while most * round(float(np.float32(limit)) / step) > _LARGEST_SUM:
+        step *= 2
+        if step > limit:
+            raise InputError(f"sums of {most:,} numbers do not fit into 32 bits")
+    return step
+
+
+class CellSums:
+    """Sums of several channels for each of any number of cells. They are the same each time, whichever order
+    items come in, since numbers are rounded before they are added.
+
+    Raises InputError where the driver takes no so large buffer: 4 bytes a channel of each cell.
+    """
+
+    def __init__(self, gpu: Gpu, cells: int, channels: int) -> None:
+        nbytes = 4 * channels * cells
+        if nbytes > gpu.max_storage_bytes:
+            raise InputError(f"sums of {channels} channels in {cells:,} cells are too large for this driver")
+        self._gpu = gpu
+        self.channels = channels
+        self.buffer = gpu.ctx.buffer(reserve=max(nbytes, 4))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.buffer.size
+
+    def clear(self) -> None:
+        """Set all sums to zero."""
+        gl.clear_words(self.buffer, 0)
+
+    def add(self, visits: Visits, fixed: FixedPoint) -> None:
+        """Add what items give to cells: the file of `visits` calls `add(cell, numbers)`, as
+        shaders/scatter/sums.glsl has it, in place of `visit`.
+
+        No cell may be given more than `fixed.most` numbers in all since it was cleared.
+        """
+        if len(fixed.limits) != self.channels:
+            raise ValueError(f"{len(fixed.limits)} limits for {self.channels} channels")
+
+        def bind(_: Program) -> None:
+            self.buffer.bind_to_storage_buffer(Storage.SUMS)
+
+        visits.send(self._gpu, "scatter/sums.glsl", bind, **fixed.defines)
+
+    def read(self, fixed: FixedPoint) -> NDArray[np.float64]:
+        """All sums, (cells, channels); waits for the GPU."""
+        sums = np.frombuffer(self.buffer.read(), np.int32).reshape(-1, self.channels)
+        return sums * np.array(fixed.steps)
+
+    def release(self) -> None:
+        """Delete it."""
+        self.buffer.release()

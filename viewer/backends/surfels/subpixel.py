@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ...gpu.amplify import Points
 from ...gpu.bindings import Storage
 from ...gpu.constants import LEAST_RADIUS
-from ...gpu.context import Gpu
-from ...gpu.scatter import Visits, scatter
+from ...gpu.context import Gpu, Program
+from ...gpu.scatter import CellSums, FixedPoint, Visits, scatter
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from .passes import bind_looks
@@ -23,22 +23,9 @@ from .splats import Splats, bind_visible
 
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
 _SAMPLE = 1 << 13
-
-
-class _Sums:
-    """Four words a pixel."""
-
-    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
-        self.buffer = gpu.ctx.buffer(reserve=16 * size[0] * size[1])
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes held on the GPU."""
-        return self.buffer.size
-
-    def release(self) -> None:
-        """Delete it."""
-        self.buffer.release()
+# What a splat gives to a mean, as surfels/passes/averaged.glsl has it: one of it, its normal, its colour.
+_LIMITS = (1.0, 512.0, 512.0, 512.0)
+_COLORED_LIMITS = (*_LIMITS, 255.0, 255.0, 255.0)
 
 
 def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
@@ -79,6 +66,14 @@ def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
     return float(np.quantile(known, 0.9)) if known.size else 0.0, largest
 
 
+def _plain_sums(gpu: Gpu, size: tuple[int, int]) -> CellSums:
+    return CellSums(gpu, size[0] * size[1], len(_LIMITS))
+
+
+def _colored_sums(gpu: Gpu, size: tuple[int, int]) -> CellSums:
+    return CellSums(gpu, size[0] * size[1], len(_COLORED_LIMITS))
+
+
 def splat_subpixel(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel, by scatter: what `tiles.splat` draws, up to rounding."""
     visits = Visits("surfels/scatter.glsl", points.count, points.bind, points.defines, splats)
@@ -90,20 +85,26 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
     what it shows, as far as `mean_share` says."""
     gpu = surface.gpu
     covered = surface.list_covered()
-    sums = surface.keep(_Sums)
     bound = bind_looks(points, surface)
-    # All splats may share a pixel: normals of up to 511, with sign, and colours of up to 255 add up there.
-    bound |= {"NORMAL_DIVISOR": (points.count >> 22) + 1, "COLOR_DIVISOR": f"{(points.count >> 24) + 1}u"}
-    with gpu.timers.measure("mean"):
+    limits, make = (_COLORED_LIMITS, _colored_sums) if bound["HAS_COLORS"] else (_LIMITS, _plain_sums)
+    sums = surface.keep(make)
+    fixed = FixedPoint(limits, (1.0,) * len(limits), points.count)  # all splats may share a pixel
+
+    def bind(program: Program) -> None:
+        bind_visible(points, program)
+        points.bind(program)
+
+    def run(step: int) -> None:
+        program = gpu.compute(
+            "surfels/passes/mean.comp", {"STEP": step, **fixed.defines, **bound}, params=splats
+        )
         sums.buffer.bind_to_storage_buffer(Storage.SUMS)
+        covered.run(program)
+        gpu.ctx.memory_barrier()
+
+    with gpu.timers.measure("mean"):
         surface.bind_textures()
-        for step in range(3):
-            defines = {"STEP": step, **bound, **points.defines}
-            program = gpu.compute("surfels/passes/mean.comp", defines, params=splats)
-            if step == 1:
-                bind_visible(points, program)
-                points.bind(program)
-                gpu.dispatch(program, points.count)
-            else:
-                covered.run(program)
-                gpu.ctx.memory_barrier()
+        run(0)
+        defines = {**bound, **points.defines}
+        sums.add(Visits("surfels/passes/averaged.glsl", points.count, bind, defines, splats), fixed)
+        run(1)
