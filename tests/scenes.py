@@ -30,7 +30,7 @@ def variants() -> list[str]:
         return [
             f"{one.name} {parameter.name}={word}"
             for parameter in one.parameters
-            if parameter.affects == "shader"
+            if parameter.affects == "speed"
             for word in parameter.choices
             if word not in ("auto", *BUFFERS[1:])
         ]

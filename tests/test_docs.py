@@ -25,12 +25,12 @@ ELSEWHERE = ("make ", "git clone", "cd ", "pipx ", "scan4d view", "python ")
 
 def table(parameters: list[Parameter]) -> str:
     """A Markdown table of declared parameters."""
-    rows = ["| parameter | default | values | affects | what it does |", "|---|---|---|---|---|"]
+    rows = ["| parameter | group | default | values | affects | what it does |", "|---|---|---|---|---|---|"]
     for p in parameters:
         default = "auto" if p.default is None else str(p.default).lower() if p.type is bool else p.default
         limits = f"{p.low:g} to {p.high:g}" if p.low is not None and p.high is not None else p.type.__name__
-        values = ", ".join(p.choices) or ("on, off" if p.type is bool else limits)
-        rows.append(f"| `{p.name}` | {default} | {values} | {p.affects} | {p.help} |")
+        values = ", ".join(p.choices) or ("on, off" if p.type is bool else f"{limits} {p.unit}".rstrip())
+        rows.append(f"| `{p.name}` | {p.group} | {default} | {values} | {p.affects} | {p.help} |")
     return "\n".join(rows)
 
 

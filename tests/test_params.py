@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -8,7 +10,8 @@ import pytest
 from viewer.backends import backend, backends
 from viewer.errors import InputError
 from viewer.look import COLOR_MAPS, Look, color_table
-from viewer.params import AFFECTS, describe, param, parse
+from viewer.output.marks import Marks
+from viewer.params import AFFECTS, describe, param, parse, renamed
 
 
 @dataclass(frozen=True)
@@ -16,7 +19,7 @@ class Example:
     size: int = param(2, "size", low=1, high=9, sweep=(1, 2))
     scale: float = param(1.5, "scale")
     on: bool = param(True, "on")
-    mode: str = param("one", "mode", choices=("one", "two"), affects="shader")
+    mode: str = param("one", "mode", choices=("one", "two"), affects="speed")
     limit: float | None = param(None, "limit", type=float)
 
 
@@ -74,6 +77,66 @@ def _pose() -> object:
     from viewer.scan.pose import Pose
 
     return Pose(0, 0.0, "", PointCloud.from_arrays([[0.0, 0, 0]]))
+
+
+@dataclass(frozen=True)
+class Grown:
+    """A declaration with all that one may say."""
+
+    mode: str = param("one", "mode", choices=("one", "two"), group="Passes")
+    reach: float = param(
+        1.0, "reach", low=0, high=9, unit="pixels", group="Passes", when={"mode": ("two",)},
+        deprecated=("radius", "extent"),
+    )  # fmt: skip
+    rest: int = param(1, "rest", unless={"mode": ("two",)})
+    fill: bool = param(True, "fill", key="H")
+
+
+def test_a_parameter_matters_where_its_conditions_hold() -> None:
+    def mattering(values: Grown) -> list[str]:
+        return [p.name for p in describe(Grown) if p.matters(values)]
+
+    assert mattering(Grown()) == ["mode", "rest", "fill"]
+    assert mattering(Grown(mode="two")) == ["mode", "reach", "fill"]
+
+
+def test_former_names_are_read_as_what_they_are_now() -> None:
+    assert parse(Grown, {"radius": 2}) == parse(Grown, {"reach": 2}) == Grown(reach=2.0)
+    assert renamed(Grown, {"extent": 2, "mode": "one"}) == {"extent": "reach"}
+    with pytest.raises(InputError, match="outside 0 to 9"):
+        parse(Grown, {"radius": 10})
+    with pytest.raises(InputError, match="unknown parameter 'radius'"):
+        parse(Grown, {"radius": 2, "reach": 3})
+
+
+def test_a_declaration_is_told_in_full() -> None:
+    told = {p.name: p.to_json() for p in describe(Grown)}
+    assert told["reach"]["when"] == [{"parameter": "mode", "values": ["two"], "negated": False}]
+    assert told["rest"]["when"] == [{"parameter": "mode", "values": ["two"], "negated": True}]
+    assert (told["reach"]["unit"], told["reach"]["group"]) == ("pixels", "Passes")
+    assert (told["reach"]["deprecated"], told["fill"]["key"]) == (["radius", "extent"], "H")
+    assert json.loads(json.dumps(told)) == told
+
+
+@pytest.mark.parametrize("kind", [Look, Marks, *(one.module.Params for one in backends().values())])
+def test_declarations_are_complete(kind: type) -> None:
+    declared = {p.name: p for p in describe(kind)}
+    former = [old for p in declared.values() for old in p.deprecated]
+    assert len({*declared, *former}) == len(declared) + len(former)
+    keys = [p.key for p in declared.values() if p.key]
+    assert len(keys) == len(set(keys))
+    groups = [group for group, _ in groupby(p.group for p in declared.values())]
+    assert len(groups) == len(set(groups)), "the parameters of a group stand together"
+    for p in declared.values():
+        assert p.help
+        assert not p.help.endswith(".")
+        assert p.type is bool or not p.key
+        assert p.type in (int, float) or not p.unit
+        for condition in p.when:
+            other = declared[condition.parameter]
+            assert other.name != p.name
+            for value in condition.values:
+                assert other.parse(value) == value
 
 
 def test_unknown_backend_lists_the_known() -> None:

@@ -18,6 +18,9 @@ from .params import param
 # Perceptually uniform and readable with colour-blindness; the tables are the library cmap's.
 COLOR_MAPS = ("batlow", "cividis", "viridis", "lapaz", "oslo", "vik")
 COLOR_BY = ("auto", "own", "plain", "normal", "depth", "height", "id")
+_UNMAPPED = {"color_by": tuple(name for name in COLOR_BY if name not in ("depth", "height"))}
+_FIXED, _FLAT = {"light": ("fixed",)}, {"light": ("flat",)}
+_EYE_DOME = {"eye_dome": (None, True)}
 
 
 @dataclass(frozen=True)
@@ -31,26 +34,47 @@ class Look:
     color_by: str = param(
         "auto",
         f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, or #N for scalar N",
+        group="Colour",
     )
+    color_map: str = param(
+        "batlow",
+        "Colour map of depth, height and scalars",
+        choices=COLOR_MAPS,
+        group="Colour",
+        unless=_UNMAPPED,
+    )
+    low: float | None = param(
+        None, "Value at the map's start; auto: from the data", type=float, group="Colour", unless=_UNMAPPED
+    )
+    high: float | None = param(
+        None, "Value at the map's end; auto: from the data", type=float, group="Colour", unless=_UNMAPPED
+    )
+    up: str = param("+y", "The axis that height is measured along", choices=tuple(AXES), group="Colour")
+    plain: str = param("#c8c2b8", "Colour of points that have none, #rrggbb", group="Colour")
+    background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa", group="Colour")
     light: str = param(
         "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
-        choices=("auto", "flat", "head", "fixed"),
+        choices=("auto", "flat", "head", "fixed"), group="Light",
     )  # fmt: skip
-    eye_dome: bool | None = param(None, "Darken where the depth steps back; auto: if unlit", type=bool)
-    eye_dome_strength: float = param(1.0, "Strength of eye-dome lighting", low=0, high=20)
-    eye_dome_radius: int = param(1, "Reach of eye-dome lighting, pixels", low=1, high=16)
-    azimuth: float = param(-35.0, "Where the fixed light stands, degrees", low=-180, high=180)
-    elevation: float = param(40.0, "How high the fixed light stands, degrees", low=-90, high=90)
-    ambient: float = param(0.25, "Light from everywhere", low=0, high=1)
-    diffuse: float = param(0.75, "Phong's diffuse share", low=0, high=1)
-    specular: float = param(0.12, "Phong's specular share", low=0, high=1)
-    shininess: float = param(24.0, "Phong's exponent", low=1, high=200)
-    color_map: str = param("batlow", "Colour map of depth, height and scalars", choices=COLOR_MAPS)
-    low: float | None = param(None, "Value at the map's start; auto: from the data", type=float)
-    high: float | None = param(None, "Value at the map's end; auto: from the data", type=float)
-    up: str = param("+y", "The axis that height is measured along", choices=tuple(AXES))
-    plain: str = param("#c8c2b8", "Colour of points that have none, #rrggbb")
-    background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa")
+    azimuth: float = param(
+        -35.0, "Where the fixed light stands", low=-180, high=180, unit="degrees", group="Light", when=_FIXED
+    )
+    elevation: float = param(
+        40.0, "How high the fixed light stands", low=-90, high=90, unit="degrees", group="Light", when=_FIXED
+    )
+    ambient: float = param(0.25, "Light from everywhere", low=0, high=1, group="Light", unless=_FLAT)
+    diffuse: float = param(0.75, "Phong's diffuse share", low=0, high=1, group="Light", unless=_FLAT)
+    specular: float = param(0.12, "Phong's specular share", low=0, high=1, group="Light", unless=_FLAT)
+    shininess: float = param(24.0, "Phong's exponent", low=1, high=200, group="Light", unless=_FLAT)
+    eye_dome: bool | None = param(
+        None, "Darken where the depth steps back; auto: if unlit", type=bool, group="Light"
+    )
+    eye_dome_strength: float = param(
+        1.0, "Strength of eye-dome lighting", low=0, high=20, group="Light", when=_EYE_DOME
+    )
+    eye_dome_radius: int = param(
+        1, "Reach of eye-dome lighting", low=1, high=16, unit="px", group="Light", when=_EYE_DOME
+    )
 
     def __post_init__(self) -> None:
         rgba(self.plain, "plain")

@@ -7,16 +7,30 @@ in the docs, the tests and the benchmark's sweep.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from .errors import InputError, shortened, unknown_name
 
 T = TypeVar("T")
-AFFECTS = ("draw", "derive", "shader", "target")
+# What an edit changes: the picture alone, what a backend derives for a pose, or speed and not the picture.
+AFFECTS = ("draw", "derive", "speed")
 _LARGEST = 3.4e38  # of a float32
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What another parameter has to be: one of these values, or, with `negated`, none of them."""
+
+    parameter: str
+    values: tuple[Any, ...]
+    negated: bool = False
+
+    def holds(self, values: object) -> bool:
+        """Whether it does, of an instance of the declaration."""
+        return (getattr(values, self.parameter) in self.values) is not self.negated
 
 
 @dataclass(frozen=True)
@@ -24,8 +38,10 @@ class Parameter:
     """One parameter as its declaration has it.
 
     type: bool, int, float or str. low, high: inclusive limits of a number. choices: the
-    words a str may be; empty: any. sweep: the values a benchmark tries. affects: what has
-    to be made anew when it changes. optional: None ("auto" in text) is allowed.
+    words a str may be; empty: any. sweep: the values a benchmark tries. affects: what an edit
+    changes (`AFFECTS`). optional: None ("auto" in text) is allowed. unit: of a number, empty: none.
+    group: the heading that it stands under, empty: none. when: all that has to hold for it to matter.
+    key: what switches a bool on the keyboard, empty: nothing. deprecated: former names, which are still read.
     """
 
     name: str
@@ -38,6 +54,20 @@ class Parameter:
     sweep: tuple[Any, ...]
     affects: str
     optional: bool
+    unit: str
+    group: str
+    when: tuple[Condition, ...]
+    key: str
+    deprecated: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """The name in words, as the panel has it."""
+        return self.name.replace("_", " ").capitalize()
+
+    def matters(self, values: object) -> bool:
+        """Whether its value matters beside the other values of the same declaration."""
+        return all(condition.holds(values) for condition in self.when)
 
     def parse(self, value: object) -> Any:
         """The value of this parameter from text or a plain value; raises InputError."""
@@ -59,6 +89,8 @@ class Parameter:
             "type": self.type.__name__,
             "choices": list(self.choices),
             "sweep": list(self.sweep),
+            "when": [{**dataclasses.asdict(one), "values": list(one.values)} for one in self.when],
+            "deprecated": list(self.deprecated),
         }
 
 
@@ -72,8 +104,18 @@ def param(
     sweep: tuple[Any, ...] = (),
     affects: str = "draw",
     type: type | None = None,
+    unit: str = "",
+    group: str = "",
+    when: Mapping[str, tuple[Any, ...]] | None = None,
+    unless: Mapping[str, tuple[Any, ...]] | None = None,
+    key: str = "",
+    deprecated: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field that is a parameter. type: needed where the default is None."""
+    """A dataclass field that is a parameter, as `Parameter` says.
+
+    type: needed where the default is None. when, unless: names of other parameters -> the values of them with
+    which this one matters, or does not.
+    """
     assert affects in AFFECTS
     return dataclasses.field(
         default=default,
@@ -86,8 +128,17 @@ def param(
             "affects": affects,
             "type": type or default.__class__,
             "optional": default is None,
+            "unit": unit,
+            "group": group,
+            "when": (*_conditions(when, negated=False), *_conditions(unless, negated=True)),
+            "key": key,
+            "deprecated": deprecated,
         },
     )
+
+
+def _conditions(values: Mapping[str, tuple[Any, ...]] | None, negated: bool) -> list[Condition]:
+    return [Condition(name, several, negated) for name, several in (values or {}).items()]
 
 
 def describe(cls: type) -> list[Parameter]:
@@ -95,13 +146,28 @@ def describe(cls: type) -> list[Parameter]:
     return [Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(cls)]
 
 
+def switches(values: object) -> dict[str, bool]:
+    """The parameters that a key switches on and off, by name, where they matter beside the others."""
+    declared = [p for p in describe(type(values)) if p.key and p.matters(values)]
+    return {p.name: getattr(values, p.name) for p in declared}
+
+
 def parse(cls: type[T], values: Mapping[str, object], kind: str = "parameter") -> T:
     """An instance of a declaration from names and text or plain values; raises InputError."""
     declared = {p.name: p for p in describe(cls)}
-    for name in values:
+    now = renamed(cls, values)
+    current = {now.get(name, name): value for name, value in values.items()}
+    for name in current:
         if name not in declared:
             raise unknown_name(kind, name, list(declared))
-    return cls(**{name: declared[name].parse(value) for name, value in values.items()})
+    return cls(**{name: declared[name].parse(value) for name, value in current.items()})
+
+
+def renamed(cls: type, names: Iterable[str]) -> dict[str, str]:
+    """Those of the names that a declaration had formerly -> what they are called now."""
+    former = {old: p.name for p in describe(cls) for old in p.deprecated}
+    given = set(names)
+    return {name: former[name] for name in given if name in former and former[name] not in given}
 
 
 def _bool(value: object) -> bool | None:

@@ -318,7 +318,11 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
     after = assert_true_picture(app)
     assert before.description["params"] == {"point_size": 0}
     assert after.description["params"] == {"point_size": 32}
-    drag(app, 1, (1250, 168), (1000, 168))
+    drag(app, 1, (1225, 168), (1000, 168))
+    assert difference(Screenshot(app).pixels, before.pixels) == 0
+    drag(app, 1, (1110, 168), (1250, 168))
+    app.screen.do("mousemove", 1246, 168, "sleep", 0.1, "click", 1)  # back to the default
+    app.settle()
     assert difference(Screenshot(app).pixels, before.pixels) == 0
 
 

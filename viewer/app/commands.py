@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ..backends import backends
+from ..backends import Backend, backends
 from ..errors import InputError, unknown_name
+from ..params import Parameter
 from . import theme
 from .keys import chords
 from .scene import legend, navigation
-from .scene.levels import LEVELS
 
 if TYPE_CHECKING:
     from .app import App
@@ -59,10 +59,11 @@ class Listing(Generic[T]):
 
 @dataclass(frozen=True)
 class Menu(Generic[T]):
-    """Groups of entries, with a line between them."""
+    """Groups of entries, with a line between them. is_there: whether it is shown."""
 
     title: str
     groups: tuple[tuple[Command[T] | Listing[T] | Menu[T], ...], ...]
+    is_there: Callable[[T], bool] = _always
 
 
 Entry = Command[T] | Listing[T] | Menu[T]
@@ -108,12 +109,18 @@ def _view(number: int, side: str) -> Command[App]:
     )  # fmt: skip
 
 
-def _level(number: int) -> Command[App]:
-    title = f"Level {number}" if number else "Native level"
+def switches(several: Iterable[Backend]) -> tuple[Command[App], ...]:
+    """What switches the parameters that backends declare with a key; one name has one key in all of them."""
+    declared = {parameter.name: parameter for each in several for parameter in each.parameters}
+    return tuple(_switch(parameter) for parameter in declared.values() if parameter.key)
+
+
+def _switch(parameter: Parameter) -> Command[App]:
+    name = parameter.name
     return Command(
-        f"level_{number}", title, lambda app: app.rendering.toggle_level(number), str(number),
-        is_on=lambda app: app.rendering.levels.get(number, False),
-        can=lambda app: number in app.rendering.levels,
+        f"switch_{name}", parameter.title, lambda app: app.rendering.switch(name), parameter.key,
+        is_on=lambda app: app.rendering.switches.get(name, False),
+        can=lambda app: name in app.rendering.switches,
     )  # fmt: skip
 
 
@@ -226,15 +233,9 @@ _VIEW: Menu[App] = Menu("View", (
         Command("text_usual", "Usual text", lambda app: app.change_text(0), "Ctrl+0"),
     ),
 ))  # fmt: skip
-_LEVELS: Menu[App] = Menu("Pyramid levels", (
-    tuple(_level(number) for number in LEVELS),
-    (
-        Command(
-            "fill", "Fill all holes", lambda app: app.rendering.toggle_filling(), "H",
-            is_on=lambda app: app.rendering.is_filling, can=lambda app: bool(app.rendering.levels),
-        ),
-    ),
-))  # fmt: skip
+_SWITCHES: Menu[App] = Menu(
+    "Of this renderer", (switches(backends().values()),), lambda app: bool(app.rendering.switches)
+)
 _PLAYBACK: Menu[App] = Menu("Playback", (
     (
         Command(
@@ -262,7 +263,7 @@ _TOOLS: Menu[App] = Menu("Tools", (
         Listing("Renderer", _renderers),
         Command("backend", "Next renderer", lambda app: app.rendering.step(1), "B"),
         Command("backend_before", "Renderer before", lambda app: app.rendering.step(-1), "Shift+B"),
-        _LEVELS,
+        _SWITCHES,
     ),
     (_PLAYBACK,),
 ))  # fmt: skip

@@ -70,7 +70,7 @@ def _draw(app: App, entry: Entry[App]) -> None:
         if imgui.menu_item(f"{title}###{entry.name}", app.keys.of[entry.name], is_on, entry.can(app))[0]:
             with app.failures.told(entry.title):
                 entry.act(app)
-    elif imgui.begin_menu(entry.title):
+    elif (isinstance(entry, Listing) or entry.is_there(app)) and imgui.begin_menu(entry.title):
         if isinstance(entry, Listing):
             _draw_items(app, entry)
         else:

@@ -10,7 +10,7 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from ..backends import backend, backends
 from ..camera import PROJECTIONS
 from ..files import printable
-from ..look import COLOR_BY, drawable
+from ..look import COLOR_BY, Look, drawable
 from . import widgets
 from .files.scans import title
 from .scene import counting
@@ -40,7 +40,8 @@ def draw(app: App) -> None:
         if _section("Renderer"):
             _draw_renderer(app, pose)
         if _section("Look"):
-            app.rendering.edit_look(widgets.edit(app.document.look, {"color_by": _colors(app, pose)}))
+            look = app.document.look
+            app.rendering.edit_look(widgets.edit(look, Look(up=app.up), {"color_by": _colors(app, pose)}))
             _draw_projection(app)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
             app.bookmarks.draw(ui)
@@ -90,7 +91,7 @@ def _draw_renderer(app: App, pose: Pose) -> None:
     if chosen != name:
         app.rendering.choose(chosen)
     _, params = app.document.chosen(pose)
-    app.rendering.edit_params(widgets.edit(params))
+    app.rendering.edit_params(widgets.edit(params, app.document.defaults(pose)[1]))
 
 
 def _colors(app: App, pose: Pose) -> dict[str, str]:

@@ -23,7 +23,7 @@ from ..files import parsed_json, read_text, whole_file
 from ..geometry import up_vector
 from ..look import COLOR_BY, Look
 from ..output.marks import Marks
-from ..params import describe
+from ..params import describe, renamed
 from . import theme
 from .output.export_plan import Choices
 from .place import Place
@@ -209,9 +209,11 @@ def _usable(data: Mapping[str, Any], readers: Mapping[str, Callable[[Any], Any]]
 def declared(cls: type[T], data: Mapping[str, Any], default: T | None = None) -> T:
     """An instance of a declaration (see viewer/params.py) with those values that it takes."""
     values: Any = cls() if default is None else default
+    now = renamed(cls, data)
+    current = {now.get(name, name): value for name, value in data.items()}
     for parameter in describe(cls):
         with suppress(*_WRONG):
-            values = replace(values, **{parameter.name: parameter.parse(data[parameter.name])})
+            values = replace(values, **{parameter.name: parameter.parse(current[parameter.name])})
     return values
 
 

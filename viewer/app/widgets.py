@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_4 as icons
 
 from ..files import printable
 from ..look import rgba
@@ -23,32 +24,63 @@ _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
-def edit(values: T, choices: Mapping[str, Mapping[str, str]] | None = None) -> T:
-    """A row of label and widget for each parameter; the same object while nothing is edited.
+def edit(values: T, defaults: T, choices: Mapping[str, Mapping[str, str]] | None = None) -> T:
+    """A row for each parameter that matters beside the others, under the headings of their groups: label,
+    widget, and what resets it where it is not its default. The same object while nothing is edited.
 
     choices: words to choose from and their titles, for parameters that declare none.
     """
+    group = ""
     for parameter in describe(type(values)):
-        old = getattr(values, parameter.name)
-        words = (choices or {}).get(parameter.name, {})
-        imgui.push_id(parameter.name)
-        label(parameter.name.replace("_", " ").capitalize(), parameter.help)
-        new = _edit_optional(parameter, old) if parameter.optional else _edit(parameter, old, words)
-        imgui.pop_id()
+        if not parameter.matters(values):
+            continue
+        if parameter.group != group:
+            group = parameter.group
+            imgui.separator_text(group)
+        old, default = (getattr(each, parameter.name) for each in (values, defaults))
+        new = _edit_row(parameter, old, default, (choices or {}).get(parameter.name, {}))
         if new != old:
             values = replace(values, **{parameter.name: new})  # type: ignore[type-var]
     return values
 
 
-def label(text: str, tooltip: str = "") -> None:
-    """A text at the left of a row; the next widget takes the rest of it."""
+def _edit_row(parameter: Parameter, value: Any, default: Any, words: Mapping[str, str]) -> Any:
+    """What the row of a parameter leaves of its value."""
+    imgui.push_id(parameter.name)
+    gutter = imgui.get_frame_height()
+    label(parameter.title, _in_words(parameter), gutter)
+    new = _edit_optional(parameter, value, gutter) if parameter.optional else _edit(parameter, value, words)
+    if value != default:
+        imgui.same_line(imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x - gutter)
+        text = _value_in_words(default, words)
+        if flat_button(icons.ICON_FA_UNDO, f"Back to the default, {text}"):
+            new = default
+    imgui.pop_id()
+    return new
+
+
+def _in_words(parameter: Parameter) -> str:
+    """What a parameter does, and which key switches it."""
+    return parameter.help + (f" ({parameter.key})" if parameter.key else "")
+
+
+def _value_in_words(value: Any, titles: Mapping[str, str]) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if value is None:
+        return "auto"
+    return titles.get(value, value) if isinstance(value, str) else f"{value:g}"
+
+
+def label(text: str, tooltip: str = "", gutter: float = 0.0) -> None:
+    """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end."""
     width = imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
     imgui.text(text)
     if tooltip:
         imgui.set_item_tooltip(tooltip)
     imgui.same_line(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE)
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(-1 - gutter)
 
 
 def choose(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:
@@ -62,14 +94,14 @@ def choose(name: str, current: str, words: Sequence[str], titles: Mapping[str, s
     return current
 
 
-def _edit_optional(parameter: Parameter, value: Any) -> Any:
+def _edit_optional(parameter: Parameter, value: Any, gutter: float) -> Any:
     """A box for "auto", and the widget beside it where that is not ticked."""
     toggled, auto = imgui.checkbox("auto", value is None)
     if toggled:
         value = None if auto else parameter.type(parameter.low or 0)
     if value is not None:
         imgui.same_line()
-        imgui.set_next_item_width(-1)
+        imgui.set_next_item_width(-1 - gutter)
         value = _edit(parameter, value)
     return value
 
@@ -89,26 +121,26 @@ def _edit_number(name: str, parameter: Parameter, value: Any) -> Any:
     low = -math.inf if parameter.low is None else parameter.low
     high = math.inf if parameter.high is None else parameter.high
     edit_one = _edit_whole if parameter.type is int else _edit_real
-    changed, new = edit_one(name, value, low, high)
+    changed, new = edit_one(name, value, low, high, f" {parameter.unit}" if parameter.unit else "")
     return parameter.type(min(max(new, low), high)) if changed else value
 
 
-def _edit_whole(name: str, value: int, low: float, high: float) -> tuple[bool, int]:
+def _edit_whole(name: str, value: int, low: float, high: float, unit: str) -> tuple[bool, int]:
     if math.isfinite(high - low):
-        return imgui.slider_int(name, value, int(low), int(high))
-    return imgui.drag_int(name, value, 0.1)
+        return imgui.slider_int(name, value, int(low), int(high), f"%d{unit}")
+    return imgui.drag_int(name, value, 0.1, format=f"%d{unit}")
 
 
-def _edit_real(name: str, value: float, low: float, high: float) -> tuple[bool, float]:
+def _edit_real(name: str, value: float, low: float, high: float, unit: str) -> tuple[bool, float]:
     if not math.isfinite(high - low):
         speed = max(abs(value), 1.0) * _DRAG_SPEED
-        changed, new = imgui.drag_float(name, value, speed, format="%.5g")
+        changed, new = imgui.drag_float(name, value, speed, format=f"%.5g{unit}")
     elif low > 0 and high / low > _DECADES:
         logarithmic = imgui.SliderFlags_.logarithmic.value
-        changed, new = imgui.slider_float(name, value, low, high, "%.3g", logarithmic)
+        changed, new = imgui.slider_float(name, value, low, high, f"%.3g{unit}", logarithmic)
     else:
         decimals = min(max(2 - math.floor(math.log10(high - low)), 0), 6)
-        changed, new = imgui.slider_float(name, value, low, high, f"%.{decimals}f")
+        changed, new = imgui.slider_float(name, value, low, high, f"%.{decimals}f{unit}")
     return changed, float(f"{new:.6g}")  # ImGui's float32 has no more digits
 
 
@@ -162,6 +194,15 @@ def modal(title: str, is_open: bool) -> Iterator[bool]:
     yield is_drawn
     if is_drawn:
         imgui.end_popup()
+
+
+def flat_button(icon: str, tooltip: str) -> bool:
+    """An icon that is a button without a frame; True when it is pressed."""
+    imgui.push_style_color(imgui.Col_.button, 0)
+    pressed = imgui.button(icon, ImVec2(imgui.get_frame_height(), 0))
+    imgui.pop_style_color()
+    imgui.set_item_tooltip(tooltip)
+    return pressed
 
 
 def icon_button(icon: str, tooltip: str, color: int | None = None) -> bool:

@@ -41,9 +41,10 @@ class Params:
 
     point_size: int = param(
         1,
-        "Edge of a point's square, pixels; 0: as far as the next point",
+        "Edge of a point's square; 0: as far as the next point",
         low=0,
         high=_LARGEST,
+        unit="px",
         sweep=(0, 1, 2, 4),
     )
 

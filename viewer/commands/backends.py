@@ -70,10 +70,14 @@ def _obstacle(device: int | None) -> str | None:
 def _as_text(backend: Backend) -> str:
     rows = [(p.name, _value(p.default), _domain(p), p.help) for p in backend.parameters]
     widths = [max(len(row[column]) for row in rows) for column in range(3)] if rows else []
-    lines = [
-        "  " + "  ".join([*(f"{c:{w}}" for c, w in zip(row, widths, strict=False)), row[3]]) for row in rows
-    ]
-    return "\n".join([f"{backend.name}: {backend.help}", *lines])
+    lines, group = [f"{backend.name}: {backend.help}"], ""
+    for parameter, row in zip(backend.parameters, rows, strict=True):
+        if parameter.group != group:
+            group = parameter.group
+            lines.append(f"  {group}:")
+        columns = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=False))
+        lines.append("  " + "  ".join([*columns, row[3]]))
+    return "\n".join(lines)
 
 
 def _value(value: object) -> str:
@@ -84,7 +88,8 @@ def _domain(parameter: Parameter) -> str:
     """Values that a parameter takes: its choices, or its type and range."""
     if parameter.choices:
         return "|".join(parameter.choices)
+    unit = f" {parameter.unit}" if parameter.unit else ""
     if parameter.low is None and parameter.high is None:
-        return parameter.type.__name__
+        return parameter.type.__name__ + unit
     low, high = ("" if limit is None else f"{limit:g}" for limit in (parameter.low, parameter.high))
-    return f"{parameter.type.__name__} {low}..{high}"
+    return f"{parameter.type.__name__} {low}..{high}{unit}"

@@ -65,11 +65,14 @@ class Document:
         """The document that a scan begins with which is opened after this one: drawn alike, all else anew."""
         return Document(look=self.look, backend=self.backend, params=self.params)
 
+    def defaults(self, pose: Pose) -> tuple[str, Any]:
+        """The backend that draws this pose, by name, and the parameters that it begins with."""
+        name, defaults = choose(pose)
+        return (name, defaults) if self.backend in (None, name) else choose(pose, self.backend)
+
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""
-        name, defaults = choose(pose)
-        if self.backend not in (None, name):
-            name, defaults = choose(pose, self.backend)
+        name, defaults = self.defaults(pose)
         return name, self.params.get(name, defaults)
 
     def request(self, pose: Pose) -> Request:

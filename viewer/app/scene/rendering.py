@@ -1,14 +1,15 @@
-"""Which backend draws, and its pyramid levels."""
+"""Which backend draws, how, and in which look."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ...backends import backends
 from ...look import Look, drawable
+from ...params import switches
 from ...scan.pose import Pose
 from ..session import edit_name
-from . import levels
 
 if TYPE_CHECKING:
     from ..app import App
@@ -70,19 +71,10 @@ class Rendering:
             self._app.change(name, merge=name, look=look)
 
     @property
-    def levels(self) -> dict[int, bool]:
-        """The backend's pyramid levels and whether they are on; empty where it has none."""
-        return {} if self._params is None else levels.levels(self._params)
+    def switches(self) -> dict[str, bool]:
+        """Those of the backend's parameters, see `params.switches`; none before the first pose."""
+        return {} if self._params is None else switches(self._params)
 
-    def toggle_level(self, number: int) -> None:
-        """Switch one of the backend's pyramid levels on or off."""
-        self.edit_params(levels.toggled(self._params, number))
-
-    @property
-    def is_filling(self) -> bool:
-        """Whether all levels that fill holes are on."""
-        return self._params is not None and levels.is_filling(self._params)
-
-    def toggle_filling(self) -> None:
-        """Switch all levels that fill holes on or off."""
-        self.edit_params(levels.with_filling(self._params, not self.is_filling))
+    def switch(self, name: str) -> None:
+        """Switch one of them on or off."""
+        self.edit_params(replace(self._params, **{name: not self.switches[name]}))

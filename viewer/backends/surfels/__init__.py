@@ -41,14 +41,6 @@ _RADIUS_PER_SPACING = 1.5
 class Params:
     """Parameters of the surfels backend."""
 
-    instancing: str = param(
-        "auto",
-        "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
-        "the others: quads from a geometry shader, uniform blocks, buffer textures, vertex attributes or "
-        "pulled vertices",
-        choices=("auto", *_WAYS),
-        affects="shader",
-    )
     passes: str = param(
         "one",
         "How splats that overlap become one surface. one: the nearest is seen, and where all are about a "
@@ -58,24 +50,53 @@ class Params:
         "behind it",
         choices=("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
         sweep=("one", "two"),
+        group="Surface",
     )
-    enlarge: float = param(2.0, "Factor on splats in the second pass (f); 1: none (d)", low=1.0, high=8.0)
+    enlarge: float = param(
+        2.0,
+        "Factor on splats in the second pass (f); 1: none (d)",
+        low=1.0,
+        high=8.0,
+        group="Surface",
+        when={"passes": _TWO},
+    )
     epsilon: float = param(
-        1.0, "How far behind the nearest splat others are blended with it, in its radii", low=0.0, high=100.0
+        1.0,
+        "How far behind the nearest splat others are blended with it, in its radii",
+        low=0.0,
+        high=100.0,
+        group="Surface",
+        unless={"passes": ("one_blended", "one_no_depth", "sorted")},
     )
     radius: str = param(
         "auto",
         "auto: the scan's own, else uniform; own: estimated where the scan has none; uniform: one for all",
         choices=("auto", "own", "uniform"),
+        group="Splats",
     )
-    radius_scale: float = param(1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0))
+    radius_scale: float = param(
+        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group="Splats"
+    )
     mask_falloff: float = param(
-        4.0, "How fast the mask fades, exp(-falloff d^2), d = 1 at the radius", low=0.1, high=100.0
+        4.0,
+        "How fast the mask fades, exp(-falloff d^2), d = 1 at the radius",
+        low=0.1,
+        high=100.0,
+        group="Splats",
     )
     mask_cutoff: float = param(
-        0.0183, "Value of the Gaussian mask where the splat ends", low=0.0183, high=0.99
+        0.0183, "Value of the Gaussian mask where the splat ends", low=0.0183, high=0.99, group="Splats"
     )
-    cull_back: bool = param(False, "Leave out surfels that face away")
+    cull_back: bool = param(False, "Leave out surfels that face away", group="Splats")
+    instancing: str = param(
+        "auto",
+        "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
+        "the others: quads from a geometry shader, uniform blocks, buffer textures, vertex attributes or "
+        "pulled vertices",
+        choices=("auto", *_WAYS),
+        affects="speed",
+        group="Speed",
+    )
 
 
 def needs(pose: Pose, params: Params) -> tuple[str, ...]:

@@ -69,23 +69,46 @@ class Params:
         "occupancy: each by itself, when it holds few points",
         choices=STOPS,
         affects="derive",
+        group="Octree",
     )
     delta: float = param(
         0.05,
-        "delta: the share of the positions that may lack an octant of their own",
+        "The share of the positions that may lack an octant of their own",
         low=0,
         high=1,
         affects="derive",
+        group="Octree",
+        when={"stop": ("delta",)},
     )
-    depth: int = param(10, "depth: the level of the leaves", low=0, high=DEEPEST, affects="derive")
+    depth: int = param(
+        10,
+        "The level of the leaves",
+        low=0,
+        high=DEEPEST,
+        affects="derive",
+        group="Octree",
+        when={"stop": ("depth",)},
+    )
     occupancy: int = param(
-        8, "occupancy: points that are not divided any more", low=1, high=1 << 20, affects="derive"
+        8,
+        "How many points are not divided any more",
+        low=1,
+        high=1 << 20,
+        affects="derive",
+        unit="points",
+        group="Octree",
+        when={"stop": ("occupancy",)},
     )
     max_depth: int = param(
-        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11)
+        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11), group="Cubes"
     )
     pixel_threshold: float = param(
-        1.0, "Octants whose edge is less are drawn in place of what they hold, pixels", low=0.25, high=64.0
+        1.0,
+        "Octants whose edge is less are drawn in place of what they hold",
+        low=0.25,
+        high=64.0,
+        unit="px",
+        group="Cubes",
     )
     least: float = param(
         1.25,
@@ -94,6 +117,7 @@ class Params:
         low=0.0,
         high=10.0,
         sweep=(0.0, 1.25),
+        group="Cubes",
     )
     normals: str = param(
         "auto",
@@ -101,17 +125,22 @@ class Params:
         "the scan has normals",
         choices=("auto", "smooth", "flat"),
         affects="derive",
+        group="Cubes",
     )
-    cull_back: bool = param(False, "Leave out octants whose normals all face away")
+    cull_back: bool = param(False, "Leave out octants whose normals all face away", group="Cubes")
     scatter: bool = param(
-        True, "Send cubes of a few pixels to their pixels one by one; off: all are made by `instancing`"
+        True,
+        "Send cubes of a few pixels to their pixels one by one; off: all are made by `instancing`",
+        affects="speed",
+        group="Speed",
     )
     instancing: str = param(
         "auto",
         "How octants become cubes: a geometry shader, uniform blocks, buffer textures, vertex attributes or "
         "pulled vertices; auto: what is fastest on this device",
         choices=("auto", *FEEDS),
-        affects="shader",
+        affects="speed",
+        group="Speed",
     )
 
 

@@ -1,0 +1,51 @@
+"""Parameters that backends declare with a key are switched by it: pyramid levels, filling of holes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+from viewer.app.commands import Commands, switches
+from viewer.app.keys import chord
+from viewer.backends import Backend, backends
+from viewer.params import param
+from viewer.params import switches as switches_of
+
+
+@dataclass(frozen=True)
+class Pyramid:
+    """Parameters as a backend with levels declares them."""
+
+    size: int = param(3, "Something else", low=1, high=9)
+    fill: bool = param(True, "Fill holes", key="H")
+    level_1: bool = param(False, "Fills small holes", key="1", when={"fill": (True,)})
+    level_2: bool = param(False, "Fills larger ones", key="2", when={"fill": (True,)})
+
+
+@dataclass(frozen=True)
+class Laplacian:
+    """Parameters of another that has a level of the first."""
+
+    level_2: bool = param(True, "Blends", key="2")
+
+
+def test_a_key_switches_what_declares_it_while_it_matters() -> None:
+    assert switches_of(Pyramid(level_2=True)) == {"fill": True, "level_1": False, "level_2": True}
+    assert switches_of(Pyramid(fill=False)) == {"fill": False}
+    assert switches_of(Laplacian()) == {"level_2": True}
+
+
+def test_each_switch_is_one_command_whichever_backend_draws() -> None:
+    found = switches(Backend(kind.__name__, SimpleNamespace(Params=kind)) for kind in (Pyramid, Laplacian))
+    named = [(command.name, command.title, command.key) for command in found]
+    assert named == [
+        ("switch_fill", "Fill", "H"), ("switch_level_1", "Level 1", "1"), ("switch_level_2", "Level 2", "2"),
+    ]  # fmt: skip
+
+
+def test_the_keys_of_parameters_are_theirs_alone() -> None:
+    declared = {p.key: p.name for one in backends().values() for p in one.parameters if p.key}
+    names = {p.name for one in backends().values() for p in one.parameters if p.key}
+    assert len(declared) == len(names)
+    chords = [chord(one) for command in Commands().of.values() for one in command.key.split()]
+    assert len(chords) == len(set(chords))
