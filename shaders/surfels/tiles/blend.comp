@@ -36,7 +36,8 @@ void blend(int first, int last) {
             float y = down_at(c, k), here = key_at(c, y), form = form_at(c, y);
             float edge = PERSPECTIVE != 0 ? here * here : 1.0;
             bool counts = form <= edge && here >= limit[k];
-            float weight = counts ? weight_at(0.25 * falloff * form / edge) : 0.0;
+            // Rounding takes the form of a disc that is seen edge on below zero, where the mask has no bound.
+            float weight = counts ? weight_at(max(0.25 * falloff * form / edge, 0.0)) : 0.0;
             weight_sum[k] += weight;
             color_sum[k] += weight * rgb;
             normal_sum[k] += turned(weight, n, visible[k]) * n;
