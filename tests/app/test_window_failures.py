@@ -114,7 +114,7 @@ def fail(name):
 """
 PARTS = [
     "viewer.app.panel._draw_statistics", "viewer.app.playing.timeline_bar._draw_track",
-    "viewer.app.scene.cube.draw", "viewer.app.scene.view._navigate", "viewer.app.menu.draw_toolbar",
+    "viewer.app.scene.cube.draw", "viewer.app.scene.view._take_drag", "viewer.app.menu.draw_toolbar",
     "viewer.app.scene.viewport.render_frame", "viewer.app.scene.viewport.Viewport.present",
     "viewer.app.scene.viewport.Viewport.pick", "viewer.app.playing.playback.Playback.advance",
     "viewer.app.app.App.remembered", "viewer.app.app.App.pass_on_messages", "viewer.app.loop.Loop._patience",

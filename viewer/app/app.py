@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 
 
 class App:
-    """What the window shows and can do. Panels read it and call its commands.
+    """All that the window shows and can do. Panels read it and call its commands.
 
     session: what the user has chosen. playback: the scan. renderer: what is on the GPU. viewport: the 3D
     view.
@@ -118,7 +118,7 @@ class App:
 
     @property
     def document(self) -> Document:
-        """What the user has chosen and made for the open scan."""
+        """The document of the open scan: what the user has chosen and made for it."""
         return self.session.document
 
     def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:
@@ -230,7 +230,7 @@ class App:
 
     @property
     def tasks(self) -> list[Task]:
-        """What goes on beside the window, the latest last."""
+        """Work that goes on beside the window, the latest last."""
         tasks = [self.exporting.task, self.renderer.preparing, self._opening.task, *self.tools.tasks]
         if self.playback.pose is None:
             tasks.append(self.playback.timeline.reading)
@@ -276,7 +276,7 @@ class App:
         log.debug("replays frame %d", entry.pose)
 
     def remembered(self) -> Settings:
-        """What is to come back at the next start."""
+        """The settings that are to come back at the next start."""
         return Settings.of(
             self.session, window=self.window.place, theme=self.theme, text_scale=self.window.text_scale,
             marks=self.marks, cube=self.steering.cube.is_shown, turn_seconds=self.steering.turntable.seconds,

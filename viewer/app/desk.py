@@ -36,7 +36,7 @@ class Click:
 
 @dataclass(frozen=True)
 class Work:
-    """What runs beside the window for a tool. then: takes its result."""
+    """A piece of work that runs beside the window for a tool. then: takes its result."""
 
     task: Task
     future: Future[Any]
@@ -71,7 +71,7 @@ class Desk:
 
     @property
     def scan(self) -> str:
-        """Its name, as the user gave it."""
+        """The name of the open scan, as the user gave it."""
         return self._app.session.scan
 
     @property
@@ -98,7 +98,7 @@ class Desk:
 
     @property
     def document(self) -> Document:
-        """What the user has chosen and made for the scan."""
+        """The document of the open scan: what the user has chosen and made for it."""
         return self._app.session.document
 
     def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:

@@ -56,7 +56,7 @@ def in_words(what: str, error: BaseException) -> str:
 
 
 def reason(error: BaseException) -> str:
-    """What an error says, and of which kind it is unless it is meant for users."""
+    """The words of an error, and its kind unless it is meant for users."""
     if isinstance(error, Scan4DError):
         return str(error)
     said = " ".join(str(error).split())[:_LONGEST]
@@ -76,7 +76,7 @@ def widgets_ended() -> Iterator[None]:
 
 
 def _state_of_widgets() -> imgui.internal.ErrorRecoveryState | None:
-    """Which widgets have begun; None outside of a frame."""
+    """The state of the widgets that have begun; None outside of a frame."""
     context = imgui.get_current_context()
     if context is None or not context.within_frame_scope:
         return None

@@ -103,7 +103,7 @@ def load(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], list[InputError]]:
-    """What a TOML file says, and why it cannot be read; nothing where there is no file."""
+    """The content of a TOML file, and why it cannot be read; nothing where there is no file."""
     try:
         return tomllib.loads(read_text(path, _MOST_BYTES)), []
     except FileNotFoundError:

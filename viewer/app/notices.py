@@ -50,7 +50,7 @@ class Notices:
         self.count += 1
 
     def shown(self, now: float) -> list[Notice]:
-        """Those to show over the picture, the oldest first."""
+        """Notices to show over the picture, the oldest first."""
         return [notice for notice in self.all[-_MOST_SHOWN:] if notice.until > now]
 
     def next_change(self, now: float) -> float:

@@ -95,7 +95,7 @@ def _draw_renderer(app: App, pose: Pose) -> None:
 
 
 def _colors(app: App, pose: Pose) -> dict[str, str]:
-    """What can give colours, and the title of each: also what is chosen although the frame lacks it."""
+    """Sources of colours, and the title of each: also the one chosen where the frame lacks it."""
     there = [*COLOR_BY, *pose.cloud.scalars]
     look = app.document.look
     titles = {name: printable(name) for name in there}

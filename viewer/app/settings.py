@@ -301,7 +301,7 @@ def _places(data: Any) -> dict[str, Left]:
 
 
 def _tools(data: Any) -> dict[str, dict[str, Any]]:
-    """As the file has them: each tool reads its own."""
+    """Settings of tools as the file has them: each tool reads its own."""
     return {_text(name): values for name, values in data.items() if isinstance(values, dict)}
 
 

@@ -85,7 +85,7 @@ class Toolbox:
             yield title, partial(self._do, slot, act), is_on
 
     def _ask(self, slot: Slot, function: Callable[[Any], Any], is_users: bool = False) -> Any:
-        """What a function says of the slot's tool; None where that is off or fails.
+        """The answer of a function of the slot's tool; None where that is off or fails.
 
         is_users: whether an InputError is a mistake of the user's.
         """
@@ -106,7 +106,7 @@ class Toolbox:
         self._ask(slot, lambda _: act(), is_users=True)
 
     def _call(self, slot: Slot, hook: str, *arguments: Any) -> Any:
-        """What a hook of the slot's tool returns; None where the tool is off, lacks it or fails."""
+        """The answer of a hook of the slot's tool; None where the tool is off, lacks it or fails."""
         return self._ask(slot, lambda tool: getattr(tool, hook)(*arguments)) if slot.has(hook) else None
 
     def _switch_off(self, slot: Slot, error: BaseException) -> None:
@@ -144,7 +144,7 @@ class Toolbox:
 
     @property
     def prompt(self) -> str:
-        """What to say at the top of the view; empty: nothing."""
+        """The words to show at the top of the view; empty: none."""
         return str(self._call(self._first, "prompt") or "") if self._first else ""
 
     @property
@@ -185,7 +185,7 @@ class Toolbox:
 
     @property
     def tasks(self) -> list[Task]:
-        """What runs beside the window for tools."""
+        """Work that runs beside the window for tools."""
         return [work.task for slot in self._slots.values() for work in slot.desk.works]
 
     def advance(self) -> bool:

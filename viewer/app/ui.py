@@ -8,7 +8,7 @@ from .keys import Keys
 
 
 class Ui:
-    """What a section of the panel is declared with, beside ImGui and `widgets`."""
+    """Helpers that declare a section of the panel, beside ImGui and `widgets`."""
 
     def __init__(self, keys: Keys) -> None:
         self._keys = keys

@@ -23,7 +23,7 @@ _LONGEST = 60  # letters of a name
 
 
 class Bookmarks:
-    """What the user does with the bookmarks of the document. tell: takes messages.
+    """Actions on the bookmarks of the document. tell: takes messages.
 
     editing: the one whose name is being typed, None while none is.
     """
@@ -37,7 +37,7 @@ class Bookmarks:
 
     @property
     def all(self) -> tuple[Bookmark, ...]:
-        """Those of the scan that is shown."""
+        """The bookmarks of the open scan."""
         return self._session.document.bookmarks
 
     def add(self) -> None:
@@ -77,7 +77,7 @@ class Bookmarks:
         self._session.change("Delete bookmark", bookmarks=left)
 
     def items(self) -> Iterator[Item]:
-        """For a menu."""
+        """Bookmarks for a menu."""
         for bookmark in self.all:
             yield bookmark.name, partial(self.go_to, bookmark), self.is_shown(bookmark)
 

@@ -19,7 +19,7 @@ _HEAD = 2.6  # of the view's head, where the prompt is
 
 
 class ViewPlace:
-    """Where places of the scan are on the screen.
+    """The view on the screen, and where places of the scan are in it.
 
     box: the view. is_hovered: whether the mouse is over the view and nothing else. Places on the screen are
     ImGui's.
@@ -32,7 +32,7 @@ class ViewPlace:
         self.box = Box(corner, corner + size)
 
     def on_screen(self, position: Vector) -> ImVec2 | None:
-        """None behind the eye. position: float64, scan units."""
+        """A place of the scan on the screen; None behind the eye. position: float64, scan units."""
         place = navigation.place(self.camera, position)
         if place is None:
             return None
@@ -50,7 +50,7 @@ class Label:
         self.size = ImVec2(max(e.x for e in extents), sum(e.y for e in extents)) + self._pad * 2
 
     def in_short(self) -> Label:
-        """What stands before a colon alone, such as its number."""
+        """A label of what stands before the colon alone, such as its number."""
         return Label([self.texts[0].partition(":")[0]], self.line, self.faint)
 
     def draw(self, box: Box) -> None:

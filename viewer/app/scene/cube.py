@@ -25,7 +25,7 @@ SHADE = 0.24  # how much darker a face is that is seen from the side
 
 
 class OrientationCube:
-    """What the mouse does with it.
+    """The state of the cube: what the mouse does with it.
 
     is_shown: by the user's choice. is_held: the button went down on it. is_dragged: the
     camera follows the mouse.
@@ -132,7 +132,7 @@ class _Drawing:
         self.draw_list.add_polyline(corners, line, self.half / 18, imgui.ImDrawFlags_.closed)
 
     def write(self, text: str, face: Direction) -> None:
-        """Its name, lying in the face: each letter a slanted rectangle of the font's picture."""
+        """The name of a face, lying in it: each letter a slanted rectangle of the font's picture."""
         right, up = orientation.writing(self.turned, face)
         font = imgui.get_font_baked()
         scale = _TEXT_HEIGHT / font.size

@@ -26,13 +26,13 @@ class Quality(NamedTuple):
 
     @property
     def cost(self) -> float:
-        """What a picture takes, against that in full; no less, as some of it always stays."""
+        """The time that a picture takes, against that in full; no less, as some of it always stays."""
         return self.share * self.scale
 
 
 @cache
 def qualities(points: int) -> tuple[Quality, ...]:
-    """What there is for a scan of so many points, in full first: fewer points, fewer pixels, fewer points."""
+    """Qualities for a scan of so many points, in full first: fewer points, fewer pixels, fewer points."""
     many = [1.0, *takewhile(lambda share: share * points >= _MANY, _SHARES)]
     few = [share for share in _SHARES if share < many[-1] and share * points >= _FEWEST]
     return (

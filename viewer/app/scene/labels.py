@@ -34,7 +34,7 @@ class Box:
         )  # fmt: skip
 
     def moved_into(self, area: Box) -> Box:
-        """The same size, all in the area; from its upper left corner on where it is larger."""
+        """A box of the same size, all in the area; from its upper left corner on where it is larger."""
         size = self.high - self.low
         left = max(area.low.x, min(self.low.x, area.high.x - size.x))
         top = max(area.low.y, min(self.low.y, area.high.y - size.y))
@@ -58,7 +58,7 @@ class Box:
 def free_place(
     size: ImVec2, line: Line, gap: float, area: Box, taken: Sequence[Box], lines: Sequence[Line]
 ) -> Box | None:
-    """Where a label stands beside its line, in the area and off all that is taken; None where it cannot.
+    """The place of a label beside its line, in the area and off all that is taken; None where there is none.
 
     size: of the label. gap: from the line, at least. lines: other ones, of which it covers as few as can be.
     """
@@ -71,7 +71,7 @@ def free_place(
 
 
 def usual_place(size: ImVec2, line: Line, gap: float, area: Box) -> Box:
-    """Where it would stand if nothing else were there."""
+    """The place of a label if nothing else were there."""
     return next(_beside(size, line, gap)).moved_into(area)
 
 

@@ -41,7 +41,7 @@ class Pointer:
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
-        """What is seen there when the picture is no preview."""
+        """The place under the mouse in the picture in full."""
         return self._app.viewport.pick_in_full() or self.picked
 
 

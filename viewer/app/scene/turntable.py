@@ -44,7 +44,7 @@ class Turntable:
         return math.inf if self._last is None else self._last + _STEP - now
 
     def turned(self, camera: Camera, pivot: Vector | None, now: float) -> Camera:
-        """As far as it has turned since the last call, about the pivot; None: the camera's target."""
+        """The camera, turned as far as the table has since then. pivot: None is the camera's target."""
         if self._last is None or self.next_change(now) > 0:
             return camera
         degrees = 360 * (now - self._last) / self.seconds

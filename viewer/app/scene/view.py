@@ -144,7 +144,7 @@ def _gesture(io: imgui.IO) -> str:
 
 
 def _note(app: App) -> str | None:
-    """What to say over the picture: why it is not what was asked for."""
+    """The words over the picture: why it is not what was asked for."""
     playback = app.playback
     if app.viewport.problem:
         return str(app.viewport.problem)

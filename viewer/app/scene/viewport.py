@@ -118,7 +118,7 @@ class Viewport:
         log.debug("drew frame %d with %s, %dx%d pixels, %d points", request.pose.index, drew, *pixels, count)
 
     def without_preparing(self, request: Request) -> Request:
-        """What to show instead, so that nothing has to be prepared: as it was before, or plain points."""
+        """A request to show instead, for which nothing has to be prepared: as before, or plain points."""
         if self._asked_for is not None:
             before = replace(self._asked_for, pose=request.pose, camera=request.camera)
             if is_prepared(self.renderer, before, self.size):
@@ -147,7 +147,7 @@ class Viewport:
         return self.request is not None and math.isinf(self.better_at(playing=False))
 
     def better_at(self, playing: bool) -> float:
-        """By the clock, when drawing the same again may give a better picture; infinite where it cannot."""
+        """The time by the clock when drawing the same again may give a better picture; infinite: never."""
         rest = self._motion.ends if self.is_preview and not playing else math.inf
         return min(self._prepared_at, rest)
 
@@ -190,7 +190,7 @@ class Viewport:
             self._presenter.present(self.surface, *self.place[:2], self.size)
 
     def pick(self, pixel: tuple[int, int]) -> Picked | None:
-        """What a pixel shows, without its spacing, never through a gap (`before_gap`).
+        """The place that a pixel shows, without its spacing, never through a gap (`before_gap`).
 
         Read from the GPU once for each place and picture.
         """

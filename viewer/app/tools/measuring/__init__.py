@@ -30,7 +30,7 @@ _SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is
 
 
 class Tool:
-    """What measures. What was measured is in the document.
+    """The tool that measures. What was measured is in the document.
 
     begun: the first end of the one that is being made, None where none is. filled: whether ends may be set
     where holes are filled. saving: the file name in the dialog that saves, None while it is closed; problem:
@@ -51,7 +51,7 @@ class Tool:
 
     @property
     def made(self) -> Measurements:
-        """Those of the scan that is open."""
+        """The measurements of the open scan."""
         return self.desk.document.part(Measurements)
 
     def delete(self, number: int) -> None:
@@ -93,7 +93,7 @@ class Tool:
         self.begun = None
 
     def prompt(self) -> str:
-        """What a click does."""
+        """The words that say what a click does."""
         return f"Measuring: click the {'second' if self.begun else 'first'} place.  Esc ends."
 
     def on_click(self, click: Click) -> bool:
@@ -138,7 +138,7 @@ class Tool:
         log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
 
     def readings(self) -> list[Reading]:
-        """Them as they stand in the frame that is shown, in order; none before the first frame."""
+        """The measurements as they stand in the frame that is shown; none before the first."""
         pose, one_topology = self.desk.pose, self.desk.timeline.one_topology
         if pose is None:
             return []

@@ -66,7 +66,7 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
 
 
 def _details(reading: Reading, unit: str) -> str:
-    """Both ends in full."""
+    """A text that tells both ends in full."""
     uncertain = "sampling alone: what the spacing of the points around the ends leaves open"
     return "\n".join([*(_end_words(end, unit) for end in reading.measurement.ends), f"± is of {uncertain}"])
 

@@ -11,7 +11,7 @@ def distance_words(reading: Reading, unit: str) -> str:
 
 
 def snap_words(reading: Reading) -> str:
-    """What the ends snapped to, such as "points 12 and 345"."""
+    """The points or surfaces that the ends snapped to, such as "points 12 and 345"."""
     ids = [end.id for end in reading.measurement.ends if end.id is not None]
     if len(ids) == 2:
         return f"points {ids[0]} and {ids[1]}"
