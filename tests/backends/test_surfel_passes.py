@@ -95,7 +95,7 @@ def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None
 
 def test_discs_that_are_seen_edge_on_weigh_no_more_than_others(draw: Draw) -> None:
     """Of the demo from this eye one does at the outline, whose form is below zero by rounding."""
-    cloud = open_scan("demo").get(0).cloud
+    cloud = open_scan("demo").pose(0).cloud
     camera = Camera(
         eye=(296.65148770755775, 181.91379588975124, 640.5755395931167),
         target=(-0.002124786376953125, -6.171062469482422, 4.399814605712891),
