@@ -6,6 +6,7 @@ from .errors import unknown_name
 
 Vector = tuple[float, float, float]
 
+UP = "+y"  # where nobody says otherwise; a name of AXES
 AXES: dict[str, Vector] = {
     "+x": (1, 0, 0),
     "-x": (-1, 0, 0),

@@ -22,6 +22,7 @@ from viewer.analysis.measure import Measurement, Reading, read
 from viewer.app import run
 from viewer.app.app import App
 from viewer.document.measurements import Measurements
+from viewer.document.schema import plain
 
 
 class Observer:
@@ -95,6 +96,9 @@ def shown(app: App) -> dict[str, Any]:
         "is_under_way": app.tools.is_under_way,
         "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
         "camera": document.camera and document.camera.to_json(),
+        "document": plain(document),
+        "undoes": app.session.history.undoes,
+        "redoes": app.session.history.redoes,
     }
     if viewport.is_there and viewport.request is not None and surface is not None:
         state |= {

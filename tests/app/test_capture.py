@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
+from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -42,7 +43,13 @@ def app() -> Any:
     picture = SimpleNamespace(request=request, is_there=True, size=(64, 48))
     session = SimpleNamespace(scan="ball.npz")
     return SimpleNamespace(
-        told=told, note=told.append, viewport=picture, session=session, hash=None, unit="mm"
+        told=told,
+        note=told.append,
+        viewport=picture,
+        session=session,
+        hash=None,
+        hash_found=Future(),
+        unit="mm",
     )
 
 

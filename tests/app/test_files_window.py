@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from virtual_screen import PATIENCE, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PATIENCE, RunningApp, Screen, kept_of, running_app, virtual_screen
 
 from viewer.app.settings import FILE, load
 
@@ -34,14 +32,6 @@ def study(tmp_path: Path) -> Path:
         np.save(path, np.random.default_rng(number).random((500, 3)))
     (study / "odd.npz").write_bytes(b"none")
     return study
-
-
-def drop(app: RunningApp, *paths: object) -> None:
-    """From another program, with a real protocol."""
-    pytest.importorskip("Xlib")
-    window = app.screen.do("search", "--name", "Scan4D").split()[-1]
-    command = [sys.executable, str(Path(__file__).with_name("drop.py")), window, *map(str, paths)]
-    subprocess.run(command, env=app.screen.env, check=True, timeout=PATIENCE)
 
 
 def ctrl(app: RunningApp, key: str) -> None:
@@ -104,7 +94,7 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
     settings = tmp_path / "config" / "scan4d" / FILE
     kept = load(settings)[0]
     assert kept.recent == tuple(str(study / name) for name in ("one", "two.npy", "three.npy"))
-    assert (kept.theme, kept.backend, kept.places[str(study / "one")].index) == ("light", "surfels", 1)
+    assert (kept.theme, kept.backend, kept_of(tmp_path, study / "one").pose) == ("light", "surfels", 1)
 
     np.save(study / "three.npy", np.random.default_rng(9).random((500, 3)) * 1e4 + 1e6)
     with running_app(screen, tmp_path, study / "one") as app:
@@ -121,7 +111,7 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
     settings.write_text("{")
     with running_app(screen, tmp_path, study / "one") as app:
         app.told(r"settings\.json: is damaged\. It is kept as settings\.old\.json")
-        assert described(app)["pose"] == 0
+        assert described(app)["pose"] == 1, "its document is a file of its own"
         close(app)
     assert settings.with_name("settings.old.json").read_text() == "{"
     assert load(settings)[1] == []
@@ -132,21 +122,21 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
     (study / "worse 1%.ply").write_bytes(b"no array")
     with running_app(screen, tmp_path, study / "missing.npy", study) as app:
         app.told(r"missing\.npy: no such file")  # and the others are opened
-        drop(app, study / "one")
+        app.drop(study / "one")
         app.see(scan=str(study / "one"))
-        drop(app, *(study / "one" / f"{number}.npy" for number in range(3)))
+        app.drop(*(study / "one" / f"{number}.npy" for number in range(3)))
         app.see(scan=str(study / "one/%d.npy"))
-        drop(app, study / "two.npy", study / "gone.ply", study / "three.npy")
+        app.drop(study / "two.npy", study / "gone.ply", study / "three.npy")
         app.told("gone.ply: no such file")
         app.see(scan=str(study / "two.npy"))
         app.settle()
         screen.do("key", "Next")
         app.see(scan=str(study / "three.npy"))
-        drop(app, study / "wrong.json")
+        app.drop(study / "wrong.json")
         app.told("wrong.json: is no recording")
-        drop(app, study / "worse 1%.ply")
+        app.drop(study / "worse 1%.ply")
         app.told("Cannot open: .*worse 1%.ply")
-        drop(app, study / "one", study / "wrong.json")
+        app.drop(study / "one", study / "wrong.json")
         app.told(r"Left out: wrong\.json")
         app.see(scan=str(study / "one"))
         screen.do("key", "r")
@@ -154,7 +144,7 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
         app.settle()
         screen.do("key", "r")
         recording = app.told(r"Saved (.+\.json)")[1]
-        drop(app, recording)
+        app.drop(recording)
         app.see(is_replaying=True)
         app.see(is_replaying=False)
         app.settle()

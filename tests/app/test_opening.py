@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from viewer.app.files.opening import Opening, find_facts
+from viewer.document.document import Document
+from viewer.document.saved_session import SavedSession
 from viewer.errors import InputError, Scan4DError
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
@@ -34,8 +36,13 @@ def taken(opening: Opening) -> tuple[str, Timeline]:
     return scan, opened.timeline
 
 
+def no_session() -> None:
+    """Nothing is to come back."""
+
+
 def start(opening: Opening, scan: Path, index: int = 0) -> None:
-    opening.start(str(scan), scan.name, index, lambda: open_scan(scan))
+    saved = SavedSession("scan", None, index, Document())
+    opening.start(str(scan), scan.name, lambda: saved, lambda: open_scan(scan))
 
 
 def test_an_opened_scan_has_its_first_pose_in_memory(tmp_path: Path) -> None:
@@ -87,7 +94,7 @@ def test_whatever_goes_wrong_is_one_message(tmp_path: Path) -> None:
         raise KeyError("x")
 
     opening = Opening()
-    opening.start("scan", "scan", 0, fail)
+    opening.start("scan", "scan", no_session, fail)
     with pytest.raises(Scan4DError, match=r"scan: cannot be opened \(KeyError: 'x'\)"):
         taken(opening)
 
@@ -113,7 +120,7 @@ def is_closed(timeline: Timeline) -> bool:
 
 def test_another_scan_takes_the_place_of_the_one_being_opened(tmp_path: Path) -> None:
     gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
-    opening.start("slow", "slow", 0, slow(save(tmp_path / "slow"), gate, opened))
+    opening.start("slow", "slow", no_session, slow(save(tmp_path / "slow"), gate, opened))
     former = opening.task
     assert former is not None
     start(opening, save(tmp_path / "fast"))
@@ -130,7 +137,7 @@ def test_another_scan_takes_the_place_of_the_one_being_opened(tmp_path: Path) ->
 
 def test_what_was_cancelled_never_comes(tmp_path: Path) -> None:
     gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
-    opening.start("slow", "slow", 0, slow(save(tmp_path / "slow"), gate, opened))
+    opening.start("slow", "slow", no_session, slow(save(tmp_path / "slow"), gate, opened))
     opening.cancel()
     assert opening.scan is None
     assert opening.take() is None
@@ -145,7 +152,7 @@ def test_what_was_cancelled_never_comes(tmp_path: Path) -> None:
 def test_what_was_ready_and_never_taken_is_closed(tmp_path: Path) -> None:
     gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
     gate.set()
-    opening.start("slow", "slow", 0, slow(save(tmp_path / "slow"), gate, opened))
+    opening.start("slow", "slow", no_session, slow(save(tmp_path / "slow"), gate, opened))
     left = opened.result()
     threads = [thread for thread in threading.enumerate() if thread.name == "Opening slow"]
     for thread in threads:

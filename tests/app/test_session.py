@@ -10,6 +10,7 @@ from viewer.app.session import Session, edit_name
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
+from viewer.document.saved_session import SavedSession
 from viewer.look import Look
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -54,6 +55,20 @@ def test_a_scan_begins_drawn_as_the_one_before() -> None:
     session.turn_to("two")
     assert session.document == drawn
     assert session.history.undoes is None
+
+
+def test_a_saved_session_takes_the_place_of_what_is_there_and_can_be_undone() -> None:
+    session = Session("one", Document(camera=Camera()))
+    session.turn_to("two")
+    saved = SavedSession("one", None, 5, Document(camera=Camera(eye=(0, 0, 9))))
+    session.turn_to("one")
+    session.take_up(saved)
+    assert session.document == saved.document
+    session.history.undo()
+    assert session.document == Document(camera=Camera())
+    session.turn_to("three", saved)
+    assert (session.index, session.document) == (5, saved.document)
+    assert session.history.undoes is None, "that is how it begins"
 
 
 def test_a_frame_without_the_chosen_scalar_is_drawn_in_other_colours_and_the_choice_stays() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from scenes import sphere
-from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app, virtual_screen
 
 from viewer.document.recording import Recording
 from viewer.scan import formats
@@ -84,7 +84,7 @@ def test_a_signal_closes_the_window_and_saves_all(
     check_recording(path)
     kept = settings(tmp_path)
     assert kept["theme"] == "light"
-    assert str(scan) in kept["places"]
+    assert kept_of(tmp_path, scan).document.camera is not None
     assert journals(tmp_path) == []
     left = {entry.name for entry in tmp_path.iterdir()}
     assert left == {"config", "state", "log", path.name}

@@ -23,6 +23,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from viewer.document.saved_session import SavedSession, kept_file
+
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 120.0  # seconds until what does not come about counts as failed
 
@@ -174,6 +176,13 @@ class RunningApp:
                 self._came.wait(seconds)
             return found
 
+    def drop(self, *paths: object) -> None:
+        """Drop files and folders from another program, with a real protocol."""
+        pytest.importorskip("Xlib")
+        window = self.screen.do("search", "--name", "Scan4D").split()[-1]
+        command = [sys.executable, str(Path(__file__).with_name("drop.py")), window, *map(str, paths)]
+        subprocess.run(command, env=self.screen.env, check=True, timeout=PATIENCE)
+
     def reset(self) -> None:
         """Bring it back to how it was at its start: frame, renderer, camera, pace, theme; at rest."""
 
@@ -216,6 +225,11 @@ class RunningApp:
         """Processor time that it has taken."""
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def kept_of(home: Path, scan: object) -> SavedSession:
+    """What is kept of a scan for the next start, in the home that `running_app` was given."""
+    return SavedSession.load(home / "config" / "scan4d" / "scans" / kept_file(str(scan)).name)
 
 
 @contextmanager

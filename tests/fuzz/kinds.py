@@ -8,19 +8,23 @@ import os
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import lzf
 import numpy as np
 
+from viewer.analysis.measure import End, Measurement
 from viewer.app import keys, settings
 from viewer.app.commands import Commands
-from viewer.app.session import Left
 from viewer.backends import backend, backends
 from viewer.camera import Camera
-from viewer.document.document import Bookmark
+from viewer.document.document import Bookmark, Document
+from viewer.document.measurements import Measurements
 from viewer.document.recording import Entry, Recording
+from viewer.document.saved_session import SavedSession
+from viewer.document.schema import plain
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, shared_renderer
 from viewer.gpu.surface import Surface
@@ -57,7 +61,7 @@ def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
     """Kind -> whole files: made here, and small real ones where they are at hand.
 
     Kinds are the suffixes of scans, and the names of other files that the project reads: "camera.json",
-    "recording.json", "recording.png", "times.csv", "settings.json", "keys.toml".
+    "recording.json", "recording.png", "session.json", "times.csv", "settings.json", "keys.toml".
     """
     for name, text in _TEXTS.items():
         (folder / name).write_text(text)
@@ -120,9 +124,16 @@ def _write_choices(folder: Path) -> None:
     Recording((entry, later), 1.0).save(folder / "recording.json")
     write_png(np.zeros((2, 2, 4), np.uint8), folder / "recording.png", entry.description())
     (folder / TIMES_FILE).write_text("file,time\nf0.ply,0\nf1.ply,0.04\n")
-    left = Left(3, camera, "mm", (Bookmark("front", camera),))
-    kept = settings.Settings(look=Look(light="head"), recent=("demo",), places={"demo": left})
-    (folder / "settings.json").write_text(json.dumps(kept.to_json()))
+    marks = (Bookmark("front", camera),)
+    left = {"index": 3, "camera": camera.to_json(), "unit": "mm", "bookmarks": plain(marks)}
+    chosen = settings.Settings(look=Look(light="head"), recent=("demo",)).to_json()
+    (folder / "settings.json").write_text(json.dumps(chosen | {"places": {"demo": left}}))
+    end = End(0, 0.0, (1.0, 2.0, 3.0), "point", 3, 0.1, 0)
+    document = Document(camera, (1.0, 2.0, 3.0), Look(light="head"), "points", unit="mm", bookmarks=marks)
+    document = document.with_params("points", backend("points").params()).with_part(
+        Measurements((Measurement(end, replace(end, id=None, snapped="surface")),))
+    )
+    SavedSession("scan.npz", None, 3, document).save(folder / "session.json")
     keys.write_template(folder / "keys.toml", Commands())
     text = (folder / "keys.toml").read_text()
     (folder / "keys.toml").write_text(text.replace("\n# ", "\n").split("[keys]")[1].join(["[keys]", ""]))
@@ -163,6 +174,12 @@ def _recorded(path: Path) -> None:
         entry.description()
 
 
+def _kept(path: Path) -> None:
+    session = SavedSession.load(path)
+    session.document.part(Measurements)
+    session.save(path)
+
+
 def _times(path: Path) -> None:
     for name in ("f0.ply", "f1.ply"):
         (path.parent / name).write_text(_TEXTS["mesh.ply"])
@@ -199,6 +216,7 @@ def _planted(path: Path) -> None:
 _CHOICES: dict[str, Callable[[Path], Any]] = {
     "camera.json": Camera.load,
     "recording.json": _recorded,
+    "session.json": _kept,
     "recording.png": _recorded,
     "times.csv": _times,
     "settings.json": _settings,

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ..document.saved_session import SavedSession
+    from ..scan.timeline import Timeline
     from .app import App
 
 
@@ -15,28 +17,32 @@ def run(
     *,
     unit: str | None = None,
     fps: float | None = None,
-    up: str = "+y",
+    up: str | None = None,
+    opened: Timeline | None = None,
     device: int | None = None,
     replay: Path | None = None,
     watch: Callable[[App], None] | None = None,
+    session: SavedSession | None = None,
 ) -> int:
     """Open a window on the first of the scans and return 0 when it is closed, by a signal too.
 
     scans: as a user names them (see `named_scans`); the others can be chosen in the window, which tells
-    what is wrong with those that cannot be opened. up: the up axis. device: has no effect on a window,
-    which says so. replay: a recording to show first. watch: called at the end of each turn of the window's
-    loop, with the app as it is then. Raises InputError where no scan can be opened,
-    NoOpenGLError without a window.
+    what is wrong with those that cannot be opened. up: the up axis; None: as a scan was left.
+    opened: the first of the scans, where that is open already; the window closes it. device: has no effect
+    on a window, which says so. replay: a recording to show first. session: to open the first scan with.
+    watch: called at the end of each turn of the window's loop, with the app as it is then. Raises InputError
+    where no scan can be opened, NoOpenGLError without a window.
     """
     from ..geometry import up_vector
     from ..scan.listing import named_scans
     from ..scan.open import open_scan
 
-    up_vector(up)
+    if up is not None:
+        up_vector(up)
     found, problems = named_scans(scans)
     if not found:
         raise problems[0]
-    timeline = open_scan(found[0], unit, fps)
+    timeline = opened or open_scan(found[0], unit, fps)
     from .closing import Signals
 
     with Signals() as signals:
@@ -45,13 +51,15 @@ def run(
         from ..unfinished import remove_leftovers
         from . import settings
         from .app import App
+        from .files.keeping import take_over
         from .loop import Loop
         from .window import Window
 
         remembered, notes = settings.load(user_folder() / settings.FILE)
+        take_over(remembered.places.values())
         window = Window("Scan4D", remembered.window)
         try:
-            app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up)
+            app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up, session=session)
             try:
                 for note in notes:
                     app.note(note)

@@ -6,7 +6,9 @@ import logging
 import os
 import time
 from collections.abc import Hashable, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from ..document.anonymous import in_place
 from ..document.document import Document
 from ..document.part import Part
 from ..document.recording import Entry
+from ..document.saved_session import SavedSession, kept
 from ..errors import InputError, Scan4DError
 from ..folders import user_folder
 from ..gpu.context import Gpu
@@ -28,8 +31,10 @@ from . import keys, settings, theme
 from .commands import Commands
 from .failures import Failures
 from .files.browser import Browser
+from .files.keeping import Keeping
 from .files.opening import Opened, Opening, begin
 from .files.scans import Scans, title
+from .files.sessions import Sessions
 from .help import Help
 from .notices import Notices
 from .output.capture import Capture
@@ -42,8 +47,8 @@ from .scene.pointed import Pointer
 from .scene.rendering import Rendering
 from .scene.steering import Steering
 from .scene.viewport import Viewport
-from .session import Left, Session, known_as
-from .settings import Keeper, Settings
+from .session import Session, known_as
+from .settings import Settings
 from .toolbox import Toolbox
 from .window import Window
 
@@ -60,9 +65,10 @@ class App:
     keys: which do what. help: its open pages.
     pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
     rendering: which backend draws.
-    scans: those to go to without a dialog. browser: the dialog that finds others.
+    scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
     full_view: whether the panels are hidden. tools: what is in their folder. commands: all that can be done.
-    marks: what lies over the view. keeper: keeps what is to come back at the next start.
+    marks: what lies over the view. hash_found: brings the hash of the scan.
+    keeping: keeps what is to come back at the next start.
     """
 
     def __init__(
@@ -74,11 +80,12 @@ class App:
         *,
         unit: str | None = None,
         fps: float | None = None,
-        up: str = "+y",
+        up: str | None = None,
+        session: SavedSession | None = None,
     ) -> None:
+        """up: the up axis; None: as the scan was left. session: to open the first scan with."""
         self.scans: Scans = Scans(self, scans, remembered.recent)
         self.browser: Browser = Browser(self)
-        self.session: Session = remembered.session(scans[0], up)
         self.theme = remembered.theme
         self.notices = Notices()
         self.failures = Failures(self.note)
@@ -88,6 +95,10 @@ class App:
         self.keys, problems = keys.load(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
+        self._up = up
+        opened = begin(timeline, lambda: self._kept(scans[0]), session)
+        document = remembered.document if up is None else remembered.document.with_up(up)
+        self.session: Session = Session(scans[0], document, remembered.pace, opened.left)
         self.pointer: Pointer = Pointer(self)
         self.rendering: Rendering = Rendering(self)
         self.steering: Steering = Steering(self, remembered.cube, remembered.turn_seconds)
@@ -103,12 +114,13 @@ class App:
         log.debug("%s", window.place)
         window.text_scale = remembered.text_scale
         self.set_theme(self.theme)
-        self.keeper = Keeper(user_folder() / settings.FILE, remembered)
+        self.sessions: Sessions = Sessions(self)
+        self.keeping: Keeping = Keeping(self, user_folder() / settings.FILE, remembered)
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         if self.renderer.gpu.software:
             self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
-        self.playback: Playback = self._start(begin(timeline))
+        self.playback: Playback = self._start(opened)
 
     # --- commands ---------------------------------------------------------------------
 
@@ -217,11 +229,22 @@ class App:
         except InputError as error:
             self.note(str(error))
 
-    def open(self, scan: str) -> None:
+    def open(self, scan: str, session: SavedSession | None = None) -> None:
         """Open another scan on a worker, instead of one that is being opened; the current one stays
-        until a pose of it is there."""
-        index = self.session.places.get(known_as(scan), Left()).index
-        self._opening.start(scan, title(scan), index, lambda: open_scan(scan, self._unit, self._fps))
+        until a pose of it is there.
+
+        session: to open it with; None: as it was left.
+        """
+        left = self.session.left(scan)
+        find = (lambda: self._kept(scan)) if left is None else lambda: left
+        self._opening.start(scan, title(scan), find, lambda: open_scan(scan, self._unit, self._fps), session)
+
+    def _kept(self, scan: str) -> SavedSession | None:
+        """What was kept of a scan. Raises InputError where that is damaged."""
+        found = kept(known_as(scan))
+        if found is None or self._up is None:
+            return found
+        return replace(found, document=found.document.with_up(self._up))
 
     @property
     def opening(self) -> str | None:
@@ -259,8 +282,11 @@ class App:
 
     @property
     def hash(self) -> str | None:
-        """Tells whether the scan is still the same, None where it has no files (see `fingerprint`)."""
-        return self._hash.result()
+        """Tells whether the scan is still the same (see `fingerprint`).
+
+        None where it has no files, and for a moment after the start, until it was found.
+        """
+        return self.hash_found.result() if self.hash_found.done() else None
 
     def show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""
@@ -307,12 +333,19 @@ class App:
         if opened is not None:
             scan, begun = opened
             in_background(Task("Closing"), self.playback.close)  # it may wait for a pose that is being read
-            self.session.turn_to(scan)
+            self.keeping.leave()
+            self.session.turn_to(scan, begun.left)
             self.playback = self._start(begun)
             log.debug("opened %s", scan)
 
     def _start(self, opened: Opened) -> Playback:
-        timeline, self._hash = opened
+        timeline, self.hash_found, left, problem, session = opened
+        if problem:
+            self.note(problem)
+        if session is not None:
+            self.session.take_up(session)
+        self.session.index = opened.first
+        self._compare(session or left)
         self.viewport.clear()
         self._messages_read = 0
         self.window.title = f"{timeline.name} - Scan4D"
@@ -322,6 +355,19 @@ class App:
         self.steering.begin_scan()
         self.tools.abandon()
         return Playback(timeline, self.session)
+
+    def take_up(self, session: SavedSession) -> None:
+        """Show the open scan as a session has it."""
+        self.tools.abandon()
+        self.session.take_up(session)
+        self.seek(min(session.pose, len(self.playback.timeline) - 1))
+        self._compare(session)
+        self.window.touch()
+
+    def _compare(self, saved: SavedSession | None) -> None:
+        """Find out beside the window whether the scan is the one that something was saved of."""
+        if saved is not None and saved.hash is not None:
+            self.capture.tell_later(partial(_words_of_change, saved.hash, self.hash_found))
 
     def pass_on_messages(self) -> None:
         """Tell what the timeline has to say."""
@@ -338,16 +384,11 @@ class App:
             top = self.window.buffer_size[1] - bottom - height
             log.debug("view at %d,%d %dx%d pixels", left, top, width, height)
 
-    def keep(self, now: float) -> None:
-        """Save what is to come back, where it has changed. now: by the clock, seconds."""
-        if problem := self.keeper.look(now, self.remembered):
-            self.note(problem)
-
     def close(self) -> None:
         """Save what is being recorded and what is to come back, and let go of everything but the window."""
         for name, end in (
             ("Saving", self.capture.end_recording),
-            ("Keeping settings", self._keep_at_last),
+            ("Keeping", self.keeping.close),
             ("Saving pictures", self.capture.close),
             ("Counting", self.counting.cancel),
             ("Putting tools away", self.tools.close),
@@ -361,6 +402,9 @@ class App:
             with self.failures.told(name):
                 end()
 
-    def _keep_at_last(self) -> None:
-        if problem := self.keeper.close(self.remembered()):
-            self.note(problem)
+
+def _words_of_change(hash: str, found: Future[str | None]) -> str:
+    """What to tell of a scan whose hash, which this waits for, is another one; nothing else."""
+    if found.result() in (hash, None):
+        return ""
+    return "The scan is not as it was when this was saved: views and measurements may not fit."

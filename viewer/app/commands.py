@@ -151,6 +151,10 @@ _FILE: Menu[App] = Menu("File", (
         Command("scans", "Back to the list of scans", lambda app: app.browser.show(), "Q"),
     ),
     (
+        Command(
+            "save_session", "Save session...", lambda app: app.sessions.ask_to_save(), "Ctrl+Shift+S",
+            can=_has_camera,
+        ),
         Command("screenshot", "Screenshot", lambda app: app.capture.screenshot(), "P", short="Screenshot"),
         Command(
             "record", "Record", lambda app: app.capture.toggle_recording(), "R",
@@ -170,11 +174,11 @@ _FILE: Menu[App] = Menu("File", (
 _EDIT: Menu[App] = Menu("Edit", (
     (
         Command(
-            "undo", "Undo", lambda app: app.undo(), "Ctrl+Z", repeats=True, can=_can_undo,
+            "undo", "Undo", lambda app: app.undo(), "Ctrl+Z", can=_can_undo,
             title_now=lambda app: f"Undo {app.session.history.undoes or ''}",
         ),
         Command(
-            "redo", "Redo", lambda app: app.redo(), "Ctrl+Y Ctrl+Shift+Z", repeats=True, can=_can_redo,
+            "redo", "Redo", lambda app: app.redo(), "Ctrl+Y Ctrl+Shift+Z", can=_can_redo,
             title_now=lambda app: f"Redo {app.session.history.redoes or ''}",
         ),
     ),

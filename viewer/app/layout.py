@@ -37,6 +37,7 @@ def draw(app: App) -> Place:
         ("The list of work", lambda: tasks.draw(app, place, head)),
         ("Help", lambda: help.draw(app)),
         ("The dialog that opens scans", app.browser.draw),
+        ("The dialog that saves sessions", app.sessions.saving.draw),
         ("The export dialog", lambda: export_dialog.draw(app)),
         ("Dialogs of tools", app.tools.draw_dialogs),
     ):

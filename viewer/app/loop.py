@@ -90,7 +90,7 @@ class Loop:
             ("Taking what was dropped", lambda: dropping.take(app, app.window.take_dropped())),
             ("Listing scans", app.scans.advance),
             ("Listing a folder", app.browser.advance),
-            ("Keeping settings", lambda: app.keep(now)),
+            ("Keeping", lambda: app.keeping.advance(now)),
             ("Exporting", app.exporting.advance),
             ("Saving", lambda: app.capture.advance(now)),
             ("Playing", lambda: app.playback.advance(now)),

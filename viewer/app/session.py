@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Hashable
+from dataclasses import replace
 from typing import Any
 
-from ..camera import Camera
-from ..document.document import Bookmark, Document
+from ..document.document import Document
 from ..document.history import History
 from ..document.part import Part
+from ..document.saved_session import SavedSession
 from ..files import absolute
 from ..scan.open import DEMO
 from .playing.player import Pace
 
-
-@dataclass(frozen=True)
-class Left:
-    """How a scan was left: what of it comes back."""
-
-    index: int = 0
-    camera: Camera | None = None
-    unit: str | None = None
-    bookmarks: tuple[Bookmark, ...] = ()
+_MOST_LEFT = 50  # scans whose changes can still be undone
 
 
 def known_as(scan: str) -> str:
@@ -34,7 +26,6 @@ class Session:
     """The open scan, and those that were open.
 
     scan: as the user named it. index: the frame. history: of the scan's document. pace: how the scan plays.
-    places: scan, as `known_as` has it -> how it was left; the one left last at the end.
     """
 
     def __init__(
@@ -42,16 +33,16 @@ class Session:
         scan: str,
         document: Document | None = None,
         pace: Pace | None = None,
-        places: Mapping[str, Left] | None = None,
+        left: SavedSession | None = None,
     ) -> None:
-        """document: to begin with, where the scan is in none of the places."""
+        """left: how the scan was left; None: it begins with the document."""
         self.scan = scan
-        self.index = 0
-        self.history = History(document or Document())
+        self.index = 0 if left is None else left.pose
+        self.history = History(left.document if left else document or Document())
         self.pace = pace or Pace()
-        self.places = dict(places or {})
-        self._histories: dict[str, History] = {}
-        self._find_again()
+        self._left: dict[
+            str, tuple[History, int]
+        ] = {}  # by scan, as `known_as` has it; the last one left last
 
     @property
     def document(self) -> Document:
@@ -69,25 +60,31 @@ class Session:
         """Set fields of the document that no user changed."""
         self.history.amend(replace(self.document, **fields))
 
-    def turn_to(self, scan: str) -> None:
-        """Go to another scan, where it was left; what can be undone of it stays."""
-        self.leave()
-        self._histories[known_as(self.scan)] = self.history
-        self.scan, self.index = scan, 0
-        self.history = self._histories.get(known_as(scan)) or History(self.document.for_another())
-        self._find_again()
+    def saved(self, hash: str | None, index: int) -> SavedSession:
+        """What is to come back of the open scan. hash: of its files. index: the frame to begin with."""
+        return SavedSession(known_as(self.scan), hash, index, self.document)
 
-    def leave(self) -> None:
-        """Note how the scan is now, as the one left last."""
-        name, now = known_as(self.scan), self.document
-        self.places.pop(name, None)
-        self.places[name] = Left(self.index, now.camera, now.unit, now.bookmarks)
+    def left(self, scan: str) -> SavedSession | None:
+        """How a scan was left that was open before, None where it was not."""
+        history, index = self._left.get(known_as(scan), (None, 0))
+        return None if history is None else SavedSession(known_as(scan), None, index, history.document)
 
-    def _find_again(self) -> None:
-        """Take up the scan as it was left."""
-        if (left := self.places.get(known_as(self.scan))) is not None:
-            self.index = left.index
-            self.amend(camera=left.camera, unit=left.unit, bookmarks=left.bookmarks)
+    def turn_to(self, scan: str, left: SavedSession | None = None) -> None:
+        """Go to another scan, as it was left; what can be undone of one that was open stays.
+
+        left: None where it was never open: it begins drawn as this one.
+        """
+        begun = History(self.document.for_another() if left is None else left.document)
+        self._left[known_as(self.scan)] = self.history, self.index
+        beginning = begun, 0 if left is None else left.pose
+        self.history, self.index = self._left.pop(known_as(scan), beginning)
+        self.scan = scan
+        for oldest in list(self._left)[:-_MOST_LEFT]:
+            del self._left[oldest]
+
+    def take_up(self, session: SavedSession) -> None:
+        """Take up the document of a session of the open scan; undo brings back how it was."""
+        self.history.change("Open session", session.document)
 
 
 def edit_name(before: Any, after: Any) -> str:

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import errno
 import json
-import math
 import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
-
-import numpy as np
 
 from ..backends import backend
 from ..camera import Camera
 from ..document.document import Bookmark, Document
+from ..document.saved_session import SavedSession
+from ..document.schema import PoseNumber, Unit, structured
 from ..errors import InputError
 from ..files import parsed_json, read_text, whole_file
-from ..geometry import up_vector
 from ..look import COLOR_BY, Look
 from ..output.marks import Marks
 from ..params import describe, renamed
@@ -29,15 +27,12 @@ from .output.export_plan import Choices
 from .place import Place
 from .playing.player import Pace
 from .scene import legend, turntable
-from .session import Left, Session
+from .session import Session
 
 T = TypeVar("T")
 FORMAT = 1
 FILE = "settings.json"
 MOST_RECENT = 15
-_MOST_PLACES = 200
-_UPRIGHT = 0.999  # cosine between a camera's up and the scan's
-_LOOK_EVERY = 3.0  # seconds between looks at what has changed
 _OF_ONE_SCAN = ("up", "low", "high")  # of a look: no use for the next scan
 _MOST_BYTES = 32 * 2**20  # of the file
 _WRONG = (  # by odd JSON
@@ -52,8 +47,8 @@ class Settings:
     window: None until it was open once. backend: None for the scan's own default. params: backend ->
     its `Params`. marks: over the view. cube: whether the orientation cube is shown. turn_seconds: of the
     turntable. export, export_marks: of the export dialog. recent: the scans opened last, newest first.
-    places: scan, as `known_as` has it -> how it was left, the last one at the end. tools: name of a tool ->
-    values of its `Settings` that are not the defaults.
+    places: what earlier versions kept here of each scan, whose documents have files of their own now.
+    tools: name of a tool -> values of its `Settings` that are not the defaults.
     """
 
     window: Place | None = None
@@ -69,29 +64,29 @@ class Settings:
     export: Choices = field(default_factory=Choices)
     export_marks: Marks = field(default_factory=Marks)
     recent: tuple[str, ...] = ()
-    places: Mapping[str, Left] = field(default_factory=dict)
+    places: Mapping[str, SavedSession] = field(default_factory=dict)
     tools: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, session: Session, **others: Any) -> Settings:
         """What a session holds, and other fields by name."""
-        session.leave()
         now = session.document
+        params = {
+            name: of for name, of in now.params.items() if is_dataclass(of)
+        }  # of backends that are there
         return cls(
-            backend=now.backend, params=dict(now.params), look=now.look, pace=session.pace,
-            places=dict(session.places), **others,
+            backend=now.backend, params=params, look=now.look, pace=session.pace, **others
         )  # fmt: skip
 
-    def session(self, scan: str, up: str) -> Session:
-        """A session that begins with a scan, as it was left. up: the up axis; other cameras are forgotten."""
-        places = {name: _under(left, up) for name, left in self.places.items()}
-        begun = Document(look=replace(self.look, up=up), backend=self.backend, params=self.params)
-        return Session(scan, begun, self.pace, places)
+    @property
+    def document(self) -> Document:
+        """The document of a scan that was never open."""
+        return Document(look=self.look, backend=self.backend, params=self.params)
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object."""
-        data = {"format": FORMAT} | asdict(self)
-        data["places"] = dict(list(data["places"].items())[-_MOST_PLACES:])
+        data = {"format": FORMAT} | asdict(replace(self, places={}))
+        del data["places"]
         data["params"] = {name: chosen(values) for name, values in self.params.items()}
         data["look"] = {k: value for k, value in chosen(self.look).items() if k not in _OF_ONE_SCAN}
         return data
@@ -99,7 +94,8 @@ class Settings:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Settings:
         """What can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
-        return cls(**_usable(data, _READERS))
+        usable = cls(**_usable(data, _READERS))
+        return replace(usable, places=_places(data.get("places"), usable.document))
 
 
 def load(path: Path) -> tuple[Settings, list[str]]:
@@ -128,55 +124,6 @@ def save(settings: Settings, path: Path) -> None:
     with whole_file(path) as temporary:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_text(text + "\n", encoding="utf-8")
-
-
-class Keeper:
-    """Keeps the file up to date on a thread of its own, so that a crash loses little.
-
-    path: of the file. saved: what is in it.
-    """
-
-    def __init__(self, path: Path, saved: Settings) -> None:
-        self._path = path
-        self._saved: Settings | None = saved
-        self._next_look = 0.0
-        self._writing: Future[None] | None = None
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="settings")
-
-    def look(self, now: float, current: Callable[[], Settings]) -> str | None:
-        """Save what has changed; now and then only. now: by the clock, seconds.
-
-        Returns what went wrong, once: from then on only closing tries again.
-        """
-        if now < self._next_look:
-            return None
-        self._next_look = now + _LOOK_EVERY
-        if problem := self._take_problem():
-            return problem
-        settings = current()
-        if settings != self._saved and not self._is_writing:
-            self._saved = settings
-            self._writing = self._worker.submit(save, settings, self._path)
-        return None
-
-    def close(self, current: Settings) -> str | None:
-        """Save, and wait for it. Returns what went wrong."""
-        if current != self._saved or self._is_writing:
-            self._writing = self._worker.submit(save, current, self._path)
-        self._worker.shutdown()
-        return self._take_problem()
-
-    @property
-    def _is_writing(self) -> bool:
-        return self._writing is not None and not self._writing.done()
-
-    def _take_problem(self) -> str | None:
-        if self._writing is None or self._is_writing:
-            return None
-        error, self._writing = self._writing.exception(), None
-        if error is not None:
-            self._next_look, self._saved = math.inf, None
-        return None if error is None else f"Settings are not kept: {error}"
 
 
 def chosen(values: Any) -> dict[str, Any]:
@@ -230,15 +177,6 @@ def _params(data: Mapping[str, Any]) -> dict[str, Any]:
     return read
 
 
-def _under(left: Left, up: str) -> Left:
-    """How a scan was left, where its camera stands upright."""
-    if left.camera is None:
-        return left
-    above = np.array(left.camera.up)
-    is_upright = above @ up_vector(up) >= _UPRIGHT * np.linalg.norm(above)
-    return left if is_upright else replace(left, camera=None)
-
-
 def _theme(data: Any) -> str:
     if data not in theme.PALETTES:
         raise InputError("there is no such theme")
@@ -272,31 +210,18 @@ def _text(data: Any) -> str:
     return data
 
 
-def _index(data: Any) -> int:
-    if type(data) is not int or not 0 <= data < 2**31:
-        raise InputError("is no frame")
-    return data
-
-
 def _recent(data: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_text(name) for name in data))[:MOST_RECENT]
 
 
-def _left(data: Any) -> Left:
-    return Left(**_usable(data, _OF_A_SCAN))
-
-
-def _bookmark(data: Any) -> Bookmark:
-    if not isinstance(data["name"], str):
-        raise InputError("a bookmark's name is a text")
-    return Bookmark(data["name"], Camera.from_json(data["camera"]))
-
-
-def _places(data: Any) -> dict[str, Left]:
+def _places(data: Any, document: Document) -> dict[str, SavedSession]:
+    """How earlier versions left each scan. document: of one that was never open."""
     places = {}
-    for name, left in data.items():
+    for name, left in data.items() if isinstance(data, dict) else ():
         with suppress(*_WRONG):
-            places[_text(name)] = _left(left)
+            fields = _usable(left, _OF_A_SCAN)
+            index = fields.pop("index", 0)
+            places[_text(name)] = SavedSession(name, None, index, replace(document, **fields))
     return places
 
 
@@ -319,12 +244,11 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "export": lambda data: declared(Choices, data),
     "export_marks": lambda data: declared(Marks, data),
     "recent": _recent,
-    "places": _places,
     "tools": _tools,
 }
 _OF_A_SCAN: dict[str, Callable[[Any], Any]] = {
-    "index": _index,
+    "index": partial(structured, PoseNumber),
     "camera": Camera.from_json,
-    "unit": _text,
-    "bookmarks": lambda data: tuple(_bookmark(bookmark) for bookmark in data),
+    "unit": partial(structured, Unit),
+    "bookmarks": partial(structured, tuple[Bookmark, ...]),
 }

@@ -58,7 +58,7 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
 
 def _check_arguments(args: Namespace) -> None:
     given = [f"--{name}" for name in _TOLD if _is_given(getattr(args, name))]
-    if args.up != "+y":
+    if args.up is not None:
         given.append("--up")
     if given:
         hint = "The recording tells what to draw; leave it out"

@@ -23,6 +23,7 @@ from ..document.recording import Entry, fingerprint, new_salt
 from ..errors import InputError
 from ..files import whole_file
 from ..frame import Request, choose
+from ..geometry import UP
 from ..look import Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..output.marks import MARKS, Legend, marks_of
@@ -126,7 +127,7 @@ def run(args: Namespace) -> int:
 @contextmanager
 def _planned(args: Namespace) -> Iterator[Plan]:
     """The pictures that the arguments describe."""
-    look, values = parse(Look, {"up": args.up, **dict(args.look)}, "look"), dict(args.set)
+    look, values = parse(Look, {"up": args.up or UP, **dict(args.look)}, "look"), dict(args.set)
     if args.backend:
         find_backend(args.backend).params(values)  # wrong names are told before anything is read
     camera = Camera.load(args.camera) if args.camera else None
@@ -215,8 +216,8 @@ def _camera(
     aspect = size[0] / size[1]
     bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:
-        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, args.up)
-    camera = Camera.orbit(bounds, *(args.orbit or ()), aspect=aspect, up=args.up)
+        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, args.up or UP)
+    camera = Camera.orbit(bounds, *(args.orbit or ()), aspect=aspect, up=args.up or UP)
     return lambda shot: camera
 
 

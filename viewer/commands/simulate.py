@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..geometry import UP
 from ..mesh.triangles import Mesh
 from ..output.export import check_output
 from ..scan import formats
@@ -103,7 +104,7 @@ def run(args: Namespace) -> int:
         faces_of(indices[0])  # told before all frames are looked at
         aspect = args.size[0] / args.size[1]
         bounds = framing(timeline, indices)
-        pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up)
+        pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up or UP)
         with frame_files(args.out) as file_of, progress(len(indices)) as tick:
             for pose in read_poses(timeline, indices):
                 mesh = _mesh(pose, faces_of(pose.index))

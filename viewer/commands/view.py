@@ -1,4 +1,5 @@
-"""Open scans in a window; the demo scan where none is named. A recording or a picture is shown again.
+"""Open scans in a window; the demo scan where none is named. A recording, a picture or a
+session is shown again.
 
 Where no window can be opened, --fallback plays them without one: into numbered PNGs, a
 contact sheet and a film.
@@ -8,16 +9,22 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..camera import Camera
 from ..document.recording import Recording, is_recording, place_of
+from ..document.saved_session import SavedSession, is_session
 from ..errors import InputError, NoOpenGLError, explained
+from ..files import printable
 from ..frame import Request
+from ..geometry import UP
 from ..look import Look
 from ..output.export import contact_sheet, film, thumbnail, write_png
 from ..scan.inputs import scan_inputs
-from ..scan.listing import named_scans
+from ..scan.listing import is_there, named_scans
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..timing import draw
@@ -43,50 +50,60 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Open the window, or play without one."""
-    names, replay = args.scans or [DEMO], None
-    if len(names) == 1 and is_recording(Path(names[0])):
-        replay = Path(names[0])
-        names = [_scan_of(replay)]
-    scans, problems = named_scans(names)
+    named = _named(args.scans or [DEMO])
+    scans, problems = named_scans(named.scans)
     if not scans:
         raise problems[0]
-    for scan in scans:
-        open_timeline(args, scan).close()  # what is wrong is told before anything is drawn
-    try:
-        return _open_window(args, names, replay)
-    except NoOpenGLError as error:
-        if args.fallback is None:
-            raise
-        tell(f"No window: {error.what}. Playing into {args.fallback} instead.")
-    for problem in problems:
-        warn(str(problem))
-    try:
-        args.fallback.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be made: {what}", args.fallback, hint) from error
-    prefixes = [f"{number}_" if len(scans) > 1 else "" for number in range(len(scans))]
-    outputs: list[Path] = []
-    inputs: list[Path] = []
-    for scan, prefix in zip(scans, prefixes, strict=True):
-        with open_timeline(args, scan) as timeline:
-            outputs += _files(args.fallback, prefix, timeline)
-            inputs += scan_inputs(timeline)
-    claim(outputs, inputs, args.force)
-    for scan, prefix in zip(scans, prefixes, strict=True):
-        _play(args, scan, prefix)
+    with ExitStack() as opened:
+        # What is wrong is told before anything is drawn.
+        timelines = [opened.enter_context(open_timeline(args, scan)) for scan in scans]
+        try:
+            return _open_window(args, named, timelines[0])
+        except NoOpenGLError as error:
+            if args.fallback is None:
+                raise
+            tell(f"No window: {error.what}. Playing into {args.fallback} instead.")
+        for problem in problems:
+            warn(str(problem))
+        _play_all(args, timelines)
     return 0
 
 
-def _scan_of(replay: Path) -> str:
-    """The scan that a recording begins with. Raises InputError where it tells none."""
-    scan = Recording.load(replay).entries[0].scan
-    if scan is None:
-        raise InputError("does not tell its scan", replay, "Open the scan, and drop this onto the window")
-    return place_of(scan, replay)
+@dataclass(frozen=True)
+class _Named:
+    """What the command line names. replay: a recording to show. session: to open the first scan with."""
+
+    scans: list[str]
+    replay: Path | None = None
+    session: SavedSession | None = None
 
 
-def _open_window(args: Namespace, scans: list[str], replay: Path | None) -> int:
+def _named(names: list[str]) -> _Named:
+    """Scans alone, a recording, or a session, before which its scan may be named.
+
+    Raises InputError where a file does not tell its scan, or that is not there.
+    """
+    path = Path(names[-1])
+    if is_session(path) and len(names) <= 2:
+        session = SavedSession.load(path)
+        return _Named(names[:-1] or [_scan_of_session(session, path)], session=session)
+    if len(names) == 1 and is_recording(path):
+        scan = Recording.load(path).entries[0].scan
+        if scan is None:
+            raise InputError("does not tell its scan", path, "Open the scan, and drop this onto the window")
+        return _Named([place_of(scan, path)], replay=path)
+    return _Named(names)
+
+
+def _scan_of_session(session: SavedSession, path: Path) -> str:
+    scan = place_of(session.scan, path)
+    if not is_there(scan):
+        hint = f"Say where it is now: scan4d view SCAN {path}"
+        raise InputError(f"its scan '{printable(session.scan)}' is not there", path, hint)
+    return scan
+
+
+def _open_window(args: Namespace, named: _Named, first: Timeline) -> int:
     if display() is None:
         raise NoOpenGLError(
             "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)",
@@ -95,7 +112,28 @@ def _open_window(args: Namespace, scans: list[str], replay: Path | None) -> int:
     from .. import app
 
     remove_leftovers()
-    return app.run(scans, unit=args.unit, fps=args.fps, up=args.up, device=args.device, replay=replay)
+    return app.run(
+        named.scans, opened=first, unit=args.unit, fps=args.fps, up=args.up, device=args.device,
+        replay=named.replay, session=named.session,
+    )  # fmt: skip
+
+
+def _play_all(args: Namespace, timelines: Sequence[Timeline]) -> None:
+    """Play the scans into the folder of --fallback."""
+    try:
+        args.fallback.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be made: {what}", args.fallback, hint) from error
+    prefixes = [f"{number}_" if len(timelines) > 1 else "" for number in range(len(timelines))]
+    outputs: list[Path] = []
+    inputs: list[Path] = []
+    for timeline, prefix in zip(timelines, prefixes, strict=True):
+        outputs += _files(args.fallback, prefix, timeline)
+        inputs += scan_inputs(timeline)
+    claim(outputs, inputs, args.force)
+    for timeline, prefix in zip(timelines, prefixes, strict=True):
+        _play(args, timeline, prefix)
 
 
 def _stem(folder: Path, prefix: str, timeline: Timeline) -> str:
@@ -110,28 +148,27 @@ def _files(folder: Path, prefix: str, timeline: Timeline) -> list[Path]:
     return [Path(name) for name in (*pictures, f"{stem}.mp4", f"{stem}_contact_sheet.png")]
 
 
-def _play(args: Namespace, scan: str, prefix: str) -> None:
+def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     """Draw all poses of a scan into the folder, and say what is there."""
-    with open_timeline(args, scan) as timeline:
-        name = _stem(args.fallback, prefix, timeline)
-        indices = list(range(len(timeline)))
-        on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
-        fps = drawing.film_rate(timeline, indices, args.fps)
-        thumbnails = []
-        with (
-            drawing.canvas(args.device, _SIZE) as (renderer, surface),
-            film(f"{name}.mp4", _SIZE, fps) as add,
-            progress(len(indices)) as tick,
-        ):
-            bounds = framing(timeline, indices)
-            camera = Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=args.up)
-            for pose in read_poses(timeline, indices):
-                draw(renderer, Request(pose, camera, look=Look(up=args.up)), surface)
-                image = surface.image()
-                write_png(image, f"{name}_{pose.index:04d}.png")
-                add(image)
-                if pose.index in on_sheet:
-                    thumbnails.append(thumbnail(image))
-                tick()
+    name, up = _stem(args.fallback, prefix, timeline), args.up or UP
+    indices = list(range(len(timeline)))
+    on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
+    fps = drawing.film_rate(timeline, indices, args.fps)
+    thumbnails = []
+    with (
+        drawing.canvas(args.device, _SIZE) as (renderer, surface),
+        film(f"{name}.mp4", _SIZE, fps) as add,
+        progress(len(indices)) as tick,
+    ):
+        bounds = framing(timeline, indices)
+        camera = Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=up)
+        for pose in read_poses(timeline, indices):
+            draw(renderer, Request(pose, camera, look=Look(up=up)), surface)
+            image = surface.image()
+            write_png(image, f"{name}_{pose.index:04d}.png")
+            add(image)
+            if pose.index in on_sheet:
+                thumbnails.append(thumbnail(image))
+            tick()
     contact_sheet(thumbnails, f"{name}_contact_sheet.png")
     tell(*(Path(f"{name}{end}") for end in ("_%04d.png", "_contact_sheet.png", ".mp4")))

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
+import numpy as np
+
+from ..backends import backends
 from ..camera import Camera
+from ..errors import InputError, shortened
 from ..frame import Request, choose
-from ..geometry import Vector
+from ..geometry import Vector, up_vector
 from ..look import Look, drawable
 from ..scan.pose import Pose
 from .part import Part
+from .schema import DAMAGED, ReadBy, Unit, Word, is_object, structured, unread
 
 P = TypeVar("P", bound=Part)
+_UPRIGHT = 0.999  # cosine between a camera's up and the scan's
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,24 @@ class Bookmark:
 
     name: str
     camera: Camera
+
+
+def _read_params(data: Any) -> dict[str, Any]:
+    return _read_known(data, {name: one.module.Params for name, one in backends().items()})
+
+
+def _read_parts(data: Any) -> dict[str, Any]:
+    return _read_known(data, Part.kinds)
+
+
+def _read_known(data: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
+    """Values by name, each of its kind; what has a name that is not known here stays as it is."""
+    if not is_object(data):
+        raise InputError(f"is not values by name but {shortened(data)}", hint=DAMAGED)
+    return {
+        name: structured(kinds[name], value, name) if name in kinds else unread(value)
+        for name, value in data.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -41,16 +65,19 @@ class Document:
     camera: Camera | None = None
     pivot: Vector | None = None
     look: Look = field(default_factory=Look)
-    backend: str | None = None
-    params: Mapping[str, Any] = field(default_factory=dict)
-    unit: str | None = None
+    backend: Word | None = None
+    params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
+    unit: Unit | None = None
     bookmarks: tuple[Bookmark, ...] = ()
-    parts: Mapping[str, Any] = field(default_factory=dict)
+    parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
 
     def part(self, kind: type[P]) -> P:
-        """What a tool keeps, its defaults where it has kept nothing yet."""
-        found = self.parts.get(kind.part_name)
-        return found if isinstance(found, kind) else kind()
+        """What a tool keeps, its defaults where it has kept nothing yet.
+
+        Raises InputError where the tool was not there when a file was read, and what that said is wrong.
+        """
+        found = self.parts.get(kind.part_name, {})
+        return found if isinstance(found, kind) else structured(kind, found, kind.part_name)
 
     def with_part(self, part: Part) -> Document:
         """The document in which a tool keeps this; nothing where that is its defaults."""
@@ -60,6 +87,15 @@ class Document:
     def with_params(self, backend: str, params: Any) -> Document:
         """The document with other parameters of a backend."""
         return replace(self, params={**self.params, backend: params})
+
+    def with_up(self, up: str) -> Document:
+        """The document of a scan whose up axis is told; a camera that stands upright along another goes."""
+        turned = replace(self, look=replace(self.look, up=up))
+        if self.camera is None:
+            return turned
+        above = np.array(self.camera.up)
+        is_upright = above @ up_vector(up) >= _UPRIGHT * np.linalg.norm(above)
+        return turned if is_upright else replace(turned, camera=None, pivot=None)
 
     def for_another(self) -> Document:
         """The document that a scan begins with which is opened after this one: drawn alike, all else anew."""

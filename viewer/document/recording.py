@@ -207,14 +207,16 @@ class Recorder:
         Returns what has changed, as the recording's file will have it; None where nothing has.
         """
         before = self._entries[-1] if self._entries else None
-        if entry == before:
-            return None
+        if before is not None and entry == replace(before, hash=before.hash or entry.hash):
+            return None  # nothing, or the hash alone was found
         self._entries.append(replace(entry, at=self._since(now)))
         return _change(self._entries[-1], before)
 
     def finish(self, now: float) -> Recording:
-        """All that was noted, which must be something."""
-        return Recording(tuple(self._entries), self._since(now))
+        """All that was noted, which must be something; where a scan's hash was found late, with that."""
+        found = {entry.scan: entry.hash for entry in self._entries if entry.hash is not None}
+        entries = (replace(entry, hash=entry.hash or found.get(entry.scan)) for entry in self._entries)
+        return Recording(tuple(entries), self._since(now))
 
     def _since(self, now: float) -> float:
         return round(now - self._began, 3)

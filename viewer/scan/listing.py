@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -31,6 +32,12 @@ class Listed:
     title: str
     kind: Literal["whole", "folder", "sequence", "file"]
     frames: int
+
+
+def is_there(scan: str) -> bool:
+    """Whether a scan can be opened, as far as its name tells; of a pattern its folder must be there."""
+    is_pattern = "%" in scan or glob.has_magic(scan)
+    return scan == DEMO or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
 
 
 def list_folder(folder: Path | str) -> list[Listed]:

@@ -12,6 +12,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
 from ...document.recording import is_recording
+from ...document.saved_session import is_session
 from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed, list_folder
 from ...scan.open import DEMO
@@ -50,9 +51,12 @@ class Browser:
         self._select = ""  # the path to choose once it is listed
         self._text = ""
 
-    def show(self) -> None:
-        """Open the dialog on the folder of the open scan, that scan chosen."""
+    def show(self, folder: Path | None = None) -> None:
+        """Open the dialog on a folder; None: that of the open scan, that scan chosen."""
         self._asked = True
+        if folder is not None:
+            self._go(folder)
+            return
         scan = self._app.session.scan
         here = self._folder if scan == DEMO else Path(known_as(scan)).parent
         self._go(here, "" if scan == DEMO else known_as(scan))
@@ -92,6 +96,8 @@ class Browser:
             if not stays or imgui.is_key_pressed(imgui.Key.escape):
                 imgui.close_current_popup()
             imgui.end_popup()
+        elif not self._asked:
+            self._app.sessions.homeless = None  # the user gave up
 
     # --- what the user does -----------------------------------------------------------
 
@@ -114,7 +120,11 @@ class Browser:
             self._open(path)
 
     def _open(self, scan: str) -> None:
-        if is_recording(Path(scan)):
+        if is_session(Path(scan)):
+            self._app.sessions.open(Path(scan))
+        elif (session := self._app.sessions.homeless) is not None:
+            self._app.sessions.open_with(session, scan)
+        elif is_recording(Path(scan)):
             self._app.capture.replay(Path(scan))
         else:
             self._app.scans.open([scan])

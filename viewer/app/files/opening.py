@@ -8,6 +8,7 @@ from concurrent.futures import Future, wait
 from typing import NamedTuple
 
 from ...document.recording import fingerprint
+from ...document.saved_session import SavedSession
 from ...errors import InputError, Scan4DError
 from ...scan.pose import Pose
 from ...scan.spacing import spacings
@@ -26,16 +27,39 @@ def find_facts(pose: Pose) -> None:
 
 
 class Opened(NamedTuple):
-    """A scan that can be shown, and its `fingerprint`, which takes a moment for a large file."""
+    """A scan that can be shown.
+
+    hash: its `fingerprint`, which takes a moment for a large file. left: how it was left, None where it was
+    never open. problem: why that cannot come back. session: what the user opens it with, None where that is
+    the scan alone.
+    """
 
     timeline: Timeline
     hash: Future[str | None]
+    left: SavedSession | None = None
+    problem: str | None = None
+    session: SavedSession | None = None
+
+    @property
+    def first(self) -> int:
+        """The frame to begin with."""
+        begins = self.session or self.left
+        return 0 if begins is None else min(begins.pose, len(self.timeline) - 1)
 
 
-def begin(timeline: Timeline) -> Opened:
+Find = Callable[[], SavedSession | None]  # how a scan was left; it may raise InputError
+
+
+def begin(timeline: Timeline, find: Find, session: SavedSession | None = None) -> Opened:
     """Have its poses come with their facts, and find its hash in the background."""
     timeline.finish = find_facts
-    return Opened(timeline, in_background(Task("Hashing"), lambda: fingerprint(timeline.files)))
+    hash = in_background(Task("Hashing"), lambda: fingerprint(timeline.files))
+    left, problem = None, None
+    try:
+        left = find()
+    except InputError as error:
+        problem = str(error)
+    return Opened(timeline, hash, left, problem, session)
 
 
 class Opening:
@@ -49,11 +73,18 @@ class Opening:
         self.task: Task | None = None
         self._future: Future[Opened] | None = None
 
-    def start(self, scan: str, title: str, index: int, open_it: Callable[[], Timeline]) -> None:
-        """Open a scan instead of any other that is being opened. index: the frame to read first."""
+    def start(
+        self,
+        scan: str,
+        title: str,
+        find: Find,
+        open_it: Callable[[], Timeline],
+        session: SavedSession | None = None,
+    ) -> None:
+        """Open a scan instead of any other that is being opened. session: to open it with."""
         self.cancel()
         self.scan, self.task = scan, Task(f"Opening {title}")
-        self._future = in_background(self.task, lambda: _opened(open_it, index))
+        self._future = in_background(self.task, lambda: _opened(lambda: begin(open_it(), find, session)))
 
     def cancel(self) -> None:
         """Give up what is being opened."""
@@ -83,15 +114,16 @@ def _close_unclaimed(future: Future[Opened]) -> None:
         future.result().timeline.close()
 
 
-def _opened(open_it: Callable[[], Timeline], index: int) -> Opened:
-    """A scan whose frame `index` is in memory and whose hash is known.
+def _opened(begin_it: Callable[[], Opened]) -> Opened:
+    """A scan whose frame that is to be shown is in memory and whose hash is known.
 
     Raises InputError where it has no frame that can be shown.
     """
-    opened = begin(timeline := open_it())
+    opened = begin_it()
+    timeline = opened.timeline
     try:
         checkpoint()
-        timeline.pose(min(index, len(timeline) - 1))
+        timeline.pose(opened.first)
     except InputError:
         if len(timeline) == 1:
             timeline.close()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import glob
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from functools import partial
@@ -12,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import InputError
 from ...files import printable
-from ...scan.listing import named_scans, scans_beside
+from ...scan.listing import is_there, named_scans, scans_beside
 from ...scan.open import DEMO
 from ...task import Task, in_background
 from ..session import known_as
@@ -69,7 +67,7 @@ class Scans:
         recent, listed = self.recent, self.listed
 
         def work() -> tuple[list[str], frozenset[str]]:
-            return listed if is_listed else scans_beside(scan), frozenset(filter(_is_there, recent))
+            return listed if is_listed else scans_beside(scan), frozenset(filter(is_there, recent))
 
         self._looking = in_background(Task("Looking for scans"), work)
 
@@ -114,9 +112,3 @@ class Scans:
 def title(scan: str) -> str:
     """A scan's name for lists."""
     return "Demo scan" if scan == DEMO else printable(Path(known_as(scan)).name or scan)
-
-
-def _is_there(scan: str) -> bool:
-    """Whether a scan can still be opened, as far as its name tells; of a pattern its folder must be there."""
-    is_pattern = "%" in scan or glob.has_magic(scan)
-    return scan == DEMO or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))

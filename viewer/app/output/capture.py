@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -62,8 +63,8 @@ class Capture:
         if surface is None or entry is None:
             self._app.note("There is no picture to save.")
             return
-        image, text = surface.image(), entry.description()
-        self._saving.append(in_background(Task("Saving"), partial(self._save_picture, image, text)))
+        work = partial(self._save_picture, surface.image(), entry, self._app.hash_found)
+        self._saving.append(in_background(Task("Saving"), work))
 
     # --- recording --------------------------------------------------------------------
 
@@ -128,8 +129,9 @@ class Capture:
         for journal in journals():
             self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
 
-    def _save_picture(self, image: NDArray[np.uint8], text: str) -> str:
-        """Write it under the next free name; returns what to tell."""
+    def _save_picture(self, image: NDArray[np.uint8], entry: Entry, hash: Future[str | None]) -> str:
+        """Write it under the next free name, with the scan's hash, which this waits for; what to tell."""
+        text = replace(entry, hash=hash.result()).description()
         with self._naming:
             path = free_file(working_folder(), ".png")
             try:

@@ -1,0 +1,279 @@
+"""The document in the real window: undo and redo of whatever was done, and what comes back after a kill."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app, virtual_screen
+from written import picture
+
+from viewer.document.measurements import Measurements
+from viewer.document.saved_session import SavedSession
+from viewer.scan import formats
+from viewer.scan.points import PointCloud
+
+SIZE = (1280, 720)
+
+
+@pytest.fixture(scope="module")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
+        yield screen
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    """Three frames of a wall with a bump, with normals and a scalar."""
+    folder = tmp_path / "scans" / "wall"
+    folder.mkdir(parents=True)
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, 120), np.linspace(-1, 1, 120)))
+    for number in range(3):
+        z = np.exp(-4 * (x**2 + y**2)) * (1 + number / 4)
+        normals = np.stack([8 * x * z, 8 * y * z, np.ones(x.size)], axis=1)
+        cloud = PointCloud.from_arrays(np.stack([x, y, z], axis=1), normals=normals, scalars={"bump": z})
+        formats.write(folder / f"{number}.npz", cloud)
+    return folder
+
+
+class Hands:
+    """What a person does to the window, and what comes of it. states: documents, in order of the steps."""
+
+    def __init__(self, app: RunningApp) -> None:
+        self.app = app
+        left, top, width, height = app.view()
+        self.middle = left + width // 2, top + height // 2
+
+    def press(self, *keys: str) -> None:
+        for key in keys:
+            self.app.screen.do("key", key)
+            self.app.settle()
+
+    def move(self, right: int = 0, down: int = 0) -> None:
+        self.app.screen.do("mousemove", self.middle[0] + right, self.middle[1] + down, "sleep", 0.1)
+
+    def drag(self, button: int, right: int, down: int) -> None:
+        self.move()
+        self.app.screen.do("mousedown", button, "sleep", 0.1)
+        for share in (0.5, 1.0):
+            self.move(round(share * right), round(share * down))
+        self.app.settle()
+        self.app.screen.do("mouseup", button)
+        self.app.settle()
+
+    def wheel(self, button: int, times: int) -> None:
+        self.move(20, 10)
+        self.app.screen.do("click", "--repeat", times, "--delay", 30, button)
+        self.app.settle()
+        time.sleep(0.7)  # or else it would go on
+
+    def click(self, right: int, down: int, times: int = 1) -> None:
+        self.move(right, down)
+        self.app.screen.do("click", "--repeat", times, "--delay", 60, 1)
+        self.app.settle()
+
+    def slide(self, row: int, start: int, end: int) -> None:
+        """Drag in the panel."""
+        self.app.screen.do("mousemove", start, row, "sleep", 0.1, "mousedown", 1, "sleep", 0.1)
+        self.app.screen.do("mousemove", (start + end) // 2, row, "sleep", 0.1, "mousemove", end, row)
+        self.app.settle()
+        self.app.screen.do("mouseup", 1)
+        self.app.settle()
+
+    def turn(self) -> None:
+        """By the turntable."""
+        self.app.screen.do("key", "y", "sleep", 0.6, "key", "y")
+        self.app.settle()
+
+    def measure(self, right: int) -> None:
+        self.press("m")
+        self.click(-60, 40)
+        self.click(right, -30)
+        self.press("m")
+
+    def shot(self) -> NDArray[np.uint8]:
+        self.app.screen.do("key", "p")
+        return picture(Path(self.app.told(r"Saved (.+)")[1]))
+
+
+def mixed(hands: Hands) -> list[Callable[[], object]]:
+    """Ways to change the document, each a step."""
+    slider = 168  # the first row below the list of renderers
+    return [
+        lambda: hands.drag(1, 120, 40), lambda: hands.wheel(4, 3), lambda: hands.press("o"),
+        lambda: hands.press("ctrl+b"), lambda: hands.press("b"), lambda: hands.drag(2, -60, 30),
+        lambda: hands.measure(70), lambda: hands.slide(slider, 1150, 1220), lambda: hands.press("ctrl+3"),
+        lambda: hands.press("ctrl+b"), lambda: hands.drag(3, 0, 40), lambda: hands.press("ctrl+1"),
+        lambda: hands.click(30, 20, times=2), hands.turn, lambda: hands.press("f"),
+        lambda: hands.press("n"), lambda: hands.press("o"), lambda: hands.wheel(5, 2),
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_fifty_mixed_actions_are_undone_by_keys_to_the_same_document_and_picture_and_redone(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        hands = Hands(app)
+        first, documents, names = hands.shot(), [app.state.document], []
+        ways = mixed(hands)
+        number = 0
+        while len(names) < 50:
+            ways[number % len(ways)]()
+            state = app.settle()
+            number += 1
+            if state.document != documents[-1]:
+                documents.append(state.document)
+                names.append(state.undoes)
+            assert number < 80, f"too little is changed: {names}"
+        assert len(set(names)) > 10, names
+        hands.press("Right", "Right", "Left", "Left")  # frames are no changes of the document
+        last = hands.shot()
+        assert np.abs(last.astype(int) - first).max() > 20
+
+        for document, name in zip(documents[-2::-1], names[::-1], strict=True):
+            assert app.settle().undoes == name
+            screen.do("key", "ctrl+z")
+            assert app.settle().document == document, name
+        assert app.state.undoes is None
+        np.testing.assert_array_equal(hands.shot(), first)
+
+        for way, (document, name) in enumerate(zip(documents[1:], names, strict=True)):
+            assert app.settle().redoes == name
+            screen.do("key", ("ctrl+y", "ctrl+shift+z")[way % 2])
+            assert app.settle().document == document, name
+        assert app.state.redoes is None
+        np.testing.assert_array_equal(hands.shot(), last)
+        assert "Traceback" not in app.log()
+
+
+def wait_until(holds: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        hands = Hands(app)
+        hands.press("Right")
+        hands.measure(60)
+        hands.press("o", "ctrl+b", "b")
+        done = app.settle()
+        time.sleep(1.5)
+        app.process.send_signal(signal.SIGKILL)
+        app.process.wait()
+    kept = kept_of(tmp_path, scan)
+    assert len(kept.document.part(Measurements).all) == 1
+    assert str(kept.hash).startswith("files:")
+    with running_app(screen, tmp_path, scan) as app:
+        state = app.settle()
+        assert state.document == done.document
+        assert (state.frame, state.backend) == (1, done.backend)
+        assert state.undoes is None
+    folder = tmp_path / "config" / "scan4d" / "scans"
+    assert [path.suffix for path in folder.iterdir()] == [".json"]
+    for number in range(3):
+        (scan / f"{number}.npz").rename(scan / f"{number + 7}.npz")
+    with running_app(screen, tmp_path, scan) as app:
+        app.told("is not as it was")
+
+
+def saved_session(app: RunningApp, name: str) -> Path:
+    """Saved by the dialog, under this name."""
+    app.screen.do("key", "ctrl+shift+s")
+    app.settle()
+    app.screen.do("type", "--delay", 40, name)
+    app.settle()
+    app.screen.do("key", "Return")
+    return Path(app.told("Saved (.*)")[1])
+
+
+def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        hands = Hands(app)
+        hands.press("Right", "ctrl+b", "o")
+        hands.measure(60)
+        path = saved_session(app, "mine")
+        assert path == tmp_path / "mine.scan4d.json"
+        done = app.settle()
+        hands.press("ctrl+4", "b", "Home")
+        changed = app.settle().document
+        app.drop(path)
+        assert app.see(document=done.document, frame=1).undoes == "Open session"
+        screen.do("key", "ctrl+z")
+        app.see(document=changed)
+    session = SavedSession.load(path)
+    assert (session.scan, session.pose) == ("scans/wall", 1)
+
+    (tmp_path / "else").mkdir()
+    moved = tmp_path / "else" / path.name
+    path.rename(moved)
+    home = tmp_path / "another"
+    home.mkdir()
+    with running_app(screen, home, "demo") as app:
+        app.drop(moved)
+        app.told("its scan 'scans/wall' is not there. Choose where it is now")
+        app.settle()
+        screen.do("key", "Tab", "sleep", 0.2, "type", "--delay", 15, scan)
+        app.settle()
+        screen.do("key", "Return")  # into the folder
+        app.settle()
+        screen.do("key", "Return")  # all of it
+        app.see(lambda state: state.scan == str(scan) and state.document == done.document, frame=1)
+        assert "Traceback" not in app.log()
+
+
+def view(screen: Screen, home: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    """`scan4d view` until it ends, which it does not where a window opens."""
+    command = [sys.executable, "-m", "viewer.cli", "view", *map(str, words)]
+    env = {**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(home)}
+    return subprocess.run(command, env=env, capture_output=True, text=True, cwd=home)
+
+
+def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        Hands(app).press("o", "Right")
+        path = saved_session(app, "mine")
+        done = app.settle().document
+    home = tmp_path / "another"
+    home.mkdir()
+    environment = {**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(home / "config")}
+    command = [sys.executable, "-m", "viewer.cli", "view", str(path)]
+    with subprocess.Popen(command, env=environment, cwd=home) as process:
+        kept = lambda: os.path.isdir(home / "config") and list((home / "config").rglob("scans/*.json"))  # noqa: E731
+        wait_until(kept)
+        process.terminate()
+    assert json.loads(json.dumps(kept_of(home, scan).to_json()))["document"] == done
+    assert kept_of(home, scan).pose == 1
+
+    def refused(*words: object) -> str:
+        ended = view(screen, home, *words)
+        assert (ended.returncode, ended.stdout) == (2, "")
+        return ended.stderr
+
+    scan.rename(scan.parent / "gone")
+    assert f"its scan 'scans/wall' is not there. Say where it is now: scan4d view SCAN {path}" in refused(
+        path
+    )
+    data: dict[str, Any] = json.loads(path.read_text())
+    data["document"]["camera"]["fov_y"] = 0
+    path.write_text(json.dumps(data))
+    assert f"{path}, document.camera: the camera's fov_y is 0" in refused(path)
+    path.write_text("{")
+    assert "is not JSON" in refused("demo", path)

@@ -1,0 +1,82 @@
+"""What changes is saved now and then, beside whoever changes it; what cannot be saved is told once."""
+
+from __future__ import annotations
+
+import threading
+from itertools import count
+
+from viewer.document.keeper import Keeper
+
+
+def finish(keeper: Keeper[int]) -> None:
+    """Wait until it has written."""
+    if keeper._writing is not None:
+        keeper._writing.exception()
+
+
+def test_it_saves_now_and_then_also_what_goes_on_changing() -> None:
+    written: list[int] = []
+    keeper = Keeper("Numbers", written.append, 0, every=3.0)
+    looks = 0
+
+    def current() -> int:
+        nonlocal looks
+        looks += 1
+        return number
+
+    number = 0
+    for now in (0.0, 0.1, 5.0):
+        assert keeper.look(now, current) is None
+    assert looks == 2, "now and then"
+    assert written == [], "nothing has changed"
+    for number in range(1, 6):
+        keeper.look(10.0 + 5 * number, current)
+        finish(keeper)
+    number = 6
+    keeper.look(35.5, current)
+    finish(keeper)
+    assert written == [1, 2, 3, 4, 5], "it was saved a moment ago"
+    assert keeper.close(6) is None
+    assert written == [1, 2, 3, 4, 5, 6]
+
+
+def test_closing_saves_only_what_has_changed() -> None:
+    written: list[int] = []
+    assert Keeper("Numbers", written.append, 1, 3.0).close(1) is None
+    assert written == []
+    assert Keeper("Numbers", written.append, 0, 3.0).close(1) is None
+    assert written == [1]
+
+
+def test_nobody_waits_for_a_slow_disk_and_nothing_is_lost_meanwhile() -> None:
+    written: list[int] = []
+    goes_on = threading.Event()
+
+    def save(number: int) -> None:
+        goes_on.wait()
+        written.append(number)
+
+    keeper = Keeper("Numbers", save, 0, every=3.0)
+    for number in (1, 2, 3):
+        keeper.look(10.0 * number, lambda number=number: number)  # type: ignore[misc]
+    keeper.keep(4)
+    goes_on.set()
+    assert keeper.close(5) is None
+    assert written == [1, 4, 5]
+
+
+def test_what_cannot_be_kept_is_told_once() -> None:
+    def fail(number: int) -> None:
+        raise OSError("no room")
+
+    keeper = Keeper("Numbers", fail, 0, every=3.0)
+
+    def look(now: float) -> str | None:
+        problem = keeper.look(now, lambda: 7)
+        finish(keeper)
+        return problem
+
+    problem = next(filter(None, map(look, count(0.0, 5.0))))
+    assert problem == "Numbers are not kept: no room"
+    assert not any(map(look, (1e6, 2e6, 3e6)))
+    assert "not kept" in str(keeper.close(8))

@@ -1,0 +1,242 @@
+"""Sessions come back as they were, find their scan, and damaged ones are one message; documents are kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hostile_values import variants
+
+from viewer.analysis.measure import End, Measurement
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.document import saved_session
+from viewer.document.document import Bookmark, Document
+from viewer.document.measurements import Measurements
+from viewer.document.part import Part
+from viewer.document.recording import place_of
+from viewer.document.saved_session import SavedSession, is_session, keep, kept, kept_file
+from viewer.errors import InputError
+from viewer.look import Look
+
+CAMERA = Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5)
+ENDS = End(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), End(2, 0.08, (1, 2, 3), "surface", None, None, 2)
+FULL = Document(
+    camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
+    params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
+    unit="mm", bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
+    parts={"measurements": Measurements((Measurement(*ENDS), Measurement(*ENDS[::-1])))},
+)  # fmt: skip
+SESSION = SavedSession("/scans/knot", "files:0123456789abcdef", 3, FULL)
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    return tmp_path / "home"
+
+
+def test_all_of_a_session_comes_back(tmp_path: Path) -> None:
+    same = [of.name for of in fields(Document) if getattr(FULL, of.name) == getattr(Document(), of.name)]
+    assert same == [], "the example says something about every field"
+    SESSION.save(tmp_path / "a.scan4d.json")
+    assert SavedSession.load(tmp_path / "a.scan4d.json") == SESSION
+    (tmp_path / "b.scan4d.json").write_text(
+        '{"format": 1, "scan": "demo", "hash": null, "pose": 0, "document": {}}'
+    )
+    assert SavedSession.load(tmp_path / "b.scan4d.json") == SavedSession("demo", None, 0, Document())
+
+
+def test_a_scan_and_its_session_move_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "one" / "scans" / "knot").mkdir(parents=True)
+    session = replace(SESSION, scan=str(tmp_path / "one" / "scans" / "knot"))
+    session.export(tmp_path / "one" / "notes" / "a.scan4d.json")
+    os.rename(tmp_path / "one", tmp_path / "two")
+    monkeypatch.chdir(tmp_path / "home" if (tmp_path / "home").exists() else "/")
+    path = tmp_path / "two" / "notes" / "a.scan4d.json"
+    found = SavedSession.load(path)
+    assert found.scan == "../scans/knot"
+    assert os.path.samefile(place_of(found.scan, path), tmp_path / "two" / "scans" / "knot")
+    replace(SESSION, scan="demo").export(path)
+    assert SavedSession.load(path).scan == "demo"
+
+
+def test_sessions_are_known_by_their_names() -> None:
+    assert is_session(Path("a.scan4d.json"))
+    assert is_session(Path("A.SCAN4D.JSON"))
+    assert not is_session(Path("scan4d_0001.json"))
+
+
+def test_what_other_tools_and_renderers_keep_survives_untouched(tmp_path: Path) -> None:
+    data = json.loads(json.dumps(SESSION.to_json()))
+    unknown: dict[str, Any] = {
+        "all": [{"text": "a note", "place": [1, 2.5, None]}],
+        "later": {"deep": [[[1e300]]]},
+    }
+    data["document"]["parts"]["tests.pins"] = data["document"]["params"]["a backend"] = unknown
+    (tmp_path / "a.json").write_text(json.dumps(data))
+    read = SavedSession.load(tmp_path / "a.json")
+    changed = replace(read, document=read.document.with_part(Measurements()))
+    changed.save(tmp_path / "b.json")
+    again = json.loads((tmp_path / "b.json").read_text())["document"]
+    assert again["parts"] == {"tests.pins": unknown}
+    assert again["params"]["a backend"] == unknown
+
+    @dataclass(frozen=True)
+    class Pins(Part, name="tests.pins"):
+        all: tuple[str, ...] = ()
+
+    try:
+        with pytest.raises(InputError, match=r"tests\.pins"):
+            read.document.part(Pins)
+        with pytest.raises(InputError, match=r"parts: tests\.pins"):
+            SavedSession.load(tmp_path / "b.json")
+        pinned = replace(read, document=read.document.with_part(Pins(("a", "b"))))
+        pinned.save(tmp_path / "b.json")
+        del Part.kinds["tests.pins"]
+        raw = SavedSession.load(tmp_path / "b.json").document
+        Part.kinds["tests.pins"] = Pins
+        assert raw.part(Pins).all == ("a", "b"), "a tool that comes later finds what it kept"
+    finally:
+        Part.kinds.pop("tests.pins", None)
+
+
+def changed(*path: Any, to: Any) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        inner: Any = data
+        for step in path[:-1]:
+            inner = inner[step]
+        inner[path[-1]] = to
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (changed("format", to=2), "has the format 2, this Scan4D"),
+        (lambda data: data.pop("format"), "has the format None"),
+        (lambda data: data.pop("document"), "is no session"),
+        (lambda data: data.pop("scan"), "has no 'scan'"),
+        (changed("scan", to="a\0b"), "'scan' is not the name of a scan"),
+        (changed("hash", to=7), "'hash' is not a hash but 7"),
+        (changed("pose", to=-1), "'pose' is not the number of a pose but -1"),
+        (changed("document", to=[1]), "'document' is not values by name but [1]"),
+        (changed("document", "camera", "fov_y", to=0), ", document.camera: the camera's fov_y is 0"),
+        (changed("document", "pivot", to=[1, 2]), ", document: 'pivot' is not 3 values but [1, 2]"),
+        (changed("document", "look", "light", to="dim"), ", document.look: unknown light 'dim'"),
+        (changed("document", "params", "points", "point_size", to=99), "points: point_size: 99 is outside"),
+        (changed("document", "params", to=[1]), ", document.params: is not values by name but [1]"),
+        (changed("document", "unit", to=" "), "document.unit: ' ' is no unit of length"),
+        (
+            changed("document", "bookmarks", 1, "name", to=3),
+            ", document.bookmarks[1]: 'name' is not a text but 3",
+        ),
+        (
+            changed("document", "parts", "measurements", "all", 1, "first", "snapped", to="x"),
+            "all[1].first.snapped",
+        ),
+        (
+            changed("document", "parts", "measurements", "all", 0, "second", "level", to="x"),
+            "'level' is not a whole",
+        ),
+        (changed("document", "camra", to=3), ", document: unknown field 'camra'. Did you mean 'camera'?"),
+    ],
+)
+def test_a_wrong_session_is_one_message(damage: Any, words: str, tmp_path: Path) -> None:
+    data = json.loads(json.dumps(SESSION.to_json()))
+    damage(data)
+    path = tmp_path / "a.scan4d.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(InputError) as caught:
+        SavedSession.load(path)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_whatever_stands_in_a_session_it_is_read_or_refused() -> None:
+    data = json.loads(json.dumps(SESSION.to_json()))
+    data["document"]["bookmarks"] = data["document"]["bookmarks"][:1]
+    data["document"]["params"].pop("voxels")
+    read = 0
+    for variant in variants(data):
+        try:
+            session = SavedSession.from_json(variant, "a")
+        except InputError:
+            continue
+        read += 1
+        again = json.loads(json.dumps(session.to_json()))
+        assert json.dumps(SavedSession.from_json(again, "a").to_json()) == json.dumps(session.to_json())
+    assert read > 100
+
+
+# --- those of all scans -----------------------------------------------------------------------
+
+
+def test_each_scan_has_its_own(home: Path) -> None:
+    sessions = [replace(SESSION, scan=name) for name in ("demo", "/a", "/b", os.fsdecode(b"/caf\xe9"))]
+    for session in sessions:
+        keep(session)
+    assert [kept(session.scan) for session in sessions] == sessions
+    assert kept("/c") is None
+    assert all("knot" not in path.name for path in home.rglob("*")), "names of files tell nothing"
+
+
+def test_those_kept_last_stay(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saved_session, "MOST_KEPT", 5)
+    for number in range(12):
+        keep(replace(SESSION, scan=f"/{number}"))
+        os.utime(kept_file(f"/{number}"), (number, number))
+    keep(replace(SESSION, scan="/8", pose=1))
+    keep(replace(SESSION, scan="/12"))
+    there = [number for number in range(13) if kept(f"/{number}") is not None]
+    assert there == [8, 9, 10, 11, 12]
+
+
+def test_what_is_damaged_is_put_aside_and_told_once() -> None:
+    keep(SESSION)
+    file = kept_file(SESSION.scan)
+    file.write_text(file.read_text()[:-40])
+    with pytest.raises(InputError) as caught:
+        kept(SESSION.scan)
+    assert str(caught.value).startswith("/scans/knot: what was kept of it cannot be read (is not JSON")
+    assert str(file.with_suffix(".old.json")) in str(caught.value)
+    assert kept(SESSION.scan) is None
+
+
+_KEEP_ON = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+from viewer.document.saved_session import SavedSession, keep
+session = SavedSession.load(Path(sys.argv[1]))
+print("begins", flush=True)
+for number in range(10**9):
+    keep(replace(session, pose=number % 1000))
+"""
+
+
+def test_a_kill_leaves_a_whole_document_and_nothing_else(tmp_path: Path, home: Path) -> None:
+    SESSION.save(tmp_path / "a.scan4d.json")
+    for moment in range(6):
+        command = [sys.executable, "-c", _KEEP_ON, str(tmp_path / "a.scan4d.json")]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2]) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            time.sleep(0.05 + 0.013 * moment)
+            process.send_signal(signal.SIGKILL)
+        found = kept(SESSION.scan)
+        assert found is None or replace(found, pose=3) == SESSION
+        assert moment == 0 or found is not None
+    shutil.rmtree(home)
