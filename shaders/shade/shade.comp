@@ -137,7 +137,9 @@ vec4 over_background(vec4 color, float coverage) {
 
 void main() {
     uint i = item();
-    if (i >= list_count) return;
+    // All variants read the view: of those that did not, Mesa's Zink (22.3.6) took the view for the params, after
+    // other programs had read it.
+    if (i >= list_count || view_size.x == 0) return;
     vec4 color = vec4(shade(int(list[i])), 1.0);
 #if OWN_COLOR
     color = over_background(color, texelFetch(own_colors, int(list[i])).a);
