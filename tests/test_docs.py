@@ -18,7 +18,11 @@ from viewer.look import Look
 from viewer.params import Parameter, describe
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+DOCS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+SOURCES = [*(ROOT / "viewer").rglob("*.py"), *(p for p in (ROOT / "shaders").rglob("*") if p.is_file())]
+_PATH = re.compile(r"(?<![\w/.-])(?:viewer|shaders|tests|docs|assets)/[\w/.-]*\w")
+# A file whose text a page gives, to be written by the reader: its name, and then a block of code.
+_GIVEN = re.compile(r"`([\w/]+\.\w+)`:?\n\n```")
 # These set up, open a window or run all tests; they have tests of their own.
 ELSEWHERE = ("make ", "git clone", "cd ", "pipx ", "scan4d view", "python ")
 
@@ -96,3 +100,25 @@ def test_commands_in_the_docs_run(page: Path, tmp_path: Path) -> None:
 def test_links_in_the_docs_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def missing_paths(text: str) -> set[str]:
+    """The paths of the project that a text names and that are not there. One with NAME stands for several."""
+    named = {path for path in _PATH.findall(text) if "NAME" not in path} - set(_GIVEN.findall(text))
+    return {path for path in named if not (ROOT / path).exists()}
+
+
+@pytest.mark.parametrize("page", DOCS, ids=lambda page: page.name)
+def test_what_the_docs_name_is_there(page: Path) -> None:
+    assert missing_paths(page.read_text(encoding="utf-8")) == set()
+
+
+def test_what_the_sources_name_is_there() -> None:
+    missing = {path: names for path in SOURCES if (names := missing_paths(path.read_text(encoding="utf-8")))}
+    assert missing == {}
+
+
+def test_a_path_that_is_not_there_is_found() -> None:
+    text = "in `viewer/pick.py`, unlike viewer/analysis/pick.py or tests/NAME.py"
+    assert missing_paths(text) == {"viewer/pick.py"}
+    assert missing_paths("`viewer/new.py`:\n\n```python") == set()
