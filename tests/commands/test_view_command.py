@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,8 @@ from command_line import Run
 from small_scans import names
 from written import film, picture
 
+from viewer.document.document import Document
+from viewer.document.saved_session import SavedSession
 from viewer.errors import NoOpenGLError
 
 
@@ -81,10 +84,36 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     ball = str(scans / "ball.npz")
     assert run("view", ball, "demo", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
     assert run("view").code == 0
+    opened = [options.pop("opened") for _, options in calls]
+    assert [timeline.name for timeline in opened] == ["ball.npz", "demo"], "opened once, and handed over"
+    assert (opened[0].unit, opened[0].times[0]) == ("mm", 0.0)
+    nothing = {"replay": None, "session": None}
     assert calls == [
-        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, "replay": None}),
-        (["demo"], {"unit": None, "fps": None, "up": "+y", "device": None, "replay": None}),
+        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, **nothing}),
+        (["demo"], {"unit": None, "fps": None, "up": None, "device": None, **nothing}),
     ]
+
+
+def test_view_opens_a_session_with_its_scan(
+    run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from viewer import app
+
+    calls: list[tuple[object, object]] = []
+    monkeypatch.setattr(app, "run", lambda scans, **options: calls.append((scans, options["session"])) or 0)
+    monkeypatch.setenv("DISPLAY", ":7")
+    ball, path = tmp_path / "ball.npz", tmp_path / "a.scan4d.json"
+    shutil.copy(scans / "ball.npz", ball)
+    SavedSession(str(ball), None, 0, Document(unit="mm")).export(path)
+    session = SavedSession.load(path)
+    assert session.scan == "ball.npz"
+    assert run("view", path).code == 0
+    ball.rename(tmp_path / "moved.npz")
+    missing = run("view", path)
+    assert missing.code == 2
+    assert f"its scan 'ball.npz' is not there. Say where it is now: scan4d view SCAN {path}" in missing.err
+    assert run("view", tmp_path / "moved.npz", path).code == 0
+    assert calls == [([str(ball)], session), ([str(tmp_path / "moved.npz")], session)]
 
 
 def test_a_window_that_does_not_open_falls_back(
