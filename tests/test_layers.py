@@ -127,7 +127,7 @@ def libraries(names: Iterable[str]) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
-TOOLS_KNOW = {"commands", "desk", "ui", "widgets", "scene.canvas", "tools"}  # of the window
+TOOLS_KNOW = {"commands", "desk", "save_dialog", "scene.canvas", "tools", "ui", "widgets"}  # of the window
 
 
 def test_every_part_has_a_layer() -> None:

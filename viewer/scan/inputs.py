@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from ..errors import InputError
 from .sources import FACES_FILE
 from .timeline import Timeline
 from .times import TIMES_FILE
@@ -24,6 +25,12 @@ def found_among(paths: Iterable[Path], inputs: Iterable[Path]) -> list[Path]:
     there = [(path, identity) for path in paths if (identity := _identity(path)) is not None]
     read = {_identity(path) for path in inputs} if there else set()
     return [path for path, identity in there if identity in read]
+
+
+def refuse_input(path: Path, timeline: Timeline) -> None:
+    """Raise InputError where a path leads to one of the files that a scan may be read from."""
+    if found_among([path], scan_inputs(timeline)):
+        raise InputError("is a file of the scan, and is not replaced", path, "Use another name")
 
 
 def _identity(path: Path) -> tuple[int, int] | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -13,10 +12,9 @@ from viewer.analysis.measure import End, Measurement, Reading
 from viewer.app.desk import Desk
 from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
-from viewer.app.tools.measuring import Tool, csv_file
+from viewer.app.tools.measuring import Tool
 from viewer.app.tools.measuring.words import snap_words
 from viewer.camera import Camera
-from viewer.errors import InputError
 
 PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 
@@ -93,16 +91,3 @@ def test_places_of_the_scan_are_where_the_picture_shows_them() -> None:
     assert above.x > 250
     assert above.y < 150
     assert PLACE.on_screen((0, 0, 5)) is None, "behind the eye"
-
-
-def test_the_file_of_a_table_is_what_the_user_means(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert csv_file(" a.csv ") == csv_file("~/a") == tmp_path / "a.csv"
-    assert csv_file("a.b") == tmp_path / "a.b.csv"
-    for wrong in ("", str(tmp_path), "~"):
-        with pytest.raises(InputError, match="is a folder"):
-            csv_file(wrong)
-    for wrong in ("nowhere/a.csv", "f" * 300 + "/a.csv"):
-        with pytest.raises(InputError, match="no such folder"):
-            csv_file(wrong)

@@ -9,10 +9,10 @@ from ...document.recording import place_of
 from ...document.saved_session import SUFFIX, SavedSession
 from ...errors import InputError
 from ...files import free_file, printable, working_folder
-from ...scan.inputs import found_among, scan_inputs
+from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
+from ..save_dialog import SaveDialog
 from ..session import known_as
-from .saving import SaveDialog
 
 if TYPE_CHECKING:
     from ..app import App
@@ -35,8 +35,7 @@ class Sessions:
 
     def _save(self, file: Path) -> None:
         app = self._app
-        if found_among([file], scan_inputs(app.playback.timeline)):
-            raise InputError("is a file of the scan, and is not replaced", file, "Use another name")
+        refuse_input(file, app.playback.timeline)
         app.session.saved(app.hash, app.session.index).export(file)
         app.note(f"Saved {file}")
 

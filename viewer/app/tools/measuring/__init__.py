@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -13,11 +12,12 @@ from ....analysis.measure import End, Measurement, Reading, read, save, table, t
 from ....analysis.pick import is_seen
 from ....document.measurements import Measurements
 from ....errors import InputError
-from ....files import absolute, free_file, working_folder
-from ....scan.inputs import found_among, scan_inputs
+from ....files import free_file, working_folder
+from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ...commands import Command, Menu
 from ...desk import Click, Desk
+from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import overlay, panel
@@ -33,16 +33,14 @@ class Tool:
     """The tool that measures. What was measured is in the document.
 
     begun: the first end of the one that is being made, None where none is. filled: whether ends may be set
-    where holes are filled. saving: the file name in the dialog that saves, None while it is closed; problem:
-    why it could not be saved under that name; to_type: whether its field has yet to take the keyboard.
+    where holes are filled. saving: the dialog that saves.
     """
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.filled = False
-        self.saving: str | None = None
-        self.problem = ""
-        self.to_type = False
+        about = "All measurements, as a table of comma separated values"
+        self.saving = SaveDialog("Save measurements", about, ".csv", self._save)
         self.begun: End | None = None
         self._seen: tuple[object, dict[End, bool]] = None, {}
         self._told: list[str] = []
@@ -114,7 +112,7 @@ class Tool:
 
     def dialog(self) -> None:
         """Declare the dialog that saves, while it is open."""
-        panel.draw_dialog(self)
+        self.saving.draw()
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
         """Draw what was measured, and tell what changes by it."""
@@ -191,29 +189,12 @@ class Tool:
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self.saving, self.problem, self.to_type = str(free_file(working_folder(), ".csv")), "", True
+        self.saving.ask(free_file(working_folder(), ".csv"))
 
-    @property
-    def replaces(self) -> bool:
-        """Whether the file of the dialog is there already."""
-        try:
-            return self.saving is not None and os.path.exists(csv_file(self.saving))
-        except InputError:
-            return False
-
-    def save(self) -> None:
-        """Write them as the CSV file of the dialog and close that, or say why it cannot be written."""
-        assert self.saving is not None
-        try:
-            file = csv_file(self.saving)
-            if found_among([file], scan_inputs(self.desk.timeline)):
-                raise InputError("is a file of the scan, and is not replaced", file, "Use another name")
-            save(file, self._table())
-        except InputError as error:
-            self.problem, self.to_type = str(error), True
-        else:
-            self.desk.note(f"Saved {file}")
-            self.saving = None
+    def _save(self, file: Path) -> None:
+        refuse_input(file, self.desk.timeline)
+        save(file, self._table())
+        self.desk.note(f"Saved {file}")
 
     def _table(self) -> list[list[object]]:
         """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
@@ -223,20 +204,6 @@ class Tool:
             if reading.measurement != made:
                 rows.append((number, reading))
         return table(rows, self.desk.timeline.name, self.desk.unit)
-
-
-def csv_file(text: str) -> Path:
-    """The file that a user's text names: ~ is the user's folder, and .csv is added where it is missing.
-
-    Raises InputError where there is no folder for it, or no name.
-    """
-    typed = os.path.expanduser(text.strip())
-    path = Path(absolute(typed))
-    if not typed or os.path.isdir(path):
-        raise InputError("is a folder", path, "Name a file in it")
-    if not os.path.isdir(path.parent):
-        raise InputError("there is no such folder", path.parent, "Create it first, or name another")
-    return path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv")
 
 
 def _place_words(end: End) -> tuple[str, str]:

@@ -8,7 +8,6 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from imgui_bundle import imgui
 
 from ....analysis.measure import End, Reading
-from ....files import printable
 from ....scan.points import UNKNOWN_UNIT
 from ... import widgets
 from ...ui import Ui
@@ -16,8 +15,6 @@ from .words import distance_words, snap_words
 
 if TYPE_CHECKING:
     from . import Tool
-
-_DIALOG = "Save measurements"
 
 
 def draw(measuring: Tool, ui: Ui) -> None:
@@ -91,28 +88,3 @@ def _draw_outlets(measuring: Tool, ui: Ui) -> None:
     if imgui.button("Clear", third):
         measuring.clear()
     imgui.set_item_tooltip("Delete all; undo brings them back")
-
-
-def draw_dialog(measuring: Tool) -> None:
-    """Declare the dialog that saves, while it is open."""
-    with widgets.modal(_DIALOG, measuring.saving is not None) as is_drawn:
-        if not is_drawn or measuring.saving is None:
-            return
-        imgui.text("All measurements, as a table of comma separated values")
-        if measuring.to_type:
-            imgui.set_keyboard_focus_here()
-            measuring.to_type = False
-        imgui.set_next_item_width(-1)
-        changed, measuring.saving = widgets.edit_path("##path", measuring.saving)
-        if changed:
-            measuring.problem = ""
-        is_entered = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
-        exists = measuring.replaces
-        imgui.text_wrapped(printable(measuring.problem) or ("This file is there already." if exists else ""))
-        if imgui.button("Replace" if exists else "Save") or (is_entered and not exists):
-            measuring.save()
-        imgui.same_line()
-        if imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
-            measuring.saving = None
-        if measuring.saving is None:
-            imgui.close_current_popup()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from ...errors import InputError
-from ...files import absolute, printable
-from .. import widgets
+from ..errors import InputError
+from ..files import absolute, printable
+from . import widgets
 
 
 class SaveDialog:
