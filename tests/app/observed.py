@@ -86,7 +86,7 @@ def shown(app: App) -> dict[str, Any]:
         "is_playing": app.playback.player.playing,
         "is_recording": app.capture.recorder is not None,
         "pointed": app.pointer.words,
-        "unit": app.unit,
+        "unit": app.playback.unit,
         "theme": app.theme,
         "is_replaying": app.capture.replaying is not None,
         "is_export_open": app.exporting.is_open,

@@ -49,7 +49,7 @@ def app() -> Any:
         session=session,
         hash=None,
         hash_found=Future(),
-        unit="mm",
+        playback=SimpleNamespace(unit="mm"),
     )
 
 

@@ -220,9 +220,12 @@ def test_reverse_reads_ahead_backwards_and_shows_the_latest_pose_behind(started:
 def test_a_change_outlives_the_scan(started: Callable) -> None:
     playback, _ = started(all_read=True)
     playback.change(0.0, speed=2.0, loop=False)
-    other = Playback(Timeline(Frames(3), np.arange(3) / 10), playback.session)
-    assert (other.player.pace.speed, other.player.pace.loop) == (2.0, False)
-    other.close()
+    playback.toggle(0.0)
+    until(lambda: shown(playback, 0.0) == 0)
+    playback.close()
+    playback.begin(Timeline(Frames(3), np.arange(3) / 10), first=2)
+    assert (playback.player.pace.speed, playback.player.pace.loop) == (2.0, False)
+    assert (playback.pose, playback.player.playing, playback.session.index) == (None, False, 2)
 
 
 def test_the_rate_is_what_was_shown_lately(started: Callable) -> None:

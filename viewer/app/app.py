@@ -99,6 +99,7 @@ class App:
         opened = begin(timeline, lambda: self._kept(scans[0]), session)
         document = remembered.document if up is None else remembered.document.with_up(up)
         self.session: Session = Session(scans[0], document, remembered.pace, opened.left)
+        self.playback: Playback = Playback(timeline, self.session, opened.first)
         self.pointer: Pointer = Pointer(self)
         self.rendering: Rendering = Rendering(self)
         self.steering: Steering = Steering(self, remembered.cube, remembered.turn_seconds)
@@ -120,7 +121,7 @@ class App:
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         if self.renderer.gpu.software:
             self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
-        self.playback: Playback = self._start(opened)
+        self._start(opened)
 
     # --- commands ---------------------------------------------------------------------
 
@@ -205,11 +206,6 @@ class App:
     def step(self, count: int) -> None:
         """Pause, and go some frames on."""
         self.playback.step(count, time.monotonic())
-
-    @property
-    def unit(self) -> str:
-        """The scan's unit of length: as the user calls it, else as the scan tells, else "units"."""
-        return self.document.unit or self.playback.timeline.unit
 
     @property
     def up(self) -> str:
@@ -332,19 +328,20 @@ class App:
             return
         if opened is not None:
             scan, begun = opened
-            in_background(Task("Closing"), self.playback.close)  # it may wait for a pose that is being read
+            # It may wait for a pose that is being read.
+            in_background(Task("Closing"), self.playback.timeline.close)
             self.keeping.leave()
             self.session.turn_to(scan, begun.left)
-            self.playback = self._start(begun)
+            self._start(begun)
+            self.playback.begin(begun.timeline, begun.first)
             log.debug("opened %s", scan)
 
-    def _start(self, opened: Opened) -> Playback:
+    def _start(self, opened: Opened) -> None:
         timeline, self.hash_found, left, problem, session = opened
         if problem:
             self.note(problem)
         if session is not None:
             self.session.take_up(session)
-        self.session.index = opened.first
         self._compare(session or left)
         self.viewport.clear()
         self._messages_read = 0
@@ -354,7 +351,6 @@ class App:
             self.session.amend(unit=self._unit)
         self.steering.begin_scan()
         self.tools.abandon()
-        return Playback(timeline, self.session)
 
     def take_up(self, session: SavedSession) -> None:
         """Show the open scan as a session has it."""

@@ -87,7 +87,7 @@ class Desk:
     @property
     def unit(self) -> str:
         """The unit of length: as the user calls it, else as the scan tells, else "units"."""
-        return self._app.unit
+        return self._app.playback.unit
 
     @property
     def viewport(self) -> Viewport:

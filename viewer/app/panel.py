@@ -131,7 +131,7 @@ def _draw_statistics(app: App) -> None:
     )
     for name, number in counting.words(app.viewport, app.counting.counts):
         _row(name, number)
-    _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.unit}")
+    _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.playback.unit}")
     _row("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
     for name, choice in surface.stats.chosen.items():
         _row(name.capitalize(), choice)

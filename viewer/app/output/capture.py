@@ -54,7 +54,7 @@ class Capture:
         request = app.viewport.request
         if not app.viewport.is_there or request is None:
             return None
-        return Entry.of(request, app.session.scan, app.hash, app.viewport.size, app.unit)
+        return Entry.of(request, app.session.scan, app.hash, app.viewport.size, app.playback.unit)
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""

@@ -17,22 +17,32 @@ _RATE_FRAMES = 4
 
 
 class Playback:
-    """Moves `session.index` along a timeline and finds the pose to show.
+    """Moves `session.index` along the timeline of the open scan and finds the pose to show.
 
     pose: the one that is shown, None before the first. Where reading is slower than
     playing, it is the latest one that is there. dropped: readable frames that were not there
     at their time, since playing began; none where every frame is shown.
     """
 
-    def __init__(self, timeline: Timeline, session: Session) -> None:
-        self.timeline = timeline
+    def __init__(self, timeline: Timeline, session: Session, first: int = 0) -> None:
+        """first: the frame to begin with."""
         self.session = session
-        self.player = Player(timeline.times, session.pace)
+        self.begin(timeline, first)
+
+    def begin(self, timeline: Timeline, first: int = 0) -> None:
+        """Show another scan from now on, paused at one of its frames; the one before stays open."""
+        self.timeline = timeline
+        self.player = Player(timeline.times, self.session.pace)
         self.pose: Pose | None = None
         self.dropped = 0
         self._shown: deque[float] = deque()  # when poses were, lately
-        session.index = min(session.index, len(timeline) - 1)
-        timeline.request(session.index)
+        self.session.index = first
+        timeline.request(first)
+
+    @property
+    def unit(self) -> str:
+        """The scan's unit of length: as the user calls it, else as the scan tells, else "units"."""
+        return self.session.document.unit or self.timeline.unit
 
     @property
     def problem(self) -> InputError | None:

@@ -29,8 +29,8 @@ def draw(app: App, size: ImVec2) -> None:
     request, surface = app.viewport.request, app.viewport.surface
     if app.document.camera is None or request is None or surface is None or not app.viewport.is_there:
         return
-    pose, count = request.pose, len(app.playback.timeline)
-    told = Legend(app.marks, app.document.camera, surface.look, app.unit, pose.index, count, float(pose.time))
+    pose, unit, count = request.pose, app.playback.unit, len(app.playback.timeline)
+    told = Legend(app.marks, app.document.camera, surface.look, unit, pose.index, count, float(pose.time))
     corner = imgui.get_window_pos()
     canvas = _View(corner)
     marks.draw(canvas, (size.x, size.y), told, surface.color_range)

@@ -37,7 +37,7 @@ class Pointer:
         if picked is not None and app.viewport.request is not None:
             pose = app.viewport.request.pose
             frame = f"frame {pose.index + 1}/{len(app.playback.timeline)}"
-            self.words = describe(picked, frame, app.unit, app.viewport.bounds(pose).radius)
+            self.words = describe(picked, frame, app.playback.unit, app.viewport.bounds(pose).radius)
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
