@@ -2,6 +2,7 @@
 
 PYTHON := .venv/bin/python
 QUICK := --quick
+WORKERS := auto
 MINUTES := 5
 SEED := 1
 
@@ -17,11 +18,11 @@ setup: ## system libraries, and .venv with all dependencies; what is there is le
 run: setup ## open the demo scan, or yours: make run SCAN=path (without a display: into out/)
 	.venv/bin/scan4d view $(if $(SCAN),"$(SCAN)") --fallback out --force
 
-test: setup ## the tests, without the slow ones
-	$(PYTHON) -m pytest -m "not slow"
+test: setup ## the tests, without the slow ones; a process for each core: make test WORKERS=0 has but one
+	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile -m "not slow"
 
 test-all: setup ## all tests
-	$(PYTHON) -m pytest
+	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
 
 test-drivers: setup ## backends and numerics on a second driver (Zink), shaders through glslangValidator
 	$(PYTHON) tests/drivers/zink.py tests/gpu tests/backends tests/numerics -m "not slow"
