@@ -72,7 +72,10 @@ class Dialog:
         self._top = np.nonzero((edge == BEHIND).all(axis=(1, 2)))[0][0]
 
     def _click(self, x: float, y: float, *more: object) -> None:
-        self._app.screen.do("mousemove", x, y, "sleep", 0.15, "click", *more, 1, "sleep", 0.25)
+        self._app.screen.do("mousemove", x, y)
+        self._app.settle()
+        self._app.screen.do("click", *more, 1)
+        self._app.settle()
 
     def choose(self, row: int, item: int) -> None:
         """An item of the list in a row."""
@@ -88,8 +91,11 @@ class Dialog:
         at = LEFT + 250 + 280 * share
         self._click(at, self._top + FIRST_ROW + ROW * row, "--repeat", 2, "--delay", 60)
         press_with_ctrl(self._app, "a")
+        self._app.settle()
         self._app.screen.do("type", "--delay", 40, text)
-        self._app.screen.do("key", "Return", "sleep", 0.2)
+        self._app.settle()
+        self._app.screen.do("key", "Return")
+        self._app.settle()
 
     def tick(self, row: int) -> None:
         """The box of a row."""
@@ -97,7 +103,9 @@ class Dialog:
 
     def export(self, rows: float) -> None:
         """Press the button below so many rows, a line and a line of text."""
-        self._click(LEFT + 38, self._top + FIRST_ROW + ROW * rows + 29)
+        self._app.screen.do("mousemove", LEFT + 38, self._top + FIRST_ROW + ROW * rows + 29)
+        self._app.settle()
+        self._app.screen.do("click", 1)
 
 
 def replayed(folder: Path, *arguments: object) -> None:

@@ -43,6 +43,8 @@ class Loop:
             before = failures.count
             with failures.told("The window"):
                 self._turn()
+            if self._watch is not None:
+                self._watch(self._app)
             if failures.count != before:
                 time.sleep(_CALM)
 
@@ -56,8 +58,6 @@ class Loop:
         if changed or self._app.window.due:
             self._draw()
         self._turns.end()
-        if self._watch is not None:
-            self._watch(self._app)
 
     def _ends(self) -> bool:
         """Whether the window is closed, and the user was asked where that cancels an export; a signal asks
