@@ -84,41 +84,41 @@ class App:
         session: SavedSession | None = None,
     ) -> None:
         """up: the up axis; None: as the scan was left. session: to open the first scan with."""
-        self.scans: Scans = Scans(self, scans, remembered.recent)
-        self.browser: Browser = Browser(self)
-        self.theme = remembered.theme
+        self.window = window
+        log.debug("%s", window.place)
+        window.text_scale = remembered.text_scale
+        self.set_theme(remembered.theme)
         self.notices = Notices()
         self.failures = Failures(self.note)
-        self.help: Help = Help()
+        self._up, self._unit, self._fps = up, unit, fps
+        opened = begin(timeline, lambda: self._kept(scans[0]), session)
+        document = remembered.document if up is None else remembered.document.with_up(up)
+        self.session: Session = Session(scans[0], document, remembered.pace, opened.left)
+        self.playback: Playback = Playback(timeline, self.session, opened.first)
+        self.renderer = Renderer(Gpu(window.ctx))
+        self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         self.commands = Commands()
         self.tools: Toolbox = Toolbox(self, self.commands, remembered.tools)
         self.keys, problems = keys.load(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
-        self._up = up
-        opened = begin(timeline, lambda: self._kept(scans[0]), session)
-        document = remembered.document if up is None else remembered.document.with_up(up)
-        self.session: Session = Session(scans[0], document, remembered.pace, opened.left)
-        self.playback: Playback = Playback(timeline, self.session, opened.first)
-        self.pointer: Pointer = Pointer(self)
-        self.rendering: Rendering = Rendering(self)
-        self.steering: Steering = Steering(self, remembered.cube, remembered.turn_seconds)
+        self.help: Help = Help()
+        self.scans: Scans = Scans(self, scans, remembered.recent)
+        self.browser: Browser = Browser(self)
+        self.sessions: Sessions = Sessions(self)
+        self._opening = Opening()
+        self.keeping: Keeping = Keeping(self, user_folder() / settings.FILE, remembered)
+        self.pointer: Pointer = Pointer(self.viewport, self.playback)
+        self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
+        self.steering: Steering = Steering(
+            self.session, self.playback, self.viewport, self.pointer, remembered.cube, remembered.turn_seconds
+        )
         self.marks = remembered.marks
         self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
-        self.full_view: FullView = FullView(self)
-        self.capture: Capture = Capture(self)
+        self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
+        self.capture: Capture = Capture(self)
         self.exporting: Exporting = Exporting(self, remembered.export, remembered.export_marks)
-        self._opening = Opening()
-        self._unit, self._fps = unit, fps
-        self.window = window
-        log.debug("%s", window.place)
-        window.text_scale = remembered.text_scale
-        self.set_theme(self.theme)
-        self.sessions: Sessions = Sessions(self)
-        self.keeping: Keeping = Keeping(self, user_folder() / settings.FILE, remembered)
-        self.renderer = Renderer(Gpu(window.ctx))
-        self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         if self.renderer.gpu.software:
             self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
         self._start(opened)
@@ -206,11 +206,6 @@ class App:
     def step(self, count: int) -> None:
         """Pause, and go some frames on."""
         self.playback.step(count, time.monotonic())
-
-    @property
-    def up(self) -> str:
-        """The scan's up axis: as the command line or the panel has it."""
-        return self.document.look.up
 
     @property
     def _keys_file(self) -> Path:

@@ -41,7 +41,7 @@ def draw(app: App) -> None:
             _draw_renderer(app, pose)
         if _section("Look"):
             look = app.document.look
-            app.rendering.edit_look(widgets.edit(look, Look(up=app.up), {"color_by": _colors(app, pose)}))
+            app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": _colors(app, pose)}))
             _draw_projection(app)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
             app.bookmarks.draw(ui)

@@ -13,7 +13,8 @@ from . import navigation, orientation
 from .orientation import Direction
 
 if TYPE_CHECKING:
-    from ..app import App
+    from ...document.document import Document
+    from .steering import Steering
 
 _HALF = 1.55  # of an edge, in heights of the font
 _REACH = _HALF * 3**0.5  # of the corners from the centre
@@ -36,10 +37,6 @@ class OrientationCube:
         self.is_held = self.is_dragged = False
         self.under_mouse: Direction | None = None
 
-    def is_drawn(self, app: App) -> bool:
-        """Whether it can be seen."""
-        return self.is_shown and not app.full_view.is_on and app.document.camera is not None
-
     def toggle(self) -> None:
         """Show it, or hide it."""
         self.is_shown = not self.is_shown
@@ -56,17 +53,21 @@ def place(width: float, height: float, em: float) -> tuple[float, float, float] 
     return width - inset, inset, _HALF * em
 
 
-def take_mouse(app: App, size: ImVec2) -> None:
-    """Let the mouse click and drag the cube; declare this before the view, so that it comes first."""
-    cube, camera = app.steering.cube, app.document.camera
+def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: bool) -> None:
+    """Let the mouse click and drag the cube; declare this before the view, so that it comes first.
+
+    size: of the view. is_drawn: whether the cube is.
+    """
+    cube, camera = steering.cube, document.camera
     where = place(size.x, size.y, imgui.get_font_size())
     cube.under_mouse = None
-    if camera is None or where is None or not cube.is_drawn(app):
+    if camera is None or where is None or not is_drawn:
         cube.is_held = cube.is_dragged = False
         return
     x, y, half = where
     mouse = imgui.get_mouse_pos() - imgui.get_window_pos() - ImVec2(x, y)
-    under = orientation.part_at(orientation.rotation(camera, app.up), mouse.x / half, -mouse.y / half)
+    turned = orientation.rotation(camera, document.look.up)
+    under = orientation.part_at(turned, mouse.x / half, -mouse.y / half)
     if under is None and not cube.is_held:
         return
     before, reach = imgui.get_cursor_pos(), half * 3**0.5
@@ -77,32 +78,39 @@ def take_mouse(app: App, size: ImVec2) -> None:
     if imgui.is_item_hovered() or cube.is_held:
         cube.under_mouse = under
     if clicked and under is not None and not cube.is_dragged:
-        app.steering.look_from(*orientation.angles(under))
+        steering.look_from(*orientation.angles(under))
     cube.is_dragged = cube.is_held and (cube.is_dragged or imgui.is_mouse_dragging(0))
     if cube.is_dragged:
-        app.steering.turntable.stop()
+        steering.turntable.stop()
         # The cube's surface follows the mouse.
         delta = imgui.get_io().mouse_delta / (2 * reach)
-        app.steering.move("Turn view", navigation.orbit(camera, delta.x, -delta.y, app.document.pivot))
+        steering.move("Turn view", navigation.orbit(camera, delta.x, -delta.y, document.pivot))
     elif under is not None:
         imgui.set_item_tooltip(f"Look from {orientation.name(under)}")
 
 
-def draw(app: App, size: ImVec2) -> None:
-    """Draw it over the view in the current ImGui window. size: of the view."""
-    camera, em = app.document.camera, imgui.get_font_size()
-    where = place(size.x, size.y, em)
-    if camera is None or where is None or not app.steering.cube.is_drawn(app):
+def draw(cube: OrientationCube, document: Document, palette: theme.Palette, size: ImVec2) -> None:
+    """Draw a cube over the view in the current ImGui window. size: of the view."""
+    where = place(size.x, size.y, imgui.get_font_size())
+    if document.camera is None or where is None:
         return
     x, y, half = where
-    _Drawing(app, orientation.rotation(camera, app.up), imgui.get_window_pos() + ImVec2(x, y), half).draw()
+    turned = orientation.rotation(document.camera, document.look.up)
+    _Drawing(cube, palette, turned, imgui.get_window_pos() + ImVec2(x, y), half).draw()
 
 
 class _Drawing:
     """One picture of the cube. center: on the screen. half: an edge's half length."""
 
-    def __init__(self, app: App, turned: NDArray[np.float64], center: ImVec2, half: float) -> None:
-        self.palette, self.marked = app.palette, app.steering.cube.under_mouse
+    def __init__(
+        self,
+        cube: OrientationCube,
+        palette: theme.Palette,
+        turned: NDArray[np.float64],
+        center: ImVec2,
+        half: float,
+    ) -> None:
+        self.palette, self.marked = palette, cube.under_mouse
         self.turned, self.center, self.half = turned, center, half
         self.draw_list = imgui.get_window_draw_list()
 

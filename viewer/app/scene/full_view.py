@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-if TYPE_CHECKING:
-    from ..app import App
+from ..keys import Keys
+from ..window import Window
 
 
 class FullView:
-    """is_on: whether the panels are hidden."""
+    """Hides the panels, and takes the whole screen. is_on: whether the panels are hidden."""
 
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __init__(self, window: Window, keys: Keys, note: Callable[[str], None]) -> None:
+        """keys: that bring the panels back. note: tells the user of them."""
+        self._window, self._keys, self._note = window, keys, note
         self.is_on = False
 
     @property
     def on_screen(self) -> bool:
         """Whether the window takes the whole screen."""
-        return self._app.window.fullscreen
+        return self._window.fullscreen
 
     def toggle(self) -> None:
         """Hide the panels, or show them again."""
@@ -26,20 +27,20 @@ class FullView:
         self._tell("panels")
 
     def toggle_screen(self) -> None:
-        """The view alone on the whole screen; or the window with its panels as it was."""
-        self.is_on = self._app.window.fullscreen = not self.on_screen
+        """Show the view alone on the whole screen; or the window with its panels as it was."""
+        self.is_on = self._window.fullscreen = not self.on_screen
         self._tell("full_screen")
 
     def on_escape(self) -> bool:
-        """Back to the window with its panels; whether it was not that."""
+        """Go back to the window with its panels; whether it was not that."""
         was_on, self.is_on = self.is_on, False
         if self.on_screen:
-            self._app.window.fullscreen = False
+            self._window.fullscreen = False
         return was_on
 
     def _tell(self, command: str) -> None:
-        """How to come back, as no menu says so."""
+        """Say how to come back, as no menu does."""
         if self.is_on:
-            keys = self._app.keys.of[command]
-            self._app.note((f"{keys} or " if keys else "") + "Escape brings the panels back.")
-        self._app.window.touch()
+            keys = self._keys.of[command]
+            self._note((f"{keys} or " if keys else "") + "Escape brings the panels back.")
+        self._window.touch()

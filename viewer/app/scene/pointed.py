@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import TYPE_CHECKING
 
 from ...analysis.pick import Picked
-
-if TYPE_CHECKING:
-    from ..app import App
+from ..playing.playback import Playback
+from .viewport import Viewport
 
 log = logging.getLogger(__name__)
 
@@ -22,27 +20,26 @@ class Pointer:
     picked: what is seen there, None where nothing is. words: the same for users.
     """
 
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __init__(self, viewport: Viewport, playback: Playback) -> None:
+        self._viewport, self._playback = viewport, playback
         self.picked: Picked | None = None
         self.words: list[str] = []
 
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
-        app = self._app
-        picked = app.viewport.pick(pixel) if pixel else None
+        picked = self._viewport.pick(pixel) if pixel else None
         if picked is self.picked:
             return
         self.picked, self.words = picked, []
-        if picked is not None and app.viewport.request is not None:
-            pose = app.viewport.request.pose
-            frame = f"frame {pose.index + 1}/{len(app.playback.timeline)}"
-            self.words = describe(picked, frame, app.playback.unit, app.viewport.bounds(pose).radius)
+        if picked is not None and (request := self._viewport.request) is not None:
+            pose = request.pose
+            frame = f"frame {pose.index + 1}/{len(self._playback.timeline)}"
+            self.words = describe(picked, frame, self._playback.unit, self._viewport.bounds(pose).radius)
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
         """The place under the mouse in the picture in full."""
-        return self._app.viewport.pick_in_full() or self.picked
+        return self._viewport.pick_in_full() or self.picked
 
 
 def describe(picked: Picked, frame: str, unit: str, radius: float) -> list[str]:

@@ -2,35 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...backends import backends
 from ...look import Look, drawable
 from ...params import switches
 from ...scan.pose import Pose
-from ..session import edit_name
-
-if TYPE_CHECKING:
-    from ..app import App
+from ..playing.playback import Playback
+from ..session import Session, edit_name
 
 
 class Rendering:
     """Changes backend, parameters and look of the document."""
 
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __init__(self, session: Session, playback: Playback, note: Callable[[str], None]) -> None:
+        self._session, self._playback, self._note = session, playback, note
         self._missed: set[tuple[str, str]] = set()  # scan and scalar, which were told
 
     def tell_missing(self, pose: Pose) -> None:
         """Tell, once a scan, that a frame has not the scalar that the user chose to colour by."""
-        look = self._app.document.look
-        missed = self._app.session.scan, look.color_by
+        look = self._session.document.look
+        missed = self._session.scan, look.color_by
         if missed not in self._missed and drawable(look, pose.cloud.scalars) != look:
             self._missed.add(missed)
             chosen = missed[1]
             name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"
-            self._app.note(
+            self._note(
                 f"Frame {pose.index + 1} has no {name} to colour by: "
                 "other colours are shown until a frame has it."
             )
@@ -38,12 +37,12 @@ class Rendering:
     @property
     def backend(self) -> str | None:
         """The name of the backend that draws; None before the first pose."""
-        pose = self._app.playback.pose
-        return None if pose is None else self._app.document.chosen(pose)[0]
+        pose = self._playback.pose
+        return None if pose is None else self._session.document.chosen(pose)[0]
 
     def choose(self, name: str) -> None:
         """Draw with a backend."""
-        self._app.change(f"Choose {backends()[name].title}", backend=name)
+        self._session.change(f"Choose {backends()[name].title}", backend=name)
 
     def step(self, by: int) -> None:
         """Draw with the next backend, 1, or the one before, -1."""
@@ -54,27 +53,27 @@ class Rendering:
     @property
     def _params(self) -> Any:
         """The backend's parameters; None before the first pose."""
-        pose = self._app.playback.pose
-        return None if pose is None else self._app.document.chosen(pose)[1]
+        pose = self._playback.pose
+        return None if pose is None else self._session.document.chosen(pose)[1]
 
     def edit_params(self, params: Any) -> None:
         """Draw with other parameters of the backend; edits of one without a pause are one step."""
         if self.backend is not None and params != self._params:
             name = edit_name(self._params, params)
-            every = {**self._app.document.params, self.backend: params}
-            self._app.change(name, merge=name, params=every)
+            every = {**self._session.document.params, self.backend: params}
+            self._session.change(name, merge=name, params=every)
 
     def edit_look(self, look: Look) -> None:
-        """Draw with another look; likewise."""
-        if look != self._app.document.look:
-            name = edit_name(self._app.document.look, look)
-            self._app.change(name, merge=name, look=look)
+        """Draw with another look; edits of one field without a pause are one step."""
+        if look != self._session.document.look:
+            name = edit_name(self._session.document.look, look)
+            self._session.change(name, merge=name, look=look)
 
     @property
     def switches(self) -> dict[str, bool]:
-        """Those of the backend's parameters, see `params.switches`; none before the first pose."""
+        """The switches among the backend's parameters, see `params.switches`; none before the first pose."""
         return {} if self._params is None else switches(self._params)
 
     def switch(self, name: str) -> None:
-        """Switch one of them on or off."""
+        """Switch one of `switches` on or off."""
         self.edit_params(replace(self._params, **{name: not self.switches[name]}))

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
 
 from ...camera import Camera
 from ...scan.pose import Pose
+from ..playing.playback import Playback
+from ..session import Session
 from . import navigation
 from .cube import OrientationCube
+from .pointed import Pointer
 from .turntable import Turntable
-
-if TYPE_CHECKING:
-    from ..app import App
+from .viewport import Viewport
 
 _PAUSE = 0.5  # seconds without the wheel, after which turning it is another step
 
@@ -25,9 +25,17 @@ class Steering:
     drags in it.
     """
 
-    def __init__(self, app: App, cube: bool, turn_seconds: float) -> None:
+    def __init__(
+        self,
+        session: Session,
+        playback: Playback,
+        viewport: Viewport,
+        pointer: Pointer,
+        cube: bool,
+        turn_seconds: float,
+    ) -> None:
         """cube: whether it is shown. turn_seconds: that the turntable takes."""
-        self._app = app
+        self._session, self._playback, self._viewport, self._pointer = session, playback, viewport, pointer
         self.gesture: str | None = None
         self.cube: OrientationCube = OrientationCube(cube)
         self.turntable: Turntable = Turntable(turn_seconds)
@@ -40,30 +48,34 @@ class Steering:
         return self.gesture is not None or self.cube.is_dragged or self.turntable.is_on
 
     @property
+    def _up(self) -> str:
+        return self._session.document.look.up
+
+    @property
     def is_orthographic(self) -> bool:
-        """Whether the camera is."""
-        camera = self._app.document.camera
+        """Whether the camera's projection is."""
+        camera = self._session.document.camera
         return camera is not None and camera.projection == "orthographic"
 
     def fit(self) -> None:
         """Show all of the current pose, from the same side."""
-        app, camera = self._app, self._app.document.camera
-        if app.playback.pose and camera:
-            fitted = camera.fit(app.viewport.bounds(app.playback.pose), app.viewport.aspect)
-            app.change("Fit", camera=fitted, pivot=None)
+        pose, camera = self._playback.pose, self._session.document.camera
+        if pose and camera:
+            fitted = camera.fit(self._viewport.bounds(pose), self._viewport.aspect)
+            self._session.change("Fit", camera=fitted, pivot=None)
 
     def look_from(self, azimuth: float, elevation: float) -> None:
         """Show all of the current pose from a direction in degrees, such as those of `navigation.VIEWS`."""
-        app, camera = self._app, self._app.document.camera
-        if app.playback.pose and camera:
-            bounds = app.viewport.bounds(app.playback.pose)
-            turned = navigation.view_from(azimuth, elevation, camera, bounds, app.viewport.aspect, app.up)
-            app.change("Look from there", camera=turned, pivot=None)
+        pose, camera = self._playback.pose, self._session.document.camera
+        if pose and camera:
+            bounds, aspect = self._viewport.bounds(pose), self._viewport.aspect
+            turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
+            self._session.change("Look from there", camera=turned, pivot=None)
 
     def project(self, projection: str) -> None:
         """Show the same in a projection of `camera.PROJECTIONS`."""
-        if camera := self._app.document.camera:
-            self._app.change("Change projection", camera=camera.projected(projection))
+        if camera := self._session.document.camera:
+            self._session.change("Change projection", camera=camera.projected(projection))
 
     def switch_projection(self) -> None:
         """Perspective to orthographic and back."""
@@ -71,15 +83,15 @@ class Steering:
 
     def set_pivot(self) -> None:
         """Orbit about the surface under the mouse from now on; the picture stays as it is."""
-        camera, picked = self._app.document.camera, self._app.pointer.in_full()
+        camera, picked = self._session.document.camera, self._pointer.in_full()
         if picked and camera:
-            self._app.change("Set pivot", camera=camera.focused(picked.place), pivot=picked.place)
+            self._session.change("Set pivot", camera=camera.focused(picked.place), pivot=picked.place)
 
     def center(self) -> None:
         """Bring what is under the mouse to the middle of the view, and orbit about it from now on."""
-        camera, picked = self._app.document.camera, self._app.pointer.in_full()
+        camera, picked = self._session.document.camera, self._pointer.in_full()
         if picked and camera:
-            self._app.change("Centre the point", camera=camera.centered(picked.place), pivot=picked.place)
+            self._session.change("Centre the point", camera=camera.centered(picked.place), pivot=picked.place)
 
     def toggle_turntable(self) -> None:
         """Turn the view round the subject from now on, or stop."""
@@ -90,19 +102,19 @@ class Steering:
 
     def advance(self, now: float) -> bool:
         """Turn the view as far as the turntable has; whether it did."""
-        document = self._app.document
+        document = self._session.document
         if document.camera is None:
             return False
         turned = self.turntable.turned(document.camera, document.pivot, now)
-        self._app.change("Turntable", merge="turntable", camera=turned)
+        self._session.change("Turntable", merge="turntable", camera=turned)
         return turned is not document.camera
 
     def move(self, name: str, camera: Camera) -> None:
         """Follow the mouse; what it does without a pause is one step of the history. name: of that."""
-        self._app.change(name, merge=name, camera=camera)
+        self._session.change(name, merge=name, camera=camera)
 
     def zoom(self, camera: Camera) -> None:
-        """Follow the wheel: likewise, though nothing tells when it comes to rest."""
+        """Follow the wheel, in one step as well, though nothing tells when it comes to rest."""
         self._wheeled = time.monotonic()
         self.move("Zoom", camera)
 
@@ -115,15 +127,15 @@ class Steering:
 
         The latter is looked at once a scan: its file may have changed since it was left.
         """
-        app, camera = self._app, self._app.document.camera
-        bounds = app.viewport.bounds(pose)
+        camera = self._session.document.camera
+        bounds, aspect = self._viewport.bounds(pose), self._viewport.aspect
         if not self._is_checked:
             self._is_checked = True
-            if camera is not None and not navigation.shows(camera, bounds, app.viewport.aspect):
+            if camera is not None and not navigation.shows(camera, bounds, aspect):
                 camera = None
         if camera is None:
-            app.session.amend(camera=Camera.orbit(bounds, aspect=app.viewport.aspect, up=app.up))
+            self._session.amend(camera=Camera.orbit(bounds, aspect=aspect, up=self._up))
 
     def begin_scan(self) -> None:
-        """Another scan is shown from now on."""
+        """Take in that another scan is shown from now on."""
         self._is_checked = False

@@ -31,8 +31,9 @@ _RED = 0xE0483E  # 0xRRGGBB
 def draw(app: App) -> float:
     """Declare the view in the current ImGui window, which it fills; returns where notes at its top end."""
     size, told = imgui.get_content_region_avail(), app.failures.told
-    cube.take_mouse(app, size)
-    if app.steering.cube.under_mouse is not None:
+    the_cube, has_cube = app.steering.cube, app.steering.cube.is_shown and not app.full_view.is_on
+    cube.take_mouse(app.steering, app.document, size, has_cube)
+    if the_cube.under_mouse is not None:
         imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
     imgui.invisible_button("view", size, _BUTTONS)
     with told("Looking what is under the mouse"):
@@ -43,7 +44,8 @@ def draw(app: App) -> float:
         with told("Tools"):
             _serve_tools(app, size)
     with told("The cube"):
-        cube.draw(app, size)
+        if has_cube:
+            cube.draw(the_cube, app.document, app.palette, size)
     with told("Scale bar and colour bar"):
         legend.draw(app, size)
     text = printable(_note(app) or "")
