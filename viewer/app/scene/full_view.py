@@ -14,7 +14,7 @@ class FullView:
     def __init__(self, window: Window, keys: Keys, note: Callable[[str], None]) -> None:
         """keys: that bring the panels back. note: tells the user of them."""
         self._window, self._keys, self._note = window, keys, note
-        self.is_on = False
+        self.is_on: bool = False
 
     @property
     def on_screen(self) -> bool:
