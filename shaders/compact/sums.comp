@@ -5,6 +5,7 @@
 #include "common/item.glsl"
 
 uniform uint word_count;
+uniform uint run;  // words of an invocation
 
 #if BLOCKS
 layout(std430, binding = STORAGE_BLOCK_SUMS) buffer BlockSums { uint block_sums[]; };
@@ -24,7 +25,7 @@ void meet() {
 
 void main() {
     uint me = gl_LocalInvocationID.x, block = item() / uint(GROUP);
-    uint first = min(item() * RUN, word_count), last = min(first + RUN, word_count);
+    uint first = min(item() * run, word_count), last = min(first + run, word_count);
     uint sum = 0u;
     for (uint i = first; i < last; ++i) sum += word_of(i);
 #if STEP == 0

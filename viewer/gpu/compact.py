@@ -12,7 +12,7 @@ from .constants import GROUP, GROUP_LIMIT
 from .context import Gpu, Program
 
 _RUN = 8  # pixels an invocation of compact/covered.comp looks at, words one of compact/sums.comp adds
-_BLOCK = GROUP * _RUN  # words of a work group of compact/sums.comp
+_SOFTWARE_RUN = 256  # words at most on software drivers, where it is work groups that take long
 MOST_WORDS = 1 << 27  # that prefix sums are made of
 
 Bind = Callable[[Program], None]  # what a program reads: sets its uniforms, binds its buffers
@@ -99,7 +99,7 @@ def scan_words(
     parts: Mapping[str, str] | None = None,
 ) -> None:
     """Exclusive prefix sums of `count` words, at most 2^27, modulo 2^32: sums before each word in the
-    items' order, by sums of blocks of 2048 words, of blocks of those, and so on.
+    items' order, by sums of blocks of 2048 words or more, of blocks of those, and so on.
 
     words: the shader file that gives an item's word and takes its sum (shaders/compact/sums.comp says how).
     bind: sets what that file reads, from binding points 0 to 5. parts: what it includes in angle brackets.
@@ -120,19 +120,20 @@ def _scan_level(
     parts: Mapping[str, str],
 ) -> None:
     """Sums of words (level 1), of the sums of their blocks (level 2), and so on."""
-    blocks = -(-count // _BLOCK)
+    length = min(max(-(-count // GROUP), _RUN), _SOFTWARE_RUN) if gpu.software else _RUN
+    blocks = -(-count // (GROUP * length))
 
     def run(step: int) -> None:
-        given = {"STEP": step, "BLOCKS": int(blocks > 1), "RUN": f"{_RUN}u", **defines}
+        given = {"STEP": step, "BLOCKS": int(blocks > 1), **defines}
         program = gpu.compute("compact/sums.comp", given, {"words": words, **parts})
         bind(program)
         if blocks > 1:
             sums.bind_to_storage_buffer(Storage.BLOCK_SUMS)
-        gpu.set(program, word_count=count)
-        gpu.dispatch(program, -(-count // _RUN))
+        gpu.set(program, word_count=count, run=length)
+        gpu.dispatch(program, -(-count // length))
 
     if blocks > 1:
-        room = MOST_WORDS // _BLOCK**level
+        room = MOST_WORDS // (GROUP * _RUN) ** level
         sums = gpu.keep((_scan_level, level), lambda: gpu.ctx.buffer(reserve=4 * room))
         run(0)
 
