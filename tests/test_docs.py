@@ -113,6 +113,14 @@ def test_what_the_docs_name_is_there(page: Path) -> None:
     assert missing_paths(page.read_text(encoding="utf-8")) == set()
 
 
+def test_the_architecture_lists_all_decisions() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| \[\d+\]\((decisions/[^)]+)\) \| (.+) \|$", page, re.M)
+    there = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    titles = [path.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ") for path in there]
+    assert listed == [(f"decisions/{path.name}", title) for path, title in zip(there, titles, strict=True)]
+
+
 def test_what_the_sources_name_is_there() -> None:
     missing = {path: names for path in SOURCES if (names := missing_paths(path.read_text(encoding="utf-8")))}
     assert missing == {}

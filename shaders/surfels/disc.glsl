@@ -1,5 +1,6 @@
 // A surfel's disc as the picture sees it: an ellipse, over which the reversed depth-buffer value
-// changes linearly. The same cut-off and depth as the rasterised quad of surfels/surfel.glsl.
+// changes linearly, so that no pixel needs a division. Numbers are relative to the disc's own centre. The same cut-off
+// and depth as the rasterised quad of surfels/surfel.glsl.
 #include "surfels/splat.glsl"
 
 // Two programs of surfels/scatter.glsl compare depths of the same disc: `precise`, as in common/view.glsl.

@@ -1,4 +1,7 @@
-"""The app: what there is, and what the user can do with it. Its parts do most of it."""
+"""The app: what there is, and what the user can do with it. Its parts do most of it.
+
+It always shows a scan: lists of others and dialogs lie over it, so that nothing asks whether there is one.
+"""
 
 from __future__ import annotations
 

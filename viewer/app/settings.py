@@ -1,4 +1,8 @@
-"""What comes back at the next start: one JSON file of the user's."""
+"""What comes back at the next start: one JSON file of the user's.
+
+Each value is read by itself, so that a wrong one costs no other: a field of `Settings` has a reader.
+Values of parameters that are the defaults are not written, since a later version may change those.
+"""
 
 from __future__ import annotations
 
@@ -127,7 +131,7 @@ def save(settings: Settings, path: Path) -> None:
 
 
 def chosen(values: Any) -> dict[str, Any]:
-    """The values of a declaration that are not its defaults, which a later version may change."""
+    """The values of a declaration that are not its defaults."""
     read = {parameter.name: getattr(values, parameter.name) for parameter in describe(type(values))}
     return {name: value for name, value in read.items() if value != getattr(type(values)(), name)}
 

@@ -1,4 +1,8 @@
-"""Fonts and colours of the window."""
+"""Fonts and colours of the window.
+
+Sizes are in heights of the font everywhere in the window, so that the display's scale and the user's
+choice need nothing else.
+"""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def run(args: Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Named:
-    """What the command line names. replay: a recording to show. session: to open the first scan with."""
+    """Arguments of the command line. replay: a recording to show. session: to open the first scan with."""
 
     scans: list[str]
     replay: Path | None = None

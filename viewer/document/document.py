@@ -53,10 +53,12 @@ class Document:
     """What a user has chosen and made for a scan.
 
     camera: None until a first pose is there to fit it to. pivot: what orbiting turns about, scan units;
-    None: the camera's target. backend: None for the scan's default. params: backend's name -> its `Params`,
-    kept when another backend is chosen. unit: what the user calls the scan's unit of length, None where the
-    scan tells or nobody does. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see
-    `Part`); of a tool that is not there, what its file said.
+    None: the camera's target. It is not made the target, as that would shift or turn the picture; the
+    target moves along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for
+    the scan's default. params: backend's name -> its `Params`, kept when another backend is chosen. unit:
+    what the user calls the scan's unit of length, None where the scan tells or nobody does. bookmarks:
+    cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool that is not there, what
+    its file said.
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.

@@ -54,7 +54,8 @@ class IndexList:
 
 
 def list_covered(gpu: Gpu, pixels: int, listed: IndexList) -> None:
-    """List the pixels whose depth (`Texture.DEPTHS`) is finite, for the bound view."""
+    """List the pixels whose depth (`Texture.DEPTHS`) is finite, for the bound view, in whichever order the
+    driver has them: each listed pixel is worked on by itself."""
     with gpu.timers.measure("compact"):
         listed.clear()
         listed.bind()

@@ -33,7 +33,8 @@ class PointCloud:
     origin:    (3,) float64, scan units
     normals:   (N, 3) float32 as stored in the file (unit length expected), or None
     colors:    (N, 4) uint8, sRGB and alpha, or None
-    radii:     (N,) float32, scan units, or None; of an ellipse, that of a circle of its area
+    radii:     (N,) float32, scan units, or None; of an ellipse, that of a circle of its area, so that what
+               goes by a radius stays as deep as the splat is wide; bounds go by `splat_reach`
     axes:      (N, 4) float32, scan units, or None: of elliptical splats, one half-axis as a vector, and the
                length of the other, which is perpendicular to it and to the normal; zeros: round
     scalars:   name -> (N,) array of any real type

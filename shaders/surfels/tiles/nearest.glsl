@@ -64,6 +64,7 @@ float form_at(Column c, float y) {
     return form;
 }
 
+// No `continue` in a loop over pixels: Mesa would not unroll it, arrays would go to memory, and each loop be slower.
 void take_nearest(ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
         uint row = texelFetch(listed, i).r;

@@ -1,4 +1,8 @@
-"""The orientation cube at the upper right of the 3D view: it turns with the camera, and turns it."""
+"""The orientation cube at the upper right of the 3D view: it turns with the camera, and turns it.
+
+A widget over the view, declared before it, since ImGui gives the mouse to what is declared first. Its
+letters are slanted rectangles of the font's picture.
+"""
 
 from __future__ import annotations
 

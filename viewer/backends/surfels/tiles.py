@@ -1,7 +1,13 @@
 """Tiles: splats without quads. Each tile of the picture has a list of the discs that reach it.
 
-No atomics on pixels: a tile's pixels keep the nearest disc in registers, so that the order of the
-lists does not matter. Splats that are too large for lists go through the rasteriser.
+No atomics on pixels: a tile's pixels keep the nearest disc in registers, so that the order of the lists
+does not matter. Splats that are too large for lists go through the rasteriser, in either pass, and tiles
+go on from what that found or added up; where any is large, all tiles are worked on.
+
+What faces away comes second: first the discs that face the eye are listed and shown, then those of the
+others that some tile they reach lets through, going by the farthest depth it shows. Of a closed surface
+that leaves the outline alone. The CPU waits once, for the length of the lists: it sizes them, and tells
+whether any splat is large.
 """
 
 from __future__ import annotations

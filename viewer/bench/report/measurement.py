@@ -1,6 +1,8 @@
 """Measurements that stand beside a paper's: what they keep of results, their files, and their machines.
 
-A measurement is one small JSON file; those of several machines make one page.
+A measurement is one small JSON file; those of several machines make one page of docs/. Another machine's
+goes to docs/data/ under a name of its own, with what its numbers do not tell in its `note`; then `python
+-m pytest tests/test_docs.py --bless` makes the page.
 """
 
 from __future__ import annotations

@@ -4,6 +4,9 @@ fails.
 Reading may take 10 times the bytes of the file and 180 MiB more, and never more than half of the machine's
 memory. Formats that pack honest scans far better may take more for each byte. The variable SCAN4D_READ_MB
 replaces all that by a number of megabytes.
+
+What is held at a time counts, copies and conversions included. A reader that needs more for honest files
+should hold less, not ask for more.
 """
 
 from __future__ import annotations

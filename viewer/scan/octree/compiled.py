@@ -1,4 +1,8 @@
-"""Loops compiled by numba, kept on disk where that can be done."""
+"""Loops compiled by numba, kept on disk where that can be done.
+
+They stand in modules named *_kernels, which are imported inside functions, as numba takes a while.
+Threads are Python's (threads.py), over loops that let go of the interpreter.
+"""
 
 from __future__ import annotations
 
