@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import threading
-from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +13,7 @@ import pytest
 from scenes import sphere
 
 from viewer.app.output.capture import Capture
+from viewer.app.session import Session
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.journal import Journal, journals, saved
@@ -41,14 +41,12 @@ def app() -> Any:
     told: list[str] = []
     request = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "points", backend("points").params(), Look())
     picture = SimpleNamespace(request=request, is_there=True, size=(64, 48))
-    session = SimpleNamespace(scan="ball.npz")
+    session = Session("ball.npz")
     return SimpleNamespace(
         told=told,
         note=told.append,
         viewport=picture,
         session=session,
-        hash=None,
-        hash_found=Future(),
         playback=SimpleNamespace(unit="mm"),
     )
 

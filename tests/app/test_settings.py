@@ -215,7 +215,7 @@ def test_what_is_wrong_of_a_scan_is_left_out_alone() -> None:
 
 def test_scans_are_known_by_their_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert Session("one.ply").saved(None, 3).scan == str(tmp_path / "one.ply")
+    assert Session("one.ply").saved(3).scan == str(tmp_path / "one.ply")
     assert known_as("demo") == "demo"
 
 

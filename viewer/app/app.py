@@ -70,7 +70,7 @@ class App:
     rendering: which backend draws.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
     full_view: whether the panels are hidden. tools: what is in their folder. commands: all that can be done.
-    marks: what lies over the view. hash_found: brings the hash of the scan.
+    marks: what lies over the view.
     keeping: keeps what is to come back at the next start.
     """
 
@@ -106,11 +106,14 @@ class App:
         for problem in problems:
             self.note(problem)
         self.help: Help = Help()
-        self.scans: Scans = Scans(self, scans, remembered.recent)
-        self.browser: Browser = Browser(self)
-        self.sessions: Sessions = Sessions(self)
+        self.scans: Scans = Scans(self.session, self.note, self.open, scans, remembered.recent)
+        self.sessions: Sessions = Sessions(
+            self.session, self.playback, self.note, self.open, self.take_up, lambda at: self.browser.show(at)
+        )
         self._opening = Opening()
-        self.keeping: Keeping = Keeping(self, user_folder() / settings.FILE, remembered)
+        self.keeping = Keeping(
+            self.session, self.playback, self.note, self.remembered, remembered, user_folder() / settings.FILE
+        )
         self.pointer: Pointer = Pointer(self.viewport, self.playback)
         self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
         self.steering: Steering = Steering(
@@ -122,6 +125,9 @@ class App:
         self.counting = Counting()
         self.capture: Capture = Capture(self)
         self.exporting: Exporting = Exporting(self, remembered.export, remembered.export_marks)
+        self.browser: Browser = Browser(
+            self.session, self.scans, self.sessions, self.open, self.capture.replay
+        )
         if self.renderer.gpu.software:
             self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
         self._start(opened)
@@ -274,14 +280,6 @@ class App:
                 look = replace(look, color_by=chosen.color_by)
             self.change("Cancel preparing", backend=str(request.backend), look=look)
 
-    @property
-    def hash(self) -> str | None:
-        """Tells whether the scan is still the same (see `fingerprint`).
-
-        None where it has no files, and for a moment after the start, until it was found.
-        """
-        return self.hash_found.result() if self.hash_found.done() else None
-
     def show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""
         camera, look = entry.camera, entry.look
@@ -335,7 +333,7 @@ class App:
             log.debug("opened %s", scan)
 
     def _start(self, opened: Opened) -> None:
-        timeline, self.hash_found, left, problem, session = opened
+        timeline, self.session.hash_found, left, problem, session = opened
         if problem:
             self.note(problem)
         if session is not None:
@@ -361,7 +359,7 @@ class App:
     def _compare(self, saved: SavedSession | None) -> None:
         """Find out beside the window whether the scan is the one that something was saved of."""
         if saved is not None and saved.hash is not None:
-            self.capture.tell_later(partial(_words_of_change, saved.hash, self.hash_found))
+            self.capture.tell_later(partial(_words_of_change, saved.hash, self.session.hash_found))
 
     def pass_on_messages(self) -> None:
         """Tell what the timeline has to say."""

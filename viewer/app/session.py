@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +27,7 @@ class Session:
     """The open scan, and those that were open.
 
     scan: as the user named it. index: the frame. history: of the scan's document. pace: how the scan plays.
+    hash_found: brings the scan's hash (see `fingerprint`), None where it has no files.
     """
 
     def __init__(
@@ -40,6 +42,7 @@ class Session:
         self.index = 0 if left is None else left.pose
         self.history = History(left.document if left else document or Document())
         self.pace = pace or Pace()
+        self.hash_found: Future[str | None] = Future()
         self._left: dict[
             str, tuple[History, int]
         ] = {}  # by scan, as `known_as` has it; the last one left last
@@ -60,12 +63,17 @@ class Session:
         """Set fields of the document that no user changed."""
         self.history.amend(replace(self.document, **fields))
 
-    def saved(self, hash: str | None, index: int) -> SavedSession:
-        """What is to come back of the open scan. hash: of its files. index: the frame to begin with."""
-        return SavedSession(known_as(self.scan), hash, index, self.document)
+    @property
+    def hash(self) -> str | None:
+        """The scan's hash, which tells whether it is still the same; None until it was found."""
+        return self.hash_found.result() if self.hash_found.done() else None
+
+    def saved(self, index: int) -> SavedSession:
+        """The session of the open scan that is to come back. index: the frame to begin with."""
+        return SavedSession(known_as(self.scan), self.hash, index, self.document)
 
     def left(self, scan: str) -> SavedSession | None:
-        """How a scan was left that was open before, None where it was not."""
+        """The session of a scan that was open before, as it was left; None where it was not."""
         history, index = self._left.get(known_as(scan), (None, 0))
         return None if history is None else SavedSession(known_as(scan), None, index, history.document)
 

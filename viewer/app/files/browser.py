@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
@@ -17,12 +16,10 @@ from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed, list_folder
 from ...scan.open import DEMO
 from ...task import Task, in_background
-from .. import theme, widgets
-from ..session import known_as
-from .scans import title
-
-if TYPE_CHECKING:
-    from ..app import App
+from .. import widgets
+from ..session import Session, known_as
+from .scans import Scans, title
+from .sessions import Sessions
 
 _TITLE = "Open a scan"
 _SIZE = ImVec2(54.0, 34.0)  # in heights of the font
@@ -39,8 +36,17 @@ _ICONS = {
 class Browser:
     """The folder that the dialog shows, and what is chosen in it. A folder is listed beside the window."""
 
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __init__(
+        self,
+        session: Session,
+        scans: Scans,
+        sessions: Sessions,
+        open: Callable[[str], None],
+        replay: Callable[[Path], None],
+    ) -> None:
+        """open: opens a scan that was opened before. replay: shows a recording."""
+        self._session, self._scans, self._sessions = session, scans, sessions
+        self._open_again, self._replay = open, replay
         self._folder = working_folder()
         self._asked = False  # to be opened
         self._rows: list[Listed] = []
@@ -57,7 +63,7 @@ class Browser:
         if folder is not None:
             self._go(folder)
             return
-        scan = self._app.session.scan
+        scan = self._session.scan
         here = self._folder if scan == DEMO else Path(known_as(scan)).parent
         self._go(here, "" if scan == DEMO else known_as(scan))
 
@@ -97,7 +103,7 @@ class Browser:
                 imgui.close_current_popup()
             imgui.end_popup()
         elif not self._asked:
-            self._app.sessions.homeless = None  # the user gave up
+            self._sessions.homeless = None  # the user gave up
 
     # --- what the user does -----------------------------------------------------------
 
@@ -121,13 +127,13 @@ class Browser:
 
     def _open(self, scan: str) -> None:
         if is_session(Path(scan)):
-            self._app.sessions.open(Path(scan))
-        elif (session := self._app.sessions.homeless) is not None:
-            self._app.sessions.open_with(session, scan)
+            self._sessions.open(Path(scan))
+        elif (session := self._sessions.homeless) is not None:
+            self._sessions.open_with(session, scan)
         elif is_recording(Path(scan)):
-            self._app.capture.replay(Path(scan))
+            self._replay(Path(scan))
         else:
-            self._app.scans.open([scan])
+            self._scans.open([scan])
         imgui.close_current_popup()
 
     def _take(self, row: Listed) -> None:
@@ -165,8 +171,8 @@ class Browser:
             self._enter_text()
 
     def _draw_known(self) -> None:
-        """What can be opened at once, wherever it is."""
-        scans = self._app.scans
+        """Declare the lists of what can be opened at once, wherever it is."""
+        scans = self._scans
         if scans.are_together:
             self._draw_names("Opened together", scans.listed)
             imgui.spacing()
@@ -177,9 +183,9 @@ class Browser:
         imgui.push_id(head)
         for number, scan in enumerate(scans):
             name = widgets.shortened(title(scan), imgui.get_content_region_avail().x)
-            is_open = known_as(scan) == known_as(self._app.session.scan)
+            is_open = known_as(scan) == known_as(self._session.scan)
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
-                self._app.open(scan)
+                self._open_again(scan)
                 imgui.close_current_popup()
             imgui.set_item_tooltip(printable(scan))
         if not scans:
@@ -225,7 +231,7 @@ class Browser:
         size = ImVec2(imgui.get_content_region_avail().x - 1.3 * height, height)
         start = imgui.get_cursor_pos()
         flags = imgui.SelectableFlags_.allow_double_click | imgui.SelectableFlags_.no_auto_close_popups
-        imgui.push_style_color(imgui.Col_.header, theme.packed(self._app.palette.button[2]))
+        imgui.push_style_color(imgui.Col_.header, imgui.get_color_u32(imgui.Col_.button_active))
         clicked, _ = imgui.selectable("##row", number == self._chosen, flags, size)
         imgui.pop_style_color()
         if number == self._chosen and self._scroll:
@@ -244,7 +250,7 @@ class Browser:
                 self._take(row)
 
     def _draw_words(self, row: Listed, width: float, faint: bool) -> None:
-        """What a row says. faint: what stands beside its name, which needs the usual ground for that."""
+        """Write the words of a row. faint: those beside its name, which need the usual ground for that."""
         em, left = imgui.get_font_size(), imgui.get_cursor_pos_x()
         beside = imgui.text_disabled if faint else imgui.text
         imgui.align_text_to_frame_padding()

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ...document.keeper import Keeper
 from ...document.saved_session import SavedSession, keep, kept_file
 from ...errors import InputError
 from .. import settings
+from ..playing.playback import Playback
+from ..session import Session
 from ..settings import Settings
-
-if TYPE_CHECKING:
-    from ..app import App
 
 _EVERY = 3.0  # seconds between looks at what has changed in the settings
 _EVERY_DOCUMENT = 0.5  # the same in the document
@@ -32,38 +30,45 @@ def take_over(places: Iterable[SavedSession]) -> None:
 class Keeping:
     """Saves what has changed, beside the window."""
 
-    def __init__(self, app: App, file: Path, remembered: Settings) -> None:
-        """file: of the settings, which hold what is remembered."""
-        self._app = app
-        self._settings = Keeper("Settings", partial(settings.save, path=file), remembered, _EVERY)
+    def __init__(
+        self,
+        session: Session,
+        playback: Playback,
+        note: Callable[[str], None],
+        remembered: Callable[[], Settings],
+        kept: Settings,
+        file: Path,
+    ) -> None:
+        """remembered: brings the settings to keep. kept: those that their file holds already."""
+        self._session, self._playback, self._note, self._remembered = session, playback, note, remembered
+        self._settings = Keeper("Settings", partial(settings.save, path=file), kept, _EVERY)
         self._document: Keeper[SavedSession] = Keeper("Changes of scans", keep, None, _EVERY_DOCUMENT)
         self._index = 0
 
     def _saved(self) -> SavedSession:
-        """What is to come back of the open scan; playing alone changes nothing of it."""
-        app = self._app
-        if not app.playback.player.playing:
-            self._index = app.session.index
-        return app.session.saved(app.hash, self._index)
+        """The session of the open scan that is to come back; playing alone changes nothing of it."""
+        if not self._playback.player.playing:
+            self._index = self._session.index
+        return self._session.saved(self._index)
 
     def advance(self, now: float) -> None:
         """Look at what has changed. now: by the clock, seconds."""
-        self._tell(self._settings.look(now, self._app.remembered))
-        if self._app.document.camera is not None:  # else nothing of it was seen yet
+        self._tell(self._settings.look(now, self._remembered))
+        if self._session.document.camera is not None:  # else nothing of it was seen yet
             self._tell(self._document.look(now, self._saved))
 
     def leave(self) -> None:
         """Save the document of the open scan before another one is shown."""
-        if self._app.document.camera is not None:
+        if self._session.document.camera is not None:
             self._document.keep(self._saved())
 
     def close(self) -> None:
         """Save all, and wait for it."""
-        self._app.playback.player.pause()
-        self._tell(self._settings.close(self._app.remembered()))
-        if self._app.document.camera is not None:
+        self._playback.player.pause()
+        self._tell(self._settings.close(self._remembered()))
+        if self._session.document.camera is not None:
             self._tell(self._document.close(self._saved()))
 
     def _tell(self, problem: str | None) -> None:
         if problem:
-            self._app.note(problem)
+            self._note(problem)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -13,25 +13,31 @@ from ...files import printable
 from ...scan.listing import is_there, named_scans, scans_beside
 from ...scan.open import DEMO
 from ...task import Task, in_background
-from ..session import known_as
+from ..session import Session, known_as
 from ..settings import MOST_RECENT
 
 if TYPE_CHECKING:
-    from ..app import App
     from ..commands import Item
 
 
 class Scans:
-    """Those to go through one after another, and those opened lately.
+    """Lists of scans: those to go through one after another, and those opened lately.
 
     listed: what the user named together, else the scans in the folder of the open one, in natural order.
     are_together: whether the user did. recent: the last MOST_RECENT that were opened, newest first, as
     `known_as` has them.
     """
 
-    def __init__(self, app: App, together: Sequence[str], recent: Sequence[str]) -> None:
-        """together: what the user named at the start, at least one."""
-        self._app = app
+    def __init__(
+        self,
+        session: Session,
+        note: Callable[[str], None],
+        open: Callable[[str], None],
+        together: Sequence[str],
+        recent: Sequence[str],
+    ) -> None:
+        """open: opens a scan. together: what the user named at the start, at least one."""
+        self._session, self._note, self._open = session, note, open
         self.listed: list[str] = []
         self.are_together = False
         self._place = ""  # in the list: what was asked for last
@@ -49,10 +55,10 @@ class Scans:
         """Tell in one message what cannot be opened."""
         if problems:
             others = f" {len(problems) - 1} others cannot be opened either." if len(problems) > 1 else ""
-            self._app.note(f"Cannot open: {problems[0]}.{others}")
+            self._note(f"Cannot open: {problems[0]}.{others}")
 
     def opened(self, scan: str) -> None:
-        """A scan was opened: it is the latest. The list stays where it is in it, else it is named anew."""
+        """Take in that a scan was opened. The list stays where that is in it, else it is made anew."""
         name, self._place = known_as(scan), scan
         self.recent = (name, *(other for other in self.recent if other != name))[:MOST_RECENT]
         if len(self._together) > 1 and scan in self._together:
@@ -83,7 +89,7 @@ class Scans:
             self.tell(problems)
             if scans:
                 self._together = list(dict.fromkeys(scans))
-                self._app.open(scans[0])
+                self._open(scans[0])
         if self._looking is None or not self._looking.done():
             return False
         self.listed, self._there = self._looking.result()
@@ -95,18 +101,18 @@ class Scans:
         if len(self.listed) > 1:
             place = self._place if self._place in self.listed else self.listed[0]
             self._place = self.listed[(self.listed.index(place) + count) % len(self.listed)]
-            self._app.open(self._place)
+            self._open(self._place)
 
     @property
     def lately(self) -> list[str]:
         """The recent ones that are still there, without the open one."""
-        return [one for one in self.recent if one in self._there and one != known_as(self._app.session.scan)]
+        return [one for one in self.recent if one in self._there and one != known_as(self._session.scan)]
 
     def items(self, scans: Iterable[str]) -> Iterator[Item]:
-        """Some of them for a menu."""
-        shown = known_as(self._app.session.scan)
+        """Entries of a menu for some of them."""
+        shown = known_as(self._session.scan)
         for scan in scans:
-            yield title(scan), partial(self._app.open, scan), known_as(scan) == shown
+            yield title(scan), partial(self._open, scan), known_as(scan) == shown
 
 
 def title(scan: str) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ...document.recording import place_of
 from ...document.saved_session import SUFFIX, SavedSession
@@ -11,20 +11,30 @@ from ...errors import InputError
 from ...files import free_file, printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
+from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
-from ..session import known_as
-
-if TYPE_CHECKING:
-    from ..app import App
+from ..session import Session, known_as
 
 
 class Sessions:
-    """saving: the dialog that saves. homeless: a session whose scan is not where it says, until the user has
+    """Saves and opens session files.
+
+    saving: the dialog that saves. homeless: a session whose scan is not where it says, until the user has
     chosen that; None without one.
     """
 
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __init__(
+        self,
+        session: Session,
+        playback: Playback,
+        note: Callable[[str], None],
+        open: Callable[[str, SavedSession], None],
+        take_up: Callable[[SavedSession], None],
+        ask: Callable[[Path], None],
+    ) -> None:
+        """open: opens a scan with a session. take_up: shows the open one so. ask: for one in a folder."""
+        self._session, self._playback, self._note = session, playback, note
+        self._open, self._take_up, self._ask = open, take_up, ask
         about = "View, look, renderer, bookmarks, measurements; the scan itself stays where it is"
         self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save)
         self.homeless: SavedSession | None = None
@@ -34,31 +44,29 @@ class Sessions:
         self.saving.ask(free_file(working_folder(), SUFFIX))
 
     def _save(self, file: Path) -> None:
-        app = self._app
-        refuse_input(file, app.playback.timeline)
-        app.session.saved(app.hash, app.session.index).export(file)
-        app.note(f"Saved {file}")
+        refuse_input(file, self._playback.timeline)
+        self._session.saved(self._session.index).export(file)
+        self._note(f"Saved {file}")
 
     def open(self, path: Path) -> None:
         """Open the scan of a session file with it; where it is not there, the user is asked to find it."""
-        app = self._app
         try:
             session = SavedSession.load(path)
             scan = place_of(session.scan, path)
         except InputError as error:
-            app.note(str(error))
+            self._note(str(error))
             return
         if is_there(scan):
             self.open_with(session, scan)
             return
         self.homeless = session
-        app.note(f"{path.name}: its scan '{printable(session.scan)}' is not there. Choose where it is now.")
-        app.browser.show(path.parent)
+        self._note(f"{path.name}: its scan '{printable(session.scan)}' is not there. Choose where it is now.")
+        self._ask(path.parent)
 
     def open_with(self, session: SavedSession, scan: str) -> None:
         """Open a scan with a session; at once where it is the open one."""
         self.homeless = None
-        if known_as(scan) == known_as(self._app.session.scan):
-            self._app.take_up(session)
+        if known_as(scan) == known_as(self._session.scan):
+            self._take_up(session)
         else:
-            self._app.open(scan, session)
+            self._open(scan, session)

@@ -54,7 +54,7 @@ class Capture:
         request = app.viewport.request
         if not app.viewport.is_there or request is None:
             return None
-        return Entry.of(request, app.session.scan, app.hash, app.viewport.size, app.playback.unit)
+        return Entry.of(request, app.session.scan, app.session.hash, app.viewport.size, app.playback.unit)
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""
@@ -63,7 +63,7 @@ class Capture:
         if surface is None or entry is None:
             self._app.note("There is no picture to save.")
             return
-        work = partial(self._save_picture, surface.image(), entry, self._app.hash_found)
+        work = partial(self._save_picture, surface.image(), entry, self._app.session.hash_found)
         self._saving.append(in_background(Task("Saving"), work))
 
     # --- recording --------------------------------------------------------------------
