@@ -18,7 +18,7 @@ from test_bins import filled, some_visits
 from test_compact import flagged
 from test_pyramid import FILTERS, chain, picture
 
-from viewer.backends import Backend, backend
+from viewer.backends import Backend, backend, backends
 from viewer.bench import baselines
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
@@ -68,6 +68,15 @@ def clouds() -> Iterator[PointCloud]:
     yield PointCloud.from_arrays(cloud.positions, normals=cloud.normals, scalars=numbers)
 
 
+def settings() -> Iterator[tuple[str, dict[str, object]]]:
+    """Each backend with its defaults, and with each word and switch of one of its parameters."""
+    for one in backends().values():
+        yield one.name, {}
+        for parameter in one.parameters:
+            for value in parameter.choices or ((True, False) if parameter.type is bool else ()):
+                yield one.name, {parameter.name: value}
+
+
 def draw_all(renderer: Renderer) -> None:
     """A picture of each kind, so that each program is built."""
     surface = Surface(renderer.gpu, SIZE)
@@ -86,6 +95,8 @@ def draw_all(renderer: Renderer) -> None:
         render_frame(renderer, Request(pose, camera, which, given, look), surface, share=share)
 
     for cloud in clouds():
+        for name, setting in settings():
+            draw(cloud, name, **setting)
         for instancing, passes, share in product(("tiles", *FEEDS), ("one", "two"), (1.0, 0.5)):
             draw(cloud, "surfels", instancing=instancing, passes=passes, share=share)
         for instancing, passes in product(("tiles", "gs"), PASSES):
