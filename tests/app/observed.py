@@ -88,7 +88,7 @@ def shown(app: App) -> dict[str, Any]:
         "pointed": app.pointer.words,
         "unit": app.playback.unit,
         "theme": app.theme,
-        "is_replaying": app.capture.replaying is not None,
+        "is_replaying": app.replayer.replaying is not None,
         "is_export_open": app.exporting.is_open,
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,

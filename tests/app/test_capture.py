@@ -37,7 +37,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def app() -> Any:
-    """What Capture knows of the app, with a picture. told: the notes."""
+    """What Capture needs, with a picture. told: the notes."""
     told: list[str] = []
     request = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "points", backend("points").params(), Look())
     picture = SimpleNamespace(request=request, is_there=True, size=(64, 48))
@@ -62,7 +62,7 @@ def turn(app: Any) -> None:
 def test_a_journal_that_failed_goes_when_the_recording_is_saved(
     app: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    capture = Capture(app)
+    capture = Capture(app.session, app.playback, app.viewport, app.note)
     capture.toggle_recording()
 
     def full(*_: object) -> None:
@@ -83,7 +83,7 @@ def test_a_journal_that_failed_goes_when_the_recording_is_saved(
 
 
 def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Path) -> None:
-    capture = Capture(app)
+    capture = Capture(app.session, app.playback, app.viewport, app.note)
     capture.toggle_recording()
     (tmp_path / "work").rmdir()  # then the working folder is the user's own
     capture.toggle_recording()
@@ -95,7 +95,7 @@ def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Pa
 def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
     app: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    capture = Capture(app)
+    capture = Capture(app.session, app.playback, app.viewport, app.note)
     capture.toggle_recording()
 
     def full(*_: object) -> None:
@@ -112,7 +112,7 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
 
 
 def test_closing_waits_for_no_question(app: Any) -> None:
-    capture = Capture(app)
+    capture = Capture(app.session, app.playback, app.viewport, app.note)
     answered = threading.Event()
     capture.tell_later(lambda: str(answered.wait()))
     capture.close()  # or else for ever

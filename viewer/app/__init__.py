@@ -69,7 +69,7 @@ def run(
                 if device is not None:
                     app.note("The display's own GPU draws the window; a device number has no effect on it.")
                 if replay is not None:
-                    app.capture.replay(replay)
+                    app.replayer.replay(replay)
                 Loop(app, signals, watch).run()
             finally:
                 app.close()

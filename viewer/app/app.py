@@ -42,10 +42,12 @@ from .help import Help
 from .notices import Notices
 from .output.capture import Capture
 from .output.exporting import Exporting
+from .output.replaying import Replayer
 from .playing.playback import Playback
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
 from .scene.full_view import FullView
+from .scene.legend import ViewMarks
 from .scene.pointed import Pointer
 from .scene.rendering import Rendering
 from .scene.steering import Steering
@@ -63,7 +65,8 @@ class App:
 
     session: what the user has chosen. playback: the scan. renderer: what is on the GPU. viewport: the 3D
     view.
-    capture: pictures and recordings of it. exporting: pictures and films at other sizes.
+    capture: pictures and recordings of it. replayer: shows recordings again. exporting: pictures and films at
+    other sizes.
     theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
     keys: which do what. help: its open pages.
     pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
@@ -105,7 +108,7 @@ class App:
         self.keys, problems = keys.load(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
-        self.help: Help = Help()
+        self.help: Help = Help(self.commands, self.keys, self.notices, self.renderer.gpu)
         self.scans: Scans = Scans(self.session, self.note, self.open, scans, remembered.recent)
         self.sessions: Sessions = Sessions(
             self.session, self.playback, self.note, self.open, self.take_up, lambda at: self.browser.show(at)
@@ -119,14 +122,20 @@ class App:
         self.steering: Steering = Steering(
             self.session, self.playback, self.viewport, self.pointer, remembered.cube, remembered.turn_seconds
         )
-        self.marks = remembered.marks
+        self.marks: ViewMarks = ViewMarks(
+            self.session, self.playback, self.viewport, self.steering, remembered.marks
+        )
         self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
         self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
-        self.capture: Capture = Capture(self)
-        self.exporting: Exporting = Exporting(self, remembered.export, remembered.export_marks)
+        self.capture: Capture = Capture(self.session, self.playback, self.viewport, self.note)
+        self.replayer: Replayer = Replayer(self)
+        self.exporting: Exporting = Exporting(
+            self.session, self.playback, self.viewport, self.note, self.capture.shown,
+            remembered.export, remembered.export_marks,
+        )  # fmt: skip
         self.browser: Browser = Browser(
-            self.session, self.scans, self.sessions, self.open, self.capture.replay
+            self.session, self.scans, self.sessions, self.open, self.replayer.replay
         )
         if self.renderer.gpu.software:
             self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
@@ -297,9 +306,9 @@ class App:
         """The settings that are to come back at the next start."""
         return Settings.of(
             self.session, window=self.window.place, theme=self.theme, text_scale=self.window.text_scale,
-            marks=self.marks, cube=self.steering.cube.is_shown, turn_seconds=self.steering.turntable.seconds,
-            recent=self.scans.recent, export=self.exporting.kept,
-            export_marks=self.exporting.marks, tools=self.tools.remembered(),
+            marks=self.marks.shown, cube=self.steering.cube.is_shown,
+            turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
+            export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------
@@ -311,7 +320,7 @@ class App:
 
     def settle(self, now: float) -> None:
         """End the step of the history that a drag or typing is, once it is over. now: by the clock."""
-        if self.steering.rests(now) and self.capture.replaying is None and not imgui.is_any_item_active():
+        if self.steering.rests(now) and self.replayer.replaying is None and not imgui.is_any_item_active():
             self.session.history.settle()
 
     def take_opened(self) -> None:

@@ -15,7 +15,7 @@ from ..errors import InputError, unknown_name
 from ..params import Parameter
 from . import theme
 from .keys import chords
-from .scene import legend, navigation
+from .scene import navigation
 
 if TYPE_CHECKING:
     from .app import App
@@ -127,7 +127,7 @@ def _switch(parameter: Parameter) -> Command[App]:
 def _mark(name: str, title: str, key: str) -> Command[App]:
     """Shows one of the marks over the view."""
     return Command(
-        name, title, lambda app: legend.toggle(app, name), key, is_on=lambda app: getattr(app.marks, name)
+        name, title, lambda app: app.marks.toggle(name), key, is_on=lambda app: getattr(app.marks.shown, name)
     )
 
 
@@ -161,7 +161,7 @@ _FILE: Menu[App] = Menu("File", (
             is_on=lambda app: app.capture.recorder is not None, short="Record",
         ),
         Command(
-            "replay", "Replay the recording", lambda app: app.capture.replay_last(), "Shift+R",
+            "replay", "Replay the recording", lambda app: app.replayer.replay_last(), "Shift+R",
             can=lambda app: app.capture.last is not None,
         ),
         Command(

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
 
 from imgui_bundle import imgui
-
-from . import tasks
-
-if TYPE_CHECKING:
-    from .app import App
 
 _OWNER = 1  # of the key: any number
 
 
-def handle(app: App) -> None:
-    """End the first of what goes on where Escape was pressed. A field or a drag that is held has it first."""
+def handle(enders: Iterable[Callable[[], bool]]) -> None:
+    """End the first of what goes on where Escape was pressed. A field or a drag that is held has it first.
+
+    enders: each ends one thing, and tells whether there was any.
+    """
     if not imgui.is_key_pressed(imgui.Key.escape, repeat=False):
         return
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         if not imgui.get_io().want_text_input:
             _close_list()
     elif not imgui.is_any_item_active():
-        for ends in (
-            app.help.on_escape, app.tools.on_escape, app.capture.on_escape, partial(tasks.on_escape, app),
-            app.full_view.on_escape, app.notices.on_escape,
-        ):  # fmt: skip
-            if ends():
-                break
+        any(end() for end in enders)
 
 
 def _close_list() -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import escape, help, menu, panel, tasks
+from . import escape, menu, panel, tasks
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
@@ -31,14 +32,17 @@ def draw(app: App) -> Place:
     told = app.failures.told
     app.keys.handle(app)
     with told("Escape"):
-        escape.handle(app)
+        escape.handle((
+            app.help.on_escape, app.tools.on_escape, app.replayer.on_escape, partial(tasks.on_escape, app),
+            app.full_view.on_escape, app.notices.on_escape,
+        ))  # fmt: skip
     place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
     for name, draw_part in (
         ("The list of work", lambda: tasks.draw(app, place, head)),
-        ("Help", lambda: help.draw(app)),
+        ("Help", app.help.draw),
         ("The dialog that opens scans", app.browser.draw),
         ("The dialog that saves sessions", app.sessions.saving.draw),
-        ("The export dialog", lambda: export_dialog.draw(app)),
+        ("The export dialog", lambda: export_dialog.draw(app.exporting, app.quit)),
         ("Dialogs of tools", app.tools.draw_dialogs),
     ):
         with told(name):

@@ -73,11 +73,11 @@ class Loop:
     def _patience(self, now: float) -> float:
         """Seconds to wait for events before looking at what else has changed."""
         app = self._app
-        waits = app.playback.waiting or app.tasks or app.scans.waits or app.browser.waits
+        waits = app.playback.waiting or app.tasks or app.scans.waits or app.browser.waits or app.capture.waits
         look = _AWAIT if waits else _WATCH
         changes = (
             app.playback.player.until_next(now), app.notices.next_change(now),
-            app.steering.turntable.next_change(now), app.capture.until_next(now),
+            app.steering.turntable.next_change(now), app.replayer.until_next(now),
         )  # fmt: skip
         return min(look, *changes, app.viewport.better_at(app.playback.player.playing) - now)
 
@@ -92,7 +92,8 @@ class Loop:
             ("Listing a folder", app.browser.advance),
             ("Keeping", lambda: app.keeping.advance(now)),
             ("Exporting", app.exporting.advance),
-            ("Saving", lambda: app.capture.advance(now)),
+            ("Saving", app.capture.advance),
+            ("Replaying", lambda: app.replayer.advance(now)),
             ("Playing", lambda: app.playback.advance(now)),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),

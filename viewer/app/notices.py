@@ -7,14 +7,10 @@ import math
 import time
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
 from ..files import printable
-
-if TYPE_CHECKING:
-    from .app import App
 
 log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
@@ -63,13 +59,13 @@ class Notices:
         return True
 
 
-def draw(app: App, size: ImVec2) -> None:
-    """Declare the notes in the current ImGui window, the 3D view. size: of the view."""
+def draw(notices: Notices, size: ImVec2) -> None:
+    """Declare notes in the current ImGui window, the 3D view. size: of the view."""
     em = imgui.get_font_size()
     wrap = min(_WIDTH * em, 0.8 * size.x)
     pad = ImVec2(0.8 * em, 0.5 * em)
     bottom = size.y - _FOOT * em
-    for notice in reversed(app.notices.shown(time.monotonic())):
+    for notice in reversed(notices.shown(time.monotonic())):
         extent = imgui.calc_text_size(notice.text, wrap_width=wrap)
         corner = ImVec2((size.x - extent.x) / 2, bottom - extent.y)
         draw_text(notice.text, corner, extent, wrap, pad)

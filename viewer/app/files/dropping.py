@@ -26,7 +26,7 @@ def take(app: App, paths: Sequence[str]) -> None:
         return
     told = [path for path in paths if os.path.isfile(path) and is_recording(Path(path))]
     if told and len(paths) == 1:
-        app.capture.replay(Path(paths[0]))
+        app.replayer.replay(Path(paths[0]))
         return
     if told:
         names = ", ".join(Path(path).name for path in told)

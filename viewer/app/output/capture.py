@@ -1,8 +1,7 @@
-"""Pictures and recordings of what is shown, and replaying them."""
+"""Pictures and recordings of what is shown."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -10,7 +9,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,26 +20,24 @@ from ...files import free_file, working_folder
 from ...output.export import write_png
 from ...task import Task, in_background
 from ..failures import in_words
-from .replaying import Replaying
+from ..playing.playback import Playback
+from ..scene.viewport import Viewport
+from ..session import Session
 
-if TYPE_CHECKING:
-    from ..app import App
-
-_LOOK = 0.02  # seconds between looks at whether a picture has been written
 _PATIENCE = 10.0  # seconds that closing waits for pictures
 
 
 class Capture:
     """Saves what is shown in the working directory.
 
-    recorder: takes down what is shown, None while nothing is recorded. replaying: a recording that is
-    shown again, None while none is. last: the recording saved last.
+    recorder: takes down what is shown, None while nothing is recorded. last: the recording saved last.
     """
 
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __init__(
+        self, session: Session, playback: Playback, viewport: Viewport, note: Callable[[str], None]
+    ) -> None:
+        self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
-        self.replaying: Replaying | None = None
         self.last: Path | None = None
         self._journal: Journal | None = None  # of what is recorded
         self._saving: list[Future[str]] = []  # files; each brings what is to be told
@@ -49,21 +45,20 @@ class Capture:
         self._naming = Lock()  # one free name at a time
 
     def shown(self) -> Entry | None:
-        """What the picture shows, None where there is none."""
-        app = self._app
-        request = app.viewport.request
-        if not app.viewport.is_there or request is None:
+        """The entry that says what the picture shows, None where there is none."""
+        session, viewport, request = self._session, self._viewport, self._viewport.request
+        if not viewport.is_there or request is None:
             return None
-        return Entry.of(request, app.session.scan, app.session.hash, app.viewport.size, app.playback.unit)
+        return Entry.of(request, session.scan, session.hash, viewport.size, self._playback.unit)
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""
-        self._app.viewport.finish()
-        surface, entry = self._app.viewport.surface, self.shown()
+        self._viewport.finish()
+        surface, entry = self._viewport.surface, self.shown()
         if surface is None or entry is None:
-            self._app.note("There is no picture to save.")
+            self._note("There is no picture to save.")
             return
-        work = partial(self._save_picture, surface.image(), entry, self._app.session.hash_found)
+        work = partial(self._save_picture, surface.image(), entry, self._session.hash_found)
         self._saving.append(in_background(Task("Saving"), work))
 
     # --- recording --------------------------------------------------------------------
@@ -73,21 +68,21 @@ class Capture:
         now = time.monotonic()
         if self.recorder is None:
             self.recorder = Recorder(now)
-            self._app.note("Recording what is shown, until you stop it.")
+            self._note("Recording what is shown, until you stop it.")
             self._begin_journal()
             self.note_shown()
             return
         recorder, self.recorder = self.recorder, None
         journal, self._journal = self._journal, None
         if len(recorder):
-            self._app.note(self._save_recording(recorder.finish(now), journal))
+            self._note(self._save_recording(recorder.finish(now), journal))
         else:
-            self._app.note("Nothing was shown while recording.")
+            self._note("Nothing was shown while recording.")
             if journal is not None:
                 journal.remove()
 
     def _save_recording(self, recording: Recording, journal: Journal | None) -> str:
-        """What to tell of it. journal: what is there of it already."""
+        """Save a recording; what to tell of it. journal: what is there of it already."""
         try:
             self.last = written(recording, working_folder())
         except Exception as error:  # whatever a folder brings, the window stays
@@ -120,9 +115,7 @@ class Capture:
 
     def _tell_unsafe(self, error: OSError) -> None:
         what, _ = explained(error)
-        self._app.note(
-            f"The recording is kept in memory alone until you stop it ({journal_folder()}: {what})."
-        )
+        self._note(f"The recording is kept in memory alone until you stop it ({journal_folder()}: {what}).")
 
     def find_unfinished(self) -> None:
         """Save what processes have recorded that were killed meanwhile."""
@@ -144,7 +137,7 @@ class Capture:
         """Find something out beside the window, and tell what comes of it; empty: nothing."""
         self._looking.append(in_background(Task("Looking"), look))
 
-    def _tell(self) -> None:
+    def advance(self) -> None:
         """Tell of the work that is done: of files in the order of their names."""
         done = [work for work in self._looking if work.done()]
         self._looking = [work for work in self._looking if work not in done]
@@ -152,45 +145,12 @@ class Capture:
             done.append(self._saving.pop(0))
         for words in [work.result() for work in done]:
             if words:
-                self._app.note(words)
+                self._note(words)
 
-    # --- replaying --------------------------------------------------------------------
-
-    def replay(self, path: Path) -> None:
-        """Show a recording again, or what a picture tells of itself."""
-        try:
-            self.replaying = Replaying(path)
-        except InputError as error:
-            self._app.note(str(error))
-            return
-        self._app.playback.player.pause()
-        self._app.steering.turntable.stop()
-
-    def replay_last(self) -> None:
-        """Show the recording saved last again."""
-        if self.last is not None:
-            self.replay(self.last)
-
-    def stop_replaying(self) -> None:
-        """Stay at what is shown."""
-        self.replaying = None
-
-    def on_escape(self) -> bool:
-        """End the replay; whether there is one."""
-        was_replaying = self.replaying is not None
-        self.stop_replaying()
-        return was_replaying
-
-    def until_next(self, now: float) -> float:
-        """Seconds until there is something to do; infinite where there is nothing."""
-        soon = _LOOK if self._saving or self._looking else math.inf
-        return soon if self.replaying is None else min(soon, self.replaying.until_next(now))
-
-    def advance(self, now: float) -> None:
-        """Let the replay go on. The user's own moves end it."""
-        self._tell()
-        if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
-            self.stop_replaying()
+    @property
+    def waits(self) -> bool:
+        """Whether something is being saved or looked for."""
+        return bool(self._saving or self._looking)
 
     def end_recording(self) -> None:
         """Save what is being recorded."""
@@ -200,7 +160,7 @@ class Capture:
     def close(self) -> None:
         """Wait for pictures that are being written, but not for a disk that does not answer."""
         wait(self._saving, _PATIENCE)
-        self._tell()
+        self.advance()
 
 
 def _saved_late(journal: Path) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from imgui_bundle import icons_fontawesome_4 as icons
 from imgui_bundle import imgui
@@ -13,9 +13,7 @@ from ...output.marks import Marks
 from ...params import describe
 from .. import widgets
 from .export_plan import EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices
-
-if TYPE_CHECKING:
-    from ..app import App
+from .exporting import Exporting
 
 _TITLE, _LEAVING = "Export", "Close Scan4D?"
 _WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Frames, one after the other"}
@@ -25,22 +23,21 @@ _MARKS = {"scale_bar": "Scale bar", "color_bar": "Colour bar", "stamp": "Frame a
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
 
 
-def draw(app: App) -> None:
-    """Declare the dialogs that are open."""
-    exporting = app.exporting
+def draw(exporting: Exporting, quit: Callable[[], None]) -> None:
+    """Declare the dialogs that are open. quit: closes the window."""
     with widgets.modal(_TITLE, exporting.is_open) as is_drawn:
         if is_drawn:
             choices, problems = exporting.choices, exporting.problems()
             choices = _edit_what(choices, exporting.count, problems)
-            choices = _edit_format(choices, choices.rate(app.playback.timeline.times), problems)
-            choices = _edit_size(choices, app.viewport.size if app.viewport.surface else None, problems)
+            choices = _edit_format(choices, exporting.rate, problems)
+            choices = _edit_size(choices, exporting.size, problems)
             marks = _edit_marks(exporting.marks, choices)
             choices = _edit_place(choices, problems)
             exporting.change(choices, marks)
-            _draw_end(app, can=not exporting.problems())
+            _draw_end(exporting, can=not exporting.problems())
     with widgets.modal(_LEAVING, exporting.is_leaving) as is_drawn:
         if is_drawn:
-            _draw_leaving(app)
+            _draw_leaving(exporting, quit)
 
 
 # --- the fields -----------------------------------------------------------------------------
@@ -151,9 +148,8 @@ def _warn(text: str) -> None:
 # --- the end of it --------------------------------------------------------------------------
 
 
-def _draw_end(app: App, can: bool) -> None:
-    """What will be written, and the buttons."""
-    exporting = app.exporting
+def _draw_end(exporting: Exporting, can: bool) -> None:
+    """Tell what will be written, and declare the buttons."""
     choices, numbers = exporting.choices, exporting.choices.numbers(exporting.count)
     out = choices.out()
     imgui.separator()
@@ -181,15 +177,15 @@ def _there_already(names: list[str]) -> str:
     return f"{len(names)} of these files are there already."
 
 
-def _draw_leaving(app: App) -> None:
+def _draw_leaving(exporting: Exporting, quit: Callable[[], None]) -> None:
     imgui.text_wrapped("An export is running. Closing the window cancels it, and nothing is left of it.")
     leaves = imgui.button("Cancel the export and close")
     imgui.same_line()
     stays = imgui.button("Go on") or imgui.is_key_pressed(imgui.Key.escape)
-    task = app.exporting.task
+    task = exporting.task
     if leaves and task is not None:
         task.cancel()
-        app.quit()
+        quit()
     if leaves or stays or task is None:  # it may have ended meanwhile
-        app.exporting.is_leaving = False
+        exporting.is_leaving = False
         imgui.close_current_popup()

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import wait as wait_for
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ...document.recording import Entry
 from ...document.render_job import Made, make
 from ...files import working_folder
 from ...output.marks import Marks
 from ...scan.inputs import found_among, scan_inputs
 from ...task import Cancelled, Task, in_background
+from ..playing.playback import Playback
+from ..scene.viewport import Viewport
+from ..session import Session
 from . import export_plan
 from .export_plan import Choices, free_name
-
-if TYPE_CHECKING:
-    from ..app import App
 
 log = logging.getLogger(__name__)
 _CANCELLING = 10.0  # seconds that closing waits for a cancelled process to be gone
@@ -34,8 +35,19 @@ class Exporting:
     task: the export that runs, None without one.
     """
 
-    def __init__(self, app: App, choices: Choices, marks: Marks) -> None:
-        self._app = app
+    def __init__(
+        self,
+        session: Session,
+        playback: Playback,
+        viewport: Viewport,
+        note: Callable[[str], None],
+        shown: Callable[[], Entry | None],
+        choices: Choices,
+        marks: Marks,
+    ) -> None:
+        """shown: brings what the picture shows."""
+        self._session, self._playback, self._viewport = session, playback, viewport
+        self._note, self._shown = note, shown
         self.choices = choices
         self.marks = marks
         self.is_open = False
@@ -50,7 +62,7 @@ class Exporting:
     @property
     def can(self) -> bool:
         """Whether there is something to export, and nothing is being exported."""
-        return self._app.viewport.is_there and self.task is None
+        return self._viewport.is_there and self.task is None
 
     @property
     def kept(self) -> Choices:
@@ -60,13 +72,23 @@ class Exporting:
     @property
     def count(self) -> int:
         """Frames of the scan."""
-        return len(self._app.playback.timeline)
+        return len(self._playback.timeline)
+
+    @property
+    def rate(self) -> float:
+        """Pictures a second of a film, as chosen or as the scan has them."""
+        return self.choices.rate(self._playback.timeline.times)
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the picture in the window, pixels; None where there is none."""
+        return self._viewport.size if self._viewport.surface else None
 
     def ask(self) -> None:
         """Open the dialog; a name is suggested unless the user gave one."""
         choices = self.choices
-        if self._scan != self._app.session.scan:
-            self._scan = self._app.session.scan
+        if self._scan != self._session.scan:
+            self._scan = self._session.scan
             choices = replace(choices, first=1, last=None)
         if not choices.folder or "folder" in self.problems():
             choices = replace(choices, folder=str(working_folder()))
@@ -84,20 +106,20 @@ class Exporting:
 
     def problems(self) -> dict[str, str]:
         """What is wrong with the choices, by field."""
-        return export_plan.problems(self.choices, self.count, self._app.renderer.gpu.max_pixels)
+        return export_plan.problems(self.choices, self.count, self._viewport.renderer.gpu.max_pixels)
 
     def start(self) -> None:
         """Export, unless that would replace files that the user was not asked about; closes the dialog."""
         there = export_plan.present(self.choices, self.count)
-        shown, choices, app = self._app.capture.shown(), self.choices, self._app
-        self.refused = found_among(there, scan_inputs(app.playback.timeline))
+        shown, choices, timeline = self._shown(), self.choices, self._playback.timeline
+        self.refused = found_among(there, scan_inputs(timeline))
         if self.refused or there != self.replaced or shown is None:
             self.replaced = [] if self.refused else there
             return
         self.is_open, self.replaced = False, []
-        times = app.playback.timeline.times
-        recording = export_plan.recording(choices, shown, self.marks, times, app.document.pivot)
-        out, rate, anonymous = choices.out(), choices.rate(times), choices.anonymous
+        pivot = self._session.document.pivot
+        recording = export_plan.recording(choices, shown, self.marks, timeline.times, pivot)
+        out, rate, anonymous = choices.out(), self.rate, choices.anonymous
         numbers = choices.numbers(self.count)
         task = self.task = Task(f"Exporting {choices.name}")
         self._work = in_background(
@@ -116,18 +138,16 @@ class Exporting:
             log.debug("the export is gone")
         except Exception as error:  # whatever the process meets, the window stays
             log.debug("cannot export", exc_info=error)
-            self._app.note(f"Cannot export: {error}")
+            self._note(f"Cannot export: {error}")
 
     def _tell(self, made: Made) -> None:
         first, last = made.files[0], made.files[-1]
         several = f"{len(made.files)} pictures, {first} to {last.name}"
-        self._app.note(f"Saved {first if len(made.files) == 1 else several}")
+        self._note(f"Saved {first if len(made.files) == 1 else several}")
         for warning in made.warnings[:_MOST_WARNINGS]:
-            self._app.note(warning)
-        if made.device != self._app.renderer.gpu.device:
-            self._app.note(
-                f"It was drawn by {made.device}, not by the window's GPU: small differences may show."
-            )
+            self._note(warning)
+        if made.device != self._viewport.renderer.gpu.device:
+            self._note(f"It was drawn by {made.device}, not by the window's GPU: small differences may show.")
 
     def keeps_open(self) -> bool:
         """Whether an export runs that the user has to be asked about before the window closes."""

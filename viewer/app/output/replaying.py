@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ _LOOK = 0.015  # seconds between looks at whether what is awaited has come
 
 
 class Replaying:
-    """Shows the entries of a recording, each in full for as long as it was shown.
+    """A replay: shows the entries of a recording, each in full for as long as it was shown.
 
     None is left out: where reading or drawing takes longer than then, time slips. Raises InputError for what
     is wrong in the file.
@@ -93,7 +94,47 @@ class Replaying:
         return True
 
     def _changed(self, scan: str, hash: str, files: Sequence[Path]) -> str:
-        """What to tell of a scan whose hash was that one; nothing where it is the same."""
+        """Compare a scan with the hash that it had; what to tell of it, nothing where it is the same."""
         if fingerprint_as(hash, files) in (hash, None):
             return ""
         return f"{scan} is not as it was when {self.path.name} was made; pictures may differ."
+
+
+class Replayer:
+    """Shows recordings again. replaying: the one that is shown, None while none is.
+
+    It does what a user would, from opening scans to looking from elsewhere, so it knows the whole app.
+    """
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        self.replaying: Replaying | None = None
+
+    def replay(self, path: Path) -> None:
+        """Show a recording again, or what a picture tells of itself."""
+        try:
+            self.replaying = Replaying(path)
+        except InputError as error:
+            self._app.note(str(error))
+            return
+        self._app.playback.player.pause()
+        self._app.steering.turntable.stop()
+
+    def replay_last(self) -> None:
+        """Show the recording saved last again."""
+        if self._app.capture.last is not None:
+            self.replay(self._app.capture.last)
+
+    def on_escape(self) -> bool:
+        """End the replay, and stay at what is shown; whether there is one."""
+        was_replaying, self.replaying = self.replaying is not None, None
+        return was_replaying
+
+    def until_next(self, now: float) -> float:
+        """Seconds until there is something to do; infinite where there is nothing."""
+        return math.inf if self.replaying is None else self.replaying.until_next(now)
+
+    def advance(self, now: float) -> None:
+        """Let the replay go on. The user's own moves end it."""
+        if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
+            self.replaying = None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -11,33 +10,44 @@ from numpy.typing import NDArray
 
 from ...output import marks
 from ...output.marks import Box, Color, Legend, Marks
-
-if TYPE_CHECKING:
-    from ..app import App
+from ..playing.playback import Playback
+from ..session import Session
+from .steering import Steering
+from .viewport import Viewport
 
 SHOWN_FIRST = Marks(scale_bar=True, color_bar=True)  # until the user chooses
 _STEPS = 32  # of a colour bar; colours between them are blended
 
 
-def toggle(app: App, name: str) -> None:
-    """Show one of `marks.MARKS` or hide it."""
-    app.marks = replace(app.marks, **{name: not getattr(app.marks, name)})
+class ViewMarks:
+    """The marks over the view. shown: which of them are, by the user's choice."""
 
+    def __init__(
+        self, session: Session, playback: Playback, viewport: Viewport, steering: Steering, shown: Marks
+    ) -> None:
+        self._session, self._playback, self._viewport = session, playback, viewport
+        self._steering = steering
+        self.shown = shown
 
-def draw(app: App, size: ImVec2) -> None:
-    """Draw the marks of the picture into the current ImGui window, the 3D view. size: of the view."""
-    request, surface = app.viewport.request, app.viewport.surface
-    if app.document.camera is None or request is None or surface is None or not app.viewport.is_there:
-        return
-    pose, unit, count = request.pose, app.playback.unit, len(app.playback.timeline)
-    told = Legend(app.marks, app.document.camera, surface.look, unit, pose.index, count, float(pose.time))
-    corner = imgui.get_window_pos()
-    canvas = _View(corner)
-    marks.draw(canvas, (size.x, size.y), told, surface.color_range)
-    if app.marks.scale_bar and app.steering.gesture is None and imgui.is_window_hovered():
-        left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
-        if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):
-            imgui.set_tooltip(_scale_bar_help(app.steering.is_orthographic))
+    def toggle(self, name: str) -> None:
+        """Show one of `marks.MARKS` or hide it."""
+        self.shown = replace(self.shown, **{name: not getattr(self.shown, name)})
+
+    def draw(self, size: ImVec2) -> None:
+        """Draw the marks of the picture into the current ImGui window, the 3D view. size: of the view."""
+        request, surface = self._viewport.request, self._viewport.surface
+        camera = self._session.document.camera
+        if camera is None or request is None or surface is None or not self._viewport.is_there:
+            return
+        pose, unit, count = request.pose, self._playback.unit, len(self._playback.timeline)
+        told = Legend(self.shown, camera, surface.look, unit, pose.index, count, float(pose.time))
+        corner = imgui.get_window_pos()
+        canvas = _View(corner)
+        marks.draw(canvas, (size.x, size.y), told, surface.color_range)
+        if self.shown.scale_bar and self._steering.gesture is None and imgui.is_window_hovered():
+            left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
+            if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):
+                imgui.set_tooltip(_scale_bar_help(self._steering.is_orthographic))
 
 
 def _scale_bar_help(orthographic: bool) -> str:

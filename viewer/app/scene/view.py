@@ -12,7 +12,7 @@ from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
 from .. import notices, theme
-from . import cube, legend, navigation
+from . import cube, navigation
 from .canvas import ViewPlace
 
 if TYPE_CHECKING:
@@ -47,10 +47,10 @@ def draw(app: App) -> float:
         if has_cube:
             cube.draw(the_cube, app.document, app.palette, size)
     with told("Scale bar and colour bar"):
-        legend.draw(app, size)
+        app.marks.draw(size)
     text = printable(_note(app) or "")
     head = _draw_note(text, size) if text else _draw_prompt(app.tools.prompt, size)
-    notices.draw(app, size)
+    notices.draw(app.notices, size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
     return head
@@ -150,8 +150,8 @@ def _note(app: App) -> str | None:
     playback = app.playback
     if app.viewport.problem:
         return str(app.viewport.problem)
-    if app.capture.replaying is not None:
-        return str(app.capture.replaying)
+    if app.replayer.replaying is not None:
+        return str(app.replayer.replaying)
     if playback.pose is None:
         return str(playback.problem) if playback.problem else None
     if playback.player.playing or playback.pose.index == app.session.index:
