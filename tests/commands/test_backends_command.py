@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 from command_line import Run
 
 from viewer.backends import backends
+
+
+def documented() -> set[str]:
+    """The names in the JSON list as docs/command-line.md has them."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "command-line.md").read_text(encoding="utf-8")
+    section = page.partition("## `scan4d backends`")[2].partition("\n## ")[0]
+    return set(re.findall(r"`(\w+)`", section))
 
 
 def test_backends_as_json(run: Run) -> None:
@@ -18,7 +26,7 @@ def test_backends_as_json(run: Run) -> None:
         assert (facts["available"], facts["why_not"]) == (True, None)
         assert [p["name"] for p in facts["parameters"]] == [p.name for p in backend.parameters]
         for parameter in facts["parameters"]:
-            assert parameter.keys() >= {"type", "default", "range", "choices", "sweep", "affects", "help"}
+            assert {*facts, *parameter} == documented()
     by_name = {b["name"]: b for b in listed}
     assert by_name["points"]["needs"] == []
     assert by_name["surfels"]["needs"] == ["normals"]
