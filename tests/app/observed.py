@@ -62,8 +62,8 @@ def is_idle(app: App) -> bool:
     """Whether nothing goes on and all that was asked for is shown."""
     playback = app.playback
     goes_on = (
-        app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on, app.tasks,
-        app.scans.waits, app.browser.waits,
+        app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on,
+        app.tasks.all, app.scans.waits, app.browser.waits,
         playback.pose is not None and not app.viewport.is_complete,
     )  # fmt: skip
     return not any(goes_on)

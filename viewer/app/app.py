@@ -17,17 +17,14 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from ..document.anonymous import in_place
 from ..document.document import Document
 from ..document.part import Part
-from ..document.recording import Entry
 from ..document.saved_session import SavedSession, kept
 from ..errors import InputError, Scan4DError
 from ..folders import user_folder
 from ..gpu.context import Gpu
 from ..renderer import Renderer
 from ..scan.open import open_scan
-from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
 from . import keys, settings, theme
@@ -54,6 +51,7 @@ from .scene.steering import Steering
 from .scene.viewport import Viewport
 from .session import Session, known_as
 from .settings import Settings
+from .tasks import Tasks
 from .toolbox import Toolbox
 from .window import Window
 
@@ -72,6 +70,7 @@ class App:
     pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
     rendering: which backend draws.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
+    tasks: work that goes on beside the window.
     full_view: whether the panels are hidden. tools: what is in their folder. commands: all that can be done.
     marks: what lies over the view.
     keeping: keeps what is to come back at the next start.
@@ -104,7 +103,10 @@ class App:
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         self.commands = Commands()
-        self.tools: Toolbox = Toolbox(self, self.commands, remembered.tools)
+        self.tools: Toolbox = Toolbox(
+            self.session, self.playback, self.viewport, self.failures, self.note, window.touch,
+            self.commands, remembered.tools,
+        )  # fmt: skip
         self.keys, problems = keys.load(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
@@ -134,6 +136,9 @@ class App:
             self.session, self.playback, self.viewport, self.note, self.capture.shown,
             remembered.export, remembered.export_marks,
         )  # fmt: skip
+        self.tasks: Tasks = Tasks(
+            self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting, self.note
+        )
         self.browser: Browser = Browser(
             self.session, self.scans, self.sessions, self.open, self.replayer.replay
         )
@@ -259,48 +264,6 @@ class App:
     def opening(self) -> str | None:
         """The scan that is being opened, as the user named it; None where none is."""
         return self._opening.scan
-
-    @property
-    def tasks(self) -> list[Task]:
-        """Work that goes on beside the window, the latest last."""
-        tasks = [self.exporting.task, self.renderer.preparing, self._opening.task, *self.tools.tasks]
-        if self.playback.pose is None:
-            tasks.append(self.playback.timeline.reading)
-        return [task for task in tasks if task is not None]
-
-    def cancel(self, task: Task) -> None:
-        """Stop one of `tasks`; what was shown before it stays."""
-        is_told = task is self.playback.timeline.reading  # by what the timeline says of the frame
-        if task is self._opening.task:
-            self._opening.cancel()
-        elif task is self.renderer.preparing:
-            self._choose_prepared()
-        task.cancel()
-        if not is_told:
-            self.note(f"Cancelled: {task.name}.")
-
-    def _choose_prepared(self) -> None:
-        """Go back to what was drawn before, or to plain points."""
-        if self.viewport.request is not None:
-            drawn, chosen = self.viewport.request.look, self.document.look
-            request = self.viewport.without_preparing(self.viewport.request)
-            look = request.look
-            if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
-                look = replace(look, color_by=chosen.color_by)
-            self.change("Cancel preparing", backend=str(request.backend), look=look)
-
-    def show(self, entry: Entry, pose: Pose) -> None:
-        """Show what an entry of a recording does. pose: of the scan, which is open."""
-        camera, look = entry.camera, entry.look
-        if entry.anonymous:
-            camera, look = in_place(camera, look, pose)
-        self.seek(entry.pose)
-        shown = replace(self.document, camera=camera, pivot=None, look=look, backend=entry.backend)
-        shown = shown.with_params(entry.backend, entry.params)
-        self.session.history.change("Replay", shown, merge="replay")
-        self.viewport.rest()
-        self.window.touch()
-        log.debug("replays frame %d", entry.pose)
 
     def remembered(self) -> Settings:
         """The settings that are to come back at the next start."""

@@ -16,7 +16,7 @@ from ..task import Task, in_background
 from .scene.viewport import Viewport
 
 if TYPE_CHECKING:
-    from .app import App
+    from .toolbox import Toolbox
 
 T = TypeVar("T")
 
@@ -55,8 +55,8 @@ class Desk:
     declares none. works: what runs for it. is_revealed: whether the panel has yet to show its section.
     """
 
-    def __init__(self, app: App, name: str) -> None:
-        self._app = app
+    def __init__(self, toolbox: Toolbox, name: str) -> None:
+        self._toolbox = toolbox
         self.name = name
         self.settings: Any = None
         self.works: list[Work] = []
@@ -67,39 +67,39 @@ class Desk:
     @property
     def timeline(self) -> Timeline:
         """The scan that is open."""
-        return self._app.playback.timeline
+        return self._toolbox.playback.timeline
 
     @property
     def scan(self) -> str:
         """The name of the open scan, as the user gave it."""
-        return self._app.session.scan
+        return self._toolbox.session.scan
 
     @property
     def pose(self) -> Pose | None:
         """The pose that is shown; None before the first."""
-        return self._app.playback.pose
+        return self._toolbox.playback.pose
 
     @property
     def index(self) -> int:
         """The frame that the user is at, whose pose may still be read."""
-        return self._app.session.index
+        return self._toolbox.session.index
 
     @property
     def unit(self) -> str:
         """The unit of length: as the user calls it, else as the scan tells, else "units"."""
-        return self._app.playback.unit
+        return self._toolbox.playback.unit
 
     @property
     def viewport(self) -> Viewport:
         """The view of the scan: its picture, and what a pixel of it shows."""
-        return self._app.viewport
+        return self._toolbox.viewport
 
     # --- the document -----------------------------------------------------------------
 
     @property
     def document(self) -> Document:
         """The document of the open scan: what the user has chosen and made for it."""
-        return self._app.session.document
+        return self._toolbox.session.document
 
     def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:
         """Change the document: what a tool keeps, and fields by name. The user can undo it.
@@ -107,33 +107,33 @@ class Desk:
         name: of the step, such as "Delete note". merge: with the step before where that had this key and has
         not come to an end.
         """
-        self._app.session.change(name, *parts, merge=merge, **fields)
+        self._toolbox.session.change(name, *parts, merge=merge, **fields)
 
     # --- the window -------------------------------------------------------------------
 
     @property
     def has_clicks(self) -> bool:
         """Whether clicks in the view come to this tool."""
-        return self._app.tools.clicking == self.name
+        return self._toolbox.clicking == self.name
 
     def take_clicks(self) -> None:
         """Have clicks in the view come to this tool, and to no other."""
-        self._app.tools.clicking = self.name
+        self._toolbox.clicking = self.name
         self.redraw()
 
     def leave_clicks(self) -> None:
         """Let clicks in the view be as without a tool."""
         if self.has_clicks:
-            self._app.tools.clicking = None
+            self._toolbox.clicking = None
             self.redraw()
 
     def note(self, text: str) -> None:
         """Tell the user something."""
-        self._app.note(text)
+        self._toolbox.note(text)
 
     def redraw(self) -> None:
         """Draw the window again, since something that it shows has changed."""
-        self._app.window.touch()
+        self._toolbox.redraw()
 
     def reveal(self) -> None:
         """Open the tool's section of the panel, and scroll to its end."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import escape, menu, panel, tasks
+from . import escape, menu, panel
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
@@ -33,12 +32,12 @@ def draw(app: App) -> Place:
     app.keys.handle(app)
     with told("Escape"):
         escape.handle((
-            app.help.on_escape, app.tools.on_escape, app.replayer.on_escape, partial(tasks.on_escape, app),
+            app.help.on_escape, app.tools.on_escape, app.replayer.on_escape, app.tasks.on_escape,
             app.full_view.on_escape, app.notices.on_escape,
         ))  # fmt: skip
     place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
     for name, draw_part in (
-        ("The list of work", lambda: tasks.draw(app, place, head)),
+        ("The list of work", lambda: app.tasks.draw(place, head)),
         ("Help", app.help.draw),
         ("The dialog that opens scans", app.browser.draw),
         ("The dialog that saves sessions", app.sessions.saving.draw),

@@ -6,7 +6,7 @@ import logging
 import time
 from typing import TYPE_CHECKING, Any
 
-from . import layout, tasks
+from . import layout
 from .files import dropping
 from .turns import Turns
 
@@ -73,7 +73,9 @@ class Loop:
     def _patience(self, now: float) -> float:
         """Seconds to wait for events before looking at what else has changed."""
         app = self._app
-        waits = app.playback.waiting or app.tasks or app.scans.waits or app.browser.waits or app.capture.waits
+        waits = (
+            app.playback.waiting or app.tasks.all or app.scans.waits or app.browser.waits or app.capture.waits
+        )
         look = _AWAIT if waits else _WATCH
         changes = (
             app.playback.player.until_next(now), app.notices.next_change(now),
@@ -105,7 +107,7 @@ class Loop:
                 changed |= bool(advance())
         told = app.notices.count, len(app.notices.shown(now))
         cached = app.playback.timeline.cached()
-        report = (app.playback.pose, app.session.index, cached, told, tasks.report(app))
+        report = (app.playback.pose, app.session.index, cached, told, app.tasks.report)
         changed |= report != self._reported
         self._reported = report
         return changed or now >= app.viewport.better_at(app.playback.player.playing)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..analysis.pick import before_gap, pick
 from ..errors import InputError
@@ -13,12 +13,13 @@ from ..task import Cancelled, Task
 from . import failures, tools
 from .commands import Command, Commands, Entry, Item, Listing, Menu
 from .desk import Click, Desk
+from .failures import Failures
+from .playing.playback import Playback
 from .scene.canvas import Canvas, ViewPlace
+from .scene.viewport import Viewport
+from .session import Session
 from .settings import chosen, declared
 from .ui import Ui
-
-if TYPE_CHECKING:
-    from .app import App
 
 _BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
 
@@ -40,15 +41,27 @@ class Toolbox:
     """All tools of `tools.tool_names`.
 
     clicking: the name of the tool that clicks in the view go to; None where they only move the view.
+    session, playback, viewport, note, redraw: what their desks offer them.
     """
 
-    def __init__(self, app: App, commands: Commands, remembered: Mapping[str, Mapping[str, Any]]) -> None:
+    def __init__(
+        self,
+        session: Session,
+        playback: Playback,
+        viewport: Viewport,
+        failures: Failures,
+        note: Callable[[str], None],
+        redraw: Callable[[], None],
+        commands: Commands,
+        remembered: Mapping[str, Mapping[str, Any]],
+    ) -> None:
         """commands: takes in those of the tools. remembered: tool's name -> values of its `Settings`."""
-        self._app = app
+        self.session, self.playback, self.viewport = session, playback, viewport
+        self.note, self.redraw, self._failures = note, redraw, failures
         self._remembered = remembered
         self.clicking: str | None = None
         self._is_declined = False  # the last click, by the tool that had it
-        self._slots = {name: Slot(Desk(app, name)) for name in tools.tool_names()}
+        self._slots = {name: Slot(Desk(self, name)) for name in tools.tool_names()}
         for slot in self._slots.values():
             try:
                 self._open(slot, commands)
@@ -66,7 +79,7 @@ class Toolbox:
         commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))
         slot.tool = module.Tool(slot.desk)
 
-    def _bound(self, slot: Slot, entry: Entry[Any]) -> Entry[App]:
+    def _bound(self, slot: Slot, entry: Entry[Any]) -> Entry[Any]:
         """An entry of a menu that speaks to the slot's tool, and does nothing while that is off."""
         if isinstance(entry, Menu):
             groups = (tuple(self._bound(slot, inner) for inner in group) for group in entry.groups)
@@ -96,7 +109,7 @@ class Toolbox:
                 return function(slot.tool)
         except (Exception, Cancelled) as error:
             if is_users and isinstance(error, InputError):
-                self._app.note(str(error))
+                self.note(str(error))
             else:
                 self._switch_off(slot, error)
         return None
@@ -115,7 +128,7 @@ class Toolbox:
             self.clicking = None
         slot.desk.cancel_work()
         words = f"{slot.title} is switched off until the next start: {failures.reason(error)}"
-        self._app.failures.tell(f"The tool '{slot.desk.name}'", error, words)
+        self._failures.tell(f"The tool '{slot.desk.name}'", error, words)
 
     # --- in the window ----------------------------------------------------------------
 
@@ -139,7 +152,7 @@ class Toolbox:
 
     @property
     def _first(self) -> Slot | None:
-        """The one that has the clicks."""
+        """The slot whose tool has the clicks."""
         return None if self.clicking is None else self._slots[self.clicking]
 
     @property
@@ -154,7 +167,7 @@ class Toolbox:
 
     def click(self, pixel: tuple[int, int]) -> None:
         """Give the tool that has the clicks what a pixel of the view shows."""
-        viewport = self._app.viewport
+        viewport = self.viewport
         viewport.finish()
         surface, request = viewport.surface, viewport.request
         if self._first is None or surface is None or request is None or not viewport.is_there:

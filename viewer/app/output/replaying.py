@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...document.anonymous import in_place
 from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
 from ...errors import InputError
+from ...scan.pose import Pose
 from ..session import known_as
 
 if TYPE_CHECKING:
     from ..app import App
 
+log = logging.getLogger(__name__)
 _LOOK = 0.015  # seconds between looks at whether what is awaited has come
 
 
@@ -67,7 +72,7 @@ class Replaying:
         elif (pose := timeline.ready(entry.pose)) is None:
             timeline.request(entry.pose)
         else:
-            app.show(entry, pose)
+            _show(app, entry, pose)
             self._next, self._since = self._next + 1, None
         return True
 
@@ -98,6 +103,20 @@ class Replaying:
         if fingerprint_as(hash, files) in (hash, None):
             return ""
         return f"{scan} is not as it was when {self.path.name} was made; pictures may differ."
+
+
+def _show(app: App, entry: Entry, pose: Pose) -> None:
+    """Show what an entry of a recording does. pose: of the scan, which is open."""
+    camera, look = entry.camera, entry.look
+    if entry.anonymous:
+        camera, look = in_place(camera, look, pose)
+    app.seek(entry.pose)
+    shown = replace(app.document, camera=camera, pivot=None, look=look, backend=entry.backend)
+    shown = shown.with_params(entry.backend, entry.params)
+    app.session.history.change("Replay", shown, merge="replay")
+    app.viewport.rest()
+    app.window.touch()
+    log.debug("replays frame %d", entry.pose)
 
 
 class Replayer:
