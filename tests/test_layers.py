@@ -129,6 +129,15 @@ def libraries(names: Iterable[str]) -> set[str]:
 
 TOOLS_KNOW = {"commands", "desk", "save_dialog", "scene.canvas", "tools", "ui", "widgets"}  # of the window
 
+# Modules of the window that know the whole app: what runs it, what divides the window and what the table of
+# commands goes through, as commands act on it; and what does all that a user could. It may only shrink.
+KNOW_THE_APP = {
+    "__init__", "app", "loop",
+    "layout", "panel", "scene.view",
+    "commands", "keys", "menu", "playing.timeline_bar",
+    "output.replaying",
+}  # fmt: skip
+
 
 def test_every_part_has_a_layer() -> None:
     assert {part_of(path) for path in modules()} <= set(LAYER_OF)
@@ -200,6 +209,17 @@ def test_tools_know_their_desk_and_not_the_whole_window() -> None:
         if node.value.attr == "desk" and node.attr.startswith("_")
     }
     assert beyond | private == set()
+
+
+def test_parts_of_the_window_know_what_they_need_and_not_the_whole_app() -> None:
+    knowing = {
+        name_of(path).removeprefix("viewer.app.") if path != PACKAGE / "app" / "__init__.py" else "__init__"
+        for path in modules()
+        if part_of(path) == "app"
+        if path.stem == "app" or any(f"{name}.".startswith("viewer.app.app.") for name in all_imports(path))
+    }
+    assert knowing - KNOW_THE_APP == set(), "hand these what they need"
+    assert KNOW_THE_APP - knowing == set(), "take these from the list"
 
 
 def test_scan_and_plain_values_know_no_gl() -> None:

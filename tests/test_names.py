@@ -23,7 +23,7 @@ RIDDLES = re.compile(
 )
 # Parts of the window and of the renderer whose docstrings are still to be looked at.
 LATER = (
-    "analysis", "app", "backends", "document", "frame.py", "gpu", "params.py", "renderer.py", "timing.py",
+    "analysis", "backends", "document", "frame.py", "gpu", "params.py", "renderer.py", "timing.py",
 )  # fmt: skip
 
 Documented = ast.ClassDef | ast.FunctionDef

@@ -254,7 +254,7 @@ class App:
         self._opening.start(scan, title(scan), find, lambda: open_scan(scan, self._unit, self._fps), session)
 
     def _kept(self, scan: str) -> SavedSession | None:
-        """What was kept of a scan. Raises InputError where that is damaged."""
+        """Find what was kept of a scan. Raises InputError where that is damaged."""
         found = kept(known_as(scan))
         if found is None or self._up is None:
             return found
@@ -368,7 +368,7 @@ class App:
 
 
 def _words_of_change(hash: str, found: Future[str | None]) -> str:
-    """What to tell of a scan whose hash, which this waits for, is another one; nothing else."""
+    """Words on a scan whose hash, which this waits for, is another one; none on the same."""
     if found.result() in (hash, None):
         return ""
     return "The scan is not as it was when this was saved: views and measurements may not fit."

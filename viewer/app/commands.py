@@ -110,7 +110,7 @@ def _view(number: int, side: str) -> Command[App]:
 
 
 def switches(several: Iterable[Backend]) -> tuple[Command[App], ...]:
-    """What switches the parameters that backends declare with a key; one name has one key in all of them."""
+    """Commands that switch the parameters with a key that backends declare; one name has one key in all."""
     declared = {parameter.name: parameter for each in several for parameter in each.parameters}
     return tuple(_switch(parameter) for parameter in declared.values() if parameter.key)
 

@@ -89,7 +89,7 @@ class Loop:
         changed = False
         for name, advance in (
             ("Opening", app.take_opened),
-            ("Taking what was dropped", lambda: dropping.take(app, app.window.take_dropped())),
+            ("Taking what was dropped", self._take_dropped),
             ("Listing scans", app.scans.advance),
             ("Listing a folder", app.browser.advance),
             ("Keeping", lambda: app.keeping.advance(now)),
@@ -111,6 +111,10 @@ class Loop:
         changed |= report != self._reported
         self._reported = report
         return changed or now >= app.viewport.better_at(app.playback.player.playing)
+
+    def _take_dropped(self) -> None:
+        app = self._app
+        dropping.take(app.window.take_dropped(), app.scans, app.sessions, app.replayer.replay, app.note)
 
     def _draw(self) -> None:
         app, start = self._app, time.perf_counter()

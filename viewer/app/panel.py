@@ -17,9 +17,15 @@ from .scene import counting
 from .ui import Ui
 
 if TYPE_CHECKING:
+    from ..camera import Camera
     from ..gpu.surface import Stats
     from ..scan.pose import Pose
     from .app import App
+    from .files.scans import Scans
+    from .keys import Keys
+    from .scene.rendering import Rendering
+    from .scene.steering import Steering
+    from .session import Session
 
 _STATISTICS_ROWS = 7  # without the passes
 _STATISTICS_SHARE = 0.4  # of the panel's height at most
@@ -34,15 +40,15 @@ def draw(app: App) -> None:
     height = min(head + rows, _STATISTICS_SHARE * imgui.get_content_region_avail().y)
     imgui.begin_child("settings", ImVec2(0, -height))
     if len(app.scans.listed) > 1:
-        _draw_scans(app)
+        _draw_scans(app.scans, app.session.scan, app.keys)
     pose, ui = app.playback.pose, Ui(app.keys)
     if pose is not None:
         if _section("Renderer"):
-            _draw_renderer(app, pose)
+            _draw_renderer(app.session, app.rendering, pose)
         if _section("Look"):
             look = app.document.look
-            app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": _colors(app, pose)}))
-            _draw_projection(app)
+            app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": _colors(look, pose)}))
+            _draw_projection(app.steering, app.document.camera)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
             app.bookmarks.draw(ui)
         for title, is_revealed, declare in app.tools.sections():
@@ -63,41 +69,40 @@ def _section(title: str, is_open: bool = True) -> bool:
     return imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open.value if is_open else 0)
 
 
-def _draw_scans(app: App) -> None:
-    """The list of scans, and buttons to the one before and the next."""
-    scan, gap = app.session.scan, imgui.get_style().item_inner_spacing.x
+def _draw_scans(scans: Scans, scan: str, keys: Keys) -> None:
+    """Declare the list of scans, and buttons to the one before and the next. scan: the open one."""
+    gap = imgui.get_style().item_inner_spacing.x
     for icon, step, name in (
         (icons.ICON_FA_CHEVRON_LEFT, -1, "previous"), (icons.ICON_FA_CHEVRON_RIGHT, 1, "next"),
     ):  # fmt: skip
-        keys = app.keys.of[f"{name}_scan"]
-        if widgets.icon_button(icon, f"{name.capitalize()} scan" + (f" ({keys})" if keys else "")):
-            app.scans.step(step)
+        hint = keys.of[f"{name}_scan"]
+        if widgets.icon_button(icon, f"{name.capitalize()} scan" + (f" ({hint})" if hint else "")):
+            scans.step(step)
         imgui.same_line(0, gap)
     imgui.set_next_item_width(-1)
     room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height()
     if imgui.begin_combo("##scan", widgets.shortened(title(scan), room)):
-        for number, (name, act, is_open) in enumerate(app.scans.items(app.scans.listed)):
+        for number, (name, act, is_open) in enumerate(scans.items(scans.listed)):
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
                 act()
         imgui.end_combo()
     imgui.set_item_tooltip(printable(scan))
 
 
-def _draw_renderer(app: App, pose: Pose) -> None:
-    name, _ = app.document.chosen(pose)
+def _draw_renderer(session: Session, rendering: Rendering, pose: Pose) -> None:
+    name, _ = session.document.chosen(pose)
     imgui.set_next_item_width(-1)
     chosen = widgets.choose("backend", name, list(backends()), {n: b.title for n, b in backends().items()})
     imgui.set_item_tooltip(backend(name).help)
     if chosen != name:
-        app.rendering.choose(chosen)
-    _, params = app.document.chosen(pose)
-    app.rendering.edit_params(widgets.edit(params, app.document.defaults(pose)[1]))
+        rendering.choose(chosen)
+    _, params = session.document.chosen(pose)
+    rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))
 
 
-def _colors(app: App, pose: Pose) -> dict[str, str]:
+def _colors(look: Look, pose: Pose) -> dict[str, str]:
     """Sources of colours, and the title of each: also the one chosen where the frame lacks it."""
     there = [*COLOR_BY, *pose.cloud.scalars]
-    look = app.document.look
     titles = {name: printable(name) for name in there}
     if look.color_by in there:
         return titles
@@ -105,12 +110,12 @@ def _colors(app: App, pose: Pose) -> dict[str, str]:
     return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not here)")}
 
 
-def _draw_projection(app: App) -> None:
+def _draw_projection(steering: Steering, camera: Camera | None) -> None:
     widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth")
-    now = app.document.camera.projection if app.document.camera else PROJECTIONS[0]
+    now = camera.projection if camera else PROJECTIONS[0]
     chosen = widgets.choose("projection", now, PROJECTIONS)
     if chosen != now:
-        app.steering.project(chosen)
+        steering.project(chosen)
 
 
 def _draw_statistics(app: App) -> None:

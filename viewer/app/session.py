@@ -96,7 +96,7 @@ class Session:
 
 
 def edit_name(before: Any, after: Any) -> str:
-    """What to call a change of some parameters: "Change colour map"; of several "Change parameters"."""
+    """Name a change of some parameters: "Change colour map"; of several "Change parameters"."""
     changed = [name for name in vars(after) if getattr(after, name) != getattr(before, name)]
     words = changed[0].replace("_", " ").replace("color", "colour") if len(changed) == 1 else "parameters"
     return f"Change {words}"

@@ -73,7 +73,7 @@ class Settings:
 
     @classmethod
     def of(cls, session: Session, **others: Any) -> Settings:
-        """What a session holds, and other fields by name."""
+        """Settings of what a session holds, and of other fields by name."""
         now = session.document
         params = {
             name: of for name, of in now.params.items() if is_dataclass(of)
@@ -97,7 +97,7 @@ class Settings:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Settings:
-        """What can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
+        """Use what can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
         usable = cls(**_usable(data, _READERS))
         return replace(usable, places=_places(data.get("places"), usable.document))
 

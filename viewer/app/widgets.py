@@ -45,7 +45,7 @@ def edit(values: T, defaults: T, choices: Mapping[str, Mapping[str, str]] | None
 
 
 def _edit_row(parameter: Parameter, value: Any, default: Any, words: Mapping[str, str]) -> Any:
-    """What the row of a parameter leaves of its value."""
+    """Declare the row of a parameter; returns its value, edited or not."""
     imgui.push_id(parameter.name)
     gutter = imgui.get_frame_height()
     label(parameter.title, _in_words(parameter), gutter)
@@ -60,7 +60,7 @@ def _edit_row(parameter: Parameter, value: Any, default: Any, words: Mapping[str
 
 
 def _in_words(parameter: Parameter) -> str:
-    """What a parameter does, and which key switches it."""
+    """Words on what a parameter does, and which key switches it."""
     return parameter.help + (f" ({parameter.key})" if parameter.key else "")
 
 
@@ -171,7 +171,7 @@ def edited(path: str, text: str) -> str:
 
 
 def shortened(text: str, width: float) -> str:
-    """As much of a text as there is room for, with an ellipsis where it is not all."""
+    """Shorten a text to what there is room for, with an ellipsis where it is not all."""
     if imgui.calc_text_size(text).x <= width:
         return text
     kept = bisect(range(len(text)), width, key=lambda length: imgui.calc_text_size(text[:length] + "...").x)

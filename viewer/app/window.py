@@ -140,7 +140,7 @@ class Window(GlfwWindow):
 
     @property
     def place(self) -> Place | None:
-        """Where it is; while it fills a screen or is an icon, where it was before that. None: never seen."""
+        """The place of the window; while it fills a screen or is an icon, that before. None: never seen."""
         seen = self._window, glfw.ICONIFIED
         if glfw.get_window_monitor(self._window) or glfw.get_window_attrib(*seen):
             return self._last_place
@@ -247,12 +247,12 @@ class Window(GlfwWindow):
         return 1e3 / rate if rate else 0.0
 
     def to_pixels(self, left: float, top: float, width: float, height: float) -> tuple[int, int, int, int]:
-        """From ImGui's coordinates to the framebuffer: (left, bottom, width, height) in pixels."""
+        """Convert ImGui's coordinates to the framebuffer's: (left, bottom, width, height) in pixels."""
         x, y, w, h = (round(v * self.pixel_ratio) for v in (left, top, width, height))
         return x, self.buffer_height - y - h, w, h
 
     def _set_fullscreen(self, value: bool) -> None:
-        """On the monitor that the window is on; moderngl-window takes the primary one."""
+        """Fill the monitor that the window is on, or no more; moderngl-window takes the primary one."""
         if value:
             self._place = *glfw.get_window_pos(self._window), *glfw.get_window_size(self._window)
             monitor = _monitor_at(self._place)
@@ -287,7 +287,7 @@ def _initial_size() -> tuple[int, int]:
 
 
 def _address(window: Any) -> int:
-    """Of a glfw window, as ImGui takes it."""
+    """The address of a glfw window, as ImGui takes it."""
     return ctypes.cast(window, ctypes.c_void_p).value or 0
 
 

@@ -94,7 +94,7 @@ class Opening:
         self.scan = self.task = self._future = None
 
     def take(self) -> tuple[str, Opened] | None:
-        """What was opened, and its name, once; None while nothing is ready. Raises Scan4DError."""
+        """Take what was opened, and its name, once; None while nothing is ready. Raises Scan4DError."""
         scan, future = self.scan, self._future
         if scan is None or future is None or not future.done():
             return None

@@ -164,7 +164,7 @@ class Capture:
 
 
 def _saved_late(journal: Path) -> str:
-    """What to tell of the recording that a journal becomes; nothing where none does."""
+    """Save the recording that a journal holds; what to tell of it, nothing where it holds none."""
     try:
         path = saved(journal)
     except InputError as error:

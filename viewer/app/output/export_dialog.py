@@ -135,7 +135,7 @@ def _shares(parts: int) -> float:
 
 
 def _draw_problems(problems: dict[str, str], *names: str) -> None:
-    """What is wrong with the fields of these names."""
+    """Tell what is wrong with the fields of these names."""
     for name in names:
         if name in problems:
             _warn(problems[name])

@@ -28,7 +28,7 @@ _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{name}{n}" for name in ("COM", "LPT"
 
 @dataclass(frozen=True)
 class Choices:
-    """What the user wants. Frames are counted from 1; values may be wrong (see `problems`)."""
+    """Choices of what to export. Frames are counted from 1; values may be wrong (see `problems`)."""
 
     what: str = param(VIEW, "What the pictures show", choices=(VIEW, TURNTABLE, FRAMES))
     pictures: int = param(36, "That make a turn", low=2, high=_MOST_PICTURES)
@@ -57,7 +57,7 @@ class Choices:
         return range(max(self.first, 1) - 1, last, max(self.step, 1))
 
     def numbers(self, count: int) -> range:
-        """What its pictures of a scan with so many frames are numbered by: the frame, else from 1."""
+        """Numbers of the pictures of a scan with so many frames: those of the frames, else from 1."""
         if self.what == FRAMES:
             indices = self.indices(count)
             return range(indices.start + 1, indices.stop + 1, indices.step)
@@ -73,13 +73,13 @@ class Choices:
         return min(max(typical_rate(times[np.array(self.indices(len(times)), int)]), low), high)
 
     def out(self) -> Path:
-        """Where the pictures go, as `scan4d render -o` has it."""
+        """The pattern of the files, as `scan4d render -o` has it."""
         several = self.what != VIEW and self.format != MP4
         return _folder(self.folder) / f"{self.name}{'_%04d' if several else ''}.{self.format}"
 
 
 def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
-    """What is wrong, by the field where it is. count: frames of the scan. most_pixels: of a picture."""
+    """Find what is wrong, by the field where it is. count: frames of the scan. most_pixels: of a picture."""
     found = {}
     for parameter in describe(Choices):
         try:

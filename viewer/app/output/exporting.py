@@ -105,7 +105,7 @@ class Exporting:
             self.choices, self.marks, self.replaced, self.refused = choices, marks, [], []
 
     def problems(self) -> dict[str, str]:
-        """What is wrong with the choices, by field."""
+        """Find what is wrong with the choices, by field."""
         return export_plan.problems(self.choices, self.count, self._viewport.renderer.gpu.max_pixels)
 
     def start(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,9 @@ from .player import SPEEDS
 
 if TYPE_CHECKING:
     from ..app import App
+    from ..notices import Notices
+    from ..scene.pointed import Pointer
+    from .playback import Playback
 
 _SPEED_WIDTH = 4.6  # in heights of the font
 _SHORTEST_TRACK = 8.0
@@ -27,13 +31,13 @@ def draw(app: App) -> None:
     _draw_steps(app)
     _draw_pace(app)
     imgui.end_disabled()
-    _draw_place(app)
-    report = _report(app) if app.playback.player.playing else ""
+    _draw_place(app.playback)
+    report = _report(app.playback) if app.playback.player.playing else ""
     # Its width stays while it says nothing: the track must not move under the mouse.
     room = imgui.calc_text_size("100 of 100 fps, 10000 dropped").x + imgui.get_style().item_spacing.x
     width = imgui.get_content_region_avail().x
     is_wide = several and width - room > _SHORTEST_TRACK * imgui.get_font_size()
-    _draw_track(app, width - room if is_wide else width)
+    _draw_track(app.playback, app.palette, width - room if is_wide else width)
     if is_wide:
         imgui.same_line()
         imgui.text_disabled(report)
@@ -41,7 +45,7 @@ def draw(app: App) -> None:
             "Frames a second that are shown, and that the scan has at this speed; frames that were left out, "
             "as they were not read or drawn at their time"
         )
-    _draw_status(app)
+    _draw_status(app.playback, app.pointer, app.notices)
 
 
 def _draw_steps(app: App) -> None:
@@ -64,7 +68,7 @@ def _draw_button(app: App, icon: str, name: str, color: int | None = None, about
 
 
 def _draw_pace(app: App) -> None:
-    """How it plays."""
+    """Declare how it plays."""
     pace, accent = app.session.pace, app.palette.accent
     for icon, name, about in (
         (icons.ICON_FA_REDO, "loop", ": play round the end"),
@@ -82,9 +86,9 @@ def _draw_pace(app: App) -> None:
     imgui.same_line()
 
 
-def _draw_place(app: App) -> None:
-    """Time and frame, in a width that does not change while playing."""
-    timeline, index = app.playback.timeline, app.session.index
+def _draw_place(playback: Playback) -> None:
+    """Write time and frame, in a width that does not change while playing."""
+    timeline, index = playback.timeline, playback.session.index
     left = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
     imgui.text(_place(timeline.times[index], index, len(timeline)))
@@ -100,8 +104,8 @@ def _place(time: float, index: int, count: int) -> str:
     return f"{time:.2f} s    {index + 1}/{count}"
 
 
-def _report(app: App) -> str:
-    playback, pace = app.playback, app.session.pace
+def _report(playback: Playback) -> str:
+    pace = playback.session.pace
     shown, due = (
         f"{rate:.0f}" if playback.player.rate >= 10 else f"{rate:.1f}"
         for rate in (playback.rate, playback.player.rate)
@@ -109,27 +113,27 @@ def _report(app: App) -> str:
     return f"{shown} of {due} fps, " + ("every frame" if pace.every_frame else f"{playback.dropped} dropped")
 
 
-def _draw_track(app: App, width: float) -> None:
-    """The frames over time: cached ones coloured, broken ones red. A press or a drag goes there."""
+def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> None:
+    """Draw the frames over time: cached ones coloured, broken ones red. A press or a drag goes there."""
     size = ImVec2(width, imgui.get_frame_height())
     if size.x < 1:
         return
     imgui.invisible_button("track", size)
-    playback, palette = app.playback, app.palette
     track = _Track(playback.player.edges, imgui.get_item_rect_min(), size)
     if imgui.is_item_active() or imgui.is_item_deactivated():
-        app.seek(playback.player.frame_at(track.time(imgui.get_mouse_pos().x)))
+        frame = playback.player.frame_at(track.time(imgui.get_mouse_pos().x))
+        playback.seek(frame, time.monotonic())
     track.bar(0, len(playback.timeline), palette.frame[0])
     for run in playback.timeline.cached():
         track.bar(run.start, run.stop, palette.cached)
     for index in playback.timeline.broken:
         track.bar(index, index + 1, palette.broken)
     if len(playback.timeline) > 1:
-        track.head(app.session.index, palette.text if playback.problem is None else palette.broken)
+        track.head(playback.session.index, palette.text if playback.problem is None else palette.broken)
 
 
 class _Track:
-    """Where times lie on the screen. edges: as a Player has them."""
+    """The track on the screen, along which times lie. edges: as a Player has them."""
 
     def __init__(self, edges: NDArray[np.float64], corner: ImVec2, size: ImVec2) -> None:
         self.edges, self.corner, self.size = edges, corner, size
@@ -158,25 +162,23 @@ class _Track:
         self.draw_list.add_rect_filled(*corners, theme.packed(color), half)
 
 
-def _pointed(app: App, room: float) -> str:
-    """As much of what is under the mouse as there is room for."""
-    words = app.pointer.words
+def _pointed(words: list[str], room: float) -> str:
+    """Join as many words on what is under the mouse as there is room for."""
     while words and imgui.calc_text_size(text := _GAP.join(words)).x > room:
         words = words[:-1]
     return text if words else ""
 
 
-def _draw_status(app: App) -> None:
-    """What is under the mouse, else the latest message; the names of scan and frame."""
+def _draw_status(playback: Playback, pointer: Pointer, notices: Notices) -> None:
+    """Tell what is under the mouse, else the latest message; the names of scan and frame."""
     imgui.spacing()
-    playback = app.playback
     width, gap = imgui.get_content_region_avail().x, 2 * imgui.get_font_size()
-    names = playback.timeline.name, playback.timeline.label(app.session.index)
+    names = playback.timeline.name, playback.timeline.label(playback.session.index)
     name = "   ".join(widgets.shortened(one, width / 4) for one in names)
     left = width - imgui.calc_text_size(name).x
-    text = _pointed(app, left - gap)
-    if not text and app.notices.all:
-        text = widgets.shortened(app.notices.all[-1].text, left - gap)
+    text = _pointed(pointer.words, left - gap)
+    if not text and notices.all:
+        text = widgets.shortened(notices.all[-1].text, left - gap)
     imgui.text_disabled(text)
     imgui.same_line()
     imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)

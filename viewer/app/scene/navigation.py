@@ -39,7 +39,7 @@ def view_from(
 
 
 def place(camera: Camera, point: Vector) -> tuple[float, float] | None:
-    """Where a point is in the picture: to the right of and above its centre; None behind the eye."""
+    """The place of a point in the picture: to the right of and above its centre; None behind the eye."""
     right, up, back = camera.rotation() @ np.subtract(point, camera.eye)
     if back >= 0:
         return None
@@ -70,7 +70,7 @@ def orbit(camera: Camera, right: float, up: float, pivot: Vector | None = None) 
 
 
 def pan(camera: Camera, right: float, up: float) -> Camera:
-    """What is at the target's depth stays under the mouse."""
+    """Move sideways, so that what is at the target's depth stays under the mouse."""
     return camera.panned(-right, -up)
 
 

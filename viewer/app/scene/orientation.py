@@ -83,7 +83,7 @@ def _rectangle(
 
 
 def writing(turned: NDArray[np.float64], face: Direction) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """To the right and up, as unit vectors of the cube, for a text on a face; read from outside.
+    """Unit vectors of the cube to the right and up, for a text on a face; read from outside.
 
     On top and bottom it turns with the view, so that it stands as upright as it can.
     """
