@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -18,7 +18,6 @@ from typing import Any
 from imgui_bundle import imgui
 
 from ..document.document import Document
-from ..document.part import Part
 from ..document.saved_session import SavedSession, kept
 from ..errors import InputError, Scan4DError
 from ..folders import user_folder
@@ -62,18 +61,15 @@ class App:
     """All that the window shows and can do. Panels read it and call its commands.
 
     session: what the user has chosen. playback: the scan. renderer: what is on the GPU. viewport: the 3D
-    view.
-    capture: pictures and recordings of it. replayer: shows recordings again. exporting: pictures and films at
-    other sizes.
-    theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
-    keys: which do what. help: its open pages.
-    pointer: what the mouse points at. steering: what moves the camera. bookmarks: cameras to go back to.
-    rendering: which backend draws.
+    view. marks: what lies over it. rendering: which backend draws it. steering: what moves its camera.
+    pointer: what the mouse points at in it. bookmarks: cameras to go back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
-    tasks: work that goes on beside the window.
-    full_view: whether the panels are hidden. tools: what is in their folder. commands: all that can be done.
-    marks: what lies over the view.
     keeping: keeps what is to come back at the next start.
+    capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
+    and films at other sizes.
+    commands: all that can be done. keys: which do what. tools: what is in their folder. help: its open pages.
+    theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
+    tasks: work that goes on beside it. counting: of the points that are shown.
     """
 
     def __init__(
@@ -156,14 +152,6 @@ class App:
     def document(self) -> Document:
         """The document of the open scan: what the user has chosen and made for it."""
         return self.session.document
-
-    def change(self, name: str, *parts: Part, merge: Hashable = None, **fields: Any) -> None:
-        """Change the document: some fields, and what tools keep.
-
-        name: of the step, such as "Delete bookmark". merge: with the step before where that had this key and
-        has not come to an end.
-        """
-        self.session.change(name, *parts, merge=merge, **fields)
 
     def undo(self) -> None:
         """Take back the last change of the document; first of all what a tool has begun."""
