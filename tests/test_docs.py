@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -27,7 +28,7 @@ _GIVEN = re.compile(r"`([\w/]+\.\w+)`:?\n\n```")
 ELSEWHERE = ("make ", "git clone", "cd ", "pipx ", "scan4d view", "python ")
 
 
-def table(parameters: list[Parameter]) -> str:
+def table(parameters: Sequence[Parameter]) -> str:
     """A Markdown table of declared parameters."""
     rows = ["| parameter | group | default | values | affects | what it does |", "|---|---|---|---|---|---|"]
     for p in parameters:

@@ -92,6 +92,32 @@ class Grown:
     fill: bool = param(True, "fill", key="H")
 
 
+@dataclass(frozen=True)
+class Misnamed:
+    """A condition on what is not there."""
+
+    mode: str = param("one", "mode", when={"sise": (1,)})
+
+
+@dataclass(frozen=True)
+class Miskeyed:
+    """A key that has nothing to switch."""
+
+    size: int = param(1, "size", key="K")
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        (Misnamed, "Misnamed.mode goes by 'sise', which is no other parameter; there are mode"),
+        (Miskeyed, "Miskeyed.size: a key switches a bool alone"),
+    ],
+)
+def test_a_wrong_declaration_says_where(kind: type, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        describe(kind)
+
+
 def test_a_parameter_matters_where_its_conditions_hold() -> None:
     def mattering(values: Grown) -> list[str]:
         return [p.name for p in describe(Grown) if p.matters(values)]
@@ -118,8 +144,12 @@ def test_a_declaration_is_told_in_full() -> None:
     assert json.loads(json.dumps(told)) == told
 
 
-@pytest.mark.parametrize("kind", [Look, Marks, *(one.module.Params for one in backends().values())])
-def test_declarations_are_complete(kind: type) -> None:
+_DECLARED = {"look": Look, "marks": Marks} | {one.name: one.module.Params for one in backends().values()}
+
+
+@pytest.mark.parametrize("name", list(_DECLARED))
+def test_declarations_are_complete(name: str) -> None:
+    kind = _DECLARED[name]
     declared = {p.name: p for p in describe(kind)}
     former = [old for p in declared.values() for old in p.deprecated]
     assert len({*declared, *former}) == len(declared) + len(former)

@@ -7,8 +7,9 @@ in the docs, the tests and the benchmark's sweep.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar
 
 from .errors import InputError, shortened, unknown_name
@@ -141,9 +142,26 @@ def _conditions(values: Mapping[str, tuple[Any, ...]] | None, negated: bool) -> 
     return [Condition(name, several, negated) for name, several in (values or {}).items()]
 
 
-def describe(cls: type) -> list[Parameter]:
-    """The parameters that a dataclass declares, in order."""
-    return [Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(cls)]
+def describe(cls: type) -> tuple[Parameter, ...]:
+    """The parameters that a dataclass declares, in order. Raises TypeError where the declaration is wrong."""
+    return _described(cls)
+
+
+@cache
+def _described(cls: Hashable) -> tuple[Parameter, ...]:
+    assert isinstance(cls, type)
+    declared = tuple(Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(cls))
+    names = {parameter.name for parameter in declared}
+    for parameter in declared:
+        if parameter.key and parameter.type is not bool:
+            raise TypeError(f"{cls.__qualname__}.{parameter.name}: a key switches a bool alone")
+        for condition in parameter.when:
+            if condition.parameter not in names - {parameter.name}:
+                raise TypeError(
+                    f"{cls.__qualname__}.{parameter.name} goes by '{condition.parameter}', which is no other "
+                    f"parameter; there are {', '.join(sorted(names))}"
+                )
+    return declared
 
 
 def switches(values: object) -> dict[str, bool]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import pytest
+
 from viewer.app.commands import Commands, switches
 from viewer.app.keys import chord
 from viewer.backends import Backend, backends
+from viewer.errors import InputError
 from viewer.params import param
 from viewer.params import switches as switches_of
 
@@ -36,11 +39,47 @@ def test_a_key_switches_what_declares_it_while_it_matters() -> None:
 
 
 def test_each_switch_is_one_command_whichever_backend_draws() -> None:
-    found = switches(Backend(kind.__name__, SimpleNamespace(Params=kind)) for kind in (Pyramid, Laplacian))
+    found = switches(of(kind) for kind in (Pyramid, Laplacian))
     named = [(command.name, command.title, command.key) for command in found]
     assert named == [
         ("switch_fill", "Fill", "H"), ("switch_level_1", "Level 1", "1"), ("switch_level_2", "Level 2", "2"),
     ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Keyless:
+    """Parameters of one that has a level without a key."""
+
+    level_2: bool = param(True, "Blends")
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """Keys that are none."""
+
+    fill: bool = param(True, "Fill holes", key="Shift H")
+
+
+def of(kind: type) -> Backend:
+    return Backend(kind.__name__.lower(), SimpleNamespace(Params=kind))
+
+
+def test_a_backend_without_a_key_takes_none_from_another() -> None:
+    assert [one.key for one in switches([of(Laplacian), of(Keyless)])] == ["2"]
+
+
+def test_keys_that_are_none_say_whose_they_are() -> None:
+    with pytest.raises(InputError, match=r"wrong\.fill, key='Shift H': unknown key 'Shift'"):
+        switches([of(Wrong)])
+
+
+def test_a_parameter_has_one_key() -> None:
+    @dataclass(frozen=True)
+    class Other:
+        fill: bool = param(True, "Fill holes", key="J")
+
+    with pytest.raises(InputError, match="'fill' has different keys"):
+        switches([of(Pyramid), of(Other)])
 
 
 def test_the_keys_of_parameters_are_theirs_alone() -> None:

@@ -25,8 +25,8 @@ def test_includes_are_expanded_once_with_line_numbers(shaders: Path) -> None:
     assert source.files == ["a.comp", "common/one.glsl", "b.glsl"]
     assert source.text.count("float one()") == 1
     assert source.text.startswith("#version 430 core\n")
-    assert "\n#define SIZE 3\n#line 1 0\n#line 1 1\n" in source.text
-    assert source.text.rstrip().endswith("#line 3 0\nfloat last;")
+    assert "\n#define SIZE 3\n#line 1\n#line 100001\n" in source.text
+    assert source.text.rstrip().endswith("#line 3\nfloat last;")
 
 
 def test_a_compile_error_names_file_and_line(shaders: Path, renderer: Renderer) -> None:
@@ -37,6 +37,16 @@ def test_a_compile_error_names_file_and_line(shaders: Path, renderer: Renderer) 
     with pytest.raises(ShaderError, match=r"common/bad\.glsl:2") as caught:
         renderer.gpu.compute("bad.comp")
     assert str(caught.value).startswith("shaders/bad.comp")
+
+
+def test_an_error_of_meaning_names_the_part_that_it_is_in(shaders: Path, renderer: Renderer) -> None:
+    """Compilers that keep no number of the file for what parses keep that of the line."""
+    (shaders / "part.glsl").write_text("float wrong() {\n    return unheard_of();\n}\n")
+    (shaders / "whole.comp").write_text(
+        "layout(local_size_x = 1) in;\n#include <part>\nvoid main() { wrong(); }\n"
+    )
+    with pytest.raises(ShaderError, match=r"part\.glsl:2"):
+        renderer.gpu.compute("whole.comp", parts={"part": "part.glsl"})
 
 
 @pytest.mark.parametrize("log", ["0:12(5): error: x", "0(12) : error C0000: x", "ERROR: 0:12: 'x' : y"])

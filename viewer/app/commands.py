@@ -111,12 +111,24 @@ def _view(number: int, side: str) -> Command[App]:
 
 def switches(several: Iterable[Backend]) -> tuple[Command[App], ...]:
     """Commands that switch the parameters with a key that backends declare; one name has one key in all."""
-    declared = {parameter.name: parameter for each in several for parameter in each.parameters}
-    return tuple(_switch(parameter) for parameter in declared.values() if parameter.key)
+    found: dict[str, Command[App]] = {}
+    for one, parameter in ((each, p) for each in several for p in each.parameters if p.key):
+        there = found.setdefault(parameter.name, _switch(one, parameter))
+        if there.key != parameter.key:
+            raise InputError(
+                f"'{parameter.name}' has different keys, {there.key} and {parameter.key}",
+                one.name,
+                "Give it the same key in all backends",
+            )
+    return tuple(found.values())
 
 
-def _switch(parameter: Parameter) -> Command[App]:
+def _switch(backend: Backend, parameter: Parameter) -> Command[App]:
     name = parameter.name
+    try:
+        chords(parameter.key)
+    except InputError as error:
+        raise InputError(error.what, f"{backend.name}.{name}, key={parameter.key!r}", error.hint) from error
     return Command(
         f"switch_{name}", parameter.title, lambda app: app.rendering.switch(name), parameter.key,
         is_on=lambda app: app.rendering.switches.get(name, False),
@@ -314,7 +326,9 @@ class Commands:
         self.menus = _MENUS
         self.toolbar = _TOOLBAR
         self.mouse = _MOUSE
-        self.of = {command.name: command for menu in _MENUS for command in _commands(menu)}
+        own = [command for menu in _MENUS for command in _commands(menu)]
+        own.sort(key=lambda command: command in _SWITCHES.groups[0])  # which have those keys that are left
+        self.of = {command.name: command for command in own}
 
     def add(self, menu: str, entries: Sequence[Entry[App]]) -> None:
         """Add a group to a menu, and to the toolbar what has a `short` title.

@@ -123,7 +123,7 @@ class Backend:
         return (self.module.__doc__ or "").splitlines()[0]
 
     @property
-    def parameters(self) -> list[Parameter]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """Its parameters as declared."""
         return describe(self.module.Params)
 

@@ -15,7 +15,9 @@ from .view import ViewBlock
 
 _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 # "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (AMD, Intel)
-_PLACE = re.compile(r"\b(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
+_PLACE = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
+# Lines of a file: the number of a line says the file too, since Mesa tells 0 for the number of most files.
+_LINES = 100_000
 _UNIFORM = re.compile(r"\buniform\s+\w+\s+(\w+)\s*[;\[]")
 _HEADER = "#version 430 core\n" + bindings_glsl() + constants_glsl()
 
@@ -32,7 +34,7 @@ class Source:
     brackets stands for, so that one file can serve several shapes: `#include <shape>`. params: the dataclass
     whose numbers `#include <params>` declares; `<view>` is always there, and so are, without being included,
     the macros of gpu/bindings.py and gpu/constants.py. text: all of it; body: without macros. files: what it
-    is made of, numbered as in a compiler's log.
+    is made of, in the order of their line numbers in a compiler's log.
     """
 
     def __init__(
@@ -74,22 +76,21 @@ class Source:
             return ""  # each once, as with #pragma once
         index = len(self.files)
         self.files.append(name)
-        lines = [f"#line 1 {index}"]
+        lines = [f"#line {index * _LINES + 1}"]
         for number, line in enumerate(text.splitlines(), start=1):
             found = _INCLUDE.match(line)
             if found is None:
                 lines.append(line)
             else:
                 lines.append(self._expand(found[1]) if found[1] else self._expand_part(found[2]))
-                lines.append(f"#line {number + 1} {index}")
+                lines.append(f"#line {index * _LINES + number + 1}")
         return "\n".join(lines) + "\n"
 
     def explain(self, log: str) -> str:
         """A compiler's log with file names in the place of file numbers."""
 
         def place(match: re.Match[str]) -> str:
-            index = int(match[1])
-            line = match[2] or match[3]
+            index, line = divmod(int(match[1] or match[2]), _LINES)
             return f"{self.files[index]}:{line}" if index < len(self.files) else match[0]
 
         return _PLACE.sub(place, log)
