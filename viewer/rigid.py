@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +38,11 @@ class Rigid:
         """(3, 3)."""
         return self.matrix[:3, :3]
 
-    @property
+    @cached_property
     def inverse(self) -> Rigid:
         """The motion back."""
+        if self.is_identity:
+            return self
         back = np.eye(4)
         back[:3, :3] = self.rotation.T
         back[:3, 3] = -self.rotation.T @ self.matrix[:3, 3]

@@ -193,8 +193,11 @@ def test_errors_of_a_drawn_sphere_are_of_its_spacing(draw: Callable[..., Surface
 
 
 @pytest.mark.parametrize(
-    ("backend", "wrong_layers", "holes", "psnr"),
-    [("points", 40, 60, (0, 20)), ("surfels", 2, 1, (25, 100))],  # the far side shows between points
+    ("backend", "wrong_layers", "holes", "psnr", "least_ssim"),
+    [
+        ("points", 40, 60, (0, 20), 0.0),
+        ("surfels", 2, 1, (25, 100), 0.5),
+    ],  # the far side shows between points
     ids=["points", "surfels"],
 )
 def test_errors_of_the_bunny_are_sane(
@@ -205,6 +208,7 @@ def test_errors_of_the_bunny_are_sane(
     wrong_layers: float,
     holes: float,
     psnr: tuple[float, float],
+    least_ssim: float,
 ) -> None:
     stored = read_mesh(data_dir / "models" / "stanford_bunny_35947.ply")
     spacing = typical_spacing(stored.points)
@@ -234,7 +238,7 @@ def test_errors_of_the_bunny_are_sane(
     image, true = drawn.image(), reference_surface(picture, renderer.gpu, look).image()
     color = metrics.color(image, true, picture.covered)
     assert psnr[0] < color["psnr"] < psnr[1]
-    assert color["ssim"] > 0.5 or holes > 1
+    assert color["ssim"] > least_ssim
 
 
 def test_a_sequence_keeps_its_faces_in_a_file_of_their_own(data_dir: Path) -> None:
