@@ -128,7 +128,7 @@ def test_a_parameter_matters_where_its_conditions_hold() -> None:
 
 def test_former_names_are_read_as_what_they_are_now() -> None:
     assert parse(Grown, {"radius": 2}) == parse(Grown, {"reach": 2}) == Grown(reach=2.0)
-    assert renamed(Grown, {"extent": 2, "mode": "one"}) == {"extent": "reach"}
+    assert renamed(Grown, {"extent": 2, "mode": "one"}) == {"reach": 2, "mode": "one"}
     with pytest.raises(InputError, match="outside 0 to 9"):
         parse(Grown, {"radius": 10})
     with pytest.raises(InputError, match="unknown parameter 'radius'"):

@@ -7,7 +7,7 @@ in the docs, the tests and the benchmark's sweep.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -23,7 +23,7 @@ _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 @dataclass(frozen=True)
 class Condition:
-    """What another parameter has to be: one of these values, or, with `negated`, none of them."""
+    """Condition on another parameter: it has to be one of these values, or, with `negated`, none of them."""
 
     parameter: str
     values: tuple[Any, ...]
@@ -173,19 +173,18 @@ def switches(values: object) -> dict[str, bool]:
 def parse(cls: type[T], values: Mapping[str, object], kind: str = "parameter") -> T:
     """An instance of a declaration from names and text or plain values; raises InputError."""
     declared = {p.name: p for p in describe(cls)}
-    now = renamed(cls, values)
-    current = {now.get(name, name): value for name, value in values.items()}
+    current = renamed(cls, values)
     for name in current:
         if name not in declared:
             raise unknown_name(kind, name, list(declared))
     return cls(**{name: declared[name].parse(value) for name, value in current.items()})
 
 
-def renamed(cls: type, names: Iterable[str]) -> dict[str, str]:
-    """Those of the names that a declaration had formerly -> what they are called now."""
+def renamed(cls: type, values: Mapping[str, T]) -> dict[str, T]:
+    """The values by the names that a declaration has now, where they are given by former ones."""
     former = {old: p.name for p in describe(cls) for old in p.deprecated}
-    given = set(names)
-    return {name: former[name] for name in given if name in former and former[name] not in given}
+    now = {old: name for old, name in former.items() if name not in values}
+    return {now.get(name, name): value for name, value in values.items()}
 
 
 def _bool(value: object) -> bool | None:

@@ -1,6 +1,6 @@
 """What comes back at the next start: one JSON file of the user's.
 
-Each value is read by itself, so that a wrong one costs no other: a field of `Settings` has a reader.
+Each value is read by itself, by the type of its field in `Settings`, so that a wrong one costs no other.
 Values of parameters that are the defaults are not written, since a later version may change those.
 """
 
@@ -12,20 +12,28 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from ..backends import backend
-from ..camera import Camera
-from ..document.document import Bookmark, Document
+from ..document.document import Document
 from ..document.saved_session import SavedSession
-from ..document.schema import PoseNumber, Unit, structured
+from ..document.schema import (
+    BackendName,
+    Kind,
+    ReadBy,
+    ScanName,
+    Values,
+    is_object,
+    structured,
+    unread,
+    usable,
+)
 from ..errors import InputError
 from ..files import parsed_json, read_text, whole_file
 from ..look import COLOR_BY, Look
 from ..output.marks import Marks
-from ..params import describe, renamed
+from ..params import describe
 from . import theme
 from .output.export_plan import Choices
 from .place import Place
@@ -37,11 +45,32 @@ T = TypeVar("T")
 FORMAT = 1
 FILE = "settings.json"
 MOST_RECENT = 15
-_OF_ONE_SCAN = ("up", "low", "high")  # of a look: no use for the next scan
 _MOST_BYTES = 32 * 2**20  # of the file
-_WRONG = (  # by odd JSON
-    InputError, TypeError, ValueError, KeyError, AttributeError, ArithmeticError, RecursionError,
-)  # fmt: skip
+ThemeName = Annotated[str, Kind("a theme", theme.PALETTES.__contains__)]
+TextScale = Annotated[float, Kind("a size of text", theme.TEXT_SCALES.__contains__)]
+TurnTime = Annotated[float, Kind("a time for a turn", turntable.SECONDS.__contains__)]
+
+
+def _by_name(data: Any, read: Callable[[str, Any], T]) -> dict[str, T]:
+    """Values by name as `read` gives them of name and value; those that it refuses are left out."""
+    found = {}
+    for name, value in data.items() if is_object(data) else ():
+        with suppress(InputError):
+            found[name] = read(name, value)
+    return found
+
+
+def _read_params(data: Any) -> dict[str, Any]:
+    return _by_name(data, lambda name, values: usable(backend(name).params(), values))
+
+
+def _read_tools(data: Any) -> dict[str, Any]:
+    """Settings of tools as the file has them: each tool reads its own."""
+    return _by_name(data, lambda _, values: unread(structured(Values, values)))
+
+
+def _read_recent(data: Any) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(structured(tuple[ScanName, ...], data)))[:MOST_RECENT]
 
 
 @dataclass(frozen=True)
@@ -56,20 +85,20 @@ class Settings:
     """
 
     window: Place | None = None
-    theme: str = theme.DEFAULT
-    text_scale: float = 1.0
-    backend: str | None = None
-    params: Mapping[str, Any] = field(default_factory=dict)
+    theme: ThemeName = theme.DEFAULT
+    text_scale: TextScale = 1.0
+    backend: BackendName | None = None
+    params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
     look: Look = field(default_factory=Look)
     pace: Pace = field(default_factory=Pace)
     marks: Marks = legend.SHOWN_FIRST
     cube: bool = True
-    turn_seconds: float = turntable.USUAL
+    turn_seconds: TurnTime = turntable.USUAL
     export: Choices = field(default_factory=Choices)
     export_marks: Marks = field(default_factory=Marks)
-    recent: tuple[str, ...] = ()
+    recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
     places: Mapping[str, SavedSession] = field(default_factory=dict)
-    tools: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    tools: Annotated[Mapping[str, Mapping[str, Any]], ReadBy(_read_tools)] = field(default_factory=dict)
 
     @classmethod
     def of(cls, session: Session, **others: Any) -> Settings:
@@ -92,14 +121,15 @@ class Settings:
         data = {"format": FORMAT} | asdict(replace(self, places={}))
         del data["places"]
         data["params"] = {name: chosen(values) for name, values in self.params.items()}
-        data["look"] = {k: value for k, value in chosen(self.look).items() if k not in _OF_ONE_SCAN}
+        data["look"] = chosen(_of_any_scan(self.look))
         return data
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Settings:
         """Use what can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
-        usable = cls(**_usable(data, _READERS))
-        return replace(usable, places=_places(data.get("places"), usable.document))
+        read = usable(cls(), {name: value for name, value in data.items() if name != "places"})
+        read = replace(read, look=_of_any_scan(read.look))
+        return replace(read, places=_places(data.get("places"), read.document))
 
 
 def load(path: Path) -> tuple[Settings, list[str]]:
@@ -145,114 +175,19 @@ def _put_aside(path: Path, what: str) -> str:
     return str(InputError(what, path, f"It is kept as {kept.name}; all starts anew"))
 
 
-# --- reading what may be wrong ----------------------------------------------------------------
-
-
-def _usable(data: Mapping[str, Any], readers: Mapping[str, Callable[[Any], Any]]) -> dict[str, Any]:
-    """The values that their readers take, by name; what is wrong or has no reader is left out."""
-    values = {}
-    for name, read in readers.items():
-        with suppress(*_WRONG):
-            values[name] = read(data[name])
-    return values
-
-
-def declared(cls: type[T], data: Mapping[str, Any], default: T | None = None) -> T:
-    """An instance of a declaration (see viewer/params.py) with those values that it takes."""
-    values: Any = cls() if default is None else default
-    now = renamed(cls, data)
-    current = {now.get(name, name): value for name, value in data.items()}
-    for parameter in describe(cls):
-        with suppress(*_WRONG):
-            values = replace(values, **{parameter.name: parameter.parse(current[parameter.name])})
-    return values
-
-
-def _look(data: Mapping[str, Any]) -> Look:
-    look = declared(Look, {name: value for name, value in data.items() if name not in _OF_ONE_SCAN})
-    return look if look.color_by in COLOR_BY else replace(look, color_by="auto")  # a scalar of one scan
-
-
-def _params(data: Mapping[str, Any]) -> dict[str, Any]:
-    read = {}
-    for name, values in data.items():
-        with suppress(*_WRONG):
-            read[name] = declared(backend(name).module.Params, values)
-    return read
-
-
-def _theme(data: Any) -> str:
-    if data not in theme.PALETTES:
-        raise InputError("there is no such theme")
-    return str(data)
-
-
-def _window(data: Any) -> Place:
-    numbers = [data[name] for name in ("left", "top", "width", "height")]
-    if not all(type(number) is int and abs(number) < 2**15 for number in numbers):
-        raise InputError("is no place of a window")
-    left, top, width, height = numbers
-    return Place(left, top, width, height, data.get("maximised") is True)
-
-
-def _text_scale(data: Any) -> float:
-    if data not in theme.TEXT_SCALES:
-        raise InputError("there is no such size of text")
-    return float(data)
-
-
-def _turn_seconds(data: Any) -> float:
-    if data not in turntable.SECONDS:
-        raise InputError("there is no such time for a turn")
-    return float(data)
-
-
-def _text(data: Any) -> str:
-    if not isinstance(data, str) or not data or "\0" in data:
-        raise InputError("is no text")
-    os.fsencode(data)  # else it cannot be shown, nor be a path
-    return data
-
-
-def _recent(data: Any) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_text(name) for name in data))[:MOST_RECENT]
+def _of_any_scan(look: Look) -> Look:
+    """The look without what only one scan can use: its up axis, range of values and scalars."""
+    default = Look()
+    color_by = look.color_by if look.color_by in COLOR_BY else default.color_by
+    return replace(look, color_by=color_by, up=default.up, low=default.low, high=default.high)
 
 
 def _places(data: Any, document: Document) -> dict[str, SavedSession]:
     """How earlier versions left each scan. document: of one that was never open."""
-    places = {}
-    for name, left in data.items() if isinstance(data, dict) else ():
-        with suppress(*_WRONG):
-            fields = _usable(left, _OF_A_SCAN)
-            index = fields.pop("index", 0)
-            places[_text(name)] = SavedSession(name, None, index, replace(document, **fields))
-    return places
 
+    def read(name: str, left: Any) -> SavedSession:
+        never_open = SavedSession(structured(ScanName, name), None, 0, document)
+        values = structured(Values, left)
+        return usable(never_open, {"pose": values.get("index"), "document": values})
 
-def _tools(data: Any) -> dict[str, dict[str, Any]]:
-    """Settings of tools as the file has them: each tool reads its own."""
-    return {_text(name): values for name, values in data.items() if isinstance(values, dict)}
-
-
-_READERS: dict[str, Callable[[Any], Any]] = {
-    "window": _window,
-    "theme": _theme,
-    "text_scale": _text_scale,
-    "backend": lambda data: backend(data).name,
-    "params": _params,
-    "look": _look,
-    "pace": lambda data: declared(Pace, data),
-    "marks": lambda data: declared(Marks, data, legend.SHOWN_FIRST),
-    "cube": lambda data: data is not False,
-    "turn_seconds": _turn_seconds,
-    "export": lambda data: declared(Choices, data),
-    "export_marks": lambda data: declared(Marks, data),
-    "recent": _recent,
-    "tools": _tools,
-}
-_OF_A_SCAN: dict[str, Callable[[Any], Any]] = {
-    "index": partial(structured, PoseNumber),
-    "camera": Camera.from_json,
-    "unit": partial(structured, Unit),
-    "bookmarks": partial(structured, tuple[Bookmark, ...]),
-}
+    return _by_name(data, read)

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from ..analysis.pick import before_gap, pick
+from ..document.schema import usable
 from ..errors import InputError
 from ..task import Cancelled, Task
 from . import failures, tools
@@ -18,7 +19,7 @@ from .playing.playback import Playback
 from .scene.canvas import Canvas, ViewPlace
 from .scene.viewport import Viewport
 from .session import Session
-from .settings import chosen, declared
+from .settings import chosen
 from .ui import Ui
 
 _BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
@@ -73,7 +74,7 @@ class Toolbox:
         module = importlib.import_module(f"{tools.__name__}.{name}")
         slot.title = module.TITLE
         if hasattr(module, "Settings"):
-            slot.desk.settings = declared(module.Settings, self._remembered.get(name, {}))
+            slot.desk.settings = usable(module.Settings(), self._remembered.get(name, {}))
         for menu, entries in getattr(module, "COMMANDS", {}).items():
             commands.add(menu, [self._bound(slot, entry) for entry in entries])
         commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))

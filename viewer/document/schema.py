@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from contextlib import suppress
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -21,7 +22,7 @@ from ..camera import Camera
 from ..errors import InputError, explained, shortened, unknown_name
 from ..files import parsed_json, read_text
 from ..output.export import read_description
-from ..params import parse
+from ..params import describe, parse, renamed
 from ..scan.units import checked_unit
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ _DEEPEST = 40  # levels of what is kept unread
 
 @dataclass(frozen=True)
 class Kind:
-    """What values of a type are, in words, and which of them fit."""
+    """Rule for the values of a type: what they are, in words, and which of them fit."""
 
     words: str
     fits: Callable[[Any], bool]
@@ -60,7 +61,7 @@ def _is_unit(value: str) -> bool:
 
 
 def _is_name(value: str) -> bool:
-    """Of a file: whatever the system takes for one."""
+    """Whether the system takes it for the name of a file."""
     try:
         return value != "" and b"\0" not in os.fsencode(value)
     except UnicodeEncodeError:
@@ -84,6 +85,7 @@ Count = Annotated[int, Kind("a whole number", lambda value: 0 <= value < 2**31)]
 PoseNumber = Annotated[int, Kind("the number of a pose", lambda value: 0 <= value < 2**31)]
 Time = Annotated[float, Kind("a time in seconds", lambda value: abs(value) <= _LATEST)]
 Stamp = Annotated[float, Kind("a time within a day, in seconds", _is_stamp)]
+Values = Annotated[Any, Kind("values by name", is_object)]
 
 
 def _known_backend(value: Any) -> str:
@@ -118,6 +120,36 @@ def structured(kind: type[T], data: Any, where: object = None) -> T:
         return _converter().structure(data, kind)
     except (BaseValidationError, InputError, _Unfit) as error:
         raise _in_words(error, where) from None
+
+
+def usable(default: T, data: Any) -> T:
+    """A dataclass with those values of plain JSON data that can be used; `default` has the others.
+
+    Each value is read by itself, also those of dataclasses within. Nothing is raised.
+    """
+    values: Any = default
+    if not is_object(data):
+        return values
+    kind = type(default)
+    given = renamed(kind, data) if _is_declaration(kind) else data
+    for name, read in _readers(default).items():
+        if name in given:
+            with suppress(InputError, RecursionError):
+                values = replace(values, **{name: read(given[name])})
+    return values
+
+
+def _readers(default: Any) -> dict[str, Callable[[Any], Any]]:
+    """Readers of a dataclass's fields: as a parameter, value by value, or whole."""
+    kind = type(default)
+    if _is_declaration(kind):
+        return {parameter.name: parameter.parse for parameter in describe(kind)}
+    hints = get_type_hints(kind, include_extras=True)
+    now = {field.name: getattr(default, field.name) for field in fields(kind)}
+    return {
+        name: partial(usable, value) if is_dataclass(value) else partial(structured, hints[name])
+        for name, value in now.items()
+    }
 
 
 def plain(value: Any) -> Any:
@@ -320,7 +352,7 @@ def _first(error: BaseException) -> tuple[str, BaseException]:
 
 
 def _steps(error: BaseException) -> Iterator[str]:
-    """From a value to the one within it that is wrong."""
+    """Steps from a value to the one within it that is wrong."""
     for note in getattr(error, "__notes__", ()):
         if hasattr(note, "name"):
             yield f".{note.name}"
