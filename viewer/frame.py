@@ -27,7 +27,7 @@ _BUDGET_MS = 15.0  # of a frame for what a backend can go on with in the next
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a picture shows. backend: a name, or one that is not in the folder of backends; None
+    """Order for a picture. backend: a name, or one that is not in the folder of backends; None
     for the default of the scan (see `choose`).
 
     params: the backend's own `Params`; None for its defaults. layers: over the pose.
@@ -110,7 +110,7 @@ def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int]) -> 
 
 
 def fallback(request: Request) -> Request:
-    """The same in plain points, of which nothing is prepared: drawn while the other is."""
+    """Request for plain points, of which nothing is prepared: drawn while the other picture is."""
     return replace(
         request, backend=FALLBACK, params=find_backend(FALLBACK).params(), look=_unlit(request.look)
     )

@@ -30,13 +30,13 @@ _PATIENCE = 0.05  # seconds: a picture late is better than one of points among o
 
 @dataclass
 class Prepared:
-    """What a backend derived for a pose; None where it derives nothing."""
+    """Result of a backend's derive function for a pose; None where it derives nothing."""
 
     derived: Derived | None
 
 
 class DerivedKey(NamedTuple):
-    """What derived data depend on. what: the backend and its parameters. view: None where on no camera."""
+    """Key of derived data. what: the backend and its parameters. view: None where on no camera."""
 
     what: tuple[Any, ...]
     view: tuple[object, ...] | None
@@ -44,7 +44,7 @@ class DerivedKey(NamedTuple):
 
 @dataclass
 class _Job:
-    """What is being prepared on the worker: (result, milliseconds)."""
+    """Job that the worker prepares: (result, milliseconds)."""
 
     task: Task
     future: Future[tuple[Any, float]]
@@ -80,7 +80,7 @@ class _Resident:
 
     @property
     def held_bytes(self) -> int:
-        """The same, and the estimates that it keeps on the CPU."""
+        """Bytes on the GPU, and of the estimates that it keeps on the CPU."""
         return self.nbytes + self.gpu_pose.cloud.nbytes - self.gpu_pose.stored.nbytes
 
     @property
@@ -182,7 +182,7 @@ class Renderer:
 
     @property
     def preparing(self) -> Task | None:
-        """What is being prepared without anybody waiting for it, None where nothing is."""
+        """Task that is being prepared without anybody waiting for it, None where nothing is."""
         jobs = [job for entry in self._resident.values() for job in entry.jobs.values()]
         return next((job.task for job in jobs if not job.task.cancelled and not job.future.done()), None)
 
@@ -199,7 +199,7 @@ class Renderer:
         wait: bool,
         on_thread: bool = False,
     ) -> Any:
-        """What the function returns; None while the worker is at it. on_thread: rather than by the helper."""
+        """Result of the function; None while the worker is at it. on_thread: rather than by the helper."""
         job = entry.jobs.get(key)
         if job is not None and job.task.cancelled:
             job = None
@@ -250,7 +250,7 @@ def _missing(pose: Pose, backend: Backend, params: Any, look: Look) -> tuple[str
 
 
 def _bare(pose: Pose) -> Pose:
-    """What estimates look at, which may have to go to another process."""
+    """The pose with all that estimates look at and nothing more, as it may have to go to another process."""
     cloud = PointCloud(pose.cloud.positions, pose.cloud.origin, ids=pose.cloud.ids)
     views = tuple(replace(view, color=None, confidence=None) for view in pose.views)
     return replace(pose, cloud=cloud, views=views)
@@ -268,6 +268,6 @@ def _release(prepared: Prepared) -> None:
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What it returns, and the milliseconds that it took."""
+    """Do the work: its result, and the milliseconds that it took."""
     start = time.perf_counter()
     return work(), (time.perf_counter() - start) * 1e3

@@ -75,7 +75,7 @@ class Measurement:
 
     @property
     def ends(self) -> tuple[End, End]:
-        """Both."""
+        """The two ends, first and second."""
         return self.first, self.second
 
     @property
@@ -85,7 +85,7 @@ class Measurement:
 
     @property
     def uncertainty(self) -> float | None:
-        """Of the distance, scan units; None where an end's is unknown.
+        """Uncertainty of the distance, scan units; None where an end's is unknown.
 
         Nothing is known between two points, so each end stands for the place that was meant up to the
         spacing there, in any direction. To first order, only what lies along the line changes the
@@ -109,7 +109,7 @@ class Reading:
 
     @property
     def motion(self) -> str:
-        """What it does in time, in words."""
+        """Movement and growth in time, in words."""
         return "fixed in space" if self.fixed else "follows points"
 
 

@@ -20,7 +20,7 @@ _WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
 
 @dataclass(frozen=True, eq=False)
 class Picked:
-    """What a pixel shows: a place on the surface, and the point of the scan that gave it.
+    """Content of a pixel: a place on the surface, and the point of the scan that gave it.
 
     position: (3,) float64, scan units: the surface at the pixel's centre. Places and normals are the world's,
     into which the layers of the picture may have moved the scan.
@@ -57,7 +57,7 @@ class Picked:
 
 
 def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | None:
-    """What pixel (x, y) shows, row 0 at the top; None where it shows nothing or is none of the picture.
+    """Pick what pixel (x, y) shows, row 0 at the top; None where it shows nothing or is none of the picture.
 
     Reads one pixel from the GPU. spacing: whether to find the spacing too, which looks at
     every point of the cloud (see `spacing_at`).

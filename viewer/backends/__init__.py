@@ -62,7 +62,7 @@ class Suited(NamedTuple):
 
 @dataclass(frozen=True)
 class Limit:
-    """What cannot be held in principle of a row of the stability suite, and what is held instead.
+    """Looser bound of a row of the stability suite whose own cannot be held in principle.
 
     pixels: the share of the pixels that may be apart by more than the suite's coarse steps. reason: why
     finer ones cannot be held.
@@ -73,7 +73,7 @@ class Limit:
 
 
 class Derived(Protocol):
-    """What a backend prepared for a pose and put on the GPU."""
+    """Data that a backend prepared for a pose and put on the GPU."""
 
     nbytes: int
 
@@ -83,7 +83,7 @@ class Derived(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FrameView:
-    """What a backend is asked to draw: a view, its own parameters, and what it derived.
+    """Order for a frame, as a backend gets it: a view, its own parameters, and what it derived.
 
     share: of the points that need to be drawn, less than 1 while the picture moves and all would
     take too long. A backend that leaves some out says that a later call would refine the picture,
@@ -114,7 +114,7 @@ class Backend:
 
     @property
     def title(self) -> str:
-        """Its name in the panel."""
+        """The name in the panel."""
         return self.module.TITLE
 
     @property
@@ -124,12 +124,12 @@ class Backend:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Its parameters as declared."""
+        """The parameters as declared."""
         return describe(self.module.Params)
 
     @property
     def rows(self) -> str:
-        """What a row of its pictures stands for: one of `ROWS`."""
+        """Meaning of a row of the backend's pictures: one of `ROWS`."""
         return getattr(self.module, "ROWS", "points")
 
     @property
@@ -148,15 +148,15 @@ class Backend:
 
     @property
     def limits(self) -> Mapping[str, Limit]:
-        """What it cannot hold of the stability suite, by the suite's rows."""
+        """Limits of the backend in the stability suite, by the suite's rows."""
         return getattr(self.module, "LIMITS", {})
 
     def params(self, values: Mapping[str, object] | None = None) -> Any:
-        """Its parameters, with these values in place of defaults; raises InputError."""
+        """Make its parameters, with these values in place of defaults; raises InputError."""
         return parse(self.module.Params, values or {}, f"parameter of '{self.name}'")
 
     def needs(self, pose: Pose, params: Any) -> tuple[str, ...]:
-        """What it needs of this pose: "normals", "radii", "views"."""
+        """Names of what it needs of this pose: "normals", "radii", "views"."""
         return self.module.needs(pose, params)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
@@ -165,7 +165,7 @@ class Backend:
 
     @property
     def derive(self) -> Callable[..., Any] | None:
-        """Its derive function, None where it prepares nothing."""
+        """The backend's derive function, None where it prepares nothing."""
         return getattr(self.module, "derive", None)
 
     @property

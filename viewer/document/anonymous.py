@@ -26,7 +26,7 @@ _DECIMALS = 6  # of seconds
 
 
 def anonymous_request(request: Request, start: float) -> Request:
-    """The same picture of a pose that stands about the origin of its coordinates.
+    """Request for the same picture of a pose that stands about the origin of its coordinates.
 
     Times count from the scan's first frame, which is at `start` seconds, heights from the middle of the
     pose, and a scalar is told by its number.

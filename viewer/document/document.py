@@ -50,7 +50,7 @@ def _read_known(data: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Document:
-    """What a user has chosen and made for a scan.
+    """Everything that a user has chosen and made for a scan.
 
     camera: None until a first pose is there to fit it to. pivot: what orbiting turns about, scan units;
     None: the camera's target. It is not made the target, as that would shift or turn the picture; the
@@ -74,7 +74,7 @@ class Document:
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
 
     def part(self, kind: type[P]) -> P:
-        """What a tool keeps, its defaults where it has kept nothing yet.
+        """The part that a tool keeps, its defaults where it has kept nothing yet.
 
         Raises InputError where the tool was not there when a file was read, and what that said is wrong.
         """

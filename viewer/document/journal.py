@@ -28,7 +28,7 @@ _MOST_BYTES = 256 * 2**20
 
 
 class Journal:
-    """Of one recording, from its first entry to `remove`. Raises OSError where it cannot be written."""
+    """Journal of a recording, from its first entry to `remove`. Raises OSError where it cannot be written."""
 
     def __init__(self, folder: Path) -> None:
         """folder: where the recording is to go, which names of scans start from."""
@@ -144,7 +144,7 @@ def written(recording: Recording, folder: Path) -> Path:
 
 
 def _places(folder: Path) -> Iterator[Path]:
-    """Where a recording may go, the best first."""
+    """Folders where a recording may go, the best first."""
     import platformdirs
 
     yield folder
@@ -153,7 +153,7 @@ def _places(folder: Path) -> Iterator[Path]:
 
 
 def _from_root(recording: Recording, folder: Path) -> Recording:
-    """The same for another folder: its scans are named from the root."""
+    """The recording for another folder: its scans are named from the root."""
 
     def named(scan: str | None) -> str | None:
         return scan if scan in (None, DEMO) else os.path.join(folder, scan or "")
@@ -177,7 +177,7 @@ def _delete(journal: Path) -> None:
 
 
 def journal_folder() -> Path:
-    """Where journals are kept for this user; it need not be there yet."""
+    """The folder of this user's journals; it need not be there yet."""
     import platformdirs
 
     return platformdirs.user_state_path("scan4d", appauthor=False) / "recordings"

@@ -15,7 +15,7 @@ class Measurements(Part, name="measurements"):
     all: tuple[Measurement, ...] = ()
 
     def added(self, measurement: Measurement) -> Measurements:
-        """These and one more at the end."""
+        """The measurements and one more at the end."""
         return Measurements((*self.all, measurement))
 
     def without(self, number: int) -> Measurements:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 
 class Part:
-    """What one tool keeps in a document.
+    """Part of a document: all that one tool keeps in it.
 
     A subclass is a frozen dataclass whose fields all have defaults, declared with the name that files know it
     by; declaring it is all there is to do:

@@ -110,7 +110,7 @@ class Entry:
         return Request(pose, self.camera, self.backend, self.params, self.look)
 
     def legend(self, timeline: Timeline) -> Legend:
-        """What the marks say. timeline: the scan's."""
+        """Texts of the marks. timeline: the scan's."""
         unit = timeline.unit if self.unit is None else self.unit
         return Legend(self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time)
 
@@ -132,7 +132,7 @@ class Entry:
         return replace(entry, params=params)
 
     def without_names(self) -> Entry:
-        """What an anonymous picture tells, of a scan that is as `anonymous_request` has it."""
+        """The entry as an anonymous picture tells it, of a scan that is as `anonymous_request` has it."""
         unit = None if self.unit is None else anonymous_unit(self.unit)
         return replace(self, scan=None, unit=unit, anonymous=True)
 
@@ -143,7 +143,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Recording:
-    """What was shown, in the order of time. entries: at least one. seconds: how long it took."""
+    """Pictures that were shown, in the order of time. entries: at least one. seconds: how long it took."""
 
     entries: tuple[Entry, ...]
     seconds: float = 0.0
@@ -182,7 +182,7 @@ class Recording:
         return cls(read, max(seconds, read[-1].at))
 
     def paced(self, fps: float) -> list[Entry]:
-        """What a film shows: picture k, at k / fps seconds, is the entry that was shown then.
+        """Entries that a film shows: picture k, at k / fps seconds, is the entry that was shown then.
 
         An entry that was gone before the next picture of the film is left out; the last one is always in it.
         """
@@ -276,12 +276,12 @@ def is_recording(path: Path) -> bool:
 
 
 def places_of(scan: str, recording: Path) -> list[str]:
-    """Where a scan may be that a recording names: beside the recording, then as it is named."""
+    """Places of a scan that a recording names: beside the recording, then as it is named."""
     return [DEMO] if scan == DEMO else list(dict.fromkeys([str(recording.parent / scan), scan]))
 
 
 def places_to_open(scan: str, recording: Path) -> list[str]:
-    """The same places, to open what is there.
+    """Places of a scan that a recording names, checked before anything there is opened.
 
     Raises InputError where that would search through folders for whoever wrote the recording.
     """

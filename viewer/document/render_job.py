@@ -30,7 +30,7 @@ _NICE = 5  # what waits for a person goes first
 
 @dataclass(frozen=True)
 class Made:
-    """What came of it. files: in order of their names. device: that drew. warnings: what was left out."""
+    """Result of a job. files: in order of their names. device: that drew. warnings: what was left out."""
 
     files: tuple[Path, ...]
     device: str

@@ -93,7 +93,7 @@ def _named_from(folder: Path, scan: str) -> str:
 
 
 def kept_file(scan: str) -> Path:
-    """Where the document of a scan is kept. scan: its path from the root, or "demo"."""
+    """File of a scan's document. scan: its path from the root, or "demo"."""
     digest = hashlib.sha256(os.fsencode(scan)).hexdigest()[:32]
     return user_folder() / "scans" / f"{digest}.json"
 
@@ -111,7 +111,7 @@ def keep(session: SavedSession) -> None:
 
 
 def kept(scan: str) -> SavedSession | None:
-    """What is kept of a scan; None where there is nothing. scan: its path from the root, or "demo".
+    """Read what is kept of a scan; None where there is nothing. scan: its path from the root, or "demo".
 
     Raises InputError where that is damaged: it is put aside.
     """

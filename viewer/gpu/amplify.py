@@ -44,7 +44,7 @@ _ATTRIBUTES = (
 
 @dataclass(frozen=True)
 class Shape:
-    """What points become. file: shader with `begin_shape` and `corner`. corners: of its triangle strip."""
+    """Shape of a point. file: shader with `begin_shape` and `corner`. corners: of its triangle strip."""
 
     file: str
     corners: int
@@ -84,7 +84,7 @@ class Points:
 
     @property
     def attributes(self) -> Attributes:
-        """What is read of each: (name of the pose's array, of the vertex attribute, floats)."""
+        """Attributes that are read of each: (name of the pose's array, of the vertex attribute, floats)."""
         return _ATTRIBUTES[: 4 if self.use_axes else 3 if self.use_radii else 2]
 
     @property
@@ -94,7 +94,7 @@ class Points:
 
     @property
     def defines(self) -> dict[str, object]:
-        """For shaders that include amplify/attributes.glsl or amplify/texels.glsl."""
+        """Macros for shaders that include amplify/attributes.glsl or amplify/texels.glsl."""
         return {
             "HAS_RADIUS": int(self.use_radii),
             "HAS_AXES": int(self.use_axes),
@@ -185,7 +185,7 @@ def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: 
 def _attributes(
     program: moderngl.Program, points: Points, advance: str
 ) -> list[tuple[moderngl.Buffer, str, str]]:
-    """What a vertex array is made of. advance: "/i" for the next value with each instance."""
+    """Contents of a vertex array. advance: "/i" for the next value with each instance."""
     return [
         (points.array(name).buffer, f"{floats}f{advance}", attribute)
         for name, attribute, floats in points.attributes

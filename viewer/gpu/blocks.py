@@ -56,11 +56,11 @@ class Block:
 
     @property
     def name(self) -> str:
-        """Where the dataclass stands."""
+        """Module and name of the dataclass."""
         return f"{self.declaration.__module__}.{self.declaration.__qualname__}"
 
     def glsl(self, name: str) -> str:
-        """What shaders include. name: one of `UniformBlock`, in lower case."""
+        """GLSL that shaders include. name: one of `UniformBlock`, in lower case."""
         lines = [f"layout(std140, binding = {UniformBlock[name.upper()]}) uniform {name.title()} {{"]
         lines += [f"    {m.kind} {m.name};{m.help and f'  // {m.help}'}" for m in self.members]
         return "\n".join([*lines, "};"])

@@ -39,7 +39,7 @@ class Resource(Protocol):
 
 @dataclass
 class Attempts:
-    """What was tried to get a context: (how, what came of it)."""
+    """Attempts to get a context: (how, what came of it)."""
 
     log: list[tuple[str, str]] = field(default_factory=list)
 
@@ -139,7 +139,7 @@ class Gpu:
         return program
 
     def keep(self, key: object, make: Callable[[], T]) -> T:
-        """What `make` returned the first time for this key: small things that live as long as this."""
+        """Return what `make` returned the first time for this key: small things that live as long as this."""
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
@@ -243,7 +243,7 @@ def obstacle() -> str | None:
 
 
 def _too_old(settings: Mapping[str, Any]) -> NoOpenGLError | None:
-    """What keeps an older OpenGL than the one that is needed from being enough, where there is one."""
+    """Error of an older OpenGL than the one that is needed, where there is one."""
     with suppress(Exception):
         ctx = moderngl.create_context(standalone=True, require=_OLDEST_VERSION, **settings)
         try:

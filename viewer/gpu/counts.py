@@ -17,7 +17,7 @@ _CHUNK = 1 << 20  # points counted at a time
 def count_points(
     cloud: PointCloud, view: View, rows: NDArray[np.uint32], share: float, faces_away: bool = False
 ) -> dict[str, int]:
-    """What became of the points of the file: "in", and of these "drawn" (they have a pixel),
+    """Count what became of the points of the file: "in", and of these "drawn" (they have a pixel),
     "dropped" (not finite), "preview" (not in the share that was drawn from; only where that is not
     all), "outside" (the centre is not in the picture or not between near and far), "away" (they face
     away from the eye; only where such points were left out) and "hidden" (the rest).

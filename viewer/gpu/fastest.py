@@ -63,7 +63,7 @@ def choose(
     names: Sequence[str],
     ways: Callable[[GpuPose, Surface], Mapping[str, Callable[[], object]]],
 ) -> str:
-    """What a parameter `instancing` says. Where it is "auto", and told in the statistics: `on_software` on
+    """Resolve a parameter `instancing`. Where it is "auto", and told in the statistics: `on_software` on
     software drivers, on others what is the `fastest` of the ways, which are made for a trial."""
     if setting != "auto":
         return setting
@@ -90,7 +90,7 @@ def _trial(gpu: Gpu) -> tuple[GpuPose, Surface]:
 
 
 def _read(file: Path) -> dict[str, str]:
-    """What is remembered; empty where the file is not there or is damaged."""
+    """Names that are remembered; empty where the file is not there or is damaged."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -82,7 +82,7 @@ class GpuPose:
         return self._arrays[name]
 
     def find(self, name: str) -> gl.BufferTexture | None:
-        """The same; None where the scan has no such attribute and none was estimated."""
+        """The attribute on the GPU; None where the scan has none such and none was estimated."""
         return None if getattr(self.cloud, name) is None else self.array(name)
 
     def image(self, view: int, name: str) -> moderngl.Texture:

@@ -28,7 +28,7 @@ _FORMATS = {1: gl.R32F, 2: gl.RG32F, 3: gl.RGB32F, 4: gl.RGBA32F}
 
 @dataclass(frozen=True)
 class Filter:
-    """What one sample of a level has to do with those of the next finer one, along either axis.
+    """Relation of one sample of a level to those of the next finer one, along either axis.
 
     Coarse sample i is the mean of the fine samples 2 i + first and those that follow, weighted by taps. Fine
     sample j is the mean of the coarse samples that it is part of, weighted by the same taps. With an even

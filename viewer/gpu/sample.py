@@ -13,7 +13,7 @@ _CHUNK = 1 << 20  # rows looked at at a time
 
 
 def is_sampled(rows: NDArray[np.uint32], share: float) -> NDArray[np.bool_]:
-    """Which rows, (N,), a sample of this share takes, (N,).
+    """Whether a sample of this share takes each of the rows, (N,): (N,).
 
     All rows there can be stand in one shuffled order, and a sample is its beginning: a larger
     share takes what a smaller one takes, and a row's lot depends on nothing but its number.

@@ -22,7 +22,7 @@ _LARGEST_SUM = 2**31 - 1
 
 @dataclass(frozen=True)
 class Visits:
-    """Which cells items go to, of which there may be any number: pixels, tiles, sectors, ...
+    """Visits of items to cells, of which there may be any number: pixels, tiles, sectors, ...
 
     cells: the shader file that says so; its `scatter(i)` calls `visit(cell, key, item)` for each cell that
     the i-th of `count` items goes to. bind: sets what that file reads. defines: its macros. params: what it
@@ -100,7 +100,7 @@ class FixedPoint:
 
     @property
     def defines(self) -> dict[str, object]:
-        """What scatter/sums.glsl is told."""
+        """Macros of scatter/sums.glsl."""
         limits, steps = (", ".join(map(str, map(np.float32, each))) for each in (self.limits, self.steps))
         return {
             "CHANNELS": f"{len(self.limits)}u",

@@ -26,7 +26,7 @@ _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
 
 @dataclass(frozen=True)
 class _Shading:
-    """What shade.comp is told of a look.
+    """Values of a look as shade.comp gets them.
 
     plain, background: sRGB and alpha. height_axis: up, along the pose's axes. to_world: turns these. light:
     towards it, view space. phong: ambient, diffuse, specular, shininess. value_range: of the colour map,
@@ -131,7 +131,7 @@ def _fractions(color: str) -> Vec4:
 
 
 def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
-    """What the backend wrote for each pixel, else the pose's, for each row."""
+    """Values that the backend wrote for each pixel, else the pose's, for each row."""
     return surface.own(name) if surface.is_own(name) else surface.pose.array(f"{name}s")
 
 
@@ -155,6 +155,6 @@ def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:
 
 
 def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
-    """To the fixed light, view space: azimuth 0 and elevation 0 is where the eye is."""
+    """Direction to the fixed light, view space: azimuth 0 and elevation 0 is where the eye is."""
     a, e = math.radians(azimuth), math.radians(elevation)
     return math.cos(e) * math.sin(a), math.sin(e), math.cos(e) * math.cos(a)

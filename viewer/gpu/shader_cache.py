@@ -21,7 +21,7 @@ _ROOM = 4 * 2**20  # bytes: 1.3 MB for the index, and some for shaders
 
 @cache
 def shader_cache() -> str | None:
-    """Where shaders are kept, or why they are not; None where the system has no Mesa.
+    """Tell where shaders are kept, or why they are not; None where the system has no Mesa.
 
     To be called before a context is made: it switches the cache off for this process where its folder cannot
     be written or has no room.
@@ -48,7 +48,7 @@ def _cache_folder() -> Path:
 
 
 def _home() -> Path:
-    """As the system knows it, whatever HOME says."""
+    """The user's home folder as the system knows it, whatever HOME says."""
     import pwd
 
     try:

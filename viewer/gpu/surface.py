@@ -36,7 +36,7 @@ _RESOLVED = {"color": 0, "normal": 1, "value": 2}  # as shade/resolve.comp numbe
 
 @dataclass
 class Stats:
-    """What a frame took. Times in milliseconds.
+    """Statistics of a frame. Times in milliseconds.
 
     backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose,
     estimates included. passes: (name, gpu_ms), empty while timers are off.
@@ -60,7 +60,7 @@ class Stats:
 
 
 class Workspace(Resource, Protocol):
-    """What a backend keeps with a surface."""
+    """Things that a backend keeps with a surface."""
 
     @property
     def nbytes(self) -> int:
@@ -265,13 +265,13 @@ class Surface:
 
     @property
     def value_source(self) -> str | None:
-        """What the look colours by where that is a number ("depth", "height", a scalar's name), else None."""
+        """Source of the number that the look colours by ("depth", "height", a scalar's name), else None."""
         return value_source(self.look, self.layers.names(self._cloud.scalars))
 
     @property
     def value_zero(self) -> float:
-        """What values on the GPU are relative to. It is taken off in float64, so that heights and times far
-        from zero keep their steps."""
+        """Zero that values on the GPU are relative to. It is taken off in float64, so that heights and times
+        far from zero keep their steps."""
         source = self.value_source
         if source == "height":
             return float(self.layers.place.points(self._cloud.origin) @ up_vector(self.look.up))
@@ -451,7 +451,7 @@ class Surface:
         return {name: getattr(self, name) for name in names}
 
     def point_counts(self) -> dict[str, int]:
-        """What became of the points of the file; see `count_points`."""
+        """Counts of what became of the points of the file; see `count_points`."""
         return count_points(self._cloud, self.view, self.row, self.stats.share, self.stats.faces_away)
 
     def release(self) -> None:
@@ -480,7 +480,7 @@ class Surface:
         return out.view(dtype).reshape(self.size[1], -1)
 
     def _read_texels(self, name: str, dtype: type) -> NDArray:
-        """What the backend wrote for each pixel, (H, W, channels)."""
+        """Read what the backend wrote for each pixel, (H, W, channels)."""
         return self._read(self._own[name].buffer, dtype).reshape(*self.size[::-1], -1)
 
     @property
@@ -489,7 +489,7 @@ class Surface:
         return np.isfinite(self.depth)
 
     def _fetch(self, values: NDArray | None, unknown: NDArray | np.generic) -> NDArray:
-        """What each pixel's row has of values (N, ...); `unknown` where there is no row, or None have any."""
+        """Values (N, ...) of each pixel's row; `unknown` where there is no row, or None have any."""
         rows = self.row
         out = np.full((*rows.shape, *unknown.shape), unknown)
         if values is not None:

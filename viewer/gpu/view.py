@@ -27,7 +27,7 @@ class ViewBlock:
 
     @classmethod
     def of(cls, view: View) -> ViewBlock:
-        """What shaders see of a view."""
+        """The block of a view."""
         x, y, z = view.rotation.T.tolist()
         return cls(
             world_to_view=(

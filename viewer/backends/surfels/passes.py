@@ -99,7 +99,7 @@ def splat_over(points: Points, surface: Surface, feed: str, splats: Splats, test
 
 
 def _farthest_first(points: Points, surface: Surface) -> Points:
-    """The same points from back to front, by their centres: sorted on the CPU, for each picture."""
+    """Points from back to front, by their centres: sorted on the CPU, for each picture."""
     rows = np.arange(len(points.pose.cloud), dtype=np.uint32)
     if points.rows is not None:
         rows = np.frombuffer(points.rows.buffer.read(), np.uint32)[: points.count]
@@ -122,7 +122,7 @@ def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
 
 
 def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
-    """What `two_passes` draws, by tiles; splats that are too large for these are rasterised."""
+    """Draw the picture of `two_passes` by tiles; splats that are too large for these are rasterised."""
     lists = _first_by_tiles(points, surface, splats)
     if lists is None:
         two_passes(points, surface, FALLBACK, splats)
@@ -181,7 +181,7 @@ def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileL
 
 @contextmanager
 def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
-    """What is added up for each pixel, bound, and what its fragment stages read; ends blending."""
+    """Sums of each pixel, bound, and what their fragment stages read; ends blending."""
     gpu = surface.gpu
     sums = surface.keep(_new_sums)
     sums.target.use()
@@ -207,7 +207,7 @@ def _limit(points: Points, surface: Surface, splats: Splats) -> None:
 
 
 def _resolve(points: Points, surface: Surface, over: bool) -> None:
-    """From sums to the surface's own colours and normals."""
+    """Turn sums into the surface's own colours and normals."""
     gpu = surface.gpu
     sums = surface.keep(_new_sums)
     with gpu.timers.measure("resolve"):
@@ -264,7 +264,7 @@ def _pack_looks(cloud: PointCloud) -> NDArray[np.uint32]:
 
 
 def _unit(normals: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Of unit length, (N, 3); zero where one is missing."""
+    """Normals of unit length, (N, 3); zero where one is missing."""
     with np.errstate(all="ignore"):
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         usable = np.isfinite(length) & (length > 0)

@@ -58,7 +58,7 @@ def _box(cloud: PointCloud) -> NDArray[np.float32]:
 
 
 def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
-    """What nine of ten radii do not exceed, going by a sample, and what none does; unknown ones aside."""
+    """Radii that nine of ten do not exceed, going by a sample, and that none does; unknown ones aside."""
     radii = cloud.splat_reach()
     sample = radii[:: max(1, len(radii) // _SAMPLE)]
     known = sample[(sample > 0) & np.isfinite(sample)]

@@ -109,7 +109,7 @@ class TileLists:
         scan_words(self._gpu, "surfels/tiles/work.glsl", self._bins.cells, bind, defines)
 
     def large_points(self, points: Points) -> Points:
-        """Those that are left to the rasteriser."""
+        """The points that are left to the rasteriser."""
         rows = np.frombuffer(self._buffer("large").read(4 * self.large, offset=_LARGE_HEAD), np.uint32)
         self._gpu.discard(self._large_rows)
         # Ascending, so that ties fall to the lowest row.

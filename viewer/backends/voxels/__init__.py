@@ -203,7 +203,7 @@ def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What a view shows. rows: (n,) the first point of each node."""
+    """Nodes that a view shows. rows: (n,) the first point of each node."""
 
     cut: Cut
     pose: GpuPose
@@ -284,7 +284,7 @@ class Voxels:
 
 
 def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
-    """What a cut has to know of a view of a pose with this origin, (3,)."""
+    """The view of a pose with this origin, (3,), as a cut has to know it."""
     eye = origin - view.rotation.T @ view.translation
     return Sight(eye, view.rotation, view.scale, view.size, view.near, view.far, view.perspective)
 
@@ -300,7 +300,7 @@ def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np
 
 
 class _Scalars(Mapping[str, NDArray[np.generic]]):
-    """Of each node, those of its lowest point; looked up when they are asked for."""
+    """Scalars of each node: those of its lowest point, looked up when they are asked for."""
 
     def __init__(self, scalars: Mapping[str, NDArray[np.generic]], rows: NDArray[np.uint32]) -> None:
         self._scalars, self._rows = scalars, rows
