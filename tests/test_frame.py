@@ -14,7 +14,7 @@ from viewer.backends import Backend, FrameView
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.errors import InputError
-from viewer.frame import Request, bring, choose, fallback, is_prepared, render_frame
+from viewer.frame import Request, backend_for, bring, fallback, is_prepared, render_frame
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.look import Look
@@ -47,11 +47,11 @@ def test_render_takes_parameters_by_name_and_explains_wrong_ones() -> None:
 
 
 def test_the_default_follows_what_the_scan_stores() -> None:
-    assert choose(_of(sphere(10)))[0] == "surfels"
-    assert choose(_of(BARE))[0] == "points"
-    assert choose(_of(BARE))[1].point_size == 0
-    assert choose(_of(BARE), "points")[1].point_size == 1
-    assert choose(_of(BARE), None, {"point_size": "3"})[1].point_size == 3
+    assert backend_for(_of(sphere(10)))[0] == "surfels"
+    assert backend_for(_of(BARE))[0] == "points"
+    assert backend_for(_of(BARE))[1].point_size == 0
+    assert backend_for(_of(BARE), "points")[1].point_size == 1
+    assert backend_for(_of(BARE), None, {"point_size": "3"})[1].point_size == 3
     assert viewer.render(sphere(10), size=(8, 8)).stats.backend == "surfels"
     assert viewer.render(BARE, size=(8, 8)).stats.backend == "points"
 

@@ -1,4 +1,4 @@
-"""One name for one thing: classes of the package differ by name, and docstrings say whose they are."""
+"""One name for one thing: public classes and functions differ by name, and docstrings say whose they are."""
 
 from __future__ import annotations
 
@@ -15,6 +15,13 @@ import viewer
 PACKAGE = Path(viewer.__file__).parent
 
 BY_PROTOCOL = {"Params", "Tool", "Settings"}  # each backend, and each tool, declares its own
+
+# Functions that modules of a kind have under one name, or that do the work of one of that name.
+FUNCTIONS_BY_PROTOCOL = {
+    "add_arguments", "run", "draw", "needs", "suits", "check", "frame_count", "read", "read_faces",
+    "read_times", "read_unit", "write", "write_poses", "render",
+}  # fmt: skip
+PAPERS = "bench/papers/"  # whose modules are made alike, each with the same few functions
 
 # A docstring begins with a noun or a verb that names its subject. These begin without one.
 RIDDLES = re.compile(
@@ -46,14 +53,25 @@ def riddles(syntax: ast.Module) -> list[str]:
     return [f"{name}: {text.splitlines()[0]}" for name, text in documented if RIDDLES.match(text)]
 
 
-def test_no_two_public_classes_share_a_name() -> None:
+def shared_names(kind: type[Documented], among: list[tuple[str, ast.Module]]) -> dict[str, list[str]]:
+    """Names that several modules give to a public class or function of their own -> the modules."""
     places = defaultdict(list)
-    for path, syntax in modules():
+    for path, syntax in among:
         for node in syntax.body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            if isinstance(node, kind) and not node.name.startswith("_"):
                 places[node.name].append(path)
-    shared = {name: found for name, found in places.items() if len(found) > 1}
+    return {name: found for name, found in places.items() if len(found) > 1}
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    shared = shared_names(ast.ClassDef, modules())
     assert shared.keys() <= BY_PROTOCOL, shared
+
+
+def test_no_two_public_functions_share_a_name() -> None:
+    others = [(path, syntax) for path, syntax in modules() if not path.startswith(PAPERS)]
+    shared = shared_names(ast.FunctionDef, others)
+    assert shared.keys() <= FUNCTIONS_BY_PROTOCOL, shared
 
 
 @pytest.mark.parametrize(

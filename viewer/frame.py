@@ -28,7 +28,7 @@ _BUDGET_MS = 15.0  # of a frame for what a backend can go on with in the next
 @dataclass(frozen=True, eq=False)
 class Request:
     """Order for a picture. backend: a name, or one that is not in the folder of backends; None
-    for the default of the scan (see `choose`).
+    for the default of the scan (see `backend_for`).
 
     params: the backend's own `Params`; None for its defaults. layers: over the pose.
     """
@@ -125,7 +125,7 @@ def _chosen(request: Request) -> tuple[Backend, Any]:
     if isinstance(request.backend, Backend):
         backend, params = request.backend, request.backend.params()
     else:
-        name, params = choose(request.pose, request.backend)
+        name, params = backend_for(request.pose, request.backend)
         backend = find_backend(name)
     return backend, params if request.params is None else request.params
 
@@ -136,7 +136,7 @@ def _unlit(look: Look) -> Look:
     return replace(look, light="auto", color_by=color_by)
 
 
-def choose(
+def backend_for(
     pose: Pose, name: str | None = None, values: Mapping[str, object] | None = None
 ) -> tuple[str, Any]:
     """(backend name, its parameters) for a scan: what the user named, the rest by default.
@@ -165,7 +165,7 @@ def render(
         pose = Pose(0, 0.0, "points", pose)
     renderer, layers = shared_renderer(), layers or NO_LAYERS
     resident = renderer.resident(pose)
-    name, chosen = choose(pose, backend, params)
+    name, chosen = backend_for(pose, backend, params)
     request = Request(
         pose=pose,
         camera=camera or Camera.orbit(layers.place.bounds(resident.bounds), aspect=size[0] / size[1]),

@@ -18,9 +18,9 @@ from viewer.analysis.measure import (
     COLUMNS,
     End,
     Measurement,
-    in_words,
-    read,
-    save,
+    distance_in_words,
+    reading_of,
+    save_table,
     table,
     to_text,
 )
@@ -145,7 +145,7 @@ def test_the_uncertainty_is_what_ends_that_err_give() -> None:
     ],
 )
 def test_digits_follow_the_uncertainty(distance: float, uncertainty: float | None, text: str) -> None:
-    assert in_words(distance, uncertainty, "mm") == text
+    assert distance_in_words(distance, uncertainty, "mm") == text
 
 
 # --- through time ---------------------------------------------------------------------------
@@ -166,17 +166,17 @@ def measured(pose: Pose, *ids: int) -> Measurement:
 
 def test_it_follows_its_points_where_the_scan_has_one_topology() -> None:
     made = measured(moved(0), 0, 2)
-    reading = read(made, moved(4), True)
+    reading = reading_of(made, moved(4), True)
     assert (reading.fixed, reading.motion) == (None, "follows points")
     assert reading.measurement == measured(moved(4), 0, 2)
     assert reading.measurement.distance == 5 * made.distance
-    assert read(reading.measurement, moved(0), True).measurement == made
+    assert reading_of(reading.measurement, moved(0), True).measurement == made
 
 
 @pytest.mark.parametrize("one_topology", [False, None])
 def test_it_stays_in_space_where_the_scan_does_not_tell(one_topology: bool | None) -> None:
     made = measured(moved(0), 0, 2)
-    reading = read(made, moved(4), one_topology)
+    reading = reading_of(made, moved(4), one_topology)
     assert reading.measurement == made
     assert reading.motion == "fixed in space"
     assert "does not tell" in str(reading.fixed)
@@ -184,13 +184,13 @@ def test_it_stays_in_space_where_the_scan_does_not_tell(one_topology: bool | Non
 
 def test_it_stays_in_space_without_points_to_follow() -> None:
     made = measured(moved(0), 0, 1)
-    assert read(made, moved(2), True).fixed is None
-    missing = read(made, moved(3), True)
+    assert reading_of(made, moved(2), True).fixed is None
+    missing = reading_of(made, moved(3), True)
     assert (missing.measurement, missing.fixed) == (made, "point 1 is missing in this frame")
     on_surface = Measurement(made.first, end((1, 2, 3), snapped="surface", id=None))
-    assert "surface" in str(read(on_surface, moved(2), True).fixed)
+    assert "surface" in str(reading_of(on_surface, moved(2), True).fixed)
     between_frames = Measurement(made.first, measured(moved(1), 0, 1).second)
-    assert "two frames" in str(read(between_frames, moved(2), True).fixed)
+    assert "two frames" in str(reading_of(between_frames, moved(2), True).fixed)
 
 
 # --- as a file ------------------------------------------------------------------------------
@@ -199,9 +199,9 @@ def test_it_stays_in_space_without_points_to_follow() -> None:
 def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
     made = measured(moved(2), 0, 3)
     surface = Measurement(end((0.1, 1 / 3, 2), None, snapped="surface", id=None, level=2), made.second)
-    readings = [(1, read(made, moved(2), True)), (2, read(surface, moved(2), True))]
+    readings = [(1, reading_of(made, moved(2), True)), (2, reading_of(surface, moved(2), True))]
     file = tmp_path / "distances.csv"
-    save(file, table(readings, 'the "left", ear', "mm"))
+    save_table(file, table(readings, 'the "left", ear', "mm"))
     assert file.read_bytes().count(b"\r\n") == 3
     with open(file, newline="", encoding="utf-8") as stream:
         first, second = csv.DictReader(stream)
@@ -222,11 +222,11 @@ def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
 
 
 def test_a_table_for_the_clipboard_has_tabs() -> None:
-    text = to_text(table([(1, read(measured(moved(0), 0, 1), moved(0), True))], "scan", "units"), "\t")
+    text = to_text(table([(1, reading_of(measured(moved(0), 0, 1), moved(0), True))], "scan", "units"), "\t")
     assert [len(line.split("\t")) for line in text.splitlines()] == [len(COLUMNS)] * 2
 
 
 def test_a_csv_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
-        save(tmp_path / "no folder" / "a.csv", [["a"]])
+        save_table(tmp_path / "no folder" / "a.csv", [["a"]])
     assert list(tmp_path.iterdir()) == []

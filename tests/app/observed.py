@@ -18,7 +18,7 @@ from typing import Any
 import glfw
 from imgui_bundle import imgui
 
-from viewer.analysis.measure import Measurement, Reading, read
+from viewer.analysis.measure import Measurement, Reading, reading_of
 from viewer.app import run
 from viewer.app.app import App
 from viewer.document.measurements import Measurements
@@ -113,7 +113,7 @@ def shown(app: App) -> dict[str, Any]:
 def told(measurement: Measurement, app: App) -> dict[str, Any]:
     """A measurement as it stands in the frame that is shown."""
     pose, one_topology = app.playback.pose, app.playback.timeline.one_topology
-    reading = read(measurement, pose, one_topology) if pose is not None else Reading(measurement, None)
+    reading = reading_of(measurement, pose, one_topology) if pose is not None else Reading(measurement, None)
     return {
         "ends": [asdict(end) for end in reading.measurement.ends],
         "distance": reading.measurement.distance,

@@ -13,7 +13,7 @@ pytest.importorskip("imgui_bundle")
 from imgui_bundle import imgui
 
 from viewer.app.commands import Command, Commands, Menu
-from viewer.app.keys import Keys, chord, chords, load, write_template
+from viewer.app.keys import Keys, chord, chords, load_keys, write_template
 from viewer.errors import InputError
 
 COMMANDS = Commands()
@@ -28,7 +28,7 @@ def file(tmp_path: Path) -> Path:
 def load_text(file: Path, text: str) -> tuple[dict[str, str], list[str]]:
     file.parent.mkdir(exist_ok=True)
     file.write_text(text)
-    keys, problems = load(file, COMMANDS)
+    keys, problems = load_keys(file, COMMANDS)
     return keys.of, problems
 
 
@@ -61,13 +61,13 @@ def test_what_is_no_key_is_told_with_those_that_are(text: str) -> None:
 
 
 def test_without_a_file_the_usual_keys_hold(file: Path) -> None:
-    keys, problems = load(file, COMMANDS)
+    keys, problems = load_keys(file, COMMANDS)
     assert (keys.of, problems) == (USUAL, [])
 
 
 def test_the_template_changes_nothing_and_each_line_of_it_can_be_used(file: Path) -> None:
     write_template(file, COMMANDS)
-    keys, problems = load(file, COMMANDS)
+    keys, problems = load_keys(file, COMMANDS)
     assert (keys.of, problems) == (USUAL, [])
     head, mark, lines = file.read_text().partition("[keys]\n")
     assert load_text(file, head + mark + lines.replace("# ", "", 1).replace("\n# ", "\n")) == (USUAL, [])
@@ -110,14 +110,14 @@ def test_what_is_wrong_in_a_file_is_told_and_the_rest_of_it_holds(file: Path, te
 def test_a_damaged_file_is_told_and_the_usual_keys_hold(file: Path, content: bytes) -> None:
     file.parent.mkdir()
     file.write_bytes(content)
-    keys, problems = load(file, COMMANDS)
+    keys, problems = load_keys(file, COMMANDS)
     assert len(problems) == 1
     assert keys.of == USUAL
 
 
 def test_a_folder_in_its_place_is_told(file: Path) -> None:
     file.mkdir(parents=True)
-    keys, (problem,) = load(file, COMMANDS)
+    keys, (problem,) = load_keys(file, COMMANDS)
     assert "cannot be read" in problem
     assert keys.of == USUAL
 
@@ -136,13 +136,13 @@ def test_keys_nested_without_end_leave_the_usual_ones(file: Path) -> None:
 def test_a_pipe_or_a_huge_file_is_not_waited_for(file: Path) -> None:
     file.parent.mkdir(parents=True)
     os.mkfifo(file)
-    keys, (problem,) = load(file, COMMANDS)
+    keys, (problem,) = load_keys(file, COMMANDS)
     assert "cannot be read" in problem
     assert keys.of == USUAL
     file.unlink()
     file.touch()
     os.truncate(file, 400 * 2**20)  # a hole, which takes no room
-    keys, (problem,) = load(file, COMMANDS)
+    keys, (problem,) = load_keys(file, COMMANDS)
     assert "longer than" in problem
     assert keys.of == USUAL
 

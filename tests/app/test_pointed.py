@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewer.analysis.pick import Picked
-from viewer.app.scene.pointed import describe
+from viewer.app.scene.pointed import describe_pick
 
 
 def test_it_says_where_what_and_how_it_was_seen() -> None:
@@ -20,7 +20,7 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
         normal=np.array([0, 0.6, 0.8], np.float32),
         scalars={"temperature": 36.6123456789, "label": 4},
     )
-    assert describe(picked, "frame 3/25", "mm", 150.0) == [
+    assert describe_pick(picked, "frame 3/25", "mm", 150.0) == [
         "12.35, -0.50, 1000.00 mm",
         "frame 3/25",
         "point 7, measured",
@@ -32,7 +32,7 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
 
 
 def test_what_was_filled_is_no_point() -> None:
-    assert describe(Picked(np.zeros(3), level=2), "frame 1/1", "units", 1.0)[1:] == [
+    assert describe_pick(Picked(np.zeros(3), level=2), "frame 1/1", "units", 1.0)[1:] == [
         "frame 1/1",
         "filled from level 2",
     ]
@@ -49,5 +49,5 @@ def test_what_was_filled_is_no_point() -> None:
     ],
 )
 def test_positions_have_the_digits_that_matter_for_the_scans_size(radius: float, text: str) -> None:
-    words = describe(Picked(np.full(3, 1e7 + 0.123456789), level=0), "", "m", radius)[0]
+    words = describe_pick(Picked(np.full(3, 1e7 + 0.123456789), level=0), "", "m", radius)[0]
     assert words == f"{text}, {text}, {text} m"

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from viewer.app.commands import Commands, switches
+from viewer.app.commands import Commands, switch_commands
 from viewer.app.keys import chord
 from viewer.backends import Backend, backends
 from viewer.errors import InputError
@@ -39,7 +39,7 @@ def test_a_key_switches_what_declares_it_while_it_matters() -> None:
 
 
 def test_each_switch_is_one_command_whichever_backend_draws() -> None:
-    found = switches(of(kind) for kind in (Pyramid, Laplacian))
+    found = switch_commands(of(kind) for kind in (Pyramid, Laplacian))
     named = [(command.name, command.title, command.key) for command in found]
     assert named == [
         ("switch_fill", "Fill", "H"), ("switch_level_1", "Level 1", "1"), ("switch_level_2", "Level 2", "2"),
@@ -65,12 +65,12 @@ def of(kind: type) -> Backend:
 
 
 def test_a_backend_without_a_key_takes_none_from_another() -> None:
-    assert [one.key for one in switches([of(Laplacian), of(Keyless)])] == ["2"]
+    assert [one.key for one in switch_commands([of(Laplacian), of(Keyless)])] == ["2"]
 
 
 def test_keys_that_are_none_say_whose_they_are() -> None:
     with pytest.raises(InputError, match=r"wrong\.fill, key='Shift H': unknown key 'Shift'"):
-        switches([of(Wrong)])
+        switch_commands([of(Wrong)])
 
 
 def test_a_parameter_has_one_key() -> None:
@@ -79,7 +79,7 @@ def test_a_parameter_has_one_key() -> None:
         fill: bool = param(True, "Fill holes", key="J")
 
     with pytest.raises(InputError, match="'fill' has different keys"):
-        switches([of(Pyramid), of(Other)])
+        switch_commands([of(Pyramid), of(Other)])
 
 
 def test_the_keys_of_parameters_are_theirs_alone() -> None:

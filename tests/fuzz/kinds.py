@@ -220,7 +220,7 @@ _CHOICES: dict[str, Callable[[Path], Any]] = {
     "recording.png": _recorded,
     "times.csv": _times,
     "settings.json": _settings,
-    "keys.toml": lambda path: keys.load(path, Commands()),
+    "keys.toml": lambda path: keys.load_keys(path, Commands()),
     "planted.txt": _planted,
 }
 

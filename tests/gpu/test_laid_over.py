@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, sphere, sphere_mesh
 
-from viewer.analysis.measure import End, Measurement, read
+from viewer.analysis.measure import End, Measurement, reading_of
 from viewer.analysis.pick import is_seen, pick
 from viewer.backends import backends
 from viewer.bench.judge import Judge
@@ -216,8 +216,8 @@ def test_measurements_go_with_the_pose(renderer: Renderer) -> None:
         np.testing.assert_allclose(end.position, there.world()[end.id], atol=1e-6)
         assert end.spacing is not None
         assert end.spacing < 0.1
-    back = read(Measurement(*ends), POSE, True).measurement
-    again = read(Measurement(*ends), POSE, True, TURNED).measurement
+    back = reading_of(Measurement(*ends), POSE, True).measurement
+    again = reading_of(Measurement(*ends), POSE, True, TURNED).measurement
     np.testing.assert_allclose([end.position for end in back.ends], CLOUD.world()[[end.id for end in ends]])
     np.testing.assert_allclose([end.position for end in again.ends], [end.position for end in ends])
     assert again.distance == pytest.approx(back.distance, rel=1e-6)

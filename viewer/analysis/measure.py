@@ -113,7 +113,9 @@ class Reading:
         return "fixed in space" if self.fixed else "follows points"
 
 
-def read(measurement: Measurement, pose: Pose, one_topology: bool | None, place: Rigid = STILL) -> Reading:
+def reading_of(
+    measurement: Measurement, pose: Pose, one_topology: bool | None, place: Rigid = STILL
+) -> Reading:
     """The measurement in a pose: its ends at the places of their points there, or where they were.
 
     place: that the pose is moved to. one_topology: as the `Timeline` says. Spacings stay those of the frame
@@ -135,7 +137,7 @@ def read(measurement: Measurement, pose: Pose, one_topology: bool | None, place:
     return Reading(Measurement(*moved), None)
 
 
-def in_words(distance: float, uncertainty: float | None, unit: str) -> str:
+def distance_in_words(distance: float, uncertainty: float | None, unit: str) -> str:
     """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm"."""
     if not uncertainty:
         return f"{distance:.6g} {unit}"
@@ -173,7 +175,7 @@ def to_text(rows: Iterable[Iterable[object]], separator: str = ",") -> str:
     return text.getvalue()
 
 
-def save(path: Path, rows: Iterable[Iterable[object]]) -> None:
+def save_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
     """Write the rows as a CSV file, in one step. Raises InputError where it cannot be written."""
     with whole_file(path) as temporary:
         temporary.write_text(to_text(rows), encoding="utf-8", newline="")

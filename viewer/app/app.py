@@ -103,7 +103,7 @@ class App:
             self.session, self.playback, self.viewport, self.failures, self.note, window.touch,
             self.commands, remembered.tools,
         )  # fmt: skip
-        self.keys, problems = keys.load(self._keys_file, self.commands)
+        self.keys, problems = keys.load_keys(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
         self.help: Help = Help(self.commands, self.keys, self.notices, self.renderer.gpu)

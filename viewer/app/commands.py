@@ -109,7 +109,7 @@ def _view(number: int, side: str) -> Command[App]:
     )  # fmt: skip
 
 
-def switches(several: Iterable[Backend]) -> tuple[Command[App], ...]:
+def switch_commands(several: Iterable[Backend]) -> tuple[Command[App], ...]:
     """Commands that switch the parameters with a key that backends declare; one name has one key in all."""
     found: dict[str, Command[App]] = {}
     for one, parameter in ((each, p) for each in several for p in each.parameters if p.key):
@@ -250,7 +250,7 @@ _VIEW: Menu[App] = Menu("View", (
     ),
 ))  # fmt: skip
 _SWITCHES: Menu[App] = Menu(
-    "Of this renderer", (switches(backends().values()),), lambda app: bool(app.rendering.switches)
+    "Of this renderer", (switch_commands(backends().values()),), lambda app: bool(app.rendering.switches)
 )
 _PLAYBACK: Menu[App] = Menu("Playback", (
     (

@@ -39,16 +39,16 @@ class Failures:
     def tell(self, what: str, error: BaseException, words: str = "") -> None:
         """Tell what went wrong: once, however many frames in a row it does.
 
-        what: was being done. words: to tell it in; else those of `in_words`.
+        what: was being done. words: to tell it in; else those of `failure_in_words`.
         """
         now, self.count = time.monotonic(), self.count + 1
         before, self._last[what] = self._last.get(what, -math.inf), now
         if now - before > _PAUSE:
             log.error("%s failed", what, exc_info=error)
-            self._note(words or in_words(what, error))
+            self._note(words or failure_in_words(what, error))
 
 
-def in_words(what: str, error: BaseException) -> str:
+def failure_in_words(what: str, error: BaseException) -> str:
     """One line for users."""
     if isinstance(error, Scan4DError):
         return str(error)

@@ -88,7 +88,7 @@ class Keys:
                     command.act(app)
 
 
-def load(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
+def load_keys(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
     """The keys that a TOML file gives, and what is wrong in it; the usual keys where there is no file.
 
     What is wrong is left out: the usual keys hold for it. Of two commands whose usual keys are the same, as

@@ -81,7 +81,7 @@ def _draw_scans(scans: Scans, scan: str, keys: Keys) -> None:
         imgui.same_line(0, gap)
     imgui.set_next_item_width(-1)
     room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height()
-    if imgui.begin_combo("##scan", widgets.shortened(title(scan), room)):
+    if imgui.begin_combo("##scan", widgets.fitted(title(scan), room)):
         for number, (name, act, is_open) in enumerate(scans.items(scans.listed)):
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
                 act()
@@ -92,7 +92,7 @@ def _draw_scans(scans: Scans, scan: str, keys: Keys) -> None:
 def _draw_renderer(session: Session, rendering: Rendering, pose: Pose) -> None:
     name, _ = session.document.chosen(pose)
     imgui.set_next_item_width(-1)
-    chosen = widgets.choose("backend", name, list(backends()), {n: b.title for n, b in backends().items()})
+    chosen = widgets.combo("backend", name, list(backends()), {n: b.title for n, b in backends().items()})
     imgui.set_item_tooltip(backend(name).help)
     if chosen != name:
         rendering.choose(chosen)
@@ -113,7 +113,7 @@ def _colors(look: Look, pose: Pose) -> dict[str, str]:
 def _draw_projection(steering: Steering, camera: Camera | None) -> None:
     widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth")
     now = camera.projection if camera else PROJECTIONS[0]
-    chosen = widgets.choose("projection", now, PROJECTIONS)
+    chosen = widgets.combo("projection", now, PROJECTIONS)
     if chosen != now:
         steering.project(chosen)
 

@@ -115,7 +115,7 @@ class Tasks:
     def _draw_task(self, task: Task) -> None:
         gap = imgui.get_style().item_spacing.x
         width = imgui.get_content_region_avail().x
-        imgui.text_unformatted(widgets.shortened(task.name, width))
+        imgui.text_unformatted(widgets.fitted(task.name, width))
         button = imgui.calc_text_size("Cancel").x + 2 * imgui.get_style().frame_padding.x
         size = ImVec2(width - button - gap, imgui.get_frame_height())
         words = f"{task.seconds:.0f} s"

@@ -83,7 +83,7 @@ def label(text: str, tooltip: str = "", gutter: float = 0.0) -> None:
     imgui.set_next_item_width(-1 - gutter)
 
 
-def choose(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:
+def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:
     """A combo box; the word that is chosen now."""
     titles = titles or {}
     if imgui.begin_combo(f"##{name}", titles.get(current, current)):
@@ -111,7 +111,7 @@ def _edit(parameter: Parameter, value: Any, words: Mapping[str, str] | None = No
     if parameter.type is bool:
         return imgui.checkbox(name, value)[1]
     if words or parameter.choices:
-        return choose(name, value, list(words or parameter.choices), words)
+        return combo(name, value, list(words or parameter.choices), words)
     if parameter.type is str:
         return _edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
     return _edit_number(name, parameter, value)
@@ -170,7 +170,7 @@ def edited(path: str, text: str) -> str:
     return kept + text[len(printable(kept)) :]
 
 
-def shortened(text: str, width: float) -> str:
+def fitted(text: str, width: float) -> str:
     """Shorten a text to what there is room for, with an ellipsis where it is not all."""
     if imgui.calc_text_size(text).x <= width:
         return text

@@ -27,7 +27,7 @@ _is_quiet = False
 NAMES_AS_THEY_ARE = "scan4d.names"
 
 
-def plain(text: str, keep: str = "") -> str:
+def escaped(text: str, keep: str = "") -> str:
     """The text with its control characters escaped, but for those to keep."""
     return _CONTROLS.sub(lambda found: found[0] if found[0] in keep else repr(found[0])[1:-1], text)
 
@@ -35,12 +35,12 @@ def plain(text: str, keep: str = "") -> str:
 def warn(text: str) -> None:
     """One line on standard error, above a progress bar if there is one; none under --quiet."""
     if not _is_quiet:
-        complain(f"scan4d: {plain(text)}")
+        complain(f"scan4d: {escaped(text)}")
 
 
 def complain(text: str) -> None:
     """Text on standard error, above a progress bar if there is one. Where nobody can read it, it is lost."""
-    text = plain(text, keep="\n")
+    text = escaped(text, keep="\n")
     with suppress(OSError):
         if "tqdm" in sys.modules:
             sys.modules["tqdm"].tqdm.write(text, file=sys.stderr)
@@ -127,12 +127,12 @@ class PlainOutput:
 
     def write(self, text: str) -> int:
         """Write as a stream does."""
-        return self._do(lambda: self._stream.write(plain(text, keep="\n")))
+        return self._do(lambda: self._stream.write(escaped(text, keep="\n")))
 
     def write_name(self, path: Path) -> None:
         """The name of a file, on a line of its own."""
         is_exact = self._stream.errors == NAMES_AS_THEY_ARE
-        self._do(lambda: self._stream.write(f"{path if is_exact else plain(str(path))}\n"))
+        self._do(lambda: self._stream.write(f"{path if is_exact else escaped(str(path))}\n"))
 
     def flush(self) -> None:
         """Flush as a stream does."""

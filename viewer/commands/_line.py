@@ -11,7 +11,7 @@ from contextlib import contextmanager, redirect_stdout
 from ..errors import InputError, Scan4DError
 from ..signals import ending_as_interrupts, ignore_from_now_on
 from ..task import listening
-from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, plain, quietly
+from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, escaped, quietly
 from ._parsing import parsed
 
 _MOST_SHOWN = 2000  # characters of a message
@@ -84,7 +84,7 @@ def _message(error: BaseException) -> str:
         text = f"internal error ({type(error).__name__}: {error}). Run it again with --debug"
     if len(text) > _MOST_SHOWN:
         text = f"{text[: _MOST_SHOWN // 2]} ... {text[-_MOST_SHOWN // 2 :]}"
-    return plain(text) if isinstance(error, InputError) else text  # what drivers say has several lines
+    return escaped(text) if isinstance(error, InputError) else text  # what drivers say has several lines
 
 
 def _was_interrupted(error: BaseException | None) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import InputError, explained
 from ..scan.inputs import found_among
 from ..unfinished import remove_leftovers
-from ._console import plain
+from ._console import escaped
 
 
 def add_force_argument(parser: ArgumentParser) -> None:
@@ -53,7 +53,7 @@ def _agreed(there: Sequence[Path]) -> bool:
     """Whether a person says that these are replaced; without a terminal nobody does."""
     if not (sys.stdin and sys.stdin.isatty() and sys.stderr and sys.stderr.isatty()):
         return False
-    question = f"{plain(str(there[0]))}: is there already{_and_more(there)}. Replace? [y/N] "
+    question = f"{escaped(str(there[0]))}: is there already{_and_more(there)}. Replace? [y/N] "
     print(question, end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 

@@ -13,7 +13,7 @@ from ..errors import shortened
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from ._console import plain
+from ._console import escaped
 from ._scans import SCAN_HELP, first_readable, open_timeline
 
 
@@ -97,6 +97,6 @@ def _as_text(facts: dict[str, Any]) -> str:
         span = "no finite value" if attribute["range"] is None else "{:g} to {:g}".format(*attribute["range"])
         columns = f" x {attribute['columns']}" if attribute["columns"] > 1 else ""
         rows.append((name, f"{attribute['type']}{columns}, {span}"))
-    shown = [(plain(shortened(name)), plain(str(value))) for name, value in rows]
+    shown = [(escaped(shortened(name)), escaped(str(value))) for name, value in rows]
     width = max(len(name) for name, _ in shown)
     return "\n".join(f"{name:{width}}  {value}" for name, value in shown)

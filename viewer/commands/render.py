@@ -22,7 +22,7 @@ from ..document.anonymous import anonymous_request
 from ..document.recording import Entry, fingerprint, new_salt
 from ..errors import InputError
 from ..files import whole_file
-from ..frame import Request, choose
+from ..frame import Request, backend_for
 from ..geometry import UP
 from ..look import Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
@@ -199,7 +199,7 @@ def _requests(
     chosen = None
     camera_of = _camera(args, timeline, shots, size) if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
-        chosen = chosen or choose(pose, args.backend, values)
+        chosen = chosen or backend_for(pose, args.backend, values)
         own = drawable(look, pose.cloud.scalars)
         if own is not look:
             title = frame_title(timeline, pose.index)

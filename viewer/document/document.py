@@ -11,7 +11,7 @@ import numpy as np
 from ..backends import backends
 from ..camera import Camera
 from ..errors import InputError, shortened
-from ..frame import Request, choose
+from ..frame import Request, backend_for
 from ..geometry import Vector, up_vector
 from ..look import Look, drawable
 from ..scan.pose import Pose
@@ -105,8 +105,8 @@ class Document:
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and the parameters that it begins with."""
-        name, defaults = choose(pose)
-        return (name, defaults) if self.backend in (None, name) else choose(pose, self.backend)
+        name, defaults = backend_for(pose)
+        return (name, defaults) if self.backend in (None, name) else backend_for(pose, self.backend)
 
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""

@@ -55,7 +55,7 @@ def fastest(
     return remembered[key]
 
 
-def choose(
+def instancing_for(
     surface: Surface,
     setting: str,
     on_software: str,

@@ -182,7 +182,7 @@ class Browser:
         imgui.text_disabled(head)
         imgui.push_id(head)
         for number, scan in enumerate(scans):
-            name = widgets.shortened(title(scan), imgui.get_content_region_avail().x)
+            name = widgets.fitted(title(scan), imgui.get_content_region_avail().x)
             is_open = known_as(scan) == known_as(self._session.scan)
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
                 self._open_again(scan)
@@ -257,7 +257,7 @@ class Browser:
         beside(_ICONS[row.kind])
         imgui.same_line(left + _ICON_ROOM * em)
         room = width - (_ICON_ROOM + _COUNT_ROOM) * em
-        imgui.text(widgets.shortened(printable(row.title), room))
+        imgui.text(widgets.fitted(printable(row.title), room))
         imgui.same_line(left + width - _COUNT_ROOM * em)
         beside(f"{row.frames} frames" if row.frames > 1 else "")
 
@@ -269,7 +269,7 @@ class Browser:
         room = sum(imgui.calc_text_size(text).x + 2 * padding for text in texts) + gap
         left = imgui.get_content_region_avail().x - room
         imgui.align_text_to_frame_padding()
-        imgui.text_disabled(widgets.shortened(_HINT, left - gap))
+        imgui.text_disabled(widgets.fitted(_HINT, left - gap))
         imgui.same_line(imgui.get_cursor_start_pos().x + left)
         imgui.begin_disabled(row is None)
         if imgui.button(texts[0]) and row is not None:

@@ -19,7 +19,7 @@ from ...errors import InputError, explained
 from ...files import free_file, working_folder
 from ...output.export import write_png
 from ...task import Task, in_background
-from ..failures import in_words
+from ..failures import failure_in_words
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -86,7 +86,7 @@ class Capture:
         try:
             self.last = written(recording, working_folder())
         except Exception as error:  # whatever a folder brings, the window stays
-            words = in_words("Saving the recording", error)
+            words = failure_in_words("Saving the recording", error)
             if journal is None:
                 return words
             journal.leave()
@@ -130,7 +130,7 @@ class Capture:
             try:
                 write_png(image, path, text)
             except Exception as error:  # whatever a folder brings, the window stays
-                return in_words(f"Saving {path}", error)
+                return failure_in_words(f"Saving {path}", error)
         return f"Saved {path}"
 
     def tell_later(self, look: Callable[[], str]) -> None:

@@ -45,7 +45,7 @@ def draw(exporting: Exporting, quit: Callable[[], None]) -> None:
 
 def _edit_what(choices: Choices, count: int, problems: dict[str, str]) -> Choices:
     widgets.label("What", "Turntable: all round, from the current view on")
-    choices = replace(choices, what=widgets.choose("what", choices.what, list(_WHAT), _WHAT))
+    choices = replace(choices, what=widgets.combo("what", choices.what, list(_WHAT), _WHAT))
     if choices.what == TURNTABLE:
         widgets.label("Pictures", _HELP["pictures"])
         choices = replace(choices, pictures=_whole("pictures", choices.pictures))
@@ -66,7 +66,7 @@ def _edit_what(choices: Choices, count: int, problems: dict[str, str]) -> Choice
 
 def _edit_format(choices: Choices, rate: float, problems: dict[str, str]) -> Choices:
     widgets.label("Format", _HELP["format"])
-    choices = replace(choices, format=widgets.choose("format", choices.format, list(_FORMATS), _FORMATS))
+    choices = replace(choices, format=widgets.combo("format", choices.format, list(_FORMATS), _FORMATS))
     if choices.format == MP4:
         widgets.label("Pictures a second", _HELP["fps"])
         edited, fps = imgui.input_float("##fps", rate, 0, 0, "%.5g")
@@ -81,7 +81,7 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
         titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, as the view"
     now = f"{choices.width}x{choices.height}"
     widgets.label("Size", "Pixels. Another shape than the view's shows more or less at the sides")
-    chosen = widgets.choose("size", now if now in titles else "Other", list(titles), titles)
+    chosen = widgets.combo("size", now if now in titles else "Other", list(titles), titles)
     if chosen in titles and chosen != now:
         width, height = (int(side) for side in chosen.split("x"))
         choices = replace(choices, width=width, height=height)

@@ -78,7 +78,7 @@ def _draw_pace(app: App) -> None:
         _draw_button(app, icon, name, accent if getattr(pace, name) else None, about)
     imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())
     titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
-    chosen = float(widgets.choose("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
+    chosen = float(widgets.combo("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
     hints = (app.keys.hint(name) for name in ("slower", "faster", "speed_1"))
     imgui.set_item_tooltip("Speed of playing. " + ", ".join(hints))
     if chosen != pace.speed:
@@ -174,11 +174,11 @@ def _draw_status(playback: Playback, pointer: Pointer, notices: Notices) -> None
     imgui.spacing()
     width, gap = imgui.get_content_region_avail().x, 2 * imgui.get_font_size()
     names = playback.timeline.name, playback.timeline.label(playback.session.index)
-    name = "   ".join(widgets.shortened(one, width / 4) for one in names)
+    name = "   ".join(widgets.fitted(one, width / 4) for one in names)
     left = width - imgui.calc_text_size(name).x
     text = _pointed(pointer.words, left - gap)
     if not text and notices.all:
-        text = widgets.shortened(notices.all[-1].text, left - gap)
+        text = widgets.fitted(notices.all[-1].text, left - gap)
     imgui.text_disabled(text)
     imgui.same_line()
     imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)

@@ -109,7 +109,7 @@ class Bookmarks:
         """One bookmark; True where it is to be deleted."""
         gap, side = imgui.get_style().item_inner_spacing.x, 1.3 * imgui.get_frame_height()
         room = imgui.get_content_region_avail().x - 2 * (side + gap)
-        name = widgets.shortened(bookmark.name, room)
+        name = widgets.fitted(bookmark.name, room)
         imgui.align_text_to_frame_padding()
         if imgui.selectable(f"{name}##go", self.is_shown(bookmark), 0, ImVec2(room, 0))[0]:
             self.go_to(bookmark)

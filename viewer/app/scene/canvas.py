@@ -33,7 +33,7 @@ class ViewPlace:
 
     def on_screen(self, position: Vector) -> ImVec2 | None:
         """A place of the scan on the screen; None behind the eye. position: float64, scan units."""
-        place = navigation.place(self.camera, position)
+        place = navigation.place_in_picture(self.camera, position)
         if place is None:
             return None
         return self.corner + self.size * 0.5 + ImVec2(place[0] * self.size.y, -place[1] * self.size.y)

@@ -46,7 +46,7 @@ class OrientationCube:
         self.is_shown = not self.is_shown
 
 
-def place(width: float, height: float, em: float) -> tuple[float, float, float] | None:
+def cube_place(width: float, height: float, em: float) -> tuple[float, float, float] | None:
     """Centre from the view's upper left corner, and half an edge; None in a view that is too small.
 
     width, height: of the view. em: the font's height.
@@ -63,7 +63,7 @@ def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: b
     size: of the view. is_drawn: whether the cube is.
     """
     cube, camera = steering.cube, document.camera
-    where = place(size.x, size.y, imgui.get_font_size())
+    where = cube_place(size.x, size.y, imgui.get_font_size())
     cube.under_mouse = None
     if camera is None or where is None or not is_drawn:
         cube.is_held = cube.is_dragged = False
@@ -95,7 +95,7 @@ def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: b
 
 def draw(cube: OrientationCube, document: Document, palette: theme.Palette, size: ImVec2) -> None:
     """Draw a cube over the view in the current ImGui window. size: of the view."""
-    where = place(size.x, size.y, imgui.get_font_size())
+    where = cube_place(size.x, size.y, imgui.get_font_size())
     if document.camera is None or where is None:
         return
     x, y, half = where

@@ -38,7 +38,7 @@ def view_from(
     )
 
 
-def place(camera: Camera, point: Vector) -> tuple[float, float] | None:
+def place_in_picture(camera: Camera, point: Vector) -> tuple[float, float] | None:
     """The place of a point in the picture: to the right of and above its centre; None behind the eye."""
     right, up, back = camera.rotation() @ np.subtract(point, camera.eye)
     if back >= 0:

@@ -34,7 +34,7 @@ class Pointer:
         if picked is not None and (request := self._viewport.request) is not None:
             pose = request.pose
             frame = f"frame {pose.index + 1}/{len(self._playback.timeline)}"
-            self.words = describe(picked, frame, self._playback.unit, self._viewport.bounds(pose).radius)
+            self.words = describe_pick(picked, frame, self._playback.unit, self._viewport.bounds(pose).radius)
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
@@ -42,7 +42,7 @@ class Pointer:
         return self._viewport.pick_in_full() or self.picked
 
 
-def describe(picked: Picked, frame: str, unit: str, radius: float) -> list[str]:
+def describe_pick(picked: Picked, frame: str, unit: str, radius: float) -> list[str]:
     """Position, frame, point and the point's attributes: the most wanted first.
 
     radius: of the scan, scan units; positions get the digits that matter for its size.

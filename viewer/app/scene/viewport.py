@@ -17,7 +17,7 @@ from ...gpu.present import Presenter
 from ...gpu.surface import Surface
 from ...renderer import Renderer
 from ...scan.pose import Pose
-from ..failures import in_words
+from ..failures import failure_in_words
 from .detail import Detail, Quality
 from .motion import Motion
 
@@ -240,6 +240,6 @@ def _problem(request: Request, error: Exception) -> Scan4DError:
     """Why there is no picture, as users read it."""
     if isinstance(error, Scan4DError):
         return error
-    problem = Scan4DError(in_words(f"Drawing frame {request.pose.index + 1}", error))
+    problem = Scan4DError(failure_in_words(f"Drawing frame {request.pose.index + 1}", error))
     problem.__cause__ = error
     return problem

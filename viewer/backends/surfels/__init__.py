@@ -15,7 +15,7 @@ import numpy as np
 
 from ...gpu.amplify import FEEDS, Points, amplify
 from ...gpu.constants import LEAST_RADIUS, UNKNOWN
-from ...gpu.fastest import choose
+from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
@@ -208,7 +208,7 @@ def _instancing(params: Params, surface: Surface) -> str:
         points = Points.of(pose, surface, 1.0, use_radii=True)
         return {name: partial(_splat, points, surface, like, name, 0.0) for name in _WAYS}
 
-    return choose(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
+    return instancing_for(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
 
 
 def _radii_suffice(cloud: PointCloud) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...gpu.amplify import FEEDS, Points
 from ...gpu.context import Gpu
-from ...gpu.fastest import choose
+from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Stats, Surface
 from ...params import param
@@ -180,7 +180,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if coarse:
         surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
     points = Points(shown.pose, use_radii=True, count=len(shown.cut))
-    feed = choose(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
+    feed = instancing_for(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
     draw_voxels(points, surface, feed, params.scatter)
     if flat:
         shade_flat(points, surface)

@@ -23,7 +23,7 @@ from . import samples
 from .real_scans import DepthFrames, placed_scans
 from .samples import Sampler
 from .simulated import simulated
-from .subjects import Moment, Subject, chosen, smooth
+from .subjects import Moment, Subject, smooth, with_rows
 
 _STANFORD = "Stanford Computer Graphics Laboratory"
 _CYBERWARE = "Cyberware"
@@ -132,7 +132,7 @@ def _of_mesh(mesh: Mesh, request: _Request, index: int, time: float, label: str)
     if not len(sided):
         raise InputError("no face of the mesh has an area", label)
     if request.count is None:
-        cloud = chosen(mesh.points, sided)
+        cloud = with_rows(mesh.points, sided)
     else:
         cloud = samples.on_mesh(mesh, request.count, request.seed)
     return Moment(Pose(index, time, label, cloud), mesh, mesh)

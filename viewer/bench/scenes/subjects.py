@@ -89,11 +89,11 @@ class Subject:
 def smooth(mesh: Mesh) -> Mesh:
     """A mesh with normals at its vertices, less the vertices that are of no face."""
     used, faces = np.unique(mesh.faces, return_inverse=True)
-    points = chosen(replace(mesh.points, normals=vertex_normals(mesh)), used)
+    points = with_rows(replace(mesh.points, normals=vertex_normals(mesh)), used)
     return Mesh(points, faces.reshape(-1, 3).astype(np.uint32))
 
 
-def chosen(cloud: PointCloud, rows: NDArray[np.integer]) -> PointCloud:
+def with_rows(cloud: PointCloud, rows: NDArray[np.integer]) -> PointCloud:
     """Some of the points of a cloud, without scalars and ids."""
 
     def pick(values: NDArray | None) -> Any:

@@ -47,7 +47,7 @@ def rest_points() -> RestPoints:
         )
 
 
-def save(points: RestPoints, path: Path) -> None:
+def save_asset(points: RestPoints, path: Path) -> None:
     """Write points as `rest_points` reads them: normals in 16 bits an axis, radii as halves."""
     np.savez_compressed(
         path,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import colors, head
-from .asset import RestPoints, asset_path, save
+from .asset import RestPoints, asset_path, save_asset
 from .dual import coordinates
 from .motion import normalized
 from .shapes import Scalar, bump, ramp
@@ -157,4 +157,4 @@ def _batched(solid: Solid, points: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 if __name__ == "__main__":
-    save(sample(), asset_path())
+    save_asset(sample(), asset_path())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from ....analysis.measure import End, Measurement, Reading, read, save, table, to_text
+from ....analysis.measure import End, Measurement, Reading, reading_of, save_table, table, to_text
 from ....analysis.pick import is_seen
 from ....document.measurements import Measurements
 from ....errors import InputError
@@ -140,7 +140,7 @@ class Tool:
         pose, one_topology = self.desk.pose, self.desk.timeline.one_topology
         if pose is None:
             return []
-        return [read(measurement, pose, one_topology) for measurement in self.made.all]
+        return [reading_of(measurement, pose, one_topology) for measurement in self.made.all]
 
     def watch(self, readings: Sequence[Reading]) -> None:
         """Tell when measurements that followed their points no longer can; note in the log what they read."""
@@ -193,7 +193,7 @@ class Tool:
 
     def _save(self, file: Path) -> None:
         refuse_input(file, self.desk.timeline)
-        save(file, self._table())
+        save_table(file, self._table())
         self.desk.note(f"Saved {file}")
 
     def _table(self) -> list[list[object]]:

@@ -56,7 +56,7 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
     words = snap_words(reading)
     if len(measuring.desk.timeline) > 1:
         words += f", {reading.motion}"
-    imgui.text_disabled(widgets.shortened(words, imgui.get_content_region_avail().x))
+    imgui.text_disabled(widgets.fitted(words, imgui.get_content_region_avail().x))
     if reading.fixed and len(measuring.desk.timeline) > 1:
         imgui.set_item_tooltip(f"Fixed in space: {reading.fixed}")
     return is_deleted

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ....analysis.measure import Reading, in_words
+from ....analysis.measure import Reading, distance_in_words
 
 
 def distance_words(reading: Reading, unit: str) -> str:
     """The distance and its uncertainty."""
-    return in_words(reading.measurement.distance, reading.measurement.uncertainty, unit)
+    return distance_in_words(reading.measurement.distance, reading.measurement.uncertainty, unit)
 
 
 def snap_words(reading: Reading) -> str:
