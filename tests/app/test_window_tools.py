@@ -142,6 +142,12 @@ class Tool:
         desk.reveal()
     def act(self): self.desk.take_clicks()
 """
+UNBALANCED = {
+    "push_id() and pop_id()": "imgui.push_id('begun')",
+    "begin() or begin_child() and its end": "imgui.begin_child('begun')",
+    "push_style_color() and pop_style_color()": "imgui.push_style_color(imgui.Col_.text, 0xFFFFFFFF)",
+    "begin_disabled() and end_disabled()": "imgui.begin_disabled()",
+}
 TAIL = """
 COMMANDS = {{"Tools": (Command("act_{name}", "Act", lambda tool: tool.act(), {key!r}),)}}
 """
@@ -228,3 +234,23 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     assert "fourth is switched off until the next start: there is a command 'measure' already" in told
     assert "no tool" not in told
     assert "first is switched off" not in told
+
+
+def test_a_tool_that_leaves_imgui_unbalanced_is_named_and_the_window_goes_on(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    folder = tmp_path / "tools"
+    folder.mkdir()
+    names = {f"unbalanced{number}": calls for number, calls in enumerate(UNBALANCED)}
+    for name, calls in names.items():
+        hooks = "".join(f"    def {hook}(self, *_): {UNBALANCED[calls]}\n" for hook in ("panel", "overlay"))
+        (folder / f"{name}.py").write_text(HEAD.format(name=name) + hooks)
+    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
+        screen.do("key", "m")
+        app.see(clicking="measuring")
+        close(app)
+    told = [note for note in app.notes if "failed" in note or "switched off" in note]
+    assert sorted(told) == [
+        f"{name} is switched off until the next start: RuntimeError: {calls} were not called equally often"
+        for name, calls in names.items()
+    ]

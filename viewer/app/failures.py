@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from operator import attrgetter
 
 from imgui_bundle import imgui
 
@@ -16,6 +17,20 @@ from ..task import Cancelled
 log = logging.getLogger(__name__)
 _PAUSE = 10.0  # seconds without it, after which the same is told again
 _LONGEST = 200  # letters of what a library says
+_PAIRS = {  # the stacks of ImGui, outermost first -> the calls that come in pairs
+    "window": "begin() or begin_child() and its end",
+    "begin_popup": "begin_popup() and end_popup()",
+    "group": "begin_group() and end_group()",
+    "tree": "tree_push() or tree_node() and tree_pop()",
+    "id": "push_id() and pop_id()",
+    "color": "push_style_color() and pop_style_color()",
+    "style_var": "push_style_var() and pop_style_var()",
+    "font": "push_font() and pop_font()",
+    "disabled": "begin_disabled() and end_disabled()",
+    "item_flags": "push_item_flag() and pop_item_flag()",
+    "focus_scope": "push_focus_scope() and pop_focus_scope()",
+}
+_sizes = attrgetter(*(f"size_of_{stack}_stack" for stack in _PAIRS))
 
 
 class Failures:
@@ -65,14 +80,27 @@ def reason(error: BaseException) -> str:
 
 @contextmanager
 def widgets_ended() -> Iterator[None]:
-    """Whatever goes wrong inside goes on from here, and the widgets that were begun there are ended."""
+    """Whatever goes wrong inside goes on from here, and the widgets that were begun there are ended.
+
+    Raises RuntimeError where nothing else goes wrong but ImGui's stacks are not as they were: left so, they
+    would have no widget after these be itself.
+    """
     state = _state_of_widgets()
     try:
         yield
+        if state is not None:
+            _check_balance(_sizes(state))
     except BaseException:
         if state is not None:
             _end_widgets(state)
         raise
+
+
+def _check_balance(before: tuple[int, ...]) -> None:
+    after = _sizes(_state_of_widgets())
+    for calls, size, now in zip(_PAIRS.values(), before, after, strict=True):
+        if size != now:
+            raise RuntimeError(f"{calls} were not called equally often")
 
 
 def _state_of_widgets() -> imgui.internal.ErrorRecoveryState | None:
