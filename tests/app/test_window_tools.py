@@ -148,6 +148,18 @@ UNBALANCED = {
     "push_style_color() and pop_style_color()": "imgui.push_style_color(imgui.Col_.text, 0xFFFFFFFF)",
     "begin_disabled() and end_disabled()": "imgui.begin_disabled()",
 }
+KEEPING = """
+from dataclasses import dataclass
+from typing import Any
+from viewer.document.part import Part
+from viewer.geometry import Vector
+@dataclass(frozen=True)
+class Place:
+    position: Vector
+@dataclass(frozen=True)
+class Kept(Part, name={name!r}):
+    all: {kind}
+"""
 TAIL = """
 COMMANDS = {{"Tools": (Command("act_{name}", "Act", lambda tool: tool.act(), {key!r}),)}}
 """
@@ -254,3 +266,30 @@ def test_a_tool_that_leaves_imgui_unbalanced_is_named_and_the_window_goes_on(
         f"{name} is switched off until the next start: RuntimeError: {calls} were not called equally often"
         for name, calls in names.items()
     ]
+
+
+def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    folder = tmp_path / "tools"
+    folder.mkdir()
+    pin = "    def on_click(self, click):\n        self.desk.change('Pin', Kept((Place(click.picked.{}),)))\n"
+    kinds = {"array": "tuple[Place, ...] = ()", "place": "tuple[Place, ...] = ()", "listed": "list = ()"}
+    for name, kind in kinds.items():
+        code = HEAD.format(name=name) + pin.format("position" if name == "array" else "place")
+        keys = TAIL.format(name=name, key=f"Alt+{name[0]}")
+        (folder / f"{name}.py").write_text(KEEPING.format(name=name, kind=kind) + code + keys)
+    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
+        app.told(r"listed is switched off until the next start: TypeError: Kept\.all cannot be kept as list")
+        screen.do("key", "alt+p", "sleep", 0.2)
+        click(app, *middle(app))
+        screen.do("key", "alt+a", "sleep", 0.2)
+        click(app, *middle(app))
+        app.told(
+            r"array is switched off .*: TypeError: array\.all\[0\]\.position is to be a tuple, not array"
+        )
+        close(app)
+    assert not [note for note in app.notes if "not kept" in note]
+    (kept,) = (tmp_path / "config" / "scan4d" / "scans").glob("*.json")
+    (position,) = json.loads(kept.read_text())["document"]["parts"]["place"]["all"]
+    assert len(position["position"]) == 3

@@ -105,8 +105,10 @@ class Desk:
         """Change the document: what a tool keeps, and fields by name. The user can undo it.
 
         name: of the step, such as "Delete note". merge: with the step before where that had this key and has
-        not come to an end.
+        not come to an end. Raises TypeError where a part holds what cannot be kept, and changes nothing.
         """
+        for part in parts:
+            part.check_kept()
         self._toolbox.session.change(name, *parts, merge=merge, **fields)
 
     # --- the window -------------------------------------------------------------------

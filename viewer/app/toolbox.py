@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from ..analysis.pick import before_gap, pick
+from ..document.part import Part
 from ..document.schema import usable
 from ..errors import InputError
 from ..task import Cancelled, Task
@@ -71,7 +72,7 @@ class Toolbox:
 
     def _open(self, slot: Slot, commands: Commands) -> None:
         name = slot.desk.name
-        module = importlib.import_module(f"{tools.__name__}.{name}")
+        module = _imported(name)
         slot.title = module.TITLE
         if hasattr(module, "Settings"):
             slot.desk.settings = usable(module.Settings(), self._remembered.get(name, {}))
@@ -226,3 +227,19 @@ class Toolbox:
         """Cancel what runs for tools."""
         for slot in self._slots.values():
             slot.desk.cancel_work()
+
+
+def _imported(name: str) -> Any:
+    """The module of a tool. Raises TypeError where a part of the document is not declared as it has to be;
+    no file is read by the parts of a module that fails.
+    """
+    before = dict(Part.kinds)
+    try:
+        module = importlib.import_module(f"{tools.__name__}.{name}")
+        for part_name in Part.kinds.keys() - before:
+            Part.kinds[part_name].check_declared()
+    except BaseException:
+        Part.kinds.clear()
+        Part.kinds.update(before)
+        raise
+    return module

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, ClassVar
+
+from .schema import check_declaration, check_kept
 
 
 class Part:
@@ -15,9 +18,9 @@ class Part:
         class Notes(Part, name="notes"):
             all: tuple[Note, ...] = ()
 
-    Fields are numbers, texts, booleans, None, tuples, mappings from texts, and frozen dataclasses of these.
-    They are written to files and checked when read by what their types say. kinds: name -> subclass, of all
-    that were declared.
+    Fields are bool, int, float, str, None, tuple[...], Mapping[str, ...], and frozen dataclasses of these.
+    They are written to files, and checked when kept and when read by what their types say; numbers and arrays
+    of numpy are none of these. kinds: name -> subclass, of all that were declared.
     """
 
     kinds: ClassVar[dict[str, type[Part]]] = {}
@@ -26,6 +29,29 @@ class Part:
     def __init_subclass__(cls, *, name: str, **others: Any) -> None:
         super().__init_subclass__(**others)
         known = Part.kinds.get(name)
-        assert known is None or known.__qualname__ == cls.__qualname__, f"two parts are called '{name}'"
+        if known is not None and _full_name(known) != _full_name(cls):
+            raise TypeError(f"two parts are called '{name}': {_full_name(known)} and {_full_name(cls)}")
         cls.part_name = name
         Part.kinds[name] = cls
+
+    @classmethod
+    def check_declared(cls) -> None:
+        """Check that it is declared as a part has to be; raises TypeError, which names the class and field.
+
+        The class alone cannot tell while it is declared: what makes a dataclass of it comes after that.
+        """
+        name = cls.__name__
+        if not is_dataclass(cls) or "__dataclass_fields__" not in vars(cls):
+            raise TypeError(f"{name} is no dataclass; declare it with @dataclass(frozen=True)")
+        for field in fields(cls):
+            if field.default is MISSING and field.default_factory is MISSING:
+                raise TypeError(f"{name}.{field.name} has no default, which a scan without a '{name}' has")
+        check_declaration(cls, name)
+
+    def check_kept(self) -> None:
+        """Check that it can be kept as it is; raises TypeError, which names the place: "notes.all[0]"."""
+        check_kept(self, self.part_name)
+
+
+def _full_name(kind: type) -> str:
+    return f"{kind.__module__}.{kind.__qualname__}"

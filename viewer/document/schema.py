@@ -15,7 +15,18 @@ from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from ..backends import backend
 from ..camera import Camera
@@ -35,6 +46,9 @@ _MOST_SECONDS = 86_400.0
 _LATEST = 1e12  # seconds, of a scan
 _LONGEST_WORD = 200
 _DEEPEST = 40  # levels of what is kept unread
+_KEPT = (
+    "what is kept: bool, int, float, str, None, tuple[...], Mapping[str, ...], frozen dataclasses of these"
+)
 
 
 @dataclass(frozen=True)
@@ -161,6 +175,73 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(inner) for inner in value]
     return value
+
+
+def check_declaration(kind: Any, where: str) -> None:
+    """Check that values of a type never change and can be kept as JSON, and if it is a dataclass those of its
+    fields. where: the name that it has in the message of a TypeError."""
+    if kind in (*_PLAIN, None, type(None), Camera):
+        return
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        return
+    if origin is Annotated:
+        if not isinstance(inner[1], ReadBy):
+            check_declaration(inner[0], where)
+    elif origin in (Union, UnionType, tuple) or (origin is Mapping and inner[0] is str):
+        for one in inner[origin is Mapping :]:
+            if one is not Ellipsis:
+                check_declaration(one, where)
+    elif isinstance(kind, type) and is_dataclass(kind):
+        if not kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+            raise TypeError(f"{where}: {kind.__name__} can change; declare it with @dataclass(frozen=True)")
+        hints = get_type_hints(kind, include_extras=True)
+        for field in fields(kind):
+            check_declaration(hints[field.name], f"{kind.__name__}.{field.name}")
+    else:
+        name = kind.__name__ if isinstance(kind, type) and origin is None else kind
+        raise TypeError(f"{where} cannot be kept as {name}: {_KEPT}")
+
+
+def check_kept(value: Any, name: str) -> None:
+    """Check that a value of a declared dataclass is read again from JSON as it is.
+
+    Raises TypeError, which names the place within it after `name`: "notes.all[0].position".
+    """
+    from cattrs.errors import BaseValidationError
+
+    try:
+        again = _converter().structure(plain(value), type(value))
+    except (BaseValidationError, InputError, _Unfit) as error:
+        path, cause = _first(error)
+        place = ".".join(filter(None, (name, path)))
+        if isinstance(cause, _Unfit):
+            expected = cause.words.replace("a list", "a tuple")  # which JSON has as a list
+            raise TypeError(f"{place} is to be {expected}, not {_typed(cause.value)}") from None
+        raise TypeError(f"{place} cannot be kept: {cause}") from None
+    if again != value:
+        place, kept, read = _difference(value, again, name)
+        raise TypeError(f"{place} would be read again as {_typed(read)}, not {_typed(kept)}")
+
+
+def _typed(value: Any) -> str:
+    return f"{shortened(value)} ({type(value).__name__})"
+
+
+def _difference(value: Any, other: Any, place: str) -> tuple[str, Any, Any]:
+    """The innermost place where two values differ, and what each has there."""
+    within: list[tuple[str, Any, Any]] = []
+    if type(value) is type(other) and is_dataclass(value):
+        names = [field.name for field in fields(value)]
+        within = [(f"{place}.{name}", getattr(value, name), getattr(other, name)) for name in names]
+    elif isinstance(value, tuple) and isinstance(other, tuple):
+        within = [(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(value, other, strict=True))]
+    elif isinstance(value, Mapping) and isinstance(other, Mapping):
+        within = [(f"{place}.{name}", value[name], other[name]) for name in value]
+    for inner, one, another in within:
+        if one != another:
+            return _difference(one, another, inner)
+    return place, value, other
 
 
 def unread(value: Any, depth: int = 0) -> Any:
