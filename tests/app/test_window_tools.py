@@ -67,23 +67,26 @@ def close(app: RunningApp) -> None:
 
 def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Path) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "adding-a-tool.md").read_text(), re.DOTALL)
-    (tmp_path / "tools" / "notes").mkdir(parents=True)
-    (tmp_path / "tools" / "notes" / "__init__.py").write_text(code)
+    (tmp_path / "tools" / "pins").mkdir(parents=True)
+    (tmp_path / "tools" / "pins" / "__init__.py").write_text(code)
     use = USE.format(str(tmp_path / "tools"))
-    settings = write_settings(tmp_path, {"notes": {"texts": False}})
+    settings = write_settings(tmp_path, {"pins": {"texts": False}})
     with running_app(screen, tmp_path, scan, before=use) as app:
         x, y = middle(app)
         assert count(app, YELLOW) == 0
-        screen.do("key", "alt+n")
+        screen.do("key", "alt+p")
         app.settle()
         click(app, x, y)
         one = count(app, YELLOW)
-        assert one > 20, "a note is pinned"
+        assert one > 20, "a text is pinned"
         click(app, x + 100, y + 60)
         assert count(app, YELLOW) == pytest.approx(2 * one, rel=0.2)
         screen.do("key", "ctrl+z")
         app.settle()
         assert count(app, YELLOW) == one, "undo takes the second away"
+
+        click(app, app.view()[0] + 40, y)
+        app.told("nothing to pin")
 
         screen.do("key", "m")
         app.see(clicking="measuring")
@@ -92,13 +95,13 @@ def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Pat
         assert count(app, YELLOW) == one, "the clicks are measuring's now"
         screen.do("key", "Escape")
         app.see(clicking=None)
-        screen.do("key", "alt+n", "sleep", 0.2, "key", "Escape")
+        screen.do("key", "alt+p", "sleep", 0.2, "key", "Escape")
         app.settle()
         click(app, x + 100, y + 60)
-        assert count(app, YELLOW) == one, "Escape has put the notes away"
+        assert count(app, YELLOW) == one, "Escape has put the pins away"
         close(app)
     assert "Traceback" not in app.log()
-    assert json.loads(settings.read_text())["tools"] == {"notes": {"texts": False}}
+    assert json.loads(settings.read_text())["tools"] == {"pins": {"texts": False}}
 
 
 FAILING = {
@@ -232,8 +235,16 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     (folder / "fourth.py").write_text(
         HEAD.format(name="fourth") + TAIL.replace("act_{name}", "measure").format(key="Alt+B")
     )
+    uncomma = TAIL.replace("),)}}", "))}}")
+    (folder / "fifth.py").write_text(HEAD.format(name="fifth") + uncomma.format(name="fifth", key=""))
+    mistaken = "    def panel(self, ui): raise InputError('a button pressed wrongly')\n"
+    (folder / "sixth.py").write_text(HEAD.format(name="sixth") + mistaken)
+    other = tmp_path / "others"
+    other.mkdir()
+    (other / "first.py").write_text("raise ValueError('not the first')\n")
     (folder / "_hidden.py").write_text("raise ValueError('no tool')\n")
-    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
+    use = USE.format(str(folder)) + USE.format(str(other))
+    with running_app(screen, tmp_path, scan, before=use) as app:
         for _ in range(2):
             screen.do("key", "alt+a", "sleep", 0.2)
             app.told("a mistake")
@@ -241,9 +252,14 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
         app.see(clicking="measuring")
         close(app)
     told = "\n".join(app.notes)
-    assert "M is to do both 'measure' and 'act_second'" in told
+    assert "The tool 'second': M is to do both 'measure' and 'act_second'. 'act_second' has none" in told
     assert "third is switched off until the next start: unknown modifier key 'Hyper'" in told
     assert "fourth is switched off until the next start: there is a command 'measure' already" in told
+    assert "fifth is switched off until the next start: TypeError: COMMANDS['Tools'] is a Command" in told
+    assert told.count("a button pressed wrongly") == 1, "once while it lasts"
+    assert f"The tool 'first' in {other} is not used: {folder} has one of this name" in told
+    assert "not the first" not in told
+    assert "sixth is switched off" not in told
     assert "no tool" not in told
     assert "first is switched off" not in told
 

@@ -319,7 +319,7 @@ class Commands:
     """The table: the window's own commands, and those that were added to it.
 
     menus: in their order. toolbar: groups of names. mouse: how, and what it does. of: name -> command, the
-    window's own first.
+    window's own first. tool_of: name -> the name of the tool that it is of; without the window's own.
     """
 
     def __init__(self) -> None:
@@ -329,9 +329,10 @@ class Commands:
         own = [command for menu in _MENUS for command in _commands(menu)]
         own.sort(key=lambda command: command in _SWITCHES.groups[0])  # which have those keys that are left
         self.of = {command.name: command for command in own}
+        self.tool_of: dict[str, str] = {}
 
-    def add(self, menu: str, entries: Sequence[Entry[App]]) -> None:
-        """Add a group to a menu, and to the toolbar what has a `short` title.
+    def add(self, menu: str, entries: Sequence[Entry[App]], tool: str) -> None:
+        """Add a group of a tool's to a menu, and to the toolbar what has a `short` title.
 
         Under Tools it comes first, in other menus last. Raises InputError for a menu or keys that are none,
         and for names of commands that are taken.
@@ -345,6 +346,7 @@ class Commands:
             if command.name in self.of:
                 raise InputError(f"there is a command '{command.name}' already", hint="Name it otherwise")
         self.of |= {command.name: command for command in added}
+        self.tool_of |= {command.name: tool for command in added}
         group = (tuple(entries),)
         self.menus = tuple(
             there if there.title != menu

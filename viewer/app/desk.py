@@ -25,8 +25,9 @@ T = TypeVar("T")
 class Click:
     """A click in the view.
 
-    picked: what is seen there, with its spacing; None where nothing is. pose: that the picture shows.
-    through_gap: whether the very pixel shows something farther, through a gap.
+    picked: what is seen there, with its spacing; None where nothing is. Its `place` is where the surface is
+    at the pixel, its `point` the point of the scan that is seen there, None where a hole is filled. pose:
+    that the picture shows. through_gap: whether the very pixel shows something farther, through a gap.
     """
 
     picked: Picked | None

@@ -96,7 +96,10 @@ def load_keys(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
     """
     given, problems = _read(path)
     changes = _checked(given, commands, problems)
-    told = [str(InputError(problem.what, path, problem.hint)) for problem in problems[:_MOST_TOLD]]
+    told = [
+        str(InputError(problem.what, problem.where or path, problem.hint))
+        for problem in problems[:_MOST_TOLD]
+    ]
     if len(problems) > _MOST_TOLD:
         told.append(f"{path}: {len(problems) - _MOST_TOLD} more lines cannot be used")
     return Keys(commands, changes), told
@@ -148,11 +151,15 @@ def _without_clashes(
             if other != name:
                 what = f"{text} is to do both '{other}' and '{name}'"
                 guilty = next((n for n in reversed(changes) if n in (name, other)), None)
-                left = f"'{guilty}' keeps its usual ones" if guilty else f"'{name}' has none"
-                problems.append(InputError(what, hint=f"Give one of them other keys. {left}"))
                 if guilty:
+                    hint = f"Give one of them other keys. '{guilty}' keeps its usual ones"
+                    problems.append(InputError(what, hint=hint))
                     del changes[guilty]
                 else:
+                    tool = commands.tool_of.get(name)
+                    where = f"The tool '{tool}'" if tool else "The usual keys"
+                    hint = f"'{name}' has none, unless {FILE} gives it others; F1 lists those that are taken"
+                    problems.append(InputError(what, where, hint))
                     usual[name] = ""
                 break
         else:

@@ -27,12 +27,17 @@ _BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
 
 
 class Slot:
-    """The place of one tool. title: as users read it. tool: None while it is switched off."""
+    """The place of one tool.
+
+    title: as users read it. tool: None while it is switched off. mistakes: hook that declares widgets -> the
+    user's mistake that these led to when they were declared last.
+    """
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.title = desk.name
         self.tool: Any = None
+        self.mistakes: dict[str, str] = {}
 
     def has(self, hook: str) -> bool:
         """Whether the tool is on and does something there."""
@@ -69,6 +74,11 @@ class Toolbox:
                 self._open(slot, commands)
             except Exception as error:  # whatever a tool's folder holds, the window stays
                 self._switch_off(slot, error)
+        for name, (used, *others) in tools.folders_of_tools().items():
+            for folder in others:
+                self.note(
+                    f"The tool '{name}' in {folder} is not used: {used} has one of this name; rename it."
+                )
 
     def _open(self, slot: Slot, commands: Commands) -> None:
         name = slot.desk.name
@@ -77,7 +87,10 @@ class Toolbox:
         if hasattr(module, "Settings"):
             slot.desk.settings = usable(module.Settings(), self._remembered.get(name, {}))
         for menu, entries in getattr(module, "COMMANDS", {}).items():
-            commands.add(menu, [self._bound(slot, entry) for entry in entries])
+            if isinstance(entries, (Command, Listing, Menu)):
+                what = f"COMMANDS['{menu}'] is a {type(entries).__name__} and has to be a tuple of such"
+                raise TypeError(f"{what}: a comma is missing after it")
+            commands.add(menu, [self._bound(slot, entry) for entry in entries], name)
         commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))
         slot.tool = module.Tool(slot.desk)
 
@@ -90,7 +103,7 @@ class Toolbox:
             return Listing(entry.title, lambda _: self._items(slot, entry))
         is_on = entry.is_on
         return Command(
-            entry.name, entry.title, lambda _: self._ask(slot, entry.act, is_users=True), entry.key,
+            entry.name, entry.title, lambda _: self._ask(slot, entry.act, self.note), entry.key,
             entry.repeats, None if is_on is None else lambda _: bool(self._ask(slot, is_on)),
             lambda _: bool(self._ask(slot, entry.can)), entry.short,
         )  # fmt: skip
@@ -99,10 +112,12 @@ class Toolbox:
         for title, act, is_on in self._ask(slot, lambda tool: list(listing.items(tool))) or ():
             yield title, partial(self._do, slot, act), is_on
 
-    def _ask(self, slot: Slot, function: Callable[[Any], Any], is_users: bool = False) -> Any:
+    def _ask(
+        self, slot: Slot, function: Callable[[Any], Any], tell: Callable[[str], object] | None = None
+    ) -> Any:
         """The answer of a function of the slot's tool; None where that is off or fails.
 
-        is_users: whether an InputError is a mistake of the user's.
+        tell: tells the user of an InputError, the user's mistake; None: it is the tool's, as any other.
         """
         if slot.tool is None:
             return None
@@ -110,19 +125,28 @@ class Toolbox:
             with failures.widgets_ended():
                 return function(slot.tool)
         except (Exception, Cancelled) as error:
-            if is_users and isinstance(error, InputError):
-                self.note(str(error))
+            if tell is not None and isinstance(error, InputError):
+                tell(str(error))
             else:
                 self._switch_off(slot, error)
         return None
 
     def _do(self, slot: Slot, act: Callable[[], object]) -> None:
         """Do something of the slot's tool that the user has asked for."""
-        self._ask(slot, lambda _: act(), is_users=True)
+        self._ask(slot, lambda _: act(), self.note)
 
     def _call(self, slot: Slot, hook: str, *arguments: Any) -> Any:
         """The answer of a hook of the slot's tool; None where the tool is off, lacks it or fails."""
         return self._ask(slot, lambda tool: getattr(tool, hook)(*arguments)) if slot.has(hook) else None
+
+    def _declare(self, slot: Slot, hook: str, *arguments: Any) -> None:
+        """Have a tool declare its widgets; a mistake of their user's is told once while it lasts."""
+        if slot.has(hook):
+            mistakes: list[str] = []
+            self._ask(slot, lambda tool: getattr(tool, hook)(*arguments), mistakes.append)
+            before, slot.mistakes[hook] = slot.mistakes.get(hook), "".join(mistakes)
+            if mistakes and mistakes[0] != before:
+                self.note(mistakes[0])
 
     def _switch_off(self, slot: Slot, error: BaseException) -> None:
         slot.tool = None
@@ -139,7 +163,7 @@ class Toolbox:
         for name, slot in self._slots.items():
             if slot.has("panel"):
                 is_revealed, slot.desk.is_revealed = slot.desk.is_revealed, False
-                yield f"{slot.title}###{name}", is_revealed, partial(self._call, slot, "panel")
+                yield f"{slot.title}###{name}", is_revealed, partial(self._declare, slot, "panel")
 
     def draw_over(self, view: ViewPlace) -> None:
         """Have the tools draw over the picture."""
@@ -150,7 +174,7 @@ class Toolbox:
     def draw_dialogs(self) -> None:
         """Have the tools declare windows of their own."""
         for slot in self._slots.values():
-            self._call(slot, "dialog")
+            self._declare(slot, "dialog")
 
     @property
     def _first(self) -> Slot | None:
@@ -176,7 +200,7 @@ class Toolbox:
             return
         meant = before_gap(surface, *pixel)
         click = Click(pick(surface, *meant), request.pose, meant != pixel)
-        self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), is_users=True) is False
+        self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
 
     @property
     def is_under_way(self) -> bool:

@@ -29,10 +29,11 @@ The Tool has any of
                             drawn, and called again at once
 
 What a user would be sorry to lose is in the document (`desk.document`, `desk.change`), what is under way in
-the Tool. A tool that raises is told and switched off until the next start, all else goes on; only an
-InputError in a command or a click is the user's mistake, and told alone. Names that begin with an underscore
-are no tools. No list of tools exists anywhere else; a folder that is appended to this package's `__path__`
-is scanned too.
+the Tool. A tool that raises, or leaves widgets begun, is told and switched off until the next start, all else
+goes on; only an InputError in a command, a click, a widget of `panel` or `dialog` or in what was run beside
+the window is the user's mistake, and told alone. Names that begin with an underscore are no tools. No list of
+tools exists anywhere else; a folder that is appended to this package's `__path__` is scanned too, and of two
+tools of one name the first folder's is used and the other told.
 """
 
 from __future__ import annotations
@@ -42,4 +43,14 @@ import pkgutil
 
 def tool_names() -> tuple[str, ...]:
     """The names of all tools, in alphabetical order in each folder. None of their modules is imported."""
-    return tuple({m.name: None for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")})
+    return tuple(folders_of_tools())
+
+
+def folders_of_tools() -> dict[str, list[str]]:
+    """Tool's name -> the folders that have one of this name. The first is used."""
+    found: dict[str, list[str]] = {}
+    for folder in dict.fromkeys(__path__):
+        for module in pkgutil.iter_modules([folder]):
+            if not module.name.startswith("_"):
+                found.setdefault(module.name, []).append(folder)
+    return found
