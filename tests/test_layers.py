@@ -139,6 +139,11 @@ KNOW_THE_APP = {
 }  # fmt: skip
 
 
+def layer_of(name: str) -> int:
+    """That of the part that a dotted name begins with; the package itself gives what frames need."""
+    return LAYER_OF.get((*name.split("."), "")[1], LAYER_OF["__init__"])
+
+
 def test_every_part_has_a_layer() -> None:
     assert {part_of(path) for path in modules()} <= set(LAYER_OF)
 
@@ -148,10 +153,24 @@ def test_imports_point_down_the_layers() -> None:
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in modules()
         for name in all_imports(path)
-        if name.startswith("viewer.")
-        and LAYER_OF.get(name.split(".")[1], LAYER_OF["__init__"]) > LAYER_OF[part_of(path)]
+        if name.split(".")[0] == "viewer" and layer_of(name) > LAYER_OF[part_of(path)]
     ]
     assert upward == []
+
+
+def test_modules_found_by_folder_are_all_that_is_imported_by_name() -> None:
+    """`import_module` gets the folder's own name and what was found in it, no other text."""
+    odd = [
+        f"{path.relative_to(PACKAGE)}: {ast.unparse(node)}"
+        for path in modules()
+        for node in ast.walk(parse(path))
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("import_module", "__import__"))
+        if not re.match(
+            r"(importlib\.)?import_module\(f'\{(__name__|__package__|tools\.__name__)\}\.\{",
+            ast.unparse(node),
+        )
+    ]
+    assert odd == []
 
 
 def test_no_text_hides_an_import() -> None:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from itertools import groupby
 
 import numpy as np
@@ -92,30 +92,24 @@ class Grown:
     fill: bool = param(True, "fill", key="H")
 
 
-@dataclass(frozen=True)
-class Misnamed:
-    """A condition on what is not there."""
-
-    mode: str = param("one", "mode", when={"sise": (1,)})
-
-
-@dataclass(frozen=True)
-class Miskeyed:
-    """A key that has nothing to switch."""
-
-    size: int = param(1, "size", key="K")
-
-
 @pytest.mark.parametrize(
-    ("kind", "message"),
+    ("fields", "message"),
     [
-        (Misnamed, "Misnamed.mode goes by 'sise', which is no other parameter; there are mode"),
-        (Miskeyed, "Miskeyed.size: a key switches a bool alone"),
+        ({"mode": param("one", "m", when={"sise": (1,)}), "size": param(1, "s")},
+         "Wrong.mode goes by 'sise', which is no other parameter; there are size"),
+        ({"size": param(1, "s", key="K")}, "Wrong.size has a key, which switches a bool alone"),
+        ({"a": param(True, "a", key="K"), "b": param(True, "b", key="K")}, "Wrong.a has the key 'K' of another"),
+        ({"size": param(1, "s", deprecated=("mode",)), "mode": param("one", "m")},
+         "Wrong.size was called 'mode', as another is or was"),
+        ({"size": param(1, "s", low=2)}, "Wrong.size has a default .* cannot be: size: 1 is outside"),
+        ({"mode": param("one", "m", choices=("one",)), "size": param(1, "s", when={"mode": ("two",)})},
+         "Wrong.size has a default .* unknown mode 'two'"),
     ],
-)
-def test_a_wrong_declaration_says_where(kind: type, message: str) -> None:
+)  # fmt: skip
+def test_a_wrong_declaration_says_where(fields: dict[str, object], message: str) -> None:
+    declared = [(name, type(field.default), field) for name, field in fields.items()]
     with pytest.raises(TypeError, match=message):
-        describe(kind)
+        describe(make_dataclass("Wrong", declared, frozen=True))
 
 
 def test_a_parameter_matters_where_its_conditions_hold() -> None:

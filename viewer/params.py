@@ -151,17 +151,36 @@ def describe(cls: type) -> tuple[Parameter, ...]:
 def _described(cls: Hashable) -> tuple[Parameter, ...]:
     assert isinstance(cls, type)
     declared = tuple(Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(cls))
-    names = {parameter.name for parameter in declared}
+    by_name = {parameter.name: parameter for parameter in declared}
     for parameter in declared:
-        if parameter.key and parameter.type is not bool:
-            raise TypeError(f"{cls.__qualname__}.{parameter.name}: a key switches a bool alone")
-        for condition in parameter.when:
-            if condition.parameter not in names - {parameter.name}:
-                raise TypeError(
-                    f"{cls.__qualname__}.{parameter.name} goes by '{condition.parameter}', which is no other "
-                    f"parameter; there are {', '.join(sorted(names))}"
-                )
+        if problem := _problem(parameter, by_name):
+            raise TypeError(f"{cls.__qualname__}.{parameter.name} {problem}")
     return declared
+
+
+def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
+    """What is wrong with a declaration; empty where nothing is. by_name: all of the dataclass."""
+    others = {name: other for name, other in by_name.items() if name != parameter.name}
+    if parameter.key and parameter.type is not bool:
+        return "has a key, which switches a bool alone"
+    if parameter.key and parameter.key in (other.key for other in others.values()):
+        return f"has the key '{parameter.key}' of another"
+    for old in parameter.deprecated:
+        if old in by_name or any(old in other.deprecated for other in others.values()):
+            return f"was called '{old}', as another is or was"
+    for condition in parameter.when:
+        if condition.parameter not in others:
+            return (
+                f"goes by '{condition.parameter}', which is no other parameter; there are {', '.join(others)}"
+            )
+    try:
+        parameter.parse(parameter.default)
+        for condition in parameter.when:
+            for value in condition.values:
+                others[condition.parameter].parse(value)
+    except InputError as error:
+        return f"has a default or a condition that cannot be: {error}"
+    return ""
 
 
 def switches(values: object) -> dict[str, bool]:
