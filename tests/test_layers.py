@@ -158,6 +158,9 @@ def test_imports_point_down_the_layers() -> None:
     assert upward == []
 
 
+FOUND = re.compile(r"(importlib\.)?import_module\(f'\{(__name__|__package__|tools\.__name__)\}\.\{")
+
+
 def test_modules_found_by_folder_are_all_that_is_imported_by_name() -> None:
     """`import_module` gets the folder's own name and what was found in it, no other text."""
     odd = [
@@ -165,10 +168,7 @@ def test_modules_found_by_folder_are_all_that_is_imported_by_name() -> None:
         for path in modules()
         for node in ast.walk(parse(path))
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("import_module", "__import__"))
-        if not re.match(
-            r"(importlib\.)?import_module\(f'\{(__name__|__package__|tools\.__name__)\}\.\{",
-            ast.unparse(node),
-        )
+        if not FOUND.match(ast.unparse(node))
     ]
     assert odd == []
 

@@ -159,7 +159,7 @@ def _described(cls: Hashable) -> tuple[Parameter, ...]:
 
 
 def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
-    """What is wrong with a declaration; empty where nothing is. by_name: all of the dataclass."""
+    """The mistake in a declaration, empty where there is none. by_name: all of the dataclass."""
     others = {name: other for name, other in by_name.items() if name != parameter.name}
     if parameter.key and parameter.type is not bool:
         return "has a key, which switches a bool alone"
@@ -170,9 +170,8 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
             return f"was called '{old}', as another is or was"
     for condition in parameter.when:
         if condition.parameter not in others:
-            return (
-                f"goes by '{condition.parameter}', which is no other parameter; there are {', '.join(others)}"
-            )
+            known = ", ".join(others)
+            return f"goes by '{condition.parameter}', which is no other parameter; there are {known}"
     try:
         parameter.parse(parameter.default)
         for condition in parameter.when:
