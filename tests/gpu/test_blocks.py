@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -31,9 +33,15 @@ class Everything:
     last: float = 1e39  # no float32: infinite
 
 
+@dataclass(frozen=True)
+class Another(Everything):
+    """Another class with the same members."""
+
+
 READ = """
 layout(local_size_x = 1) in;
 #include <params>
+uniform uint item_count;
 layout(std430, binding = 0) writeonly buffer Seen { float seen[]; };
 void main() {
     float all[15] = float[15](float(on), float(off), float(pair.x), float(pair.y), float(size),
@@ -55,8 +63,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: Renderer):
         program = gpu.compute("read.comp", params=values)
         seen = gpu.ctx.buffer(reserve=60)
         seen.bind_to_storage_buffer(0)
-        program.run()
-        gpu.ctx.memory_barrier()
+        gpu.dispatch(program, 1)
         return np.frombuffer(seen.read(), np.float32).tolist()
 
     return run
@@ -71,6 +78,36 @@ def test_values_are_those_of_the_last_call(read) -> None:
     first, second = Everything(), replace(Everything(), size=7, on=False)
     assert [read(values)[4] for values in (first, second, second, first)] == [-5, 7, 7, -5]
     assert read(second)[0] == 0
+
+
+def test_each_program_reads_its_own_values(tmp_path: Path, read, renderer: Renderer) -> None:
+    """Whichever was built last, and however it is run: two of one class, and one of another."""
+    gpu = renderer.gpu
+    first = gpu.compute("read.comp", {"NUMBER": 1}, params=replace(Everything(), size=1))
+    second = gpu.compute("read.comp", {"NUMBER": 2}, params=replace(Everything(), size=2))
+    third = gpu.compute("read.comp", params=Another(size=3))
+    (tmp_path / "pixel.vert").write_text("void main() { gl_Position = vec4(0.0, 0.0, 0.0, 1.0); }\n")
+    (tmp_path / "pixel.frag").write_text(
+        "#include <params>\nout vec4 color;\nvoid main() { color = vec4(size); }\n"
+    )
+    drawn = gpu.program(("pixel.vert", "pixel.frag"), params=replace(Everything(), size=4))
+    gpu.compute("read.comp", {"NUMBER": 5}, params=replace(Everything(), size=5))
+
+    seen = gpu.ctx.buffer(reserve=60)
+    seen.bind_to_storage_buffer(0)
+    groups = gpu.ctx.buffer(struct.pack("3I", 1, 1, 1))
+    for program, size in ((first, 1), (second, 2), (third, 3), (first, 1)):
+        gpu.dispatch(program, 1)
+        assert np.frombuffer(seen.read(), np.float32)[4] == size
+        seen.clear()
+        gpu.dispatch_indirect(program, groups)
+        assert np.frombuffer(seen.read(), np.float32)[4] == size
+    target = gpu.ctx.framebuffer([gpu.ctx.texture((1, 1), 4, dtype="f4")])
+    target.use()
+    gpu.ctx.enable_only(moderngl.NOTHING)
+    with gpu.vertices(drawn) as vertices:
+        vertices.render(moderngl.POINTS, vertices=1)
+    assert np.frombuffer(target.read(components=1, dtype="f4"), np.float32) == 4
 
 
 def test_what_did_not_change_is_not_written_again(renderer: Renderer) -> None:

@@ -147,7 +147,7 @@ def programs() -> list[list[Source]]:
     use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader
-    return [kept.extra for kept in renderer.gpu._kept.values() if isinstance(kept, built)]
+    return [kept.extra.sources for kept in renderer.gpu._kept.values() if isinstance(kept, built)]
 
 
 def test_every_shader_file_is_built(programs: list[list[Source]]) -> None:

@@ -91,7 +91,6 @@ class _Triangles:
                 pose.array(name).bind(Texture[name.upper()])
             surface.bind_own("normal", *(("color",) if colored else ()))
             covered.run(resolve)
-            gpu.ctx.memory_barrier()
         return False
 
 
@@ -122,8 +121,7 @@ def _rasterise(
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
         if count:
-            vertices = gpu.ctx.vertex_array(program, content, index_buffer=indices)
-            vertices.render(mode, vertices=count)
-            vertices.release()
+            with gpu.vertices(program, content, indices) as vertices:
+                vertices.render(mode, vertices=count)
     with gpu.timers.measure("copy"):
         surface.take_raster()

@@ -140,11 +140,9 @@ def _restore(surface: Surface) -> None:
     """Rasterise what the surface holds."""
     surface.bind_textures()
     surface.gpu.ctx.depth_func = "1"
-    triangle = surface.gpu.ctx.vertex_array(
-        surface.gpu.program(("present/present.vert", "amplify/restore.frag")), []
-    )
-    triangle.render(moderngl.TRIANGLES, vertices=3)
-    triangle.release()
+    program = surface.gpu.program(("present/present.vert", "amplify/restore.frag"))
+    with surface.gpu.vertices(program) as triangle:
+        triangle.render(moderngl.TRIANGLES, vertices=3)
 
 
 def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: Values | None = None) -> None:
@@ -172,14 +170,13 @@ def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: 
         content = []
         points.bind(program)
     index = points.rows.buffer if feed == "gs" and points.rows is not None else None
-    vertices = gpu.ctx.vertex_array(program, content, index_buffer=index)
-    if feed == "gs":
-        vertices.render(moderngl.POINTS, vertices=points.count)
-    elif feed == "pull":
-        vertices.render(moderngl.TRIANGLES, vertices=3 * (shape.corners - 2) * points.count)
-    else:
-        vertices.render(moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=points.count)
-    vertices.release()
+    with gpu.vertices(program, content, index) as vertices:
+        if feed == "gs":
+            vertices.render(moderngl.POINTS, vertices=points.count)
+        elif feed == "pull":
+            vertices.render(moderngl.TRIANGLES, vertices=3 * (shape.corners - 2) * points.count)
+        else:
+            vertices.render(moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=points.count)
 
 
 def _attributes(
@@ -198,14 +195,13 @@ def _draw_blocks(program: moderngl.Program, points: Points, shape: Shape) -> Non
     gpu, size = points.pose.gpu, _block_points(points)
     point_bytes = 4 * points.stride
     packed = points.pose.packed(_pack, points.attributes, size).buffer
-    vertices = gpu.ctx.vertex_array(program, [])
-    for first in range(0, points.count, size):
-        packed.bind_to_uniform_block(UniformBlock.POINTS, offset=first * point_bytes, size=size * point_bytes)
-        gpu.set(program, first=first)
-        vertices.render(
-            moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=min(size, points.count - first)
-        )
-    vertices.release()
+    with gpu.vertices(program) as vertices:
+        for first in range(0, points.count, size):
+            offset = first * point_bytes
+            packed.bind_to_uniform_block(UniformBlock.POINTS, offset=offset, size=size * point_bytes)
+            gpu.set(program, first=first)
+            shown = min(size, points.count - first)
+            vertices.render(moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=shown)
 
 
 def _block_points(points: Points) -> int:

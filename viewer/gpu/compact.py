@@ -22,6 +22,7 @@ class IndexList:
     """Indices in a buffer, with an indirect dispatch of one invocation each (common/list.glsl)."""
 
     def __init__(self, gpu: Gpu, capacity: int) -> None:
+        self._gpu = gpu
         self.capacity = capacity
         self.nbytes = 4 * capacity + 16
         self._indices = gpu.ctx.buffer(reserve=4 * capacity)
@@ -41,7 +42,7 @@ class IndexList:
     def run(self, program: moderngl.ComputeShader) -> None:
         """Run one invocation for each index, without the CPU knowing how many there are."""
         self.bind()
-        program.run_indirect(self._dispatch)
+        self._gpu.dispatch_indirect(program, self._dispatch)
 
     def __len__(self) -> int:
         """How many indices there are; waits for the GPU."""

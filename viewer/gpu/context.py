@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
@@ -47,6 +47,14 @@ class Attempts:
         return "; ".join(f"{how}: {outcome}" for how, outcome in self.log)
 
 
+@dataclass(frozen=True)
+class Built:
+    """Texts and values that a program is run with, its `extra`. values: of its `<params>`; None without."""
+
+    sources: list[Source]
+    values: BlockBuffer | None
+
+
 class Gpu:
     """A context with its shader programs and timers.
 
@@ -85,9 +93,11 @@ class Gpu:
         parts: Mapping[str, str] | None = None,
         params: Values | None = None,
     ) -> moderngl.ComputeShader:
-        """The compute program of a shader file, built once for each set of defines and parts.
+        """The compute program of a shader file, built once for each set of defines, parts and class of
+        params: whoever asks for the same shares it, with the uniforms and params that it was given last.
 
-        params: a frozen dataclass, whose numbers the program then finds in `<params>`.
+        params: a frozen dataclass, whose numbers the program finds in `<params>` whenever `dispatch`,
+        `dispatch_indirect` or `vertices` use it.
         """
         return self._build((name,), defines, parts, params)
 
@@ -109,18 +119,16 @@ class Gpu:
         params: Values | None,
     ) -> Any:
         declared = None if params is None else type(params)
-        if params is not None:
-            block = self.keep(
-                ("params", declared), lambda: BlockBuffer(self.ctx, type(params), UniformBlock.PARAMS)
-            )
-            block.write(params)
-            block.bind()
         key = (names, tuple((defines or {}).items()), tuple((parts or {}).items()), declared)
-        return self.keep(
-            key, lambda: self._compile([Source(name, defines, parts, declared) for name in names])
+        program = self.keep(
+            key,
+            lambda: self._compile([Source(name, defines, parts, declared) for name in names], declared),
         )
+        if params is not None:
+            program.extra.values.write(params)
+        return program
 
-    def _compile(self, sources: list[Source]) -> Any:
+    def _compile(self, sources: list[Source], declared: type[Values] | None) -> Any:
         texts = {s.name.rsplit(".", 1)[-1]: s.text for s in sources}
         self.activate()  # a program belongs to the context that is current
         program: Program
@@ -135,7 +143,8 @@ class Gpu:
                 )
         except moderngl.Error as error:
             raise shader_error(sources, error) from error
-        program.extra = sources
+        values = None if declared is None else BlockBuffer(self.ctx, declared, UniformBlock.PARAMS)
+        program.extra = Built(sources, values)
         return program
 
     def keep(self, key: object, make: Callable[[], T]) -> T:
@@ -171,8 +180,8 @@ class Gpu:
         for name, value in values.items():
             if name in program:
                 program[name] = value
-            elif not any(name in source.uniforms for source in program.extra):
-                names = ", ".join(source.name for source in program.extra)
+            elif not any(name in source.uniforms for source in program.extra.sources):
+                names = ", ".join(source.name for source in program.extra.sources)
                 raise ShaderError(f"no uniform is called '{name}'", f"shaders/{names}")
 
     def dispatch(self, program: moderngl.ComputeShader, count: int) -> None:
@@ -182,8 +191,37 @@ class Gpu:
         if groups:
             self.set(program, item_count=count)
             rows = -(-groups // GROUP_LIMIT)
+            _bind_values(program)
             program.run(-(-groups // rows), rows)
             self.ctx.memory_barrier()
+
+    def dispatch_indirect(self, program: moderngl.ComputeShader, groups: moderngl.Buffer) -> None:
+        """Run as many work groups as a buffer says that begins with their three numbers."""
+        _bind_values(program)
+        program.run_indirect(groups)
+        self.ctx.memory_barrier()
+
+    @contextmanager
+    def vertices(
+        self,
+        program: moderngl.Program,
+        content: Sequence[tuple[moderngl.Buffer, str, str]] = (),
+        indices: moderngl.Buffer | None = None,
+    ) -> Iterator[moderngl.VertexArray]:
+        """Vertex array to draw a program with, and nothing else, inside. content: (buffer, format, attribute)
+        of each; indices: a uint32 each."""
+        array = self.ctx.vertex_array(program, list(content), index_buffer=indices)
+        _bind_values(program)
+        try:
+            yield array
+        finally:
+            array.release()
+
+
+def _bind_values(program: Program) -> None:
+    """Make the params of a program those that shaders read."""
+    if program.extra.values is not None:
+        program.extra.values.bind()
 
 
 def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu:

@@ -92,7 +92,6 @@ def shade(surface: Surface, look: Look) -> None:
         gl.clear_words(surface.picture, int.from_bytes(bytes(rgba(look.background)), "little"))
         surface.picture.bind_to_storage_buffer(Storage.PICTURE)
         covered.run(program)
-        gpu.ctx.memory_barrier()
     surface.shaded_by = shade
 
 

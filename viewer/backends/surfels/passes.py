@@ -201,9 +201,8 @@ def _limit(points: Points, surface: Surface, splats: Splats) -> None:
     surface.depths.bind(Texture.DEPTHS)
     gpu.ctx.enable_only(moderngl.DEPTH_TEST)
     gpu.ctx.depth_func = "1"
-    triangle = gpu.ctx.vertex_array(program, [])
-    triangle.render(moderngl.TRIANGLES, vertices=3)
-    triangle.release()
+    with gpu.vertices(program) as triangle:
+        triangle.render(moderngl.TRIANGLES, vertices=3)
 
 
 def _resolve(points: Points, surface: Surface, over: bool) -> None:
@@ -232,7 +231,6 @@ def _close(points: Points, surface: Surface, splats: Splats) -> None:
             points.bind(program)
             bind_visible(points, program)
             surface.covered.run(program)
-            gpu.ctx.memory_barrier()
 
 
 def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:

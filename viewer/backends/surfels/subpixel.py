@@ -100,7 +100,6 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
         )
         sums.buffer.bind_to_storage_buffer(Storage.SUMS)
         covered.run(program)
-        gpu.ctx.memory_barrier()
 
     with gpu.timers.measure("mean"):
         surface.bind_textures()

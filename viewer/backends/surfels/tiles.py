@@ -123,8 +123,7 @@ class TileLists:
         self._bins.starts.bind(Texture.STARTS)
         self._bins.items.bind(Texture.LISTED)
         self._bind_storage("farthest")
-        program.run_indirect(self._buffer("work"))
-        self._gpu.ctx.memory_barrier()
+        self._gpu.dispatch_indirect(program, self._buffer("work"))
 
     def release(self) -> None:
         """Delete everything."""

@@ -43,7 +43,6 @@ def shade_flat(points: Points, surface: Surface) -> None:
         surface.bind_textures()
         surface.bind_own("normal")
         covered.run(gpu.compute("voxels/faces.comp"))
-        gpu.ctx.memory_barrier()
 
 
 def _by_size(points: Points, surface: Surface) -> tuple[Points | None, Points | None]:
