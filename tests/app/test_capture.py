@@ -5,10 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import threading
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from scenes import sphere
 
@@ -18,8 +20,11 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.journal import Journal, journals, saved
 from viewer.document.recording import Recording, fingerprint
+from viewer.errors import InputError
 from viewer.frame import Request
 from viewer.look import Look
+from viewer.output.export import read_description
+from viewer.scan.layers import Layers
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "ball", sphere(100))
@@ -57,6 +62,43 @@ def turn(app: Any) -> None:
     app.viewport.request = Request(
         POSE, request.camera.orbited(10, 0), request.backend, request.params, request.look
     )
+
+
+def colour_by_a_layer(app: Any) -> None:
+    """Show a picture whose colours are by numbers that no file has."""
+    request, layers = app.viewport.request, Layers({"deviation": np.zeros(len(POSE.cloud))})
+    app.viewport.request = replace(request, look=Look(color_by="deviation"), layers=layers)
+
+
+def test_what_cannot_be_drawn_again_is_not_recorded(app: Any) -> None:
+    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture.toggle_recording()
+    colour_by_a_layer(app)
+    capture.note_shown()
+    assert capture.recorder is None
+    assert "The recording ends: the colours come from 'deviation'" in app.told[-2]
+    assert capture.last is not None
+    assert len(Recording.load(capture.last).entries) == 1, "what was recorded until then"
+    capture.toggle_recording()
+    assert capture.recorder is None
+    assert "Cannot record: the colours come from 'deviation'" in app.told[-1]
+
+
+def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) -> None:
+    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    app.session.hash_found.set_result(None)
+    image = np.zeros((48, 64, 3), np.uint8)
+    app.viewport.surface, app.viewport.finish = SimpleNamespace(image=lambda: image), lambda: None
+    capture.screenshot()
+    colour_by_a_layer(app)
+    capture.screenshot()
+    capture.close()
+    cannot, *saved = app.told
+    assert "The picture cannot be replayed: the colours come from 'deviation'" in cannot
+    first, second = (Path(words.removeprefix("Saved ")) for words in saved)
+    assert Recording.load(first).entries[0].scan == "ball.npz"
+    with pytest.raises(InputError):
+        read_description(second)
 
 
 def test_a_journal_that_failed_goes_when_the_recording_is_saved(

@@ -20,6 +20,8 @@ from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import write_png
 from viewer.output.marks import Marks
+from viewer.rigid import Rigid
+from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
@@ -64,6 +66,38 @@ def test_an_entry_holds_all_of_a_request() -> None:
     assert (entry.pose, entry.time) == (3, 0.12)
     again = Entry.from_json(json.loads(json.dumps(entry.to_json()))).request(POSE)
     assert vars(again) == vars(request)
+
+
+def test_an_entry_has_the_place_that_the_scan_is_moved_to() -> None:
+    place = Rigid(np.array([[0.6, -0.8, 0, 1e6], [0.8, 0.6, 0, 1 / 3], [0, 0, 1, -2], [0, 0, 0, 1]]))
+    request = Request(POSE, FIRST.camera, "points", FIRST.params, FIRST.look, Layers(place=place))
+    entry = Entry.of(request, "knot", None, (96, 64), "mm")
+    again = Entry.from_json(json.loads(json.dumps(entry.to_json())))
+    assert again == entry
+    np.testing.assert_array_equal(again.request(POSE).layers.place.matrix, place.matrix)
+    back = replace(entry, place=None)
+    assert back.to_json(entry) == {"place": None}
+    for place_of_none in ([[1, 0], [0, 1]], (2 * np.eye(4)).tolist(), "here"):
+        with pytest.raises(InputError, match="a rotation and a translation, 4 x 4"):
+            Entry.from_json(entry.to_json() | {"place": place_of_none}, "a.json")
+
+
+def test_colours_by_numbers_that_are_in_no_file_are_refused() -> None:
+    pose = replace(POSE, cloud=replace(POSE.cloud, scalars={"heat": np.arange(3.0)}))
+    layers = Layers({"deviation": np.arange(3.0)})
+
+    def entry(color_by: str, layers: Layers) -> Entry:
+        look = replace(FIRST.look, color_by=color_by)
+        request = Request(pose, FIRST.camera, "points", FIRST.params, look, layers)
+        return Entry.of(request, "knot", None, (96, 64), "mm")
+
+    assert entry("heat", layers).look.color_by == "heat"
+    assert entry("#1", layers).look.color_by == "#1"
+    for color_by, over in (
+        ("deviation", layers), ("#2", layers), ("heat", Layers({"heat": np.arange(3.0)})),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match="which is computed and not in the scan's files"):
+            entry(color_by, over)
 
 
 def test_what_earlier_versions_did_not_tell_has_its_default(tmp_path: Path) -> None:

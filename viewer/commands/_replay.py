@@ -10,7 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..document.anonymous import anonymous_pose, anonymous_request
-from ..document.recording import Entry, Recording, fingerprint, fingerprint_as, new_salt, places_to_open
+from ..document.recording import (
+    Entry,
+    Recording,
+    fingerprint,
+    fingerprint_as,
+    matrix_of,
+    new_salt,
+    places_to_open,
+)
 from ..errors import InputError
 from ..frame import Request
 from ..output.export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
@@ -139,7 +147,8 @@ def _completed(
     if not (entry.anonymous or args.anonymous):
         return shown
     time = float(request.pose.time)
-    return replace(shown, time=time, camera=request.camera, look=request.look).without_names()
+    place = matrix_of(request.layers.place)
+    return replace(shown, time=time, camera=request.camera, look=request.look, place=place).without_names()
 
 
 def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:

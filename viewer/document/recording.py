@@ -27,15 +27,19 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
+
 from .. import __version__
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError, shortened
 from ..files import open_plain, whole_file
 from ..frame import Request
-from ..look import Look
+from ..look import Look, value_source
 from ..output.export import read_description
 from ..output.marks import Legend, Marks
+from ..rigid import STILL, Rigid, is_rigid
+from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import DEMO, searches_folders
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -61,6 +65,16 @@ from .schema import (
 FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
 _TICK = 0.001  # seconds that time stamps are rounded to
+_EXACT = 1e-6  # how far the rotation of a place may be from orthonormal
+
+_Row = tuple[float, float, float, float]
+
+
+def _is_place(rows: tuple[_Row, ...]) -> bool:
+    return is_rigid(np.array(rows), _EXACT)
+
+
+Matrix = Annotated[tuple[_Row, _Row, _Row, _Row], Kind("a rotation and a translation, 4 x 4", _is_place)]
 
 
 @dataclass(frozen=True)
@@ -70,9 +84,9 @@ class Entry:
     scan: as the user named it, None where it is anonymous. hash: of its files (see `fingerprint`), None
     where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
     params: the backend's own `Params`. marks: what is drawn over it. unit: of length, as marks have it;
-    None for the scan's own. anonymous: whether camera, time and look are those of the scan as
-    `anonymous_request` has it. at: seconds since the recording began; entries that differ in it alone are
-    equal.
+    None for the scan's own. place: the matrix that the scan is moved by, None where it is not. anonymous:
+    whether camera, time, look and place are those of the scan as `anonymous_request` has it. at: seconds
+    since the recording began; entries that differ in it alone are equal.
     """
 
     scan: ScanName | None
@@ -86,6 +100,7 @@ class Entry:
     look: Look
     marks: Marks = field(default_factory=Marks)
     unit: Unit | None = None
+    place: Matrix | None = None
     anonymous: bool = False
     at: Stamp = field(default=0.0, compare=False)
 
@@ -99,15 +114,30 @@ class Entry:
         unit: str,
         marks: Marks | None = None,
     ) -> Entry:
-        """The entry of a picture that was asked for with a backend's name and its parameters."""
+        """The entry of a picture that was asked for with a backend's name and its parameters.
+
+        Raises InputError where its colours come from a layer: these numbers are in no file.
+        """
+        layers = request.layers
+        source = value_source(request.look, layers.names(request.pose.cloud.scalars))
+        if source in layers.scalars:
+            what = f"the colours come from '{source}', which is computed and not in the scan's files"
+            raise InputError(what, hint="It can be drawn again in other colours")
         return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks or Marks(), unit,
+            matrix_of(layers.place),
         )  # fmt: skip
 
     def request(self, pose: Pose) -> Request:
         """The picture to draw. pose: number `self.pose` of the scan."""
-        return Request(pose, self.camera, self.backend, self.params, self.look)
+        layers = NO_LAYERS if self.place is None else Layers(place=self.motion)
+        return Request(pose, self.camera, self.backend, self.params, self.look, layers)
+
+    @property
+    def motion(self) -> Rigid:
+        """The motion of `place`."""
+        return STILL if self.place is None else Rigid(np.array(self.place))
 
     def legend(self, timeline: Timeline) -> Legend:
         """Texts of the marks. timeline: the scan's."""
@@ -139,6 +169,11 @@ class Entry:
     def description(self) -> str:
         """The JSON text that a picture carries."""
         return json.dumps(_head() | self.to_json())
+
+
+def matrix_of(place: Rigid) -> Matrix | None:
+    """The `place` of an entry."""
+    return None if place.is_identity else tuple(map(tuple, place.matrix.tolist()))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,10 @@ class Capture:
         self._naming = Lock()  # one free name at a time
 
     def shown(self) -> Entry | None:
-        """The entry that says what the picture shows, None where there is none."""
+        """The entry that says what the picture shows, None where there is none.
+
+        Raises InputError where its colours are by numbers that no file has.
+        """
         session, viewport, request = self._session, self._viewport, self._viewport.request
         if not viewport.is_there or request is None:
             return None
@@ -54,10 +57,15 @@ class Capture:
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""
         self._viewport.finish()
-        surface, entry = self._viewport.surface, self.shown()
-        if surface is None or entry is None:
+        surface = self._viewport.surface
+        if surface is None or not self._viewport.is_there:
             self._note("There is no picture to save.")
             return
+        try:
+            entry = self.shown()
+        except InputError as error:
+            entry = None
+            self._note(f"The picture cannot be replayed: {error}")
         work = partial(self._save_picture, surface.image(), entry, self._session.hash_found)
         self._saving.append(in_background(Task("Saving"), work))
 
@@ -67,6 +75,11 @@ class Capture:
         """Take down what is shown from now on; or stop, and save it."""
         now = time.monotonic()
         if self.recorder is None:
+            try:
+                self.shown()
+            except InputError as error:
+                self._note(f"Cannot record: {error}")
+                return
             self.recorder = Recorder(now)
             self._note("Recording what is shown, until you stop it.")
             self._begin_journal()
@@ -96,8 +109,16 @@ class Capture:
         return f"Saved {self.last}"
 
     def note_shown(self) -> None:
-        """Take down what is shown where that is being recorded."""
-        if self.recorder is None or (entry := self.shown()) is None:
+        """Take down what is shown where that is being recorded; where that cannot be, the recording ends."""
+        if self.recorder is None:
+            return
+        try:
+            entry = self.shown()
+        except InputError as error:
+            self._note(f"The recording ends: {error}")
+            self.toggle_recording()
+            return
+        if entry is None:
             return
         change = self.recorder.note(entry, time.monotonic())
         if change is not None and self._journal is not None and not self._journal.is_closed:
@@ -122,9 +143,12 @@ class Capture:
         for journal in journals():
             self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
 
-    def _save_picture(self, image: NDArray[np.uint8], entry: Entry, hash: Future[str | None]) -> str:
-        """Write it under the next free name, with the scan's hash, which this waits for; what to tell."""
-        text = replace(entry, hash=hash.result()).description()
+    def _save_picture(self, image: NDArray[np.uint8], entry: Entry | None, hash: Future[str | None]) -> str:
+        """Write it under the next free name, with the entry's text and the scan's hash, which this waits for.
+
+        Returns what to tell.
+        """
+        text = None if entry is None else replace(entry, hash=hash.result()).description()
         with self._naming:
             path = free_file(working_folder(), ".png")
             try:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ...document.recording import Entry
 from ...document.render_job import Made, make
+from ...errors import InputError
 from ...files import working_folder
 from ...output.marks import Marks
 from ...scan.inputs import found_among, scan_inputs
@@ -86,6 +87,8 @@ class Exporting:
 
     def ask(self) -> None:
         """Open the dialog; a name is suggested unless the user gave one."""
+        if self._entry() is None:
+            return
         choices = self.choices
         if self._scan != self._session.scan:
             self._scan = self._session.scan
@@ -111,7 +114,7 @@ class Exporting:
     def start(self) -> None:
         """Export, unless that would replace files that the user was not asked about; closes the dialog."""
         there = export_plan.present(self.choices, self.count)
-        shown, choices, timeline = self._shown(), self.choices, self._playback.timeline
+        shown, choices, timeline = self._entry(), self.choices, self._playback.timeline
         self.refused = found_among(there, scan_inputs(timeline))
         if self.refused or there != self.replaced or shown is None:
             self.replaced = [] if self.refused else there
@@ -126,6 +129,14 @@ class Exporting:
             task, lambda: make(task, recording, out, rate, anonymous, numbers, replaced=there)
         )
         log.debug("exporting %s", out)
+
+    def _entry(self) -> Entry | None:
+        """The entry of what the picture shows; where that cannot be drawn again, the user is told why."""
+        try:
+            return self._shown()
+        except InputError as error:
+            self._note(f"Cannot export: {error}")
+        return None
 
     def advance(self) -> None:
         """Tell what came of an export that has ended."""
