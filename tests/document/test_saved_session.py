@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hostile_values import variants
 
@@ -28,6 +29,8 @@ from viewer.document.recording import place_of
 from viewer.document.saved_session import SavedSession, is_session, keep, kept, kept_file
 from viewer.errors import InputError
 from viewer.look import Look
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 
 CAMERA = Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5)
 ENDS = End(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), End(2, 0.08, (1, 2, 3), "surface", None, None, 2)
@@ -36,6 +39,7 @@ FULL = Document(
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
     unit="mm", bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
     parts={"measurements": Measurements((Measurement(*ENDS), Measurement(*ENDS[::-1])))},
+    unread={"clips": [{"plane": [1, 0, 0]}]},
 )  # fmt: skip
 SESSION = SavedSession("/scans/knot", "files:0123456789abcdef", 3, FULL)
 
@@ -97,11 +101,10 @@ def test_what_other_tools_and_renderers_keep_survives_untouched(tmp_path: Path) 
         all: tuple[str, ...] = ()
 
     try:
-        with pytest.raises(InputError, match=r"tests\.pins"):
-            read.document.part(Pins)
-        with pytest.raises(InputError, match=r"parts: tests\.pins"):
-            SavedSession.load(tmp_path / "b.json")
+        assert read.document.part(Pins) == Pins()
+        assert SavedSession.load(tmp_path / "b.json").document.part(Pins) == Pins()
         pinned = replace(read, document=read.document.with_part(Pins(("a", "b"))))
+        assert pinned.document.unread["parts.tests.pins"] == unknown
         pinned.save(tmp_path / "b.json")
         del Part.kinds["tests.pins"]
         raw = SavedSession.load(tmp_path / "b.json").document
@@ -131,26 +134,8 @@ def changed(*path: Any, to: Any) -> Callable[[dict[str, Any]], None]:
         (changed("scan", to="a\0b"), "'scan' is not the name of a scan"),
         (changed("hash", to=7), "'hash' is not a hash but 7"),
         (changed("pose", to=-1), "'pose' is not the number of a pose but -1"),
-        (changed("document", to=[1]), "'document' is not values by name but [1]"),
-        (changed("document", "camera", "fov_y", to=0), ", document.camera: the camera's fov_y is 0"),
-        (changed("document", "pivot", to=[1, 2]), ", document: 'pivot' is not 3 values but [1, 2]"),
-        (changed("document", "look", "light", to="dim"), ", document.look: unknown light 'dim'"),
-        (changed("document", "params", "points", "point_size", to=99), "points: point_size: 99 is outside"),
-        (changed("document", "params", to=[1]), ", document.params: is not values by name but [1]"),
-        (changed("document", "unit", to=" "), "document.unit: ' ' is no unit of length"),
-        (
-            changed("document", "bookmarks", 1, "name", to=3),
-            ", document.bookmarks[1]: 'name' is not a text but 3",
-        ),
-        (
-            changed("document", "parts", "measurements", "all", 1, "first", "snapped", to="x"),
-            "all[1].first.snapped",
-        ),
-        (
-            changed("document", "parts", "measurements", "all", 0, "second", "level", to="x"),
-            "'level' is not a whole",
-        ),
-        (changed("document", "camra", to=3), ", document: unknown field 'camra'. Did you mean 'camera'?"),
+        (changed("document", to=[1]), ", document: is not values by name but [1]"),
+        (changed("document", "unread", to=[1]), ", document: is not values by name but"),
     ],
 )
 def test_a_wrong_session_is_one_message(damage: Any, words: str, tmp_path: Path) -> None:
@@ -163,6 +148,75 @@ def test_a_wrong_session_is_one_message(damage: Any, words: str, tmp_path: Path)
     assert words in str(caught.value)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+UNREADABLE = [
+    (("camera", "fov_y"), 0, "camera"),
+    (("pivot",), [1, 2], "pivot"),
+    (("look", "light"), "dim", "look"),
+    (("look", "haze"), 0.5, "look"),
+    (("backend",), 7, "backend"),
+    (("params", "points", "point_size"), 99, "params.points"),
+    (("params", "points", "blur"), 1, "params.points"),
+    (("params",), [1], "params"),
+    (("unit",), " ", "unit"),
+    (("bookmarks", 1, "name"), 3, "bookmarks"),
+    (("bookmarks", 0, "colour"), "#ffffff", "bookmarks"),
+    (("parts", "measurements", "all", 1, "first", "snapped"), "x", "parts.measurements"),
+    (("parts", "measurements", "all", 0, "note"), "left", "parts.measurements"),
+    (("sections",), [{"plane": [0, 0, 1]}], "sections"),
+]
+
+
+@pytest.mark.parametrize(("path", "to", "name"), UNREADABLE)
+def test_what_cannot_be_read_of_a_document_costs_no_more_and_is_written_again(
+    path: tuple[Any, ...], to: Any, name: str
+) -> None:
+    keep(SESSION)
+    file = kept_file(SESSION.scan)
+    data = json.loads(file.read_text())
+    changed("document", *path, to=to)(data)
+    file.write_text(json.dumps(data))
+
+    found = kept(SESSION.scan)
+    assert found is not None
+    assert found.problem is not None
+    assert name in found.problem
+    document = found.document
+    for of in fields(Document):
+        if of.name not in (path[0], "unread"):
+            assert getattr(document, of.name) == getattr(FULL, of.name), of.name
+    assert document.look == (replace(FULL.look, light="auto") if to == "dim" else FULL.look)
+
+    # Whatever the user does now, it is there.
+    document = document.with_part(Measurements((Measurement(*ENDS),)))
+    document = document.with_params("points", backend("points").params({"point_size": 2}))
+    keep(replace(found, document=replace(document, camera=Camera(), bookmarks=(), unit="m")))
+    again = json.loads(file.read_text())["document"]["unread"]
+    raw = data["document"]
+    for step in name.split("."):
+        raw = raw[step]
+    assert again == FULL.unread | {name: raw}
+
+
+def test_what_a_later_version_added_is_read_again_by_one_that_knows_it() -> None:
+    data = json.loads(json.dumps(replace(SESSION, document=replace(FULL, unread={})).to_json()))
+    data["document"]["unread"] = {"unit": data["document"].pop("unit")}
+    assert SavedSession.from_json(data, "a").document == replace(FULL, unread={})
+
+
+def test_fields_of_a_session_that_are_not_known_are_kept_in_its_document() -> None:
+    data = json.loads(json.dumps(SESSION.to_json())) | {"tags": ["knot"]}
+    read = SavedSession.from_json(data, "a")
+    assert read.document == replace(FULL, unread={**FULL.unread, "session.tags": ["knot"]})
+
+
+def test_parameters_that_cannot_be_read_as_a_whole_draw_with_those_that_can() -> None:
+    data = json.loads(json.dumps(SESSION.to_json()))
+    data["document"]["params"]["points"] |= {"blur": 1}
+    document = SavedSession.from_json(data, "a").document
+    pose = Pose(0, 0.0, "a", PointCloud.from_arrays(np.eye(3)))
+    assert document.chosen(pose) == ("points", FULL.params["points"])
 
 
 def test_whatever_stands_in_a_session_it_is_read_or_refused() -> None:
@@ -211,8 +265,38 @@ def test_what_is_damaged_is_put_aside_and_told_once() -> None:
     with pytest.raises(InputError) as caught:
         kept(SESSION.scan)
     assert str(caught.value).startswith("/scans/knot: what was kept of it cannot be read (is not JSON")
-    assert str(file.with_suffix(".old.json")) in str(caught.value)
+    aside = file.with_name(f"{file.stem}.old-1.scan4d.json")
+    assert str(aside) in str(caught.value)
     assert kept(SESSION.scan) is None
+    former = aside.read_bytes()
+    file.write_text("{")
+    with pytest.raises(InputError, match="old-2"):
+        kept(SESSION.scan)
+    assert aside.read_bytes() == former, "what was put aside before stays"
+
+
+def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> None:
+    keep(SESSION)
+    file = kept_file(SESSION.scan)
+    text = json.dumps(json.loads(file.read_text()) | {"format": 2})
+    file.write_text(text)
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"has the format 2.* It stays as it is in"):
+            kept(SESSION.scan)
+        with pytest.raises(InputError, match="has the format 2"):
+            keep(replace(SESSION, pose=1))
+    assert [path.read_text() for path in file.parent.iterdir()] == [text]
+
+
+def test_a_document_that_the_system_refuses_to_read_is_neither_moved_nor_written_over() -> None:
+    file = kept_file(SESSION.scan)
+    file.mkdir(parents=True)  # which root cannot read either
+    with pytest.raises(InputError, match="It stays as it is in"):
+        kept(SESSION.scan)
+    with pytest.raises(InputError, match="cannot be read"):
+        keep(SESSION)
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+    assert file.is_dir()
 
 
 _KEEP_ON = """

@@ -92,6 +92,7 @@ class App:
         self.notices = Notices()
         self.failures = Failures(self.note)
         self._up, self._unit, self._fps = up, unit, fps
+        self._told: set[str] = set()  # what could not be read of documents
         opened = begin(timeline, lambda: self._kept(scans[0]), session)
         document = remembered.document if up is None else remembered.document.with_up(up)
         self.session: Session = Session(scans[0], document, remembered.pace, opened.left)
@@ -298,7 +299,7 @@ class App:
             self.note(problem)
         if session is not None:
             self.session.take_up(session)
-        self._compare(session or left)
+        self._check(session or left)
         self.viewport.clear()
         self._messages_read = 0
         self.window.title = f"{timeline.name} - Scan4D"
@@ -313,11 +314,16 @@ class App:
         self.tools.abandon()
         self.session.take_up(session)
         self.seek(min(session.pose, len(self.playback.timeline) - 1))
-        self._compare(session)
+        self._check(session)
         self.window.touch()
 
-    def _compare(self, saved: SavedSession | None) -> None:
-        """Find out beside the window whether the scan is the one that something was saved of."""
+    def _check(self, saved: SavedSession | None) -> None:
+        """Tell what could not be read of what was saved, once, and find out beside the window whether the
+        scan is the one that it was saved of."""
+        problem = saved and saved.problem
+        if problem and problem not in self._told:
+            self._told.add(problem)
+            self.note(problem)
         if saved is not None and saved.hash is not None:
             self.capture.tell_later(partial(_words_of_change, saved.hash, self.session.hash_found))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..geometry import Vector, up_vector
 from ..look import Look, drawable
 from ..scan.pose import Pose
 from .part import Part
-from .schema import DAMAGED, ReadBy, Unit, Word, is_object, structured, unread
+from .schema import DAMAGED, ReadBy, Unit, Values, Word, is_object, structured, unread, usable
 
 P = TypeVar("P", bound=Part)
 _UPRIGHT = 0.999  # cosine between a camera's up and the scan's
@@ -30,8 +30,12 @@ class Bookmark:
     camera: Camera
 
 
+def _kinds_of_params() -> dict[str, type]:
+    return {name: one.module.Params for name, one in backends().items()}
+
+
 def _read_params(data: Any) -> dict[str, Any]:
-    return _read_known(data, {name: one.module.Params for name, one in backends().items()})
+    return _read_known(data, _kinds_of_params())
 
 
 def _read_parts(data: Any) -> dict[str, Any]:
@@ -39,13 +43,23 @@ def _read_parts(data: Any) -> dict[str, Any]:
 
 
 def _read_known(data: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
-    """Values by name, each of its kind; what has a name that is not known here stays as it is."""
+    """Values by name, each of its kind; what has a name that is not known here, or cannot be read, stays as
+    it is."""
     if not is_object(data):
         raise InputError(f"is not values by name but {shortened(data)}", hint=DAMAGED)
-    return {
-        name: structured(kinds[name], value, name) if name in kinds else unread(value)
-        for name, value in data.items()
-    }
+    return {name: _read_or_raw(kinds.get(name), value) for name, value in data.items()}
+
+
+def _read_or_raw(kind: type | None, value: Any) -> Any:
+    try:
+        return unread(value) if kind is None else structured(kind, value)
+    except InputError:
+        return unread(value)
+
+
+def _is_unreadable(kind: type | None, value: Any) -> bool:
+    """Whether a value is what a file said of a kind that is known and cannot be read as that."""
+    return kind is not None and not isinstance(value, kind) and _read_or_raw(kind, value) is value
 
 
 @dataclass(frozen=True)
@@ -58,7 +72,8 @@ class Document:
     the scan's default. params: backend's name -> its `Params`, kept when another backend is chosen. unit:
     what the user calls the scan's unit of length, None where the scan tells or nobody does. bookmarks:
     cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool that is not there, what
-    its file said.
+    its file said. unread: fields that are not known here or could not be read -> what the file said, which is
+    written again; so is what was made anew of params and parts, under names such as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.
@@ -72,23 +87,68 @@ class Document:
     unit: Unit | None = None
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
+    unread: Values = field(default_factory=dict)
+
+    @classmethod
+    def from_json(cls, data: Any) -> Document:
+        """The document of a JSON object; what cannot be read of it stays unread.
+
+        Raises InputError where it is no object, or nested so deeply that it could not be written again.
+        """
+        if not is_object(data) or not is_object(data.get("unread", {})):
+            raise InputError(f"is not values by name but {shortened(data)}", hint=DAMAGED)
+        hints = get_type_hints(cls, include_extras=True)
+        told = {name: value for name, value in data.items() if name != "unread"}
+        left = dict(unread(data.get("unread", {})))
+        values: dict[str, Any] = {}
+        for name, value in {**left, **told}.items():
+            try:
+                values[name] = structured(hints[name], value)
+                if name not in told:
+                    del left[name]
+            except (InputError, KeyError):
+                left[name] = unread(value)
+                if name == "look":
+                    values[name] = usable(Look(), value)
+        return cls(**values, unread=left)
+
+    @property
+    def unreadable(self) -> tuple[str, ...]:
+        """The names of what a file said and could not be read here."""
+        kinds = {"params": _kinds_of_params(), "parts": Part.kinds}
+        raw = [
+            f"{field}.{name}"
+            for field, known in kinds.items()
+            for name, value in getattr(self, field).items()
+            if _is_unreadable(known.get(name), value)
+        ]
+        return (*self.unread, *raw)
 
     def part(self, kind: type[P]) -> P:
-        """The part that a tool keeps, its defaults where it has kept nothing yet.
-
-        Raises InputError where the tool was not there when a file was read, and what that said is wrong.
-        """
-        found = self.parts.get(kind.part_name, {})
-        return found if isinstance(found, kind) else structured(kind, found, kind.part_name)
+        """The part that a tool keeps, its defaults where it has kept nothing yet, or nothing that can be
+        read."""
+        found = self.parts.get(kind.part_name)
+        if not (found is None or isinstance(found, kind)):
+            found = _read_or_raw(kind, found)
+        return found if isinstance(found, kind) else kind()
 
     def with_part(self, part: Part) -> Document:
         """The document in which a tool keeps this; nothing where that is its defaults."""
         others = {name: other for name, other in self.parts.items() if name != part.part_name}
-        return replace(self, parts=others if part == type(part)() else {**others, part.part_name: part})
+        parts = others if part == type(part)() else {**others, part.part_name: part}
+        return replace(self, parts=parts, unread=self._left("parts", part.part_name, type(part)))
 
     def with_params(self, backend: str, params: Any) -> Document:
         """The document with other parameters of a backend."""
-        return replace(self, params={**self.params, backend: params})
+        left = self._left("params", backend, type(params))
+        return replace(self, params={**self.params, backend: params}, unread=left)
+
+    def _left(self, field: str, name: str, kind: type) -> Mapping[str, Any]:
+        """What is unread once a value by name is another one."""
+        former = getattr(self, field).get(name)
+        if former is None or not _is_unreadable(kind, former):
+            return self.unread
+        return {**self.unread, f"{field}.{name}": former}
 
     def with_up(self, up: str) -> Document:
         """The document of a scan whose up axis is told; a camera that stands upright along another goes."""
@@ -111,7 +171,8 @@ class Document:
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""
         name, defaults = self.defaults(pose)
-        return name, self.params.get(name, defaults)
+        params = self.params.get(name, defaults)
+        return name, params if isinstance(params, type(defaults)) else usable(defaults, params)
 
     def request(self, pose: Pose) -> Request:
         """The picture to draw of a pose, in other colours where it lacks the scalar that gives them.

@@ -14,17 +14,31 @@ import hashlib
 import json
 import os
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, explained
 from ..files import absolute, whole_file
 from ..folders import user_folder
 from ..scan.open import DEMO
 from .document import Document
-from .schema import DAMAGED, Hash, PoseNumber, ScanName, is_object, migrated, plain, read_json, structured
+from .schema import (
+    DAMAGED,
+    Hash,
+    NewerFormatError,
+    PoseNumber,
+    ReadBy,
+    ScanName,
+    is_object,
+    migrated,
+    plain,
+    read_json,
+    structured,
+    unread,
+)
 
 FORMAT = 1
 SUFFIX = ".scan4d.json"
@@ -42,7 +56,7 @@ class SavedSession:
     scan: ScanName
     hash: Hash | None
     pose: PoseNumber
-    document: Document
+    document: Annotated[Document, ReadBy(Document.from_json)]
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object."""
@@ -50,12 +64,31 @@ class SavedSession:
 
     @classmethod
     def from_json(cls, data: Any, where: object) -> SavedSession:
-        """The session of a JSON object. Raises InputError for whatever is wrong in it."""
+        """The session of a JSON object; what cannot be read of its document stays unread in that, so do
+        fields that are not known here, under names such as "session.notes".
+
+        Raises InputError where something else is wrong.
+        """
         if not is_object(data) or "document" not in data:
             raise InputError("is no session", where, DAMAGED)
         current = migrated(data, FORMAT, {}, where)
-        fields = {name: value for name, value in current.items() if name not in ("format", "version")}
-        return structured(cls, fields, where)
+        known = {field.name for field in fields(cls)}
+        session = structured(cls, {name: current[name] for name in known & current.keys()}, where)
+        others = current.keys() - known - {"format", "version"}
+        left = {f"session.{name}": unread(current[name]) for name in sorted(others)}
+        return session._with_unread(left) if left else session
+
+    def _with_unread(self, left: dict[str, Any]) -> SavedSession:
+        document = replace(self.document, unread={**self.document.unread, **left})
+        return replace(self, document=document)
+
+    @property
+    def problem(self) -> str | None:
+        """What the user should know of a session that was read; None where nothing is unreadable."""
+        if not (names := ", ".join(self.document.unreadable)):
+            return None
+        what = f"of what was kept of it, these cannot be read: {names}"
+        return str(InputError(what, self.scan, "They stay in its file, for a Scan4D that can"))
 
     def save(self, path: Path) -> None:
         """Write the file, and its folder. Raises InputError where it cannot be written."""
@@ -101,9 +134,10 @@ def kept_file(scan: str) -> Path:
 def keep(session: SavedSession) -> None:
     """Keep the document of a scan, which is named from the root; older ones beyond MOST_KEPT go.
 
-    Raises InputError where it cannot be written.
+    Raises InputError where it cannot be written, or there is one that only others can read.
     """
     path = kept_file(session.scan)
+    _refuse_foreign(path)
     is_new = not os.path.exists(path)
     session.save(path)
     if is_new:
@@ -113,7 +147,8 @@ def keep(session: SavedSession) -> None:
 def kept(scan: str) -> SavedSession | None:
     """Read what is kept of a scan; None where there is nothing. scan: its path from the root, or "demo".
 
-    Raises InputError where that is damaged: it is put aside.
+    Raises InputError where that cannot be read: it is put aside where it is damaged, and stays as it is where
+    it was written by a later Scan4D or the system refuses.
     """
     path = kept_file(scan)
     if not os.path.lexists(path):
@@ -121,11 +156,43 @@ def kept(scan: str) -> SavedSession | None:
     try:
         return SavedSession.load(path)
     except InputError as error:
-        aside = path.with_suffix(".old.json")
-        with suppress(OSError):
-            os.replace(path, aside)
         what = f"what was kept of it cannot be read ({error.what})"
+        if _is_foreign(error):
+            hint = f"It stays as it is in {path}; the scan opens anew, and changes of it are not kept"
+            raise InputError(what, scan, hint) from error
+        aside = _put_aside(path)
         raise InputError(what, scan, f"It is put aside as {aside}; the scan opens anew") from error
+
+
+def _is_foreign(error: InputError) -> bool:
+    """Whether a file cannot be read here, and may well be whole."""
+    return isinstance(error, NewerFormatError) or isinstance(error.__cause__, OSError)
+
+
+def _refuse_foreign(path: Path) -> None:
+    """Raise InputError where a file must not be written over, since only others can read it."""
+    if os.path.lexists(path):
+        try:
+            SavedSession.load(path)
+        except InputError as error:
+            if _is_foreign(error):
+                raise
+
+
+def _put_aside(path: Path) -> Path:
+    """Give a file another name, which is free. Raises InputError where the system refuses."""
+    for number in count(1):
+        aside = path.with_name(f"{path.stem}.old-{number}{SUFFIX}")
+        try:
+            aside.touch(exist_ok=False)
+            os.replace(path, aside)
+            return aside
+        except FileExistsError:
+            continue
+        except OSError as error:
+            what, hint = explained(error)
+            raise InputError(f"cannot be put aside: {what}", path, hint) from error
+    raise AssertionError("there is always a number")
 
 
 def _delete_oldest(folder: Path) -> None:

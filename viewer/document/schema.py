@@ -40,6 +40,12 @@ if TYPE_CHECKING:
     from cattrs import Converter
 
 T = TypeVar("T")
+
+
+class NewerFormatError(InputError):
+    """File of a later Scan4D, whose format is not known here."""
+
+
 DAMAGED = "It is damaged, or was not written by Scan4D; make it again"
 _MOST_BYTES = 256 * 2**20
 _MOST_SECONDS = 86_400.0
@@ -270,7 +276,8 @@ def migrated(
     found = data.get("format")
     if type(found) is not int or not (found == to or found in steps):
         what = f"has the format {found!r:.40}, this Scan4D ({__version__}) reads {to}"
-        raise InputError(what, where, f"It was written by version {data.get('version')!r:.40}; use that")
+        kind = NewerFormatError if type(found) is int and found > to else InputError
+        raise kind(what, where, f"It was written by version {data.get('version')!r:.40}; use that")
     current = dict(data)
     while found < to:
         current = steps[found](current)

@@ -60,8 +60,8 @@ class Rendering:
         """Draw with other parameters of the backend; edits of one without a pause are one step."""
         if self.backend is not None and params != self._params:
             name = edit_name(self._params, params)
-            every = {**self._session.document.params, self.backend: params}
-            self._session.change(name, merge=name, params=every)
+            changed = self._session.document.with_params(self.backend, params)
+            self._session.history.change(name, changed, merge=name)
 
     def edit_look(self, look: Look) -> None:
         """Draw with another look; edits of one field without a pause are one step."""
