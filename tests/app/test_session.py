@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
 
+from viewer.app.playing.playback import Playback
+from viewer.app.scene.rendering import Rendering
 from viewer.app.session import Session, edit_name
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
 from viewer.document.saved_session import SavedSession
 from viewer.look import Look
+from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
@@ -77,6 +81,20 @@ def test_a_frame_without_the_chosen_scalar_is_drawn_in_other_colours_and_the_cho
     assert document.request(with_q).look == document.look
     assert document.request(BARE).look == Look(color_by="auto", light="flat")
     assert document.request(with_q).look.color_by == "q"
+
+
+def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> None:
+    document = Document(camera=Camera(), backend="gone", params={"gone": {"size": 3}})
+    assert document.defaults(BARE) == Document().defaults(BARE)
+    assert document.request(BARE).backend == "points"
+    told: list[str] = []
+    session = Session("one", document)
+    with closing(open_scan("demo")) as timeline:
+        rendering = Rendering(session, Playback(timeline, session), told.append)
+        for _ in range(2):
+            rendering.tell_missing(BARE)
+    assert told == ["This Scan4D has no renderer 'gone': Points draws in its place."]
+    assert session.document == document, "it comes back where the renderer is there"
 
 
 def test_a_change_of_a_parameter_is_called_by_its_name() -> None:

@@ -237,6 +237,36 @@ def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
         assert "Traceback" not in app.log()
 
 
+def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_there_is_shown_and_kept(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        hands = Hands(app)
+        hands.press("Right", "ctrl+b", "b")
+        hands.measure(60)
+        path = saved_session(app, "mine")
+        data: dict[str, Any] = json.loads(path.read_text())
+        measured = data["document"]["parts"]["measurements"]
+        measured["all"][0]["note"] = "left"
+        data["document"]["backend"] = "hpr"
+        path.write_text(json.dumps(data))
+        hands.press("Home", "ctrl+4")
+        app.drop(path)
+        app.told("these cannot be read: parts.measurements")
+        app.told("This Scan4D has no renderer 'hpr': .* draws in its place")
+        state = app.see(frame=1)
+        assert state.document["backend"] == "hpr"
+        assert state.document["camera"] == data["document"]["camera"]
+        assert state.document["bookmarks"] == data["document"]["bookmarks"]
+        assert state.document["parts"]["measurements"] == measured
+        hands.measure(60)
+        after = app.settle().document
+        assert len(after["parts"]["measurements"]["all"]) == 1
+        assert after["unread"] == {"parts.measurements": measured}
+        assert "cannot be drawn" not in app.log()
+        assert "Traceback" not in app.log()
+
+
 def view(screen: Screen, home: Path, *words: object) -> subprocess.CompletedProcess[str]:
     """`scan4d view` until it ends, which it does not where a window opens."""
     command = [sys.executable, "-m", "viewer.cli", "view", *map(str, words)]

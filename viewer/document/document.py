@@ -66,14 +66,15 @@ def _is_unreadable(kind: type | None, value: Any) -> bool:
 class Document:
     """Everything that a user has chosen and made for a scan.
 
-    camera: None until a first pose is there to fit it to. pivot: what orbiting turns about, scan units;
-    None: the camera's target. It is not made the target, as that would shift or turn the picture; the
-    target moves along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for
-    the scan's default. params: backend's name -> its `Params`, kept when another backend is chosen. unit:
-    what the user calls the scan's unit of length, None where the scan tells or nobody does. bookmarks:
-    cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool that is not there, what
-    its file said. unread: fields that are not known here or could not be read -> what the file said, which is
-    written again; so is what was made anew of params and parts, under names such as "parts.measurements".
+    camera: None until a first pose is there to fit it to. pivot: what orbiting turns about, scan units; None:
+    the camera's target. It is not made the target, as that would shift or turn the picture; the target moves
+    along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for the scan's
+    default, which also stands in for one that is not there. params: backend's name -> its `Params`, kept when
+    another backend is chosen. unit: what the user calls the scan's unit of length, None where the scan tells
+    or nobody does. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool
+    that is not there, what its file said. unread: fields that are not known here or could not be read -> what
+    the file said, which is written again; so is what was made anew of params and parts, under names such as
+    "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.
@@ -164,9 +165,11 @@ class Document:
         return Document(look=self.look, backend=self.backend, params=self.params)
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
-        """The backend that draws this pose, by name, and the parameters that it begins with."""
+        """The backend that draws this pose, by name, and the parameters that it begins with; the pose's
+        default where the one that was chosen is not there."""
         name, defaults = backend_for(pose)
-        return (name, defaults) if self.backend in (None, name) else backend_for(pose, self.backend)
+        is_own = self.backend != name and self.backend in backends()
+        return backend_for(pose, self.backend) if is_own else (name, defaults)
 
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""

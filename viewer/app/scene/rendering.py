@@ -19,11 +19,17 @@ class Rendering:
 
     def __init__(self, session: Session, playback: Playback, note: Callable[[str], None]) -> None:
         self._session, self._playback, self._note = session, playback, note
-        self._missed: set[tuple[str, str]] = set()  # scan and scalar, which were told
+        self._missed: set[tuple[str, str]] = set()  # scan, and scalar or backend, which were told
 
     def tell_missing(self, pose: Pose) -> None:
-        """Tell, once a scan, that a frame has not the scalar that the user chose to colour by."""
-        look = self._session.document.look
+        """Tell, once a scan, that the chosen backend is not there, and that a frame has not the scalar that
+        the user chose to colour by."""
+        look, chosen_backend = self._session.document.look, self._session.document.backend
+        absent = self._session.scan, f"backend {chosen_backend}"
+        if chosen_backend is not None and chosen_backend not in backends() and absent not in self._missed:
+            self._missed.add(absent)
+            stand_in = backends()[self._session.document.defaults(pose)[0]].title
+            self._note(f"This Scan4D has no renderer '{chosen_backend}': {stand_in} draws in its place.")
         missed = self._session.scan, look.color_by
         if missed not in self._missed and drawable(look, pose.cloud.scalars) != look:
             self._missed.add(missed)
