@@ -1,7 +1,8 @@
 """The app as it is run by tests: it tells after each turn of its loop what it shows, as a line of JSON.
 
-`main` takes a file descriptor that the lines go to, and scans. A number on standard input
-comes back as `answered`, in a line that is written when all events before it have been taken in.
+`main` takes a file descriptor that the lines go to, and scans. A line on standard input is a number and what
+acting.py is to do, if anything, in JSON. The number comes back as `answered`, in a line that is written when
+all events before it have been taken in and that is done; `problem` is what went wrong with it.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ from __future__ import annotations
 import json
 import logging
 import os
+import queue
 import sys
 import threading
 import time
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
 import glfw
+from acting import Actor
 from imgui_bundle import imgui
 
 from viewer.analysis.measure import Measurement, Reading, reading_of
@@ -30,32 +34,54 @@ class Observer:
 
     def __init__(self, stream: int) -> None:
         self._lines = os.fdopen(stream, "w", buffering=1)
-        self._asked = self._seen = self._answered = 0
+        self._asked: queue.SimpleQueue[tuple[int, list[Any]]] = queue.SimpleQueue()
+        self._seen = self._answered = 0
+        self._actor: Actor | None = None
+        self._is_acting = False
+        self._problem = ""
         self._told = 0
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
         for line in sys.stdin:
-            self._asked = int(line)
+            self._asked.put(json.loads(line))
             glfw.post_empty_event()
 
     def look(self, app: App) -> None:
         """Write how it is now."""
-        # A turn that began before a question may have looked for events before they came: the next answers.
-        self._answered, self._seen = self._seen, self._asked
-        if self._answered != self._seen:
-            glfw.post_empty_event()
+        self._answer(app)
         new = app.notices.count - self._told
         self._told += new
         notes = [note.text for note in app.notices.all[len(app.notices.all) - new :]]
         state = {
             "at": time.monotonic(),
             "answered": self._answered,
+            "problem": self._problem,
             "is_idle": is_idle(app),
             "notes": notes,
             **shown(app),
         }
         self._lines.write(json.dumps(state) + "\n")
+
+    def _answer(self, app: App) -> None:
+        """Go on with the actions, or take the next question."""
+        if self._actor and self._is_acting:
+            if self._actor.step():
+                self._is_acting, self._problem = False, self._actor.problem
+            app.window.touch()
+            glfw.post_empty_event()
+            return
+        # A turn that began before a question may have looked for events before they came: the next answers.
+        self._answered = self._seen
+        with suppress(queue.Empty):
+            self._seen, task = self._asked.get_nowait()
+            self._problem = ""
+            if task:
+                self._actor = self._actor or Actor()
+                self._actor.begin(*task)
+                self._is_acting = True
+                app.window.touch()
+            glfw.post_empty_event()
 
 
 def is_idle(app: App) -> bool:

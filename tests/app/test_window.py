@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from imgui_bundle import icons_fontawesome_4 as icons
 from numpy.typing import NDArray
-from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
 from written import picture
 
 from viewer import cli
@@ -312,18 +313,29 @@ def test_idle_it_draws_nothing_and_takes_no_processor_time(app: RunningApp) -> N
 
 
 def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> None:
-    """The first row below the list of scans and the renderer is the points' size: a slider from 0 to 32."""
+    """The points' size: a slider from 0 to 32."""
+    size = "point_size"
     before = Screenshot(app)
-    drag(app, 1, (1110, 168), (1250, 168))
+    app.act(PANEL, ("item_input_value", f"{size}/##value", 32))
+    app.settle()
     after = assert_true_picture(app)
     assert before.description["params"] == {"point_size": 0}
     assert after.description["params"] == {"point_size": 32}
-    drag(app, 1, (1225, 168), (1000, 168))
-    assert difference(Screenshot(app).pixels, before.pixels) == 0
-    drag(app, 1, (1110, 168), (1250, 168))
-    app.screen.do("mousemove", 1246, 168, "sleep", 0.1, "click", 1)  # back to the default
+    app.act(PANEL, ("item_drag_with_delta", f"{size}/##value", (-300, 0)))
     app.settle()
     assert difference(Screenshot(app).pixels, before.pixels) == 0
+    app.act(
+        PANEL, ("item_input_value", f"{size}/##value", 32), ("item_click", f"{size}/{icons.ICON_FA_UNDO}")
+    )
+    app.settle()
+    assert difference(Screenshot(app).pixels, before.pixels) == 0
+
+
+def test_acting_on_a_widget_or_a_window_that_is_not_there_fails(app: RunningApp) -> None:
+    for window, widget in ((PANEL, "point_size/##nothing"), ("nothing", "point_size/##value")):
+        with pytest.raises(AssertionError, match=r"Unable to locate|doesn't seem to exist"):
+            app.act(window, ("item_click", widget))
+    app.act(PANEL, ("item_click", "point_size/##value"))
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app, virtual_screen
 from written import picture
 
 from viewer.document.measurements import Measurements
@@ -82,13 +82,9 @@ class Hands:
         self.app.screen.do("click", "--repeat", times, "--delay", 60, 1)
         self.app.settle()
 
-    def slide(self, row: int, start: int, end: int) -> None:
+    def slide(self, parameter: str, right: int) -> None:
         """Drag in the panel."""
-        self.app.screen.do("mousemove", start, row, "sleep", 0.1, "mousedown", 1, "sleep", 0.1)
-        self.app.screen.do("mousemove", (start + end) // 2, row, "sleep", 0.1, "mousemove", end, row)
-        self.app.settle()
-        self.app.screen.do("mouseup", 1)
-        self.app.settle()
+        self.app.act(PANEL, ("item_drag_with_delta", f"{parameter}/##value", (right, 0)))
 
     def turn(self) -> None:
         """By the turntable."""
@@ -108,11 +104,10 @@ class Hands:
 
 def mixed(hands: Hands) -> list[Callable[[], object]]:
     """Ways to change the document, each a step."""
-    slider = 168  # the first row below the list of renderers
     return [
         lambda: hands.drag(1, 120, 40), lambda: hands.wheel(4, 3), lambda: hands.press("o"),
         lambda: hands.press("ctrl+b"), lambda: hands.press("b"), lambda: hands.drag(2, -60, 30),
-        lambda: hands.measure(70), lambda: hands.slide(slider, 1150, 1220), lambda: hands.press("ctrl+3"),
+        lambda: hands.measure(70), lambda: hands.slide("ambient", 40), lambda: hands.press("ctrl+3"),
         lambda: hands.press("ctrl+b"), lambda: hands.drag(3, 0, 40), lambda: hands.press("ctrl+1"),
         lambda: hands.click(30, 20, times=2), hands.turn, lambda: hands.press("f"),
         lambda: hands.press("n"), lambda: hands.press("o"), lambda: hands.wheel(5, 2),

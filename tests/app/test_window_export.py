@@ -26,10 +26,6 @@ from viewer.scan.formats.exr import write_views
 SIZE = (1280, 720)
 COUNT = 6  # frames
 LEFT = (SIZE[0] - 34 * 16) // 2  # of the dialog
-FIELD = LEFT + 390  # in the middle of a row's fields
-BEHIND = (0x2B, 0x2F, 0x36)  # the dialog's colour
-FIRST_ROW, ROW = 22, 30  # below its title
-ITEM, ITEMS = 23, 30  # of an opened list, below its row
 
 
 @pytest.fixture(scope="module")
@@ -60,52 +56,32 @@ def press_with_ctrl(app: RunningApp, key: str) -> None:
 
 
 class Dialog:
-    """The export dialog, as a person uses it. Rows are counted from 0."""
+    """The export dialog, by the names of its fields."""
 
     def __init__(self, app: RunningApp) -> None:
         self._app = app
-        app.screen.do("mousemove", 2, SIZE[1] - 2)
         press_with_ctrl(app, "e")
         app.see(is_export_open=True)
-        app.settle()
-        edge = app.screen.picture()[:, LEFT + 2 : LEFT + 8]
-        self._top = np.nonzero((edge == BEHIND).all(axis=(1, 2)))[0][0]
 
-    def _click(self, x: float, y: float, *more: object) -> None:
-        self._app.screen.do("mousemove", x, y)
-        self._app.settle()
-        self._app.screen.do("click", *more, 1)
-        self._app.settle()
+    def choose(self, field: str, item: str) -> None:
+        """An item of a field's list."""
+        self._app.choose("Export", f"##{field}", item)
 
-    def choose(self, row: int, item: int) -> None:
-        """An item of the list in a row."""
-        self.open_list(row)
-        self._click(FIELD - 60, self._top + FIRST_ROW + ROW * row + ITEMS + ITEM * item)
-
-    def open_list(self, row: int) -> None:
+    def open_list(self, field: str) -> None:
         """Without choosing."""
-        self._click(FIELD, self._top + FIRST_ROW + ROW * row)
+        self._app.act("Export", ("item_click", f"##{field}"))
 
-    def enter(self, row: int, text: object, share: float = 0.5) -> None:
-        """A value in a row's field; share: across the fields."""
-        at = LEFT + 250 + 280 * share
-        self._click(at, self._top + FIRST_ROW + ROW * row, "--repeat", 2, "--delay", 60)
-        press_with_ctrl(self._app, "a")
-        self._app.settle()
-        self._app.screen.do("type", "--delay", 40, text)
-        self._app.settle()
-        self._app.screen.do("key", "Return")
-        self._app.settle()
+    def enter(self, field: str, value: object) -> None:
+        """A value in a field."""
+        self._app.act("Export", ("item_input_value", f"##{field}", value))
 
-    def tick(self, row: int) -> None:
-        """The box of a row."""
-        self._click(LEFT + 262, self._top + FIRST_ROW + ROW * row)
+    def tick(self, box: str) -> None:
+        """The box of this name."""
+        self._app.act("Export", ("item_click", box))
 
-    def export(self, rows: float) -> None:
-        """Press the button below so many rows, a line and a line of text."""
-        self._app.screen.do("mousemove", LEFT + 38, self._top + FIRST_ROW + ROW * rows + 29)
-        self._app.settle()
-        self._app.screen.do("click", 1)
+    def export(self, button: str = "Export") -> None:
+        """Press the button that does it."""
+        self._app.act("Export", ("item_click", button))
 
 
 def replayed(folder: Path, *arguments: object) -> None:
@@ -151,13 +127,13 @@ def test_the_colour_bar_shows_the_map(app: RunningApp) -> None:
 
 def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose(0, 1)  # a turntable
-    dialog.enter(1, 3)
-    dialog.enter(4, 96, share=0.2)
-    dialog.enter(4, 64, share=0.8)
-    dialog.tick(5)  # the scale bar
-    dialog.enter(10, "round")
-    dialog.export(11)
+    dialog.choose("what", "Turntable##turntable")
+    dialog.enter("pictures", 3)
+    dialog.enter("width", 96)
+    dialog.enter("height", 64)
+    dialog.tick("Scale bar")
+    dialog.enter("name", "round")
+    dialog.export()
     app.told(r"Saved 3 pictures, .*round_0001.png to round_0003.png")
     names = [f"round_{number:04d}.png" for number in (1, 2, 3)]
     assert listed(folder) == set(names)
@@ -173,12 +149,12 @@ def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path)
 
 def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose(0, 2)  # frames
-    dialog.enter(1, 2, share=0.1)
-    dialog.enter(1, 5, share=0.5)
-    dialog.choose(2, 2)  # a film
-    dialog.enter(11, "frames")
-    dialog.export(12)
+    dialog.choose("what", "Frames, one after the other##frames")
+    dialog.enter("first", 2)
+    dialog.enter("last", 5)
+    dialog.choose("format", "MP4 film##mp4")
+    dialog.enter("name", "frames")
+    dialog.export()
     app.told(r"Saved .*frames.mp4")
     images, rate = film(folder / "frames.mp4")
     assert (len(images), rate, images[0].shape) == (4, 25, (64, 96, 3))
@@ -188,11 +164,11 @@ def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Pa
 
 def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose(2, 1)  # EXR
-    dialog.choose(0, 0)  # the current view
-    dialog.tick(7)
-    dialog.enter(9, "view")
-    dialog.export(10)
+    dialog.choose("format", "EXR: the surface behind the picture##exr")
+    dialog.choose("what", "Current view##view")
+    dialog.tick("##anonymous")
+    dialog.enter("name", "view")
+    dialog.export()
     app.told(r"Saved .*view.exr")
     data = (folder / "view.exr").read_bytes()
     assert b"jane" not in data
@@ -205,25 +181,25 @@ def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> No
 def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path) -> None:
     before = (folder / "view.exr").stat().st_mtime_ns
     dialog = Dialog(app)
-    dialog.open_list(0)
+    dialog.open_list("what")
     app.screen.do("key", "Escape", "sleep", 0.3)  # closes the list alone
-    dialog.enter(9, "view")
-    dialog.export(10)
+    dialog.enter("name", "view")
+    dialog.export()
     app.settle()
     assert (folder / "view.exr").stat().st_mtime_ns == before
-    dialog.export(10.8)  # a line of text below
+    dialog.export("Replace")
     app.told(r"Saved .*view.exr")
     assert (folder / "view.exr").stat().st_mtime_ns > before
 
 
 def begin_a_long_one(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose(0, 1)
-    dialog.enter(1, 300)
-    dialog.choose(2, 0)  # PNG
-    dialog.choose(3, 1)  # 1920 x 1080
-    dialog.enter(10, "long")
-    dialog.export(11)
+    dialog.choose("what", "Turntable##turntable")
+    dialog.enter("pictures", 300)
+    dialog.choose("format", "PNG pictures##png")
+    dialog.choose("size", "1920 x 1080##1920x1080")
+    dialog.enter("name", "long")
+    dialog.export()
     app.see(is_exporting=True)
     deadline = time.monotonic() + 60
     while not list(folder.glob(".scan4d_*/made/long*")):
@@ -273,13 +249,13 @@ def test_an_export_never_replaces_the_scan(tmp_path: Path, tmp_path_factory: pyt
         running_app(screen, tmp_path, scan) as app,
     ):
         dialog = Dialog(app)
-        dialog.enter(9, "range")
-        for lines in (10, 10.8):  # the second a line of text below
-            dialog.export(lines)
+        dialog.enter("name", "range")
+        for _ in range(2):
+            dialog.export()
             app.settle()
         assert not any(state.is_exporting for state in app.states)
-        dialog.enter(9, "other")
-        dialog.export(10)
+        dialog.enter("name", "other")
+        dialog.export()
         app.told(r"Saved .*other.exr")
     assert scan.read_bytes() == before
 

@@ -11,15 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PATIENCE, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app, virtual_screen
 
 from viewer.document.recording import Recording
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
 SIZE = (1280, 720)
-COLOR_BY = (1160, 256)  # its box in the panel, below the list of scans
-Q = (1160, 440)  # the eighth item of its list
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +60,7 @@ def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
 ) -> None:
     other = spheres(tmp_path / "other", 1)
     with running_app(screen, tmp_path, lacking, other) as app:
-        for place in (COLOR_BY, Q):
-            screen.do("mousemove", *place)
-            app.settle()
-            screen.do("click", 1)
-            app.settle()
-        screen.do("mousemove", 2, SIZE[1] - 2)
+        app.choose(PANEL, "color_by/##value", "q##q")
         app.settle()
         (with_q,) = saved(app, "p").entries
         assert with_q.look.color_by == "q"

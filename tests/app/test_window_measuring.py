@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, RunningApp, Screen, running_app, virtual_screen
 from written import write_mesh
 
 from viewer.camera import Camera
@@ -23,7 +23,6 @@ from viewer.view import View
 SIZE = (1280, 720)
 FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates
 FACES = ((0, 1, 2), (1, 2, 3))
-FIELD = (0x33, 0x38, 0x3F)  # the background of input fields in the dark theme
 _READ_CLIPBOARD = """
 import glfw, sys
 glfw.init()
@@ -82,13 +81,8 @@ def clipboard(screen: Screen) -> str:
 
 
 def name_unit(app: RunningApp, name: str) -> None:
-    """Type into the field for the unit, the lowest one in the panel while nothing is measured."""
-    app.settle()
-    x = SIZE[0] - 50
-    is_field = (app.screen.picture()[: app.view()[3], x] == FIELD).all(axis=1)
-    app.screen.do("mousemove", x, int(np.flatnonzero(is_field)[-1]) - 5, "sleep", 0.2, "click", 1)
-    app.settle()
-    app.screen.do("type", "--delay", 40, name)
+    """Type into the field for the unit."""
+    app.act(PANEL, ("item_input_value", "##unit", name))
     app.see(unit=name)
 
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from viewer.document.saved_session import SavedSession, kept_file
 
 ROOT = Path(__file__).resolve().parents[2]
+PANEL = "panel/settings"  # name of the window's part with the parameters
 PATIENCE = 120.0  # seconds until what does not come about counts as failed
 
 Found = TypeVar("Found")
@@ -160,11 +161,29 @@ class RunningApp:
 
     def settle(self) -> State:
         """Wait until all events so far were taken in, and nothing goes on any longer."""
+        self._ask()
+        return self.see(lambda state: state.is_idle)
+
+    def act(self, window: str, *actions: tuple[object, ...]) -> None:
+        """Act on a window's widgets by their names, when all events so far were taken in.
+
+        window: its name; a part of it that scrolls by itself has its own below that. actions: methods of
+        TestContext of ImGui's test engine and their arguments, as ("item_click", "Time each pass").
+        """
+        problem = self._ask(window, *actions).problem
+        assert not problem, f"{window}: {actions}: {problem}"
+
+    def choose(self, window: str, combo: str, item: str) -> None:
+        """An item of the list that a combo box opens, both by their names."""
+        self.act(window, ("item_click", combo), ("item_click", f"//$FOCUSED/{item}"))
+
+    def _ask(self, *task: object) -> State:
+        """The first state after all events so far were taken in, and a task for acting.py is done."""
         assert self.process.stdin is not None
         self._asked += 1
-        self.process.stdin.write(b"%d\n" % self._asked)
+        self.process.stdin.write(json.dumps([self._asked, task]).encode() + b"\n")
         self.process.stdin.flush()
-        return self.see(lambda state: state.is_idle and state.answered == self._asked)
+        return self.see(answered=self._asked)
 
     def _wait(self, find: Callable[[], Found | None], wanted: object) -> Found:
         deadline = time.monotonic() + PATIENCE

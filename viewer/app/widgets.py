@@ -111,7 +111,7 @@ def _edit(parameter: Parameter, value: Any, words: Mapping[str, str] | None = No
     if parameter.type is bool:
         return imgui.checkbox(name, value)[1]
     if words or parameter.choices:
-        return combo(name, value, list(words or parameter.choices), words)
+        return combo("value", value, list(words or parameter.choices), words)
     if parameter.type is str:
         return _edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
     return _edit_number(name, parameter, value)
