@@ -10,7 +10,7 @@ import pytest
 from scenes import NOTHING, sphere
 
 import viewer
-from viewer.backends import Backend, FrameView
+from viewer.backends import CHANGES, Backend, FrameView
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -20,6 +20,7 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.params import param
 from viewer.renderer import Renderer
+from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.task import checkpoint
@@ -197,6 +198,44 @@ class _Told:
         return False
 
 
+def test_jobs_of_views_that_were_passed_are_dropped(renderer: Renderer, deriving: Backend) -> None:
+    vars(deriving.module).update(DERIVED_BY_CAMERA=True, derive=nearer_half)
+    own, pose = Renderer(renderer.gpu), _of(sphere(1000))
+    resident = own.resident(pose)
+    entry = own._entry(resident)
+    for azimuth in range(6):
+        assert own.prepare(resident, deriving, _Params(), Look(), False, _view(azimuth)) is None
+        while own.preparing is not None:
+            time.sleep(0.001)
+        assert len(entry.jobs) == 1, "what is found for views that nobody looks at any more is not held"
+    last = own.prepare(resident, deriving, _Params(), Look(), False, _view(5))
+    assert last is not None
+    assert not entry.jobs
+    own.release()
+
+
+def test_a_job_of_a_view_that_was_passed_is_cancelled(renderer: Renderer, deriving: Backend) -> None:
+    began: list[View] = []
+
+    def derive(pose: Pose, params: _Params, view: View) -> tuple[np.ndarray, int]:
+        began.append(view)
+        while len(began) == 1:
+            checkpoint()
+            time.sleep(0.001)
+        return nearer_half(pose, params, view)
+
+    vars(deriving.module).update(DERIVED_BY_CAMERA=True, DERIVES_ON_THREAD=True, derive=derive)
+    own, pose = Renderer(renderer.gpu), _of(sphere(1000))
+    resident = own.resident(pose)
+    assert own.prepare(resident, deriving, _Params(), Look(), False, _view(0)) is None
+    deadline = time.monotonic() + 20
+    while own.prepare(resident, deriving, _Params(), Look(), False, _view(1)) is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+    assert [view.key for view in began] == [_view(0).key, _view(1).key]
+    own.release()
+
+
 def test_a_backend_is_told_what_changed_and_whether_more_will_follow(renderer: Renderer) -> None:
     module, told = ModuleType("told"), _Told([])
     vars(module).update(Params=_Params, needs=lambda pose, params: (), draw=told.draw)
@@ -209,10 +248,40 @@ def test_a_backend_is_told_what_changed_and_whether_more_will_follow(renderer: R
         render_frame(renderer, request, surface)
     render_frame(renderer, first, surface, moving=True)
     render_frame(renderer, first, Surface(renderer.gpu, (65, 48)))
-    every = {"pose", "camera", "parameters", "size"}
-    expected = [every, set(), {"camera"}, {"parameters"}, {"pose"}, set(), every - {"size"}, every]
+    every = {"pose", "camera", "parameters", "size", "values"}
+    expected = [every, set(), {"camera"}, {"parameters"}, {"pose"}, {"values"}, every - {"size"}, every]
     assert [set(frame.changed) for frame in told.frames] == expected
     assert [frame.moving for frame in told.frames] == [False] * 6 + [True, False]
+
+
+def test_a_backend_is_told_of_other_numbers_and_after_a_failure_of_everything(renderer: Renderer) -> None:
+    told = _Told([])
+
+    def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        if frame.params.shade == 13:
+            raise InputError("thirteen")
+        return told.draw(pose, frame, surface)
+
+    module = ModuleType("told")
+    vars(module).update(Params=_Params, needs=lambda pose, params: (), draw=draw)
+    first = Request(_of(BARE), Camera.orbit(BARE.bounds()), Backend("told", module), _Params())
+    surface = Surface(renderer.gpu, SIZE)
+    numbers = [np.arange(len(BARE)), np.arange(len(BARE))]
+    layered = [
+        replace(first, look=Look(color_by="n"), layers=Layers({"n": numbers[i], "other": numbers[j]}))
+        for i, j in ((0, 0), (0, 1), (1, 1))
+    ]
+    height = replace(first, look=Look(color_by="height"))
+    others = [replace(first, look=Look(plain="#123456", eye_dome_strength=strength)) for strength in (1, 2)]
+    for request in (first, *layered, height, replace(height, look=Look(color_by="height", up="+z")), *others):
+        render_frame(renderer, request, surface)
+    expected = [{"values"}, set(), {"values"}, {"values"}, {"values"}, {"values"}, set()]
+    assert [set(frame.changed) for frame in told.frames[1:]] == expected
+    with pytest.raises(InputError, match="thirteen"):
+        render_frame(renderer, replace(others[1], params=_Params(shade=13)), surface)
+    render_frame(renderer, others[1], surface)
+    render_frame(renderer, others[1], surface)
+    assert [set(frame.changed) for frame in told.frames[-2:]] == [{*CHANGES}, set()]
 
 
 def test_a_backend_of_range_views_is_refused_for_points(renderer: Renderer) -> None:

@@ -78,10 +78,17 @@ def render_frame(
     if prepared is None:
         stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
     budget_ms = None if wait else _BUDGET_MS
-    drawn = {"pose": pose, "camera": view.key, "parameters": (backend, params), "size": surface.size}
-    changed = surface.note_changes(drawn)
+    drawn = {
+        "pose": pose,
+        "camera": view.key,
+        "parameters": (backend, params),
+        "size": surface.size,
+        "values": surface.values_key,
+    }
+    changed = surface.take_changes(drawn)
     frame = FrameView(view, params, prepared and prepared.derived, share, budget_ms, changed, moving)
     refinable = backend.draw(pose, frame, surface)
+    surface.drawn = drawn
     shade(surface, look)
 
     stats.upload_ms = sum(each.take_ms("upload") for each in {pose, surface.pose})

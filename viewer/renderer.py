@@ -25,6 +25,7 @@ from .view import View
 
 _MEGABYTE = 1 << 20
 _VIEWS = 4  # of a pose that what is derived by camera is kept for
+_START = 0.4  # seconds that a process takes to start
 _PATIENCE = 0.05  # seconds: a picture late is better than one of points among others
 
 
@@ -71,6 +72,15 @@ class _Resident:
         of_views = [other for other in self.derived if other.what == key.what and other.view is not None]
         for old in of_views[:-_VIEWS]:
             _release(self.derived.pop(old))
+
+    def drop_passed(self, view: object) -> None:
+        """Drop the jobs of all other views, finished ones too. What has just begun is let finish first, since
+        cancelling ends a process."""
+        for key, job in list(self.jobs.items()):
+            passed = isinstance(key, DerivedKey) and key.view not in (None, view)
+            if passed and (job.future.done() or job.future.cancel() or job.task.seconds > _START):
+                job.cancel()
+                del self.jobs[key]
 
     @property
     def nbytes(self) -> int:
@@ -162,6 +172,7 @@ class Renderer:
         if backend.derive is None:
             return Prepared(None)
         key = _derived_key(backend, params, view)
+        entry.drop_passed(key.view)
         if key not in entry.derived:
             name = f"Preparing {backend.title}"
             args = (entry.current, params, *([view] if backend.derived_by_camera else []))

@@ -49,7 +49,7 @@ from ..scan.pose import Pose
 from ..view import View
 
 ROWS = ("points", "octants", "samples")
-CHANGES = ("pose", "camera", "parameters", "size")  # of one picture against the one before
+CHANGES = ("pose", "camera", "parameters", "size", "values")  # of one picture against the one before
 
 
 class Suited(NamedTuple):
@@ -89,7 +89,8 @@ class FrameView:
     take too long. A backend that leaves some out says that a later call would refine the picture,
     and counts them (`Points.of` does); one that is fast enough may draw all. budget_ms: after which a
     backend that can draw something coarser does, and says that a later call would refine it; None: never.
-    changed: what of `CHANGES` is another than in the call before for this surface; all in the first one.
+    changed: what of `CHANGES` is another than in the call before for this surface; all in the first one, and
+    after one that failed. "values": what `row_values` and `resolve` of the Surface give, by look and layers.
     moving: whether other pictures will follow at once.
     """
 

@@ -231,9 +231,12 @@ class GpuPose:
         self.gpu.discard(*self._arrays.values(), *self._images.values(), *layers, *begun)
 
 
-@dataclass
+@dataclass(eq=False)
 class Layer:
-    """Numbers that lie over a pose. range: their 2 % and 98 % quantiles. texels: on the GPU, None before."""
+    """Numbers that lie over a pose: one object for each array of them.
+
+    range: their 2 % and 98 % quantiles. texels: on the GPU, None before.
+    """
 
     values: weakref.ref[NDArray]
     range: tuple[float, float]

@@ -85,6 +85,7 @@ class Surface:
     shows, 0xFFFFFFFF: none), one word a pixel. A pixel is covered where its depth is finite. Colour,
     normal and value are those of the row, unless the backend wrote its `own`; a pixel without a row is
     filled, and what the backend did not write of it is unknown. Reading a property copies it to the CPU.
+    drawn: what the picture was made of, by name; empty before, and where drawing failed.
     look: what it is drawn for, and shaded in last; shaded_by: what did it, None before. layers: over the
     pose.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
@@ -121,7 +122,7 @@ class Surface:
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
         self._written: set[str] = set()
-        self._noted: dict[str, object] = {}
+        self.drawn: dict[str, object] = {}
         self._blended: tuple[str | None, str] | None = None  # the source that its own values are of, and up
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
@@ -136,10 +137,13 @@ class Surface:
         self._written.clear()
         self.stats = Stats()
 
-    def note_changes(self, drawn: dict[str, object]) -> frozenset[str]:
-        """The names of what is drawn that is another than at the call before; all at the first."""
-        before, self._noted = self._noted, drawn
-        return frozenset(name for name, value in drawn.items() if name not in before or before[name] != value)
+    def take_changes(self, wanted: dict[str, object]) -> frozenset[str]:
+        """The names of what is wanted that is another than what is `drawn`, which nothing is from then on:
+        whoever draws sets it anew when that is done."""
+        before, self.drawn = self.drawn, {}
+        return frozenset(
+            name for name, value in wanted.items() if name not in before or before[name] != value
+        )
 
     def bind_view(self) -> None:
         """Make this surface's view the one that shaders read."""
@@ -267,6 +271,14 @@ class Surface:
     def value_source(self) -> str | None:
         """Source of the number that the look colours by ("depth", "height", a scalar's name), else None."""
         return value_source(self.look, self.layers.names(self._cloud.scalars))
+
+    @property
+    def values_key(self) -> tuple[object, ...]:
+        """Key of what `row_values` and `resolve` give of a pose."""
+        source = self.value_source
+        axis = self.height_axis if source == "height" else None
+        numbers = self.layers.scalars.get(source or "")
+        return source, axis, None if numbers is None else self.scanned.layer(numbers), self.look.plain
 
     @property
     def value_zero(self) -> float:
