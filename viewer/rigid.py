@@ -63,6 +63,12 @@ class Rigid:
         corners = self.points(bounds.corners())
         return Bounds(corners.min(axis=0), corners.max(axis=0))
 
+    def after(self, other: Rigid) -> Rigid:
+        """The motion that is another one and then this one."""
+        if self.is_identity or other.is_identity:
+            return other if self.is_identity else self
+        return Rigid(self.matrix @ other.matrix)
+
     def in_frame(self, origin: NDArray[np.float64]) -> Rigid:
         """A motion that is the same in coordinates that count from an origin, (3,)."""
         if self.is_identity:

@@ -139,7 +139,9 @@ def shown(app: App) -> dict[str, Any]:
 def told(measurement: Measurement, app: App) -> dict[str, Any]:
     """A measurement as it stands in the frame that is shown."""
     pose, one_topology = app.playback.pose, app.playback.timeline.one_topology
-    reading = reading_of(measurement, pose, one_topology) if pose is not None else Reading(measurement, None)
+    reading = Reading(measurement, None)
+    if pose is not None:
+        reading = reading_of(measurement, pose, one_topology, app.session.laid.layers(pose).place)
     return {
         "ends": [asdict(end) for end in reading.measurement.ends],
         "distance": reading.measurement.distance,

@@ -15,6 +15,7 @@ from viewer.camera import Camera
 from viewer.document.recording import Entry
 from viewer.look import Look
 from viewer.output.marks import Marks
+from viewer.rigid import STILL, Rigid
 
 TIMES: NDArray[np.float64] = np.arange(10, dtype=np.float64) * 0.04
 SHOWN = Entry(
@@ -27,7 +28,7 @@ VIEW = Choices(folder=".", name="a", width=640, height=360)
 
 def made(**changes: object) -> tuple[Choices, tuple[Entry, ...], float]:
     choices = replace(VIEW, **changes)  # type: ignore[arg-type]
-    found = recording(choices, SHOWN, MARKS, TIMES, None)
+    found = recording(choices, SHOWN, MARKS, TIMES, None, lambda _: STILL)
     return choices, found.entries, found.seconds
 
 
@@ -47,8 +48,17 @@ def test_a_turntable_goes_all_round_from_the_current_view_on() -> None:
 
 
 def test_a_turntable_turns_about_what_the_view_turns_about() -> None:
-    found = recording(replace(VIEW, what="turntable", pictures=2), SHOWN, MARKS, TIMES, (0, 0, 1))
+    choices = replace(VIEW, what="turntable", pictures=2)
+    found = recording(choices, SHOWN, MARKS, TIMES, (0, 0, 1), lambda _: STILL)
     assert np.allclose(found.entries[1].camera.eye, (0, 0, 0))
+
+
+def test_each_frame_is_where_it_is_moved_to() -> None:
+    def place(index: int) -> Rigid:
+        return Rigid(np.block([[np.eye(3), np.full((3, 1), index)], [np.zeros((1, 3)), 1]]))
+
+    entries = recording(replace(VIEW, what="frames", last=3), SHOWN, MARKS, TIMES, None, place).entries
+    assert [entry.place and entry.place[1] for entry in entries] == [None, (0, 1, 0, 1), (0, 1, 0, 2)]
 
 
 def test_a_film_of_frames_keeps_their_pace() -> None:

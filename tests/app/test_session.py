@@ -15,6 +15,8 @@ from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
 from viewer.document.saved_session import SavedSession
 from viewer.look import Look
+from viewer.rigid import STILL, Rigid
+from viewer.scan.layers import NO_LAYERS
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -95,6 +97,46 @@ def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> No
             rendering.tell_missing(BARE)
     assert told == ["This Scan4D has no renderer 'gone': Points draws in its place."]
     assert session.document == document, "it comes back where the renderer is there"
+
+
+def moved(x: float) -> Rigid:
+    return Rigid(np.block([[np.eye(3), np.array([[x], [0], [0]])], [np.zeros((1, 3)), 1]]))
+
+
+def test_what_tools_lay_is_merged_and_goes_with_the_scan() -> None:
+    quarter = Rigid(np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
+    first, second = np.arange(3.0), -np.arange(3.0)
+    session = Session("one")
+    laid = session.laid
+    assert laid.layers(BARE) is NO_LAYERS
+    laid.lay("a", lambda pose: {"q": first, "a": first}, moved)
+    laid.lay("b", lambda pose: {"q": second}, lambda index: quarter)
+    layers = laid.layers(BARE)
+    assert laid.layers(BARE) is layers, "so that nothing is drawn again"
+    assert layers.scalars["q"] is second
+    assert layers.scalars["a"] is first
+    np.testing.assert_array_equal(layers.place.points(np.zeros(3)), (0, 3, 0))
+    laid.lay("a", lambda pose: {"q": first}, moved)
+    layers = laid.layers(BARE)
+    assert layers.scalars["q"] is first
+    np.testing.assert_array_equal(layers.place.points(np.array([1.0, 0, 0])), (3, 1, 0))
+    laid.take_away("b")
+    np.testing.assert_array_equal(laid.place(7).points(np.zeros(3)), (7, 0, 0))
+    session.turn_to("two")
+    assert laid.layers(BARE) is NO_LAYERS
+
+
+def test_a_pose_that_is_replayed_stands_where_it_was_and_has_its_own_numbers() -> None:
+    pose = replace(BARE, cloud=replace(BARE.cloud, scalars={"q": np.zeros(3)}))
+    laid = Session("one").laid
+    laid.lay("a", lambda pose: {"q": np.ones(3), "a": np.ones(3)}, moved)
+    laid.replay(pose.index, moved(-1))
+    assert list(laid.layers(pose).scalars) == ["a"]
+    np.testing.assert_array_equal(laid.layers(pose).place.points(np.zeros(3)), (-1, 0, 0))
+    np.testing.assert_array_equal(laid.place(4).points(np.zeros(3)), (4, 0, 0))
+    laid.lay("b", lambda pose: {}, lambda index: STILL)
+    assert list(laid.layers(pose).scalars) == ["q", "a"]
+    np.testing.assert_array_equal(laid.layers(pose).place.points(np.zeros(3)), (3, 0, 0))
 
 
 def test_a_change_of_a_parameter_is_called_by_its_name() -> None:

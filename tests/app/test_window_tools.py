@@ -9,8 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
 
+from viewer import cli
+from viewer.document.recording import Recording
+from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
@@ -309,3 +313,130 @@ def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
     (kept,) = (tmp_path / "config" / "scan4d" / "scans").glob("*.json")
     (position,) = json.loads(kept.read_text())["document"]["parts"]["place"]["all"]
     assert len(position["position"]) == 3
+
+
+LAYING = """
+from dataclasses import replace
+import numpy as np
+from viewer.app.commands import Command
+from viewer.rigid import Rigid
+TITLE = "Laying"
+PLACE = np.eye(4)
+PLACE[:3, :3] = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
+PLACE[:3, 3] = 100, 0, 3
+class Tool:
+    def __init__(self, desk):
+        self.desk, self.made = desk, {}
+    def numbers(self, pose):
+        if pose.index not in self.made:
+            self.made[pose.index] = {"rising": pose.cloud.positions[:, 1] * 5.0}
+        return self.made[pose.index]
+    def lay(self):
+        self.desk.lay(self.numbers)
+        self.color("rising")
+    def color(self, by):
+        self.desk.change("Colour", look=replace(self.desk.document.look, color_by=by, light="flat"))
+    def move(self): self.desk.lay(self.numbers, lambda index: Rigid(PLACE))
+    def wrong(self): self.desk.lay(lambda pose: {"rising": np.zeros(3)})
+    def tell(self):
+        viewport = self.desk.viewport
+        look, size = viewport.request.look, viewport.renderer.bytes_of(self.desk.pose)
+        self.desk.note(f"{look.color_by}, {size} bytes, at {self.desk.motion(self.desk.pose).matrix[0, 3]:g}")
+COMMANDS = {"Tools": (
+    Command("lay", "Lay", Tool.lay, "Alt+A"),
+    Command("move", "Move", Tool.move, "Alt+B"),
+    Command("plainly", "Plainly", lambda tool: tool.color("plain"), "Alt+C"),
+    Command("wrong", "Lay wrongly", Tool.wrong, "Alt+D"),
+    Command("tell", "Tell", Tool.tell, "Alt+E"),
+)}
+"""
+
+
+def press(app: RunningApp, key: str) -> None:
+    app.screen.do("key", key)
+    app.settle()
+
+
+def shown(app: RunningApp) -> tuple[str, int, float]:
+    """What the tool above tells: source of colours, bytes of the pose on the GPU, x of its place."""
+    press(app, "alt+e")
+    told = app.told(r"^(\w+), (\d+) bytes, at (\S+)$")
+    return told[1], int(told[2]), float(told[3])
+
+
+def saved_picture(app: RunningApp) -> Path:
+    press(app, "p")
+    return Path(app.told(r"Saved (.+\.png)")[1])
+
+
+def pixels(path: Path) -> np.ndarray:
+    with Image.open(path) as image:
+        return np.array(image)[..., :3]
+
+
+def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "laying.py").write_text(LAYING)
+    with running_app(screen, tmp_path, scan, before=USE.format(str(tmp_path / "tools"))) as app:
+        x, y = middle(app)
+        press(app, "alt+c")
+        color, before, _ = shown(app)
+        assert color == "plain"
+        plain = saved_picture(app)
+
+        press(app, "alt+a")
+        color, laid, _ = shown(app)
+        assert (color, laid - before) == ("rising", 4 * 400 * 400), "a number a point, and nothing else"
+        screen.do("mousemove", x, y - 60, "sleep", 0.2)
+        app.settle()
+        height, number = pointed(app)
+        assert number == pytest.approx(5 * height[1], abs=0.05)
+        press(app, "r")
+        app.told("Cannot record: the colours come from 'rising'")
+        press(app, "ctrl+e")
+        app.told("Cannot export: the colours come from 'rising'")
+        press(app, "p")
+        app.told("cannot be replayed: the colours come from 'rising'")
+        colored = Path(app.told(r"Saved (.+\.png)")[1])
+        assert len(np.unique(pixels(colored).reshape(-1, 3), axis=0)) > 50
+        with pytest.raises(InputError):
+            Recording.load(colored)
+
+        press(app, "alt+b")
+        press(app, "f")
+        assert shown(app) == ("rising", laid, 100), "nothing is uploaded again"
+        press(app, "alt+c")
+        screen.do("mousemove", x, y, "sleep", 0.2)
+        app.settle()
+        place, _ = pointed(app)
+        assert place == pytest.approx((100, 0, 3), abs=0.05), "it is fitted and picked where it is moved to"
+        moved = saved_picture(app)
+        assert (pixels(moved) != pixels(plain)).any(axis=2).mean() > 0.02
+        (entry,) = Recording.load(moved).entries
+        assert entry.place is not None
+        assert entry.place[0] == (0.8, -0.6, 0, 100)
+
+        press(app, "r")
+        app.see(is_recording=True)
+        press(app, "r")
+        app.told(r"Saved .+\.json")
+
+        press(app, "alt+d")
+        app.told("Laying is switched off until the next start: .*'rising' is .*expected 160,000 numbers")
+        assert (pixels(saved_picture(app)) != pixels(moved)).any(), "where the scan has it"
+        press(app, "shift+r")
+        app.see(is_replaying=False)
+        app.settle()
+        np.testing.assert_array_equal(pixels(saved_picture(app)), pixels(moved))
+        close(app)
+    assert cli.main(["render", "--replay", str(moved), "-o", str(tmp_path / "again.png")]) == 0
+    np.testing.assert_array_equal(pixels(tmp_path / "again.png"), pixels(moved))
+
+
+def pointed(app: RunningApp) -> tuple[list[float], float]:
+    """The place under the mouse, and the number of the layer there."""
+    words = app.state.pointed
+    (number,) = (float(word.split()[1]) for word in words if word.startswith("rising "))
+    return [float(part) for part in words[0].rpartition(" ")[0].split(",")], number

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..analysis.pick import Picked
 from ..document.document import Document
 from ..document.part import Part
+from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
+from .laid import NumbersOf, PlaceOf
 from .scene.viewport import Viewport
 
 if TYPE_CHECKING:
@@ -28,11 +30,13 @@ class Click:
     picked: what is seen there, with its spacing; None where nothing is. Its `place` is where the surface is
     at the pixel, its `point` the point of the scan that is seen there, None where a hole is filled. pose:
     that the picture shows. through_gap: whether the very pixel shows something farther, through a gap.
+    motion: of the pose, see `Desk.lay`; places of `picked` are where it is moved to.
     """
 
     picked: Picked | None
     pose: Pose
     through_gap: bool = False
+    motion: Rigid = STILL
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,21 @@ class Desk:
     def viewport(self) -> Viewport:
         """The view of the scan: its picture, and what a pixel of it shows."""
         return self._toolbox.viewport
+
+    def motion(self, pose: Pose) -> Rigid:
+        """The motion of a pose from the scan's coordinates to where it is shown, by what all tools lay."""
+        return self._toolbox.session.laid.layers(pose).place
+
+    def lay(self, numbers: NumbersOf | None = None, place: PlaceOf | None = None) -> None:
+        """Lay numbers over the points of the open scan, and move its poses; what the tool laid before goes.
+
+        numbers: gives those of a pose, name -> (N,) array by row of its cloud, empty where there are none;
+        they are colours to choose, and are picked, like the scan's own. It is asked when a pose comes to be
+        shown, so it answers with arrays that are there already; those that it gave before are not uploaded
+        again. place: gives the motion of a pose by its index. Without either, nothing is laid. To change
+        something, lay it anew. All is taken away when another scan is opened, and none of it is kept.
+        """
+        self._toolbox.lay(self.name, numbers, place)
 
     # --- the document -----------------------------------------------------------------
 

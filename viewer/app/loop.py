@@ -145,7 +145,8 @@ class Loop:
         app.steering.settle(pose)
         playing, held = app.playback.player.playing, app.steering.moves
         app.rendering.tell_missing(pose)
-        drew = app.viewport.draw(app.document.request(pose), playing=playing, held=held)
+        request = app.document.request(pose, app.session.laid.layers(pose))
+        drew = app.viewport.draw(request, playing=playing, held=held)
         if drew and app.viewport.problem is not None:
             app.failures.tell("Drawing", app.viewport.problem)
         elif drew:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
@@ -47,7 +48,8 @@ def draw(app: App) -> None:
             _draw_renderer(app.session, app.rendering, pose)
         if _section("Look"):
             look = app.document.look
-            app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": _colors(look, pose)}))
+            colors = _colors(look, app.session.laid.layers(pose).names(pose.cloud.scalars))
+            app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": colors}))
             _draw_projection(app.steering, app.document.camera)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
             app.bookmarks.draw(ui)
@@ -100,13 +102,16 @@ def _draw_renderer(session: Session, rendering: Rendering, pose: Pose) -> None:
     rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))
 
 
-def _colors(look: Look, pose: Pose) -> dict[str, str]:
-    """Sources of colours, and the title of each: also the one chosen where the frame lacks it."""
-    there = [*COLOR_BY, *pose.cloud.scalars]
+def _colors(look: Look, scalars: Collection[str]) -> dict[str, str]:
+    """Sources of colours, and the title of each: also the one chosen where the frame lacks it.
+
+    scalars: that the frame has.
+    """
+    there = [*COLOR_BY, *scalars]
     titles = {name: printable(name) for name in there}
     if look.color_by in there:
         return titles
-    is_here = drawable(look, pose.cloud.scalars) == look  # as the scalar's number
+    is_here = drawable(look, scalars) == look  # as the scalar's number
     return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not here)")}
 
 
@@ -129,7 +134,8 @@ def _draw_statistics(app: App) -> None:
     imgui.set_item_tooltip("Measure each pass of a picture; this makes it a little slower")
     if surface is None or pose is None or not app.viewport.is_there:
         return
-    x, y, z = app.viewport.bounds(pose).high - app.viewport.bounds(pose).low
+    bounds = app.steering.bounds(pose)
+    x, y, z = bounds.high - bounds.low
     _row(
         "Points",
         f"{len(pose.cloud):,}" + (f" ({pose.cloud.dropped:,} dropped)" if pose.cloud.dropped else ""),

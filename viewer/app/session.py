@@ -13,6 +13,7 @@ from ..document.part import Part
 from ..document.saved_session import SavedSession
 from ..files import absolute
 from ..scan.open import DEMO
+from .laid import Laid
 from .playing.player import Pace
 
 _MOST_LEFT = 50  # scans whose changes can still be undone
@@ -26,7 +27,8 @@ def known_as(scan: str) -> str:
 class Session:
     """The open scan, and those that were open.
 
-    scan: as the user named it. index: the frame. history: of the scan's document. pace: how the scan plays.
+    scan: as the user named it. index: the frame. history: of the scan's document. laid: what tools lay over
+    its poses. pace: how the scan plays.
     hash_found: brings the scan's hash (see `fingerprint`), None where it has no files.
     """
 
@@ -41,6 +43,7 @@ class Session:
         self.scan = scan
         self.index = 0 if left is None else left.pose
         self.history = History(left.document if left else document or Document())
+        self.laid = Laid()
         self.pace = pace or Pace()
         self.hash_found: Future[str | None] = Future()
         self._left: dict[
@@ -87,6 +90,7 @@ class Session:
         beginning = begun, 0 if left is None else left.pose
         self.history, self.index = self._left.pop(known_as(scan), beginning)
         self.scan = scan
+        self.laid.clear()
         for oldest in list(self._left)[:-_MOST_LEFT]:
             del self._left[oldest]
 

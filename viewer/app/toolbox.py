@@ -11,11 +11,15 @@ from ..analysis.pick import before_gap, pick
 from ..document.part import Part
 from ..document.schema import usable
 from ..errors import InputError
+from ..rigid import STILL, Rigid
+from ..scan.layers import Layers
+from ..scan.pose import Pose
 from ..task import Cancelled, Task
 from . import failures, tools
 from .commands import Command, Commands, Entry, Item, Listing, Menu
 from .desk import Click, Desk
 from .failures import Failures
+from .laid import Numbers, NumbersOf, PlaceOf
 from .playing.playback import Playback
 from .scene.canvas import Canvas, ViewPlace
 from .scene.viewport import Viewport
@@ -150,11 +154,28 @@ class Toolbox:
 
     def _switch_off(self, slot: Slot, error: BaseException) -> None:
         slot.tool = None
+        self.session.laid.take_away(slot.desk.name)
         if self.clicking == slot.desk.name:
             self.clicking = None
         slot.desk.cancel_work()
         words = f"{slot.title} is switched off until the next start: {failures.reason(error)}"
         self._failures.tell(f"The tool '{slot.desk.name}'", error, words)
+
+    def lay(self, name: str, numbers: NumbersOf | None, place: PlaceOf | None) -> None:
+        """Lay over the open scan what a tool gives, or nothing; what it gives wrong switches it off."""
+        if numbers is None and place is None:
+            self.session.laid.take_away(name)
+        else:
+            slot = self._slots[name]
+
+            def numbers_of(pose: Pose) -> Numbers:
+                return self._ask(slot, lambda _: _checked(numbers(pose), pose)) or {} if numbers else {}
+
+            def place_of(index: int) -> Rigid:
+                return self._ask(slot, lambda _: _checked_place(place(index))) or STILL if place else STILL
+
+            self.session.laid.lay(name, numbers_of, place_of)
+        self.redraw()
 
     # --- in the window ----------------------------------------------------------------
 
@@ -199,7 +220,8 @@ class Toolbox:
         if self._first is None or surface is None or request is None or not viewport.is_there:
             return
         meant = before_gap(surface, *pixel)
-        click = Click(pick(surface, *meant), request.pose, meant != pixel)
+        picked = pick(surface, *meant)
+        click = Click(picked, request.pose, meant != pixel, request.layers.place)
         self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
 
     @property
@@ -251,6 +273,19 @@ class Toolbox:
         """Cancel what runs for tools."""
         for slot in self._slots.values():
             slot.desk.cancel_work()
+
+
+def _checked(numbers: Numbers, pose: Pose) -> Numbers:
+    """The numbers, which are as many as the pose's points. Raises InputError where they are not."""
+    Layers(numbers).check(pose.cloud)
+    return numbers
+
+
+def _checked_place(place: Rigid) -> Rigid:
+    """The place. Raises TypeError where it is none."""
+    if not isinstance(place, Rigid):
+        raise TypeError(f"a place is a viewer.rigid.Rigid, not a {type(place).__name__}")
+    return place
 
 
 def _imported(name: str) -> Any:

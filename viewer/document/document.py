@@ -14,6 +14,7 @@ from ..errors import InputError, shortened
 from ..frame import Request, backend_for
 from ..geometry import Vector, up_vector
 from ..look import Look, drawable
+from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Pose
 from .part import Part
 from .schema import DAMAGED, ReadBy, Unit, Values, Word, is_object, structured, unread, usable
@@ -177,11 +178,12 @@ class Document:
         params = self.params.get(name, defaults)
         return name, params if isinstance(params, type(defaults)) else usable(defaults, params)
 
-    def request(self, pose: Pose) -> Request:
+    def request(self, pose: Pose, layers: Layers = NO_LAYERS) -> Request:
         """The picture to draw of a pose, in other colours where it lacks the scalar that gives them.
 
-        The camera must be set.
+        The camera must be set. layers: over the pose.
         """
         assert self.camera is not None
         name, params = self.chosen(pose)
-        return Request(pose, self.camera, name, params, drawable(self.look, pose.cloud.scalars))
+        look = drawable(self.look, layers.names(pose.cloud.scalars))
+        return Request(pose, self.camera, name, params, look, layers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...camera import Camera
-from ...document.recording import Entry, Recording
+from ...document.recording import Entry, Recording, matrix_of
 from ...errors import InputError
 from ...geometry import Vector
 from ...output.export import FRAME_RATES, numbered
 from ...output.marks import Marks
 from ...params import describe, param
+from ...rigid import Rigid
 from ...scan.times import DEFAULT_FPS, typical_rate
 
 VIEW, TURNTABLE, FRAMES = "view", "turntable", "frames"
@@ -127,18 +129,26 @@ def present(choices: Choices, count: int) -> list[Path]:
 
 
 def recording(
-    choices: Choices, shown: Entry, marks: Marks, times: NDArray[np.float64], pivot: Vector | None
+    choices: Choices,
+    shown: Entry,
+    marks: Marks,
+    times: NDArray[np.float64],
+    pivot: Vector | None,
+    place: Callable[[int], Rigid],
 ) -> Recording:
     """The pictures to make. shown: what the view shows. times: (T,) of the scan's frames, seconds.
 
-    pivot: what a turntable turns about; None: the camera's target.
+    pivot: what a turntable turns about; None: the camera's target. place: that frames are moved to, by index.
     """
     base = replace(shown, size=choices.size, marks=marks)
     if choices.what == TURNTABLE:
         angles = [360 * number / choices.pictures for number in range(choices.pictures)]
         entries = [replace(base, camera=_turned(base.camera, angle, pivot)) for angle in angles]
     elif choices.what == FRAMES:
-        entries = [replace(base, pose=i, time=float(times[i])) for i in choices.indices(len(times))]
+        entries = [
+            replace(base, pose=i, time=float(times[i]), place=matrix_of(place(i)))
+            for i in choices.indices(len(times))
+        ]
     else:
         entries = [base]
     if choices.format != MP4:

@@ -120,8 +120,8 @@ class Exporting:
             self.replaced = [] if self.refused else there
             return
         self.is_open, self.replaced = False, []
-        pivot = self._session.document.pivot
-        recording = export_plan.recording(choices, shown, self.marks, timeline.times, pivot)
+        pivot, place = self._session.document.pivot, self._session.laid.place
+        recording = export_plan.recording(choices, shown, self.marks, timeline.times, pivot, place)
         out, rate, anonymous = choices.out(), self.rate, choices.anonymous
         numbers = choices.numbers(self.count)
         task = self.task = Task(f"Exporting {choices.name}")

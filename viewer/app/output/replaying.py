@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...document.anonymous import in_place
+from ...document.anonymous import in_place, middle_of
 from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
 from ...errors import InputError
 from ...scan.pose import Pose
@@ -107,10 +107,12 @@ class Replaying:
 
 def _show(app: App, entry: Entry, pose: Pose) -> None:
     """Show what an entry of a recording does. pose: of the scan, which is open."""
-    camera, look = entry.camera, entry.look
+    camera, look, place = entry.camera, entry.look, entry.motion
     if entry.anonymous:
         camera, look = in_place(camera, look, pose)
+        place = place.in_frame(-middle_of(pose))
     app.seek(entry.pose)
+    app.session.laid.replay(entry.pose, place)
     shown = replace(app.document, camera=camera, pivot=None, look=look, backend=entry.backend)
     shown = shown.with_params(entry.backend, entry.params)
     app.session.history.change("Replay", shown, merge="replay")

@@ -31,7 +31,8 @@ class Rendering:
             stand_in = backends()[self._session.document.defaults(pose)[0]].title
             self._note(f"This Scan4D has no renderer '{chosen_backend}': {stand_in} draws in its place.")
         missed = self._session.scan, look.color_by
-        if missed not in self._missed and drawable(look, pose.cloud.scalars) != look:
+        names = self._session.laid.layers(pose).names(pose.cloud.scalars)
+        if missed not in self._missed and drawable(look, names) != look:
             self._missed.add(missed)
             chosen = missed[1]
             name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 
+from ...bounds import Bounds
 from ...camera import Camera
 from ...scan.pose import Pose
 from ..playing.playback import Playback
@@ -57,18 +58,22 @@ class Steering:
         camera = self._session.document.camera
         return camera is not None and camera.projection == "orthographic"
 
+    def bounds(self, pose: Pose) -> Bounds:
+        """The robust bounds of a pose, where tools move it to."""
+        return self._session.laid.layers(pose).place.bounds(self._viewport.bounds(pose))
+
     def fit(self) -> None:
         """Show all of the current pose, from the same side."""
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
-            fitted = camera.fit(self._viewport.bounds(pose), self._viewport.aspect)
+            fitted = camera.fit(self.bounds(pose), self._viewport.aspect)
             self._session.change("Fit", camera=fitted, pivot=None)
 
     def look_from(self, azimuth: float, elevation: float) -> None:
         """Show all of the current pose from a direction in degrees, such as those of `navigation.VIEWS`."""
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
-            bounds, aspect = self._viewport.bounds(pose), self._viewport.aspect
+            bounds, aspect = self.bounds(pose), self._viewport.aspect
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
             self._session.change("Look from there", camera=turned, pivot=None)
 
@@ -128,7 +133,7 @@ class Steering:
         The latter is looked at once a scan: its file may have changed since it was left.
         """
         camera = self._session.document.camera
-        bounds, aspect = self._viewport.bounds(pose), self._viewport.aspect
+        bounds, aspect = self.bounds(pose), self._viewport.aspect
         if not self._is_checked:
             self._is_checked = True
             if camera is not None and not navigation.shows(camera, bounds, aspect):

@@ -15,6 +15,7 @@ from ...errors import Scan4DError
 from ...frame import Request, bring, fallback, is_prepared, render_frame
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
+from ...look import drawable
 from ...renderer import Renderer
 from ...scan.pose import Pose
 from ..failures import failure_in_words
@@ -120,7 +121,10 @@ class Viewport:
     def without_preparing(self, request: Request) -> Request:
         """A request to show instead, for which nothing has to be prepared: as before, or plain points."""
         if self._asked_for is not None:
-            before = replace(self._asked_for, pose=request.pose, camera=request.camera)
+            before = replace(
+                self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers,
+                look=drawable(self._asked_for.look, request.layers.names(request.pose.cloud.scalars)),
+            )  # fmt: skip
             if is_prepared(self.renderer, before, self.size):
                 return before
         return fallback(request)
@@ -217,7 +221,7 @@ class Viewport:
         self._prepared_at = math.inf
 
     def bounds(self, pose: Pose) -> Bounds:
-        """The robust bounds of a pose, found once; also of one that is too large to draw."""
+        """The robust bounds of a pose, unmoved, found once; also of one that is too large to draw."""
         if self._bounded is None or self._bounded[0] is not pose:
             self._bounded = pose, pose.cloud.bounds()
         return self._bounded[1]

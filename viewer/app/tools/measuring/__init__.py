@@ -98,7 +98,7 @@ class Tool:
         """Set an end at what was clicked; raises InputError where it cannot be."""
         if click.picked is None:
             raise InputError("There is nothing to measure here.")
-        end = End.of(click.picked, click.pose, filled=self.filled)
+        end = End.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
             self.desk.note("That was seen through a gap: the end is at the point before it.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
@@ -140,7 +140,8 @@ class Tool:
         pose, one_topology = self.desk.pose, self.desk.timeline.one_topology
         if pose is None:
             return []
-        return [reading_of(measurement, pose, one_topology) for measurement in self.made.all]
+        motion = self.desk.motion(pose)
+        return [reading_of(measurement, pose, one_topology, motion) for measurement in self.made.all]
 
     def watch(self, readings: Sequence[Reading]) -> None:
         """Tell when measurements that followed their points no longer can; note in the log what they read."""

@@ -1,0 +1,77 @@
+"""What tools lay over the poses of the open scan, beside its document: it is computed, and not kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rigid import STILL, Rigid
+from ..scan.layers import NO_LAYERS, Layers
+from ..scan.pose import Pose
+
+Numbers = Mapping[str, NDArray[np.generic]]
+NumbersOf = Callable[[Pose], Numbers]
+PlaceOf = Callable[[int], Rigid]
+
+
+class Laid:
+    """Layers over the open scan, of all tools together.
+
+    Of numbers that have one name those count that were laid last. A pose is moved by one tool's place after
+    the other's, in the order in which they were laid.
+    """
+
+    def __init__(self) -> None:
+        self._by_tool: dict[str, tuple[NumbersOf, PlaceOf]] = {}
+        self._replayed: tuple[int, Rigid] | None = None
+        self._found: tuple[Pose, Layers] | None = None
+
+    def lay(self, tool: str, numbers: NumbersOf, place: PlaceOf) -> None:
+        """Lay a tool's numbers and places over the poses, instead of what it laid before.
+
+        numbers: of a pose. place: of a pose, by its index.
+        """
+        self.take_away(tool)
+        self._by_tool[tool] = numbers, place
+
+    def take_away(self, tool: str) -> None:
+        """Take away what a tool laid."""
+        self._by_tool.pop(tool, None)
+        self._replayed = self._found = None
+
+    def replay(self, index: int, place: Rigid) -> None:
+        """Have a pose stand where a recording has it, and its scan's own numbers stand for layers of the same
+        name; until another pose is replayed, or a tool lays something.
+        """
+        self._replayed, self._found = (index, place), None
+
+    def clear(self) -> None:
+        """Take away all, since another scan is opened."""
+        self._by_tool.clear()
+        self._replayed = self._found = None
+
+    def layers(self, pose: Pose) -> Layers:
+        """The layers over a pose, the same object for as long as nothing else is laid."""
+        if self._found is None or self._found[0] is not pose:
+            self._found = pose, self._merged(pose)
+        return self._found[1]
+
+    def place(self, index: int) -> Rigid:
+        """The motion of a pose, by its index, which need not have been read."""
+        if self._replayed is not None and self._replayed[0] == index:
+            return self._replayed[1]
+        place = STILL
+        for _, place_of in list(self._by_tool.values()):  # a tool that fails is taken away
+            place = place_of(index).after(place)
+        return place
+
+    def _merged(self, pose: Pose) -> Layers:
+        scalars: dict[str, NDArray[np.generic]] = {}
+        for numbers_of, _ in list(self._by_tool.values()):
+            scalars |= numbers_of(pose)
+        if self._replayed is not None and self._replayed[0] == pose.index:
+            scalars = {name: values for name, values in scalars.items() if name not in pose.cloud.scalars}
+        place = self.place(pose.index)
+        return Layers(scalars, place) if scalars or not place.is_identity else NO_LAYERS
