@@ -65,6 +65,15 @@ def test_nobody_waits_for_a_slow_disk_and_nothing_is_lost_meanwhile() -> None:
     assert written == [1, 4, 5]
 
 
+def test_what_saving_has_to_say_is_told() -> None:
+    keeper = Keeper("Numbers", lambda number: f"{number} is much", 0, every=3.0)
+    keeper.keep(7)
+    finish(keeper)
+    assert keeper.look(5.0, lambda: 7) == "7 is much"
+    assert keeper.look(10.0, lambda: 7) is None
+    assert keeper.close(8) == "8 is much"
+
+
 def test_what_cannot_be_kept_is_told_once() -> None:
     def fail(number: int) -> None:
         raise OSError("no room")

@@ -275,6 +275,78 @@ def test_what_is_damaged_is_put_aside_and_told_once() -> None:
     assert aside.read_bytes() == former, "what was put aside before stays"
 
 
+def other_window(session: SavedSession) -> None:
+    """Keep a session as another process does."""
+    session.save(kept_file(session.scan))
+
+
+def asides() -> list[SavedSession]:
+    folder = kept_file(SESSION.scan).parent
+    return [SavedSession.load(path) for path in sorted(folder.glob("*.old-*.scan4d.json"))]
+
+
+def with_bookmarks(*names: str) -> SavedSession:
+    marks = tuple(Bookmark(name, CAMERA) for name in names)
+    return replace(SESSION, document=replace(FULL, bookmarks=marks))
+
+
+def test_what_another_window_made_is_put_aside_once_and_told() -> None:
+    keep(with_bookmarks("a"))
+    assert kept(SESSION.scan) == with_bookmarks("a")
+    theirs = with_bookmarks("a", "b")
+    other_window(theirs)
+    mine = replace(with_bookmarks("a"), pose=7)
+    told = keep(mine)
+    (aside,) = kept_file(SESSION.scan).parent.glob("*.old-*")
+    assert told is not None
+    assert told.startswith("/scans/knot: what is kept of it was changed elsewhere")
+    assert str(aside) in told
+    assert asides() == [theirs]
+    assert kept(SESSION.scan) == mine
+    assert is_session(aside)
+    assert keep(replace(mine, pose=8)) is None
+    other_window(replace(theirs, pose=4))  # which goes on moving its camera
+    assert keep(replace(mine, pose=9)) is None
+    assert asides() == [theirs]
+    other_window(with_bookmarks("a", "b", "c"))
+    assert keep(mine) is not None
+    assert asides() == [theirs, with_bookmarks("a", "b", "c")]
+
+
+def test_what_another_window_made_stays_where_it_is_while_nothing_can_be_written(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    keep(with_bookmarks("a"))
+    other_window(with_bookmarks("b"))
+
+    def refuse(session: SavedSession, path: Path) -> None:
+        raise InputError("cannot be written", path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SavedSession, "save", refuse)
+        with pytest.raises(InputError):
+            keep(SESSION)
+    assert asides() == []
+    assert keep(SESSION) is not None
+    assert asides() == [with_bookmarks("b")]
+
+
+def test_another_window_that_made_nothing_costs_nothing() -> None:
+    keep(with_bookmarks("a"))
+    other_window(replace(with_bookmarks("a"), pose=9))
+    assert keep(with_bookmarks("a", "b")) is None, "it had what this one had"
+    other_window(replace(SESSION, document=Document(camera=CAMERA)))
+    assert keep(with_bookmarks("a", "b")) is None
+    assert asides() == []
+
+
+def test_a_document_that_was_damaged_meanwhile_is_put_aside_and_told() -> None:
+    keep(SESSION)
+    kept_file(SESSION.scan).write_text("{")
+    assert "put aside" in str(keep(SESSION))
+    assert kept(SESSION.scan) == SESSION
+
+
 def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> None:
     keep(SESSION)
     file = kept_file(SESSION.scan)

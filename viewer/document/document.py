@@ -115,6 +115,12 @@ class Document:
         return cls(**values, unread=left)
 
     @property
+    def made(self) -> tuple[object, ...]:
+        """What a user made, beside what was only chosen, which may hold what cannot be read here; empty where
+        there is nothing."""
+        return tuple(filter(None, (self.bookmarks, self.parts, self.unread)))
+
+    @property
     def unreadable(self) -> tuple[str, ...]:
         """The names of what a file said and could not be read here."""
         kinds = {"params": _kinds_of_params(), "parts": Part.kinds}

@@ -13,15 +13,16 @@ T = TypeVar("T")
 class Keeper(Generic[T]):
     """Saves values on a thread of its own: what has changed, now and then. Nobody waits but in `close`."""
 
-    def __init__(self, what: str, save: Callable[[T], None], saved: T | None, every: float) -> None:
-        """what: for messages, such as "Settings". save: writes a value; it may raise anything.
+    def __init__(self, what: str, save: Callable[[T], str | None], saved: T | None, every: float) -> None:
+        """what: for messages, such as "Settings". save: writes a value, and returns what the user should
+        know; it may raise anything.
 
         saved: what is in the file. every: seconds between looks at what has changed.
         """
         self._what, self._save, self._every = what, save, every
         self._saved = saved
         self._next_look = 0.0
-        self._writing: Future[None] | None = None
+        self._writing: Future[str | None] | None = None
         self._worker = ThreadPoolExecutor(1, thread_name_prefix=what.lower())
 
     def look(self, now: float, current: Callable[[], T]) -> str | None:
@@ -59,7 +60,8 @@ class Keeper(Generic[T]):
     def _take_problem(self) -> str | None:
         if self._writing is None or self._is_writing:
             return None
-        error, self._writing = self._writing.exception(), None
-        if error is not None:
-            self._next_look, self._saved = math.inf, None
-        return None if error is None else f"{self._what} are not kept: {error}"
+        written, self._writing = self._writing, None
+        if (error := written.exception()) is None:
+            return written.result()
+        self._next_look, self._saved = math.inf, None
+        return f"{self._what} are not kept: {error}"

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from itertools import count
@@ -21,7 +22,7 @@ from typing import Annotated, Any
 
 from .. import __version__
 from ..errors import InputError, explained
-from ..files import absolute, whole_file
+from ..files import absolute, open_plain, whole_file
 from ..folders import user_folder
 from ..scan.open import DEMO
 from .document import Document
@@ -43,6 +44,9 @@ from .schema import (
 FORMAT = 1
 SUFFIX = ".scan4d.json"
 MOST_KEPT = 200  # documents in the user's folder; those written last
+_seen: dict[
+    Path, tuple[bytes, object]
+] = {}  # file -> what this process read or wrote last: digest, what was made
 
 
 @dataclass(frozen=True)
@@ -92,10 +96,13 @@ class SavedSession:
 
     def save(self, path: Path) -> None:
         """Write the file, and its folder. Raises InputError where it cannot be written."""
-        text = json.dumps(self.to_json(), indent=1)
         with whole_file(path) as temporary:
             path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_text(text + "\n", encoding="utf-8")
+            temporary.write_bytes(self._text)
+
+    @property
+    def _text(self) -> bytes:
+        return (json.dumps(self.to_json(), indent=1) + "\n").encode()
 
     def export(self, path: Path) -> None:
         """Write the file with the scan named from its folder, so that both can be moved together."""
@@ -131,17 +138,29 @@ def kept_file(scan: str) -> Path:
     return user_folder() / "scans" / f"{digest}.json"
 
 
-def keep(session: SavedSession) -> None:
+def keep(session: SavedSession) -> str | None:
     """Keep the document of a scan, which is named from the root; older ones beyond MOST_KEPT go.
 
-    Raises InputError where it cannot be written, or there is one that only others can read.
+    Where another window has written it meanwhile, what was made there is put aside; returns words of that for
+    the user. Raises InputError where it cannot be written, or there is one that only others can read.
     """
     path = kept_file(session.scan)
-    _refuse_foreign(path)
-    is_new = not os.path.exists(path)
-    session.save(path)
+    is_new = not os.path.lexists(path)
+    aside = None if is_new else _spared(path, session.document)
+    try:
+        session.save(path)
+    except InputError:
+        if aside is not None:
+            with suppress(OSError):
+                os.replace(aside, path)
+        raise
+    _seen[path] = _digest(session._text), session.document.made
     if is_new:
         _delete_oldest(path.parent)
+    if aside is None:
+        return None
+    what = "what is kept of it was changed elsewhere, perhaps in another window"
+    return str(InputError(what, session.scan, f"That is put aside; open {aside} to see it"))
 
 
 def kept(scan: str) -> SavedSession | None:
@@ -154,7 +173,10 @@ def kept(scan: str) -> SavedSession | None:
     if not os.path.lexists(path):
         return None
     try:
-        return SavedSession.load(path)
+        digest = _digest_of_file(path)  # before it is read: what changes meanwhile is told
+        session = SavedSession.load(path)
+        _seen[path] = digest, session.document.made
+        return session
     except InputError as error:
         what = f"what was kept of it cannot be read ({error.what})"
         if _is_foreign(error):
@@ -169,14 +191,38 @@ def _is_foreign(error: InputError) -> bool:
     return isinstance(error, NewerFormatError) or isinstance(error.__cause__, OSError)
 
 
-def _refuse_foreign(path: Path) -> None:
-    """Raise InputError where a file must not be written over, since only others can read it."""
-    if os.path.lexists(path):
-        try:
-            SavedSession.load(path)
-        except InputError as error:
-            if _is_foreign(error):
-                raise
+def _digest(text: bytes) -> bytes:
+    return hashlib.sha256(text).digest()
+
+
+def _digest_of_file(path: Path) -> bytes:
+    """Digest of a file; empty where it cannot be read."""
+    with suppress(OSError), open_plain(path) as stream:
+        return _digest(stream.read())
+    return b""
+
+
+def _spared(path: Path, document: Document) -> Path | None:
+    """Put a file that is to be written over aside, where it would take with it what was made in another
+    window; returns where to. Raises InputError where only others can read it."""
+    digest, made = _seen.get(path, (None, ()))
+    if _digest_of_file(path) == digest:
+        return None
+    try:
+        others = SavedSession.load(path).document.made
+        if others in ((), made, document.made) or others in _made_aside(path):
+            return None
+    except InputError as error:
+        if _is_foreign(error):
+            raise
+    return _put_aside(path)
+
+
+def _made_aside(path: Path) -> Iterator[object]:
+    """What was made in the documents that are put aside of a scan."""
+    for aside in path.parent.glob(f"{path.stem}.old-*{SUFFIX}"):
+        with suppress(InputError):
+            yield SavedSession.load(aside).document.made
 
 
 def _put_aside(path: Path) -> Path:
