@@ -21,8 +21,9 @@ void main() {
     precise vec4 value = mean_sample();
 #if SIGN
     float its_weight = texelFetch(detail_weights, int(i)).r;
+    bool there = is_there(its_weight);
     value = texelFetch(detail, int(i)) + float(SIGN) * value;
-    store_sample(i, its_weight > 0.0 ? value : vec4(0.0), max(its_weight, 0.0));
+    store_sample(i, there ? value : vec4(0.0), there ? its_weight : 0.0);
 #else
     store_sample(i, value, weight / inside);
 #endif

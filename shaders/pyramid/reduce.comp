@@ -17,7 +17,7 @@ void main() {
             add_sample(ivec2(x, y), taps[x - first.x] * taps[y - first.y]);
 #if NEAREST
             vec4 here = texelFetch(samples, y * size.x + x);
-            bool better = texelFetch(weights, y * size.x + x).r > 0.0 && (!found || here.x < nearest.x);
+            bool better = is_there(texelFetch(weights, y * size.x + x).r) && (!found || here.x < nearest.x);
             nearest = better ? here : nearest;
             found = found || better;
 #endif

@@ -1,4 +1,5 @@
-// Samples of a level of a pyramid: values with a weight each, which is 0 where there is none, whatever the values.
+// Samples of a level of a pyramid: values with a weight each, which is not above 0, or not finite, where
+// there is none, whatever the values.
 #include "common/item.glsl"
 
 layout(binding = TEXTURE_SAMPLES) uniform samplerBuffer samples;  // of the level that is read
@@ -16,6 +17,8 @@ precise vec4 sum;
 precise float weight;
 precise float inside;
 
+bool is_there(float its_weight) { return its_weight > 0.0 && floatBitsToUint(its_weight) < NO_DEPTH; }
+
 void begin_sample() {
     sum = vec4(0.0);
     weight = inside = 0.0;
@@ -25,7 +28,7 @@ void add_sample(ivec2 at, float tap) {
     int i = at.y * size.x + at.x;
     float w = texelFetch(weights, i).r;
     inside += tap;
-    if (!(w > 0.0)) return;
+    if (!is_there(w)) return;
     weight += tap * w;
     sum += tap * w * texelFetch(samples, i);
 }

@@ -1,5 +1,5 @@
 // Gives each covered pixel, as its own, what its row has. CHANNEL 0 colour, 1 normal, 2 value. HAS_ROWS: whether rows have
-// any. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
+// any. IS_DEPTH: whether the value is the depth. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
 #include "common/view.glsl"
 #include "common/item.glsl"
 
@@ -18,6 +18,9 @@ layout(std430, binding = STORAGE_VALUE) writeonly buffer Value { float own[]; };
 void main() {
     int index = int(item());
     if (index >= view_size.x * view_size.y || texelFetch(depths, index).r >= NO_DEPTH) return;
+#if IS_DEPTH
+    own[index] = uintBitsToFloat(texelFetch(depths, index).r);
+#else
     uint row = texelFetch(rows, index).r;
     bool known = HAS_ROWS != 0 && row != NOTHING;
     vec4 value = known ? texelFetch(values, int(row)) : vec4(0.0);
@@ -27,5 +30,6 @@ void main() {
     for (int k = 0; k < 3; ++k) own[3 * index + k] = value[k];
 #else
     own[index] = known ? value.r : uintBitsToFloat(0x7FC00000u);
+#endif
 #endif
 }

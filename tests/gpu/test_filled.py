@@ -11,6 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, plane
 
+from viewer.analysis.pick import pick
+from viewer.gpu import gl
+from viewer.gpu.shade import shade
 from viewer.gpu.surface import EMPTY, Surface
 from viewer.look import Look, color_table
 from viewer.scan.points import PointCloud
@@ -139,6 +142,31 @@ def test_a_normal_that_is_left_open_faces_the_eye(draw: Draw) -> None:
     to_eye = -(view.unproject(np.stack([x, y], axis=1) + 0.5, np.ones(len(x))) + surface.scan.origin)
     to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True)
     np.testing.assert_allclose(normals[:, :3], to_eye, atol=1.1 / 127.5)
+
+
+def test_depth_as_the_number_is_resolved_like_others(draw: Draw) -> None:
+    look = replace(FLAT, color_by="depth", low=3.8, high=4.1)
+    surface = draw(slope(), CAMERA, SIZE, "points", look)
+    picture, value = surface.image().copy(), surface.value
+    surface.resolve("value")
+    assert surface.is_own("value")
+    np.testing.assert_array_equal(surface.value, value)
+    shade(surface, look)
+    np.testing.assert_array_equal(surface.image(), picture)
+
+
+@pytest.mark.parametrize("level", [0, 255, 256, 0xFFFFFFFF])
+def test_a_pixel_without_a_row_is_filled_whatever_level_a_backend_writes(draw: Draw, level: int) -> None:
+    surface = draw(slope(), CAMERA, SIZE, "points", FLAT)
+    gl.clear_words(surface.depths.buffer, int(np.float32(4).view(np.uint32)))
+    gl.clear_words(surface.own("level").buffer, level)
+    filled = surface.row == NOTHING
+    assert (surface.level[filled] == (1 if level == 0 else 254)).all()
+    y, x = np.argwhere(filled)[0]
+    picked = pick(surface, x, y)
+    assert picked is not None
+    assert not picked.measured
+    assert picked.level == surface.level[y, x]
 
 
 @pytest.mark.parametrize("name", ["color", "normal", "value"])

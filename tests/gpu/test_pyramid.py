@@ -213,6 +213,30 @@ def image_into(level: Image) -> Image:
     return level
 
 
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("absent", [np.inf, -np.inf, np.nan, -1.0])
+def test_a_weight_that_is_none_is_as_good_as_zero(renderer: Renderer, name: str, absent: float) -> None:
+    gpu, how, size = renderer.gpu, FILTERS[name], (6, 4)
+    values, weights = picture(size, 2)
+    results = []
+    for other in (0.0, absent):
+        fine = image(gpu, values, np.where(weights > 0, weights, other))
+        coarse, detail = Image(gpu, (3, 2), 2), Image(gpu, size, 2)
+        pyramid.reduce(gpu, fine, coarse, how)
+        pyramid.subtract_expanded(gpu, fine, coarse, detail, how)
+        results.append([array.ravel() for each in (coarse, detail) for array in each.read()])
+        gpu.discard(fine, coarse, detail)
+    assert np.isfinite(np.concatenate(results[1])).all()
+    for plain, got in zip(*results, strict=True):
+        np.testing.assert_array_equal(got, plain)
+
+
+def test_images_that_are_none_are_refused(renderer: Renderer) -> None:
+    for size, channels in (((0, 3), 1), ((3, -1), 1), ((3, 3), 0), ((3, 3), 5)):
+        with pytest.raises(ValueError, match="no image: "):
+            Image(renderer.gpu, size, channels)
+
+
 def test_levels_that_do_not_belong_together_are_refused(renderer: Renderer) -> None:
     gpu = renderer.gpu
     fine, coarse, other = Image(gpu, (6, 4), 1), Image(gpu, (3, 2), 1), Image(gpu, (3, 2), 2)

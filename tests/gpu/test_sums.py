@@ -117,11 +117,22 @@ def test_sums_that_cannot_be_held_are_refused(renderer: Renderer) -> None:
     for limit, finest in ((0.0, 1.0), (np.inf, 1.0), (1.0, 0.0), (1.0, 2.0), (np.nan, 1.0)):
         with pytest.raises(ValueError, match="limit and step"):
             FixedPoint((limit,), (finest,), 1)
+    with pytest.raises(ValueError, match="no count of numbers: -1"):
+        FixedPoint((1.0,), (1.0,), -1)
+    with pytest.raises(ValueError, match="no sums: 0 channels in 3 cells"):
+        CellSums(renderer.gpu, 3, 0)
     with pytest.raises(InputError, match="too large"):
         CellSums(renderer.gpu, renderer.gpu.max_storage_bytes, 1)
     sums = CellSums(renderer.gpu, 3, 2)
     with pytest.raises(ValueError, match="1 limits for 2 channels"):
         sums.add(Visits(f"{PARTS}/counting.glsl", 1, lambda _: None), FixedPoint((1.0,), (1.0,), 1))
+    sums.release()
+
+
+def test_no_cells_have_no_sums(renderer: Renderer) -> None:
+    sums = CellSums(renderer.gpu, 0, 3)
+    sums.clear()
+    assert sums.read(FixedPoint((1.0,) * 3, (1.0,) * 3, 0)).shape == (0, 3)
     sums.release()
 
 

@@ -54,12 +54,15 @@ GAUSSIAN = Filter(-1, (math.exp(-2), 1.0, math.exp(-2)))  # 3 x 3, of spread 0.5
 class Image:
     """Samples in rows from the top on the GPU: 1 to 4 channels of float32, and a weight each.
 
-    A sample whose weight is not above 0 is not there, and its values, NaN and infinite ones too, are not
-    used; a step writes zeros for it. Raises InputError where the driver takes no so large image.
+    A sample whose weight is not above 0 and finite is not there, and its values, NaN and infinite ones too,
+    are not used; a step writes zeros for it. Raises InputError where the driver takes no so large image,
+    ValueError for sizes and channels that are none.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int], channels: int) -> None:
         width, height = size
+        if width < 1 or height < 1 or channels not in _FORMATS:
+            raise ValueError(f"no image: {width}x{height} samples of {channels} channels")
         nbytes = 4 * channels * width * height
         if nbytes > gpu.max_storage_bytes or width * height > gpu.max_points:
             raise InputError(f"an image of {width}x{height} samples is too large for this driver")

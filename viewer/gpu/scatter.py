@@ -81,7 +81,7 @@ class FixedPoint:
 
     limits: the largest absolute number of each channel; larger ones count as that. finest: the least step of
     each channel. most: how many numbers a cell may be given. Raises InputError where so many do not fit even
-    in steps as large as a limit, ValueError for limits or steps that are none.
+    in steps as large as a limit, ValueError for limits or steps that are none, and for fewer than no numbers.
     """
 
     limits: tuple[float, ...]
@@ -89,6 +89,8 @@ class FixedPoint:
     most: int
 
     def __post_init__(self) -> None:
+        if self.most < 0:
+            raise ValueError(f"no count of numbers: {self.most}")
         _ = self.steps
 
     @cached_property
@@ -124,15 +126,18 @@ class CellSums:
     """Sums of several channels for each of any number of cells. They are the same each time, whichever order
     items come in, since numbers are rounded before they are added.
 
-    Raises InputError where the driver takes no so large buffer: 4 bytes a channel of each cell.
+    Raises InputError where the driver takes no so large buffer: 4 bytes a channel of each cell; ValueError
+    where there is no channel.
     """
 
     def __init__(self, gpu: Gpu, cells: int, channels: int) -> None:
+        if cells < 0 or channels < 1:
+            raise ValueError(f"no sums: {channels} channels in {cells} cells")
         nbytes = 4 * channels * cells
         if nbytes > gpu.max_storage_bytes:
             raise InputError(f"sums of {channels} channels in {cells:,} cells are too large for this driver")
         self._gpu = gpu
-        self.channels = channels
+        self.cells, self.channels = cells, channels
         self.buffer = gpu.ctx.buffer(reserve=max(nbytes, 4))
 
     @property
@@ -160,8 +165,8 @@ class CellSums:
 
     def read(self, fixed: FixedPoint) -> NDArray[np.float64]:
         """All sums, (cells, channels); waits for the GPU."""
-        sums = np.frombuffer(self.buffer.read(), np.int32).reshape(-1, self.channels)
-        return sums * np.array(fixed.steps)
+        sums = np.frombuffer(self.buffer.read(), np.int32, self.cells * self.channels)
+        return sums.reshape(self.cells, self.channels) * np.array(fixed.steps)
 
     def release(self) -> None:
         """Delete it."""

@@ -256,7 +256,8 @@ class Surface:
         it: for one that goes on from there, as by filling pixels that have none."""
         rows = self.row_values if name == "value" else self.pose.find(f"{name}s")
         own = self.own(name)
-        defines = {"CHANNEL": _RESOLVED[name], "HAS_ROWS": int(rows is not None)}
+        depth = name == "value" and self.value_source == "depth"
+        defines = {"CHANNEL": _RESOLVED[name], "HAS_ROWS": int(rows is not None), "IS_DEPTH": int(depth)}
         program = self.gpu.compute("shade/resolve.comp", defines)
         with self.gpu.timers.measure(f"resolve {name}"):
             self.bind_textures()
@@ -402,7 +403,8 @@ class Surface:
     @property
     def level(self) -> NDArray[np.uint8]:
         """(H, W) uint8: 0 measured, n filled from level n, 255 nothing. Without a row nothing was measured:
-        where the backend tells no level, such a pixel counts as filled from level 1."""
+        where the backend tells no level, such a pixel counts as filled from level 1. Levels above 254 count
+        as that."""
         written = self._read(self._own["level"].buffer, np.uint32) if self.is_own("level") else 0
         return _levels(self.depth, self.row, written)
 
@@ -512,7 +514,7 @@ class Surface:
 
 def _levels(depths: Any, rows: Any, written: Any) -> NDArray[np.uint8]:
     """The levels of pixels, of any one shape, by what the Surface holds of them."""
-    levels = np.maximum(written, rows == NOTHING)
+    levels = np.clip(written, rows == NOTHING, EMPTY - 1)
     return np.where(np.isfinite(depths), levels, EMPTY).astype(np.uint8)
 
 
