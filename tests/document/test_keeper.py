@@ -1,4 +1,5 @@
-"""What changes is saved now and then, beside whoever changes it; what cannot be saved is told once."""
+"""What changes is saved now and then, beside whoever changes it; what cannot be saved is told once, and tried
+again."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from viewer.document.keeper import Keeper
 
 def finish(keeper: Keeper[int]) -> None:
     """Wait until it has written."""
-    if keeper._writing is not None:
-        keeper._writing.exception()
+    for _, future in keeper._writing:
+        future.exception()
 
 
 def test_it_saves_now_and_then_also_what_goes_on_changing() -> None:
@@ -89,3 +90,80 @@ def test_what_cannot_be_kept_is_told_once() -> None:
     assert problem == "Numbers are not kept: no room"
     assert not any(map(look, (1e6, 2e6, 3e6)))
     assert "not kept" in str(keeper.close(8))
+
+
+class Disk:
+    """Where numbers are saved by tens. is_full: whether that fails."""
+
+    def __init__(self) -> None:
+        self.is_full = False
+        self.attempts = 0
+        self.held: dict[int, int] = {}
+
+    def save(self, number: int) -> None:
+        self.attempts += 1
+        if self.is_full:
+            raise OSError("no room")
+        self.held[number // 10] = number
+
+
+class Saved:
+    """Looks at a number each three seconds, until it is written."""
+
+    def __init__(self, disk: Disk) -> None:
+        self.keeper = Keeper("Numbers", disk.save, None, 3.0, lambda number: number // 10)
+        self.now = 0.0
+
+    def look(self, number: int, times: int = 1) -> list[str]:
+        told = []
+        for _ in range(times):
+            self.now += 3.0
+            told.append(self.keeper.look(self.now, lambda: number))
+            finish(self.keeper)
+        return list(filter(None, told))
+
+
+def test_what_could_not_be_saved_is_saved_when_there_is_room_again() -> None:
+    disk = Disk()
+    saved = Saved(disk)
+    disk.is_full = True
+    assert saved.look(11, 3) == ["Numbers are not kept: no room"]
+    assert saved.look(12, 1000) == []
+    assert 40 <= disk.attempts <= 60, "now and then, at most once a minute"
+    disk.is_full = False
+    assert saved.look(13, 25) == []
+    assert disk.held == {1: 13}
+    saved.look(14, 2)
+    assert disk.held == {1: 14}, "at once again"
+    disk.is_full = True
+    assert saved.look(15, 3) == ["Numbers are not kept: no room"]
+    disk.is_full = False
+    assert saved.keeper.close(15) is None
+    assert disk.held == {1: 15}
+
+
+def test_each_file_that_cannot_be_written_is_told_and_none_is_forgotten() -> None:
+    disk = Disk()
+    saved = Saved(disk)
+    disk.is_full = True
+    saved.keeper.keep(11)
+    finish(saved.keeper)
+    saved.keeper.keep(21)  # before anybody looked
+    assert saved.look(21, 4) == ["Numbers are not kept: no room"] * 2
+    saved.look(21, 100)
+    disk.is_full = False
+    assert saved.look(31, 2) == []
+    assert disk.held[3] == 31, "another file does not wait"
+    saved.look(31, 25)
+    assert disk.held == {1: 11, 2: 21, 3: 31}
+
+
+def test_closing_saves_what_could_not_be_saved_before() -> None:
+    disk = Disk()
+    saved = Saved(disk)
+    disk.is_full = True
+    for number in (11, 21, 31):
+        saved.look(number, 3)
+    disk.is_full = False
+    saved.keeper.close(31)
+    assert disk.held == {1: 11, 2: 21, 3: 31}

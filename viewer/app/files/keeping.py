@@ -42,7 +42,9 @@ class Keeping:
         """remembered: brings the settings to keep. kept: those that their file holds already."""
         self._session, self._playback, self._note, self._remembered = session, playback, note, remembered
         self._settings = Keeper("Settings", partial(settings.save, path=file), kept, _EVERY)
-        self._document: Keeper[SavedSession] = Keeper("Changes of scans", keep, None, _EVERY_DOCUMENT)
+        self._document: Keeper[SavedSession] = Keeper(
+            "Changes of scans", keep, None, _EVERY_DOCUMENT, lambda session: session.scan
+        )
         self._index = 0
 
     def _saved(self) -> SavedSession:
