@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
 
 from viewer import cli
 from viewer.document.recording import Recording
@@ -331,11 +331,9 @@ class Tool:
         if pose.index not in self.made:
             self.made[pose.index] = {"rising": pose.cloud.positions[:, 1] * 5.0}
         return self.made[pose.index]
-    def lay(self):
-        self.desk.lay(self.numbers)
-        self.color("rising")
-    def color(self, by):
-        self.desk.change("Colour", look=replace(self.desk.document.look, color_by=by, light="flat"))
+    def lay(self): self.desk.lay(self.numbers)
+    def color_plainly(self):
+        self.desk.change("Colour", look=replace(self.desk.document.look, color_by="plain", light="flat"))
     def move(self): self.desk.lay(self.numbers, lambda index: Rigid(PLACE))
     def wrong(self): self.desk.lay(lambda pose: {"rising": np.zeros(3)})
     def tell(self):
@@ -345,7 +343,7 @@ class Tool:
 COMMANDS = {"Tools": (
     Command("lay", "Lay", Tool.lay, "Alt+A"),
     Command("move", "Move", Tool.move, "Alt+B"),
-    Command("plainly", "Plainly", lambda tool: tool.color("plain"), "Alt+C"),
+    Command("plainly", "Plainly", Tool.color_plainly, "Alt+C"),
     Command("wrong", "Lay wrongly", Tool.wrong, "Alt+D"),
     Command("tell", "Tell", Tool.tell, "Alt+E"),
 )}
@@ -387,6 +385,8 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         plain = saved_picture(app)
 
         press(app, "alt+a")
+        app.choose(PANEL, "color_by/##value", "rising##rising")
+        app.settle()
         color, laid, _ = shown(app)
         assert (color, laid - before) == ("rising", 4 * 400 * 400), "a number a point, and nothing else"
         screen.do("mousemove", x, y - 60, "sleep", 0.2)
@@ -422,6 +422,16 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         app.see(is_recording=True)
         press(app, "r")
         app.told(r"Saved .+\.json")
+
+        press(app, "m")
+        click(app, x, y)
+        click(app, x + 60, y)
+        (measured,) = app.settle().measurements
+        ends = np.array([end["position"] for end in measured["ends"]])
+        np.testing.assert_allclose(ends[0], (100, 0, 3), atol=0.05)
+        (kept,) = app.state.document["parts"]["measurements"]["all"]
+        np.testing.assert_allclose([kept["first"]["position"], kept["second"]["position"]], ends, atol=1e-6)
+        press(app, "Escape")
 
         press(app, "alt+d")
         app.told("Laying is switched off until the next start: .*'rising' is .*expected 160,000 numbers")

@@ -19,15 +19,17 @@ from written import bits, film, picture
 
 from viewer.backends import backend
 from viewer.camera import Camera
-from viewer.document.recording import Entry, Recording, fingerprint
+from viewer.document.recording import Entry, Recording, fingerprint, matrix_of
 from viewer.errors import InputError
 from viewer.frame import render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.output.export import marked, read_description
 from viewer.renderer import Renderer
+from viewer.rigid import Rigid
 from viewer.scan import formats
 from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
 
 SMALL = ("--size", "96x64")
 
@@ -200,6 +202,23 @@ def test_an_anonymous_picture_is_drawn_again_when_its_scan_is_named(
     Path("ball.npz").rename("moved.npz")
     assert run("render", "moved.npz", "--replay", "a.png", "--anonymous", "-o", "again.png").code == 0
     assert Path("again.png").read_bytes() == Path("a.png").read_bytes()
+
+
+def test_a_scan_that_is_moved_is_drawn_again_where_it_is_also_without_names(run: Run) -> None:
+    place = Rigid(np.array([[0.0, -1, 0, 64], [1, 0, 0, -8], [0, 0, 1, 2], [0, 0, 0, 1]]))
+    far = PointCloud.from_arrays(sphere(2000).world() + np.array([4096.0, 512, -256]))
+    formats.write(Path("far.npz"), far)
+    camera = Camera.orbit(place.bounds(far.bounds()), 30, 20, aspect=1.5)
+    shown = entry(scan="far.npz", camera=camera, look=Look(color_by="depth"), place=matrix_of(place))
+    Recording((shown,)).save(Path("a.json"))
+    assert run("render", "--replay", "a.json", "-o", "a.png").code == 0
+    assert Recording.load(Path("a.png")).entries[0].place == shown.place
+    assert (picture(Path("a.png")) != picture(Path("a.png"))[0, 0]).any(axis=2).mean() > 0.2
+    assert run("render", "--replay", "a.json", "--anonymous", "-o", "b.png").code == 0
+    assert Recording.load(Path("b.png")).entries[0].place not in (None, shown.place)
+    assert run("render", "far.npz", "--replay", "b.png", "-o", "again.png").code == 0
+    for name in ("b.png", "again.png"):
+        assert np.array_equal(picture(Path(name)), picture(Path("a.png")))
 
 
 # --- for programs ---------------------------------------------------------------------------------

@@ -5,7 +5,8 @@ A recording is a JSON file, an entry a line:
     {
     "format": 1, "version": "0.1.0", "seconds": 2.4, "entries": [
     {"at": 0.0, "scan": "knot", "hash": ..., "pose": 0, "time": 0.0, "size": [1280, 720], "camera": {...},
-     "backend": "points", "params": {...}, "look": {...}, "marks": {...}, "unit": "mm"},
+     "backend": "points", "params": {...}, "look": {...}, "marks": {...}, "unit": "mm",
+     "place": null, "anonymous": false},
     {"at": 0.52, "pose": 1, "time": 0.04}
     ]}
 
