@@ -249,13 +249,40 @@ def test_each_scan_has_its_own(home: Path) -> None:
 
 def test_those_kept_last_stay(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(saved_session, "MOST_KEPT", 5)
+    seen = replace(SESSION, document=Document(camera=CAMERA, unit="mm"))
     for number in range(12):
-        keep(replace(SESSION, scan=f"/{number}"))
+        keep(replace(seen, scan=f"/{number}"))
         os.utime(kept_file(f"/{number}"), (number, number))
-    keep(replace(SESSION, scan="/8", pose=1))
-    keep(replace(SESSION, scan="/12"))
+    keep(replace(seen, scan="/8", pose=1))
+    keep(replace(seen, scan="/12"))
     there = [number for number in range(13) if kept(f"/{number}") is not None]
     assert there == [8, 9, 10, 11, 12]
+
+
+def test_what_a_user_made_is_never_deleted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saved_session, "MOST_KEPT", 3)
+    nothing = Document(camera=CAMERA)
+    made = [
+        replace(nothing, bookmarks=FULL.bookmarks),
+        replace(nothing, parts=FULL.parts),
+        replace(nothing, unread=FULL.unread),
+    ]
+    sessions = [replace(SESSION, scan=f"/{n}", document=document) for n, document in enumerate(made)]
+    for session in sessions:
+        keep(session)
+    other_window(replace(sessions[0], document=replace(FULL, parts={})))
+    assert keep(sessions[0]) is not None
+    later = kept_file("/later")
+    later.write_text(json.dumps(SESSION.to_json() | {"format": 2}))
+    for path in later.parent.iterdir():
+        os.utime(path, (1, 1))
+    before = set(later.parent.iterdir())
+    assert len(before) == 5
+    for number in range(10, 20):
+        keep(replace(SESSION, scan=f"/{number}", document=nothing))
+    assert before <= set(later.parent.iterdir())
+    assert len(list(later.parent.iterdir())) == len(before) + 3
+    assert [kept(session.scan) for session in sessions] == sessions
 
 
 def test_what_is_damaged_is_put_aside_and_told_once() -> None:

@@ -43,7 +43,7 @@ from .schema import (
 
 FORMAT = 1
 SUFFIX = ".scan4d.json"
-MOST_KEPT = 200  # documents in the user's folder; those written last
+MOST_KEPT = 200  # documents in the user's folder beyond which those go that hold nothing a user made
 _seen: dict[
     Path, tuple[bytes, object]
 ] = {}  # file -> what this process read or wrote last: digest, what was made
@@ -139,7 +139,8 @@ def kept_file(scan: str) -> Path:
 
 
 def keep(session: SavedSession) -> str | None:
-    """Keep the document of a scan, which is named from the root; older ones beyond MOST_KEPT go.
+    """Keep the document of a scan, which is named from the root; older ones beyond MOST_KEPT go in which
+    nothing was made (see `Document.made`).
 
     Where another window has written it meanwhile, what was made there is put aside; returns words of that for
     the user. Raises InputError where it cannot be written, or there is one that only others can read.
@@ -242,11 +243,20 @@ def _put_aside(path: Path) -> Path:
 
 
 def _delete_oldest(folder: Path) -> None:
+    """Delete documents beyond MOST_KEPT, those written first, in which a user has made nothing."""
+
     def age(path: Path) -> float:
         with suppress(OSError):
             return -os.stat(path).st_mtime
         return 0.0
 
-    with suppress(OSError):
-        for path in sorted(folder.glob("*.json"), key=age)[MOST_KEPT:]:
-            path.unlink(missing_ok=True)
+    kept_files = [path for path in folder.glob("*.json") if _is_kept_file(path)]
+    for path in sorted(kept_files, key=age)[MOST_KEPT:]:
+        with suppress(InputError, OSError):  # what cannot be read stays
+            if not SavedSession.load(path).document.made:
+                path.unlink(missing_ok=True)
+
+
+def _is_kept_file(path: Path) -> bool:
+    """Whether a file has a name as `kept_file` gives it; what was put aside has not."""
+    return "." not in path.stem
