@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +16,8 @@ import pytest
 from scenes import sphere
 
 from viewer.app.output.capture import Capture
+from viewer.app.output.export_plan import Choices
+from viewer.app.output.exporting import Exporting
 from viewer.app.session import Session
 from viewer.backends import backend
 from viewer.camera import Camera
@@ -24,7 +27,10 @@ from viewer.errors import InputError
 from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import read_description
+from viewer.output.marks import Marks
+from viewer.rigid import STILL
 from viewer.scan.layers import Layers
+from viewer.scan.open import open_scan
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "ball", sphere(100))
@@ -82,6 +88,27 @@ def test_what_cannot_be_drawn_again_is_not_recorded(app: Any) -> None:
     capture.toggle_recording()
     assert capture.recorder is None
     assert "Cannot record: the colours come from 'deviation'" in app.told[-1]
+
+
+def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, tmp_path: Path) -> None:
+    bare = replace(POSE, index=1)
+    zeros = np.zeros(len(POSE.cloud))
+    app.session.change("Colour", look=Look(color_by="deviation"))
+    app.session.laid.lay("a", lambda pose: {"deviation": zeros} if pose is POSE else {}, lambda index: STILL)
+    for pose in (POSE, bare):
+        app.session.laid.layers(pose)
+    app.viewport.request = replace(app.viewport.request, pose=bare)
+    with closing(open_scan("demo")) as timeline:
+        playback = SimpleNamespace(unit="mm", timeline=timeline)
+        capture = Capture(app.session, playback, app.viewport, app.note)
+        exporting = Exporting(
+            app.session, playback, app.viewport, app.note, capture.shown,
+            Choices(what="frames", folder=str(tmp_path), name="a"), Marks(),
+        )  # fmt: skip
+        exporting.start()
+        (told,) = app.told
+        assert "the colours of some frames come from 'deviation'" in told
+        assert exporting.task is None
 
 
 def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) -> None:

@@ -21,9 +21,12 @@ class Laid:
 
     Of numbers that have one name those count that were laid last. A pose is moved by one tool's place after
     the other's, in the order in which they were laid.
+
+    names: of the numbers that were found over the poses shown since something was laid last.
     """
 
     def __init__(self) -> None:
+        self.names: set[str] = set()
         self._by_tool: dict[str, tuple[NumbersOf, PlaceOf]] = {}
         self._replayed: tuple[int, Rigid] | None = None
         self._found: tuple[Pose, Layers] | None = None
@@ -39,7 +42,7 @@ class Laid:
     def take_away(self, tool: str) -> None:
         """Take away what a tool laid."""
         self._by_tool.pop(tool, None)
-        self._replayed = self._found = None
+        self._forget()
 
     def replay(self, index: int, place: Rigid) -> None:
         """Have a pose stand where a recording has it, and its scan's own numbers stand for layers of the same
@@ -50,7 +53,7 @@ class Laid:
     def clear(self) -> None:
         """Take away all, since another scan is opened."""
         self._by_tool.clear()
-        self._replayed = self._found = None
+        self._forget()
 
     def layers(self, pose: Pose) -> Layers:
         """The layers over a pose, the same object for as long as nothing else is laid."""
@@ -67,10 +70,16 @@ class Laid:
             place = place_of(index).after(place)
         return place
 
+    def _forget(self) -> None:
+        """Forget what was replayed and found."""
+        self._replayed = self._found = None
+        self.names = set()
+
     def _merged(self, pose: Pose) -> Layers:
         scalars: dict[str, NDArray[np.generic]] = {}
         for numbers_of, _ in list(self._by_tool.values()):
             scalars |= numbers_of(pose)
+        self.names |= scalars.keys()
         if self._replayed is not None and self._replayed[0] == pose.index:
             scalars = {name: values for name, values in scalars.items() if name not in pose.cloud.scalars}
         place = self.place(pose.index)

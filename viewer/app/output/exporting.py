@@ -112,7 +112,14 @@ class Exporting:
         return export_plan.problems(self.choices, self.count, self._viewport.renderer.gpu.max_pixels)
 
     def start(self) -> None:
-        """Export, unless that would replace files that the user was not asked about; closes the dialog."""
+        """Export, unless that would replace files that the user was not asked about; closes the dialog.
+
+        Frames are not exported by numbers that are laid over some, also where the one that is shown has none.
+        """
+        name = self._session.document.look.color_by
+        if self.choices.what == export_plan.FRAMES and name in self._session.laid.names:
+            self._note(f"Cannot export: the colours of some frames come from '{name}', which is computed.")
+            return
         there = export_plan.present(self.choices, self.count)
         shown, choices, timeline = self._entry(), self.choices, self._playback.timeline
         self.refused = found_among(there, scan_inputs(timeline))
