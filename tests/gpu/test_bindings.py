@@ -42,6 +42,13 @@ def test_no_file_has_a_number_of_its_own(folder: Path, files: str, literal: str,
     assert not {file: literals for file, literals in found.items() if literals}
 
 
+def test_what_is_no_row_is_written_once() -> None:
+    literal = re.compile(r"(?i)[=(<>]\s*0xFFFFFFFF")
+    assert [file for file, text in texts(VIEWER, "*.py").items() if literal.search(text)] == [
+        "scan/points.py"
+    ]
+
+
 def test_numbers_are_within_what_every_driver_has() -> None:
     """OpenGL 4.3, table 23.60 and those around it."""
     assert max(Storage) < 8

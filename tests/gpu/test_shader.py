@@ -69,6 +69,19 @@ def test_a_uniform_that_no_source_declares_is_an_error(shaders: Path, renderer: 
         renderer.gpu.set(program, misspelt=1.0)
 
 
+def test_uniforms_are_found_however_they_are_declared(shaders: Path) -> None:
+    (shaders / "a.comp").write_text("""
+uniform float a, b;  // uniform float commented;
+layout(location = 3) uniform highp vec2 c;
+uniform mediump int d[2], e = max(1, 2), f[] = int[](1, 2);
+/* uniform float out_of_use;
+uniform float too; */ uniform
+    sampler2D g;
+layout(std140, binding = 0) uniform Block { float inside; };
+""")
+    assert Source("a.comp").uniforms == {*"abcdefg"}
+
+
 def test_programs_are_built_once(renderer: Renderer) -> None:
     renderer.gpu.activate()  # other tests leave contexts of their own current
     one = renderer.gpu.compute("compact/covered.comp")

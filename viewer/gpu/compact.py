@@ -112,6 +112,11 @@ def scan_words(
     _scan_level(gpu, 1, words, count, bind, defines or {}, parts or {})
 
 
+def _block_sums(gpu: Gpu, level: int) -> moderngl.Buffer:
+    """Room for the sums of the blocks of a level."""
+    return gpu.ctx.buffer(reserve=4 * (MOST_WORDS // (GROUP * _RUN) ** level))
+
+
 def _scan_level(
     gpu: Gpu,
     level: int,
@@ -135,8 +140,7 @@ def _scan_level(
         gpu.dispatch(program, -(-count // length))
 
     if blocks > 1:
-        room = MOST_WORDS // (GROUP * _RUN) ** level
-        sums = gpu.keep((_scan_level, level), lambda: gpu.ctx.buffer(reserve=4 * room))
+        sums = gpu.keep(_block_sums, level)
         run(0)
 
         def bind_sums(_: Program) -> None:

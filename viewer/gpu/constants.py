@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from .. import srgb
+from ..scan import points
 
-NOTHING = 0xFFFFFFFF  # the row, or the item, where there is none
+NOTHING = points.NOTHING
 NO_DEPTH = 0x7F800000  # +inf as float bits: the depth where nothing is
 EMPTY = 255  # the level of a pixel that shows nothing
 UNKNOWN = 3e38  # a radius, or a normal's length, that is not less says nothing

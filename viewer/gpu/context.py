@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
@@ -119,16 +119,20 @@ class Gpu:
         params: Values | None,
     ) -> Any:
         declared = None if params is None else type(params)
-        key = (names, tuple((defines or {}).items()), tuple((parts or {}).items()), declared)
-        program = self.keep(
-            key,
-            lambda: self._compile([Source(name, defines, parts, declared) for name in names], declared),
-        )
+        given = tuple((defines or {}).items()), tuple((parts or {}).items())
+        program = self.keep(Gpu._compile, names, *given, declared)
         if params is not None:
             program.extra.values.write(params)
         return program
 
-    def _compile(self, sources: list[Source], declared: type[Values] | None) -> Any:
+    def _compile(
+        self,
+        names: tuple[str, ...],
+        defines: tuple[tuple[str, object], ...],
+        parts: tuple[tuple[str, str], ...],
+        declared: type[Values] | None,
+    ) -> Any:
+        sources = [Source(name, dict(defines), dict(parts), declared) for name in names]
         texts = {s.name.rsplit(".", 1)[-1]: s.text for s in sources}
         self.activate()  # a program belongs to the context that is current
         program: Program
@@ -147,10 +151,11 @@ class Gpu:
         program.extra = Built(sources, values)
         return program
 
-    def keep(self, key: object, make: Callable[[], T]) -> T:
-        """Return what `make` returned the first time for this key: small things that live as long as this."""
+    def keep(self, make: Callable[..., T], *args: Hashable) -> T:
+        """Make, once for these arguments, `make(gpu, *args)`: small things that live as long as this."""
+        key = (make, *args)
         if key not in self._kept:
-            self._kept[key] = make()
+            self._kept[key] = make(self, *args)
         return self._kept[key]
 
     def activate(self) -> None:

@@ -69,10 +69,18 @@ def instancing_for(
         return setting
     gpu, chosen = surface.gpu, on_software
     if not gpu.software:
-        chosen = gpu.keep(("fastest", task), lambda: fastest(gpu, task, names, lambda: ways(*_trial(gpu))))
+        known = gpu.keep(_choices)
+        if task not in known:
+            known[task] = fastest(gpu, task, names, lambda: ways(*_trial(gpu)))
+        chosen = known[task]
         surface.bind_view()  # in place of the trial's
     surface.stats.chosen["instancing"] = chosen
     return chosen
+
+
+def _choices(_: Gpu) -> dict[str, str]:
+    """The fastest way of each task on a device, as far as it was asked for."""
+    return {}
 
 
 def _trial(gpu: Gpu) -> tuple[GpuPose, Surface]:

@@ -66,7 +66,7 @@ class Sample:
 
 def sample_of(gpu: Gpu) -> Sample:
     """The sample that all backends on this context share."""
-    return gpu.keep("sample", lambda: Sample(gpu))
+    return gpu.keep(Sample)
 
 
 def _sampled_rows(count: int, share: float) -> NDArray[np.uint32]:

@@ -88,7 +88,7 @@ def shade(surface: Surface, look: Look) -> None:
         if color == "id" and cloud.ids is not None:
             pose.array("ids").bind(Texture.IDS)
         if value is not None:
-            _color_map(gpu, look.color_map).bind(Texture.COLOR_MAP)
+            gpu.keep(_color_map, look.color_map).bind(Texture.COLOR_MAP)
         gl.clear_words(surface.picture, int.from_bytes(bytes(rgba(look.background)), "little"))
         surface.picture.bind_to_storage_buffer(Storage.PICTURE)
         covered.run(program)
@@ -148,9 +148,7 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
 
 
 def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:
-    return gpu.keep(
-        ("color_map", name), lambda: gl.BufferTexture(gpu.ctx.buffer(color_table(name)), gl.RGBA8)
-    )
+    return gl.BufferTexture(gpu.ctx.buffer(color_table(name)), gl.RGBA8)
 
 
 def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:

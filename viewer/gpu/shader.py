@@ -18,7 +18,9 @@ _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 _PLACE = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
 # Lines of a file: the number of a line says the file too, since Mesa tells 0 for the number of most files.
 _LINES = 100_000
-_UNIFORM = re.compile(r"\buniform\s+\w+\s+(\w+)\s*[;\[]")
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_UNIFORMS = re.compile(r"\buniform\b([^;{]*);")  # a declaration, of one or more
+_IN_BRACKETS = re.compile(r"\([^()]*\)|\[[^][]*\]")
 _HEADER = "#version 430 core\n" + bindings_glsl() + constants_glsl()
 
 
@@ -55,7 +57,11 @@ class Source:
     @cached_property
     def uniforms(self) -> frozenset[str]:
         """The names of all uniforms that stand in it outside blocks, used or not."""
-        return frozenset(_UNIFORM.findall(self.text))
+        return frozenset(
+            name
+            for declared in _UNIFORMS.findall(_COMMENT.sub(" ", self.text))
+            for name in _declared(declared)
+        )
 
     def _expand(self, name: str) -> str:
         text = resource_path("shaders", name).read_text(encoding="utf-8")
@@ -94,6 +100,14 @@ class Source:
             return f"{self.files[index]}:{line}" if index < len(self.files) else match[0]
 
         return _PLACE.sub(place, log)
+
+
+def _declared(declaration: str) -> list[str]:
+    """The names that a declaration such as `highp float a, b[2] = float[](0.0, 1.0)` declares."""
+    found = 1
+    while found:
+        declaration, found = _IN_BRACKETS.subn(" ", declaration)
+    return [each.partition("=")[0].split()[-1] for each in declaration.split(",")]
 
 
 def shader_error(sources: list[Source], error: Exception) -> ShaderError:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..errors import InputError
+from ..scan.points import NOTHING
 from ..view import View
-from .scene import NOTHING, Hits, Rays, Scene, distance_to_ball
+from .scene import Hits, Rays, Scene, distance_to_ball
 
 _CHUNK = 1 << 18  # rays cast at a time
 # A hit may come before its own point by so many steps of float32 at the size of the scene: the ray's

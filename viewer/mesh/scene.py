@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..look import Look, rgba
+from ..scan.points import NOTHING
 from ..srgb import linear_from_bytes
 
-NOTHING = 0xFFFFFFFF
 PLAIN = Look().plain  # what a scan without colours is drawn in
 Rays = NDArray[np.float64]  # (N, 3)
 

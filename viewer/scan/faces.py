@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .points import NOTHING
 
 Triangles = NDArray[np.uint32]  # (F, 3) rows of points
-
-NO_POINT = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class Faces:
         if corners.dtype.kind not in "iu":
             raise InputError(f"a corner of a face is no vertex: it is of type {corners.dtype}")
         ids = np.ascontiguousarray(corners, corners.dtype.newbyteorder("="))
-        if ids.size and not 0 <= ids.min() <= ids.max() < NO_POINT:
+        if ids.size and not 0 <= ids.min() <= ids.max() < NOTHING:
             raise InputError("a corner of a face is no vertex")
         if sizes is None:
             sizes = np.full(len(ids), ids.shape[1], np.uint32)

@@ -22,6 +22,7 @@ _SMALLEST = 1e-18  # lengths whose squares it can hold
 _LONGEST_SPLAT = 1e6  # extents of the points: float32 cannot intersect a ray with much longer ones
 _SAMPLE = 1 << 13  # points that robust statistics look at
 
+NOTHING = 0xFFFFFFFF  # the row, or the number of a face or node, where there is none
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
 
 

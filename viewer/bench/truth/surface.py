@@ -10,8 +10,7 @@ from ...gpu.shade import shade
 from ...gpu.surface import Surface
 from ...look import Look
 from ...mesh.reference import Reference
-from ...mesh.scene import NOTHING
-from ...scan.points import PointCloud
+from ...scan.points import NOTHING, PointCloud
 from ...srgb import bytes_from_linear
 
 

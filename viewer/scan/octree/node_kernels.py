@@ -12,11 +12,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..points import NOTHING
 from .compiled import compiled
 from .octree import DEEPEST
 
 _BLOCK = 4096  # points that are fetched and then worked on
-_NONE = np.uint32(0xFFFFFFFF)
+_NONE = np.uint32(NOTHING)
 _FIXED = float(1 << 30)  # steps of a unit normal: sums of whole numbers do not depend on their order
 _CANCELLED = 1e-6 * _FIXED  # length of a mean normal that is rounding alone
 _8, _16, _24, _BYTE = np.uint32(8), np.uint32(16), np.uint32(24), np.uint32(255)
