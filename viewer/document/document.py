@@ -116,8 +116,7 @@ class Document:
 
     @property
     def made(self) -> tuple[object, ...]:
-        """What a user made, beside what was only chosen, which may hold what cannot be read here; empty where
-        there is nothing."""
+        """Things that a user made, beside what was only chosen; some of them may not be readable here."""
         return tuple(filter(None, (self.bookmarks, self.parts, self.unread)))
 
     @property

@@ -88,7 +88,7 @@ class SavedSession:
 
     @property
     def problem(self) -> str | None:
-        """What the user should know of a session that was read; None where nothing is unreadable."""
+        """The note for the user about a session that was read; None where nothing is unreadable."""
         if not (names := ", ".join(self.document.unreadable)):
             return None
         what = f"of what was kept of it, these cannot be read: {names}"
@@ -220,7 +220,7 @@ def _spared(path: Path, document: Document) -> Path | None:
 
 
 def _made_aside(path: Path) -> Iterator[object]:
-    """What was made in the documents that are put aside of a scan."""
+    """Things that were made in the documents put aside of a scan."""
     for aside in path.parent.glob(f"{path.stem}.old-*{SUFFIX}"):
         with suppress(InputError):
             yield SavedSession.load(aside).document.made
