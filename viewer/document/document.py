@@ -151,7 +151,7 @@ class Document:
         return replace(self, params={**self.params, backend: params}, unread=left)
 
     def _left(self, field: str, name: str, kind: type) -> Mapping[str, Any]:
-        """What is unread once a value by name is another one."""
+        """The values that stay unread once a value by name is another one."""
         former = getattr(self, field).get(name)
         if former is None or not _is_unreadable(kind, former):
             return self.unread
