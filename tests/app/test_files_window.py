@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from virtual_screen import PATIENCE, RunningApp, Screen, kept_of, running_app, virtual_screen
+from virtual_screen import PATIENCE, RunningApp, Screen, kept_of, running_app
 
 from viewer.app.settings import FILE, load
-
-SIZE = (1280, 720)
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture

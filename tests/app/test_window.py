@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from imgui_bundle import icons_fontawesome_4 as icons
 from numpy.typing import NDArray
-from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, Screen, running_app
 from written import picture
 
 from viewer import cli
@@ -32,14 +32,6 @@ from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.view import View
-
-SIZE = (1280, 720)
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture(scope="module")

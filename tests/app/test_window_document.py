@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app
 from written import picture
 
 from viewer.document.measurements import Measurements
 from viewer.document.saved_session import SavedSession
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
-
-SIZE = (1280, 720)
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture
@@ -281,8 +272,7 @@ def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
     environment = {**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(home / "config")}
     command = [sys.executable, "-m", "viewer.cli", "view", str(path)]
     with subprocess.Popen(command, env=environment, cwd=home) as process:
-        kept = lambda: os.path.isdir(home / "config") and list((home / "config").rglob("scans/*.json"))  # noqa: E731
-        wait_until(kept)
+        wait_until(lambda: list(home.glob("config/**/scans/*.json")))
         process.terminate()
     assert json.loads(json.dumps(kept_of(home, scan).to_json()))["document"] == done
     assert kept_of(home, scan).pose == 1

@@ -5,25 +5,16 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, SIZE, RunningApp, Screen, running_app
 
 from viewer.document.recording import Recording
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
-
-SIZE = (1280, 720)
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 def spheres(folder: Path, count: int = 3) -> Path:

@@ -7,20 +7,18 @@ import io
 import math
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PANEL, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, RunningApp, Screen, running_app
 from written import write_mesh
 
 from viewer.camera import Camera
 from viewer.scan.points import PointCloud
 from viewer.view import View
 
-SIZE = (1280, 720)
 FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates
 FACES = ((0, 1, 2), (1, 2, 3))
 _READ_CLIPBOARD = """
@@ -84,12 +82,6 @@ def name_unit(app: RunningApp, name: str) -> None:
     """Type into the field for the unit."""
     app.act(PANEL, ("item_input_value", "##unit", name))
     app.see(unit=name)
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture

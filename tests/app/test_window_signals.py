@@ -8,25 +8,17 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from scenes import sphere
-from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app, virtual_screen
+from virtual_screen import PATIENCE, ROOT, SIZE, RunningApp, Screen, kept_of, running_app, virtual_screen
 
 from viewer.document.recording import Recording
 from viewer.scan import formats
 
-SIZE = (1280, 720)
 COUNT = 30  # frames, which take 1.2 seconds
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture(scope="module")

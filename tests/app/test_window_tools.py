@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, Screen, running_app
 
 from viewer import cli
 from viewer.document.recording import Recording
@@ -18,15 +17,8 @@ from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
-SIZE = (1280, 720)
 YELLOW = (0xF2, 0xC1, 0x4E)
 USE = "import viewer.app.tools\nviewer.app.tools.__path__.append({!r})\n"
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture
