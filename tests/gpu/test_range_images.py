@@ -63,6 +63,13 @@ def test_only_what_is_asked_for_is_uploaded_and_goes_with_the_pose(renderer: Ren
     own.release()
 
 
+def test_colours_of_pictures_are_uploaded_as_they_are(renderer: Renderer) -> None:
+    colors = np.random.default_rng(6).integers(0, 256, (*VIEWS[0].depth.shape, 3), np.uint8)
+    pose = GpuPose(renderer.gpu, POSE.cloud, (replace(VIEWS[0], color=colors),))
+    texels = np.frombuffer(pose.image(0, "color").read(alignment=1), np.uint8)
+    np.testing.assert_array_equal(texels.reshape(*colors.shape[:2], 4)[..., :3], colors)
+
+
 def test_what_a_view_has_not_is_told(renderer: Renderer) -> None:
     bare = replace(VIEWS[0], color=None, confidence=None)
     pose = GpuPose(renderer.gpu, POSE.cloud, (bare,))

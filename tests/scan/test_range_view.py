@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from range_scenes import sphere_view
+from range_scenes import LENSES, shape_view, sphere_view
 
 from viewer.errors import InputError
 from viewer.scan.colors import linear_from_srgb8, srgb8_from_linear
 from viewer.scan.estimate import estimate, estimate_normals
 from viewer.scan.pose import Pose
-from viewer.scan.range_view import RangeView, merge
+from viewer.scan.range_view import RangeView, mask_of, merge
 
 EYE = (2.0, 1.5, 4.0)
 UTM = np.array([665187.25, 5648349.5, 241.75])
@@ -209,6 +209,98 @@ def test_a_pose_holds_views_and_their_points() -> None:
     assert bare.cloud is pose.cloud
 
 
+SEEN = [
+    *((kind, lens, False) for kind in ("z", "range") for lens in LENSES),
+    ("height", "none", False),
+    ("height", "none", True),
+    ("z", "none", True),
+    ("z", "barrel", True),
+]
+
+
+@pytest.mark.parametrize("name", ["sphere", "plane"])
+@pytest.mark.parametrize(("kind", "lens", "measured"), SEEN)
+def test_shapes_of_every_kind(name: str, kind: str, lens: str, measured: bool) -> None:
+    view, points, normals = shape_view(name, kind, lens, measured)
+    assert len(points) > 1000
+    assert view.positions() == pytest.approx(points, abs=1e-6)  # float32 depths and places up to 8
+    back = view.world_to_camera[2, :3] if kind == "height" else view.eye - points
+    facing = (normals * back).sum(axis=1) / np.linalg.norm(back, axis=-1)
+    tilt = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", view.normals(), normals), -1, 1)))
+    if name == "plane":
+        assert tilt.max() < 0.02
+    else:
+        assert np.median(tilt) < 0.2
+        assert tilt[facing > 0.3].max() < 3  # beside the edge: a pixel and a half of a radius of 38
+
+
+@pytest.mark.parametrize(("kind", "lens", "measured"), [case for case in SEEN if not case[2]])
+def test_points_project_back(kind: str, lens: str, measured: bool) -> None:
+    view, _, _ = shape_view("plane", kind, lens)
+    pixels, depths = view.project(view.positions())
+    row, column = np.nonzero(view.valid())
+    assert np.abs(pixels - np.stack([column + 0.5, row + 0.5], axis=1)).max() < 1e-6
+    assert depths == pytest.approx(view.depth[row, column].astype(float), rel=1e-12)
+
+
+def test_what_is_not_before_the_pod_is_not_seen() -> None:
+    points = np.array([[0.5, 0.5, -1.0], [0, 0, 0], [1, 1, 1]])
+    for kind in ("z", "range"):
+        pixels, depths = flat(np.ones((4, 4)), kind=kind).project(points)
+        assert pixels[0].tolist() == [3, 1]
+        assert depths[0] == (1 if kind == "z" else np.sqrt(1.5))
+        assert np.isnan(pixels[1:]).all()
+        assert np.isnan(depths[1:]).all()
+    pixels, depths = flat(np.ones((4, 4)), kind="height").project(points)
+    assert pixels.tolist() == [[3, 1], [2, 2], [4, 0]]
+    assert depths.tolist() == [1, 0, -1]
+    # Far outside of the picture this lens has turned back: it does not show that place a second time.
+    pixels, depths = flat(np.ones((4, 4)), distortion=(-0.05, 0, 0, 0)).project(points * (8, 8, 1))
+    assert np.isnan(pixels[0]).all()
+    assert np.isnan(depths[0])
+
+
+def test_heights_may_be_any_number() -> None:
+    view = flat([[1, np.nan, np.inf], [0, -1, 1e-30], [-np.inf, 2, 3]], kind="height")
+    assert np.flatnonzero(view.valid()).tolist() == [0, 3, 4, 5, 7, 8]
+    assert view.positions()[2].tolist() == [0, 0, 1]
+
+
+def test_places_that_were_not_measured_are_none() -> None:
+    xy = np.zeros((2, 2, 2), np.float32)
+    xy[0, 0, 1], xy[1, 1, 0] = np.nan, np.inf
+    view = flat(np.ones((2, 2)), xy=xy)
+    assert view.valid().tolist() == [[False, True], [True, False]]
+    assert np.isfinite(view.positions()).all()
+    assert np.isfinite(view.normals()).all()
+    assert view.points().ids.tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(("kind", "lens", "measured"), SEEN)
+def test_scaling_scales_positions(kind: str, lens: str, measured: bool) -> None:
+    view, points, _ = shape_view("sphere", kind, lens, measured)
+    longer = view.scaled(1000.0, "um")
+    assert longer.positions() == pytest.approx(1000 * points, abs=1e-3)
+    assert longer.unit == "um"
+    pixels, depths = longer.project(1000 * points)
+    assert pixels == pytest.approx(view.project(points)[0], abs=1e-9)
+    assert depths == pytest.approx(1000 * view.project(points)[1], rel=1e-12)
+
+
+def test_colours_of_pictures_are_kept_as_they_are() -> None:
+    rng = np.random.default_rng(4)
+    colors = rng.integers(0, 256, (2, 3, 3), np.uint8)
+    eight, half = flat(np.ones((2, 3)), color=colors), flat(np.ones((2, 3)), color=linear_from_srgb8(colors))
+    merged = merge((eight, half)).colors[:, :3]
+    assert np.array_equal(merged, np.tile(colors.reshape(-1, 3), (2, 1)))
+
+
+def test_a_mask_of_numbers() -> None:
+    numbers = np.array([0, 0.005, 0.02, 1], np.float16)
+    assert mask_of(numbers).tolist() == [False, False, True, True]
+    assert mask_of(np.array([0, 1, 255], np.uint8)).tolist() == [False, True, True]
+
+
 MIRROR = np.diag([1.0, 1, -1, 1])
 
 
@@ -220,7 +312,17 @@ MIRROR = np.diag([1.0, 1, -1, 1])
         ({"depth": np.zeros((2, 2))}, r"depth is \(2, 2\) float64, expected \(2, 2\) float32"),
         ({"mask": np.ones((2, 3), bool)}, r"mask is \(2, 3\) bool, expected \(2, 2\) bool"),
         ({"mask": None}, "mask is .* NoneType, expected"),
-        ({"color": np.zeros((2, 2, 3), np.uint8)}, r"color is \(2, 2, 3\) uint8, expected .* float16"),
+        ({"color": np.zeros((2, 2, 3))}, r"color is \(2, 2, 3\) float64, expected .* float16 or uint8"),
+        ({"color": np.zeros((2, 2, 4), np.uint8)}, r"color is \(2, 2, 4\) uint8, expected \(2, 2, 3\)"),
+        ({"xy": np.zeros((2, 2), np.float32)}, r"xy is \(2, 2\) float32, expected \(2, 2, 2\) float32"),
+        ({"kind": "depth"}, "unknown kind of depth 'depth'. Known: height, range, z"),
+        ({"kind": "range", "xy": np.zeros((2, 2, 2), np.float32)}, "measured x and y beside a range"),
+        ({"kind": "height", "distortion": LENSES["barrel"]}, "heights has no lens, but its distortion"),
+        ({"distortion": (0.1, 0.2)}, r"distortion is \(0.1, 0.2\), expected the numbers k1 k2 p1 p2"),
+        ({"distortion": (0.1, np.nan, 0, 0)}, r"distortion is \(0.1, nan, 0, 0\)"),
+        ({"distortion": (-2.0, 0, 0, 0)}, "folds the picture over before its corners"),
+        ({"distortion": (1e300, -1e300, 1e300, 0)}, "folds the picture over before its corners"),
+        ({"fx": 1e-300, "distortion": LENSES["barrel"]}, "folds the picture over before its corners"),
         ({"confidence": [[1, 1], [1, 1]]}, "confidence is .* list"),
         ({"fx": 0.0}, "calibration is unusable: fx 0"),
         ({"cy": np.nan}, "cy nan"),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
-from ..scan.colors import srgb8_from_linear
+from ..scan.colors import srgb8
 from ..scan.points import PointCloud
 from ..scan.range_view import RangeView
 from . import gl
@@ -37,7 +37,7 @@ FORMATS = {
 _IMAGES: dict[str, tuple[int, str, Callable[[NDArray], NDArray]]] = {
     "depth": (1, "f4", lambda depth: depth),
     "mask": (1, "f1", lambda mask: mask * np.uint8(255)),
-    "color": (4, "f1", lambda color: _opaque(srgb8_from_linear(color))),
+    "color": (4, "f1", lambda color: _opaque(srgb8(color))),
     "confidence": (1, "f4", lambda confidence: confidence),
 }
 _VIEW = "view:"  # that the keys of images begin with

@@ -1,4 +1,4 @@
-"""Colours between the 8-bit sRGB of files and points and the linear half of range views.
+"""Colours between the 8-bit sRGB of files and points and the linear half that range views may have.
 
 Every 8-bit value survives the way to half and back.
 """
@@ -16,6 +16,11 @@ from ..srgb import bytes_from_linear, linear_from_bytes
 def linear_from_srgb8(colors: NDArray[np.uint8]) -> NDArray[np.float16]:
     """Linear colours 0..1 of sRGB colours, any shape."""
     return _linear_table()[colors]
+
+
+def srgb8(colors: NDArray) -> NDArray[np.uint8]:
+    """sRGB colours of what a range view has, 8 bit as they are or linear half, any shape."""
+    return colors if colors.dtype == np.uint8 else srgb8_from_linear(colors)
 
 
 def srgb8_from_linear(colors: NDArray[np.float16]) -> NDArray[np.uint8]:

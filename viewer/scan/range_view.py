@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from ..rigid import is_rigid
-from .colors import srgb8_from_linear
+from .colors import srgb8
 from .grid_normals import normals_of_grid
+from .lens import COUNTS, can_be_undone, distorted, undistorted
 from .points import UNKNOWN_UNIT, PointCloud
 from .units import conversion
 
+DepthKind = Literal["z", "range", "height"]
+
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
+_MASKED_IN = 0.01  # above which a number in a mask says that the depth is used (Farooq 2013, 4.3)
 _AT_ONCE = 1 << 17  # pixels worked on together
 _MERGED_BYTES, _MERGING_BYTES = 52, 20 << 20  # that `merge` takes for a point, and beside all points
 
@@ -24,25 +29,38 @@ _MERGED_BYTES, _MERGING_BYTES = 52, 20 << 20  # that `merge` takes for a point, 
 class RangeView:
     """One pod's range image, texture, mask and calibration, as Scan4D's camera sees: right-handed, down -z.
 
-    depth:           (H, W) float32, view-space depth (-z) in scan units; NaN, infinite or <= 0: none
+    depth:           (H, W) float32, scan units, of one of three kinds; NaN or infinite: none
+    kind:            z: view-space depth (-z); range: distance from the eye along the pixel's ray; both above
+                     0, else none. height: -z under parallel projection, any number
     mask:            (H, W) bool, False where the depth is not to be used
-    color:           (H, W, 3) float16, linear, or None
+    color:           (H, W, 3) float16, linear, or uint8, sRGB as pictures store it, or None
     confidence:      (H, W) float32, or None
-    fx, fy, cx, cy:  pinhole calibration in pixels; pixel centres at +0.5, row 0 is the top
+    xy:              (H, W, 2) float32, x and y as measured, in camera space (scan units, y up), beside
+                     which the calibration is good to some pixels only; not with range; or None
+    fx, fy, cx, cy:  pinhole calibration in pixels; pixel centres at +0.5, row 0 is the top. Where depth is
+                     height, fx and fy are pixels for a scan unit
+    distortion:      the lens' 4, 5 or 8 coefficients, see `viewer/scan/lens.py`; none where depth is height
     world_to_camera: (4, 4) float64, a rotation and a translation, for column vectors
     name:            the pod's. unit: the name of the unit of length
+
+    With x = (column + 0.5 - cx) / fx and y = (cy - row - 0.5) / fy, less the lens' distortion, a pixel sees
+    the point d (x, y, -1) in camera space where its depth d is z, d (x, y, -1) / |(x, y, -1)| where it is
+    range, and (x, y, -d) where it is height.
 
     Raises InputError where shapes or types do not fit or the calibration is none.
     """
 
     depth: NDArray[np.float32]
+    kind: DepthKind = "z"
     mask: NDArray[np.bool_]
-    color: NDArray[np.float16] | None = None
+    color: NDArray[np.float16] | NDArray[np.uint8] | None = None
     confidence: NDArray[np.float32] | None = None
+    xy: NDArray[np.float32] | None = None
     fx: float
     fy: float
     cx: float
     cy: float
+    distortion: tuple[float, ...] = ()
     world_to_camera: NDArray[np.float64]
     name: str = ""
     unit: str = UNKNOWN_UNIT
@@ -51,22 +69,29 @@ class RangeView:
         shape = np.shape(self.depth)
         if len(shape) != 2 or 0 in shape:
             raise InputError(f"the depth of a range view has shape {shape}, expected (H, W)")
-        for name, dtype, expected in (
-            ("depth", np.float32, shape),
-            ("mask", np.bool_, shape),
-            ("color", np.float16, (*shape, 3)),
-            ("confidence", np.float32, shape),
-            ("world_to_camera", np.float64, (4, 4)),
+        for name, dtypes, expected in (
+            ("depth", (np.float32,), shape),
+            ("mask", (np.bool_,), shape),
+            ("color", (np.float16, np.uint8), (*shape, 3)),
+            ("confidence", (np.float32,), shape),
+            ("xy", (np.float32,), (*shape, 2)),
+            ("world_to_camera", (np.float64,), (4, 4)),
         ):
             array = getattr(self, name)
-            if array is None and name in ("color", "confidence"):
+            if array is None and name in ("color", "confidence", "xy"):
                 continue
-            if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != expected:
+            if not isinstance(array, np.ndarray) or array.dtype not in dtypes or array.shape != expected:
                 found = f"{np.shape(array)} {getattr(array, 'dtype', type(array).__name__)}"
-                raise InputError(f"a range view's {name} is {found}, expected {expected} {np.dtype(dtype)}")
+                types = " or ".join(str(np.dtype(dtype)) for dtype in dtypes)
+                raise InputError(f"a range view's {name} is {found}, expected {expected} {types}")
+        if self.kind not in (kinds := get_args(DepthKind)):
+            raise unknown_name("kind of depth", self.kind, kinds)
+        if self.kind == "range" and self.xy is not None:
+            raise InputError("a range view has measured x and y beside a range", hint="Give z instead")
         if not (np.isfinite([self.fx, self.fy, self.cx, self.cy]).all() and self.fx > 0 and self.fy > 0):
             given = f"fx {self.fx:g}, fy {self.fy:g}, cx {self.cx:g}, cy {self.cy:g}"
             raise InputError(f"a range view's calibration is unusable: {given}")
+        self._check_distortion()
         if not is_rigid(self.world_to_camera, _RIGID):
             raise InputError("a range view's world_to_camera is not a rotation and a translation")
 
@@ -83,7 +108,12 @@ class RangeView:
 
     def valid(self) -> NDArray[np.bool_]:
         """The pixels that see a point, (H, W)."""
-        return self.mask & np.isfinite(self.depth) & (self.depth > 0)
+        valid = self.mask & np.isfinite(self.depth)
+        if self.kind != "height":
+            valid &= self.depth > 0
+        if self.xy is not None:
+            valid &= np.isfinite(self.xy).all(axis=2)
+        return valid
 
     def positions(self) -> NDArray[np.float64]:
         """World positions of the valid pixels in row order, (N, 3)."""
@@ -91,21 +121,60 @@ class RangeView:
         from_eye += self.eye
         return from_eye
 
+    def project(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Pixels (N, 2) in which the pod sees world points (N, 3), by its calibration: column and row with
+        centres at +0.5; and depths (N,) of the view's kind. NaN where a point is not before the pod or its
+        lens cannot show it. What lies outside of the picture is not left out."""
+        x, y, z = (points @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]).T
+        depth = -z
+        if self.kind != "height":
+            depth = np.where(depth > 0, depth, np.nan)
+            x, y = x / depth, y / depth
+            if self.kind == "range":
+                depth = depth * np.sqrt(x * x + y * y + 1)
+            if self.distortion:
+                x, y = distorted(x, -y, self.distortion)
+                y, depth = -y, np.where(np.isnan(x), np.nan, depth)
+        return np.stack([self.cx + self.fx * x, self.cy - self.fy * y], axis=1), depth
+
     def normals(self) -> NDArray[np.float32]:
         """World normals of the valid pixels in row order, (N, 3), unit length, towards the pod.
 
         From the pixels around each on the same surface; see `normals_of_grid`.
         """
-        depth = np.where(self.valid(), self.depth, np.float32(np.nan))
-        normals = normals_of_grid(depth, (self.fx, self.fy), (self.cx, self.cy))
+        depth, places = np.where(self.valid(), self.depth, np.float32(np.nan)), None
+        if self.kind == "range" or self.distortion or self.xy is not None:
+            x, y = self._rays(*np.ogrid[: depth.shape[0], : depth.shape[1]])
+            if self.kind == "range":
+                depth = depth / np.sqrt(x * x + y * y + 1)
+            if self.xy is not None:
+                x, y = np.moveaxis(self.xy.astype(np.float64), 2, 0)
+                if self.kind == "z":
+                    with np.errstate(all="ignore"):
+                        x, y = x / depth, y / depth
+            places = np.stack(np.broadcast_arrays(x * self.fx, -y * self.fy))
+        focal, center = (self.fx, self.fy), (self.cx, self.cy)
+        normals = normals_of_grid(depth, focal, center, self.kind == "height", places)
         return (normals @ self._camera_to_world().T).astype(np.float32)
 
     def scaled(self, factor: float, unit: str) -> RangeView:
         """Multiply all lengths by a factor, which makes them lengths in this unit."""
         to_camera = self.world_to_camera.copy()
         to_camera[:3, 3] *= factor
-        depth = (self.depth * np.float64(factor)).astype(np.float32)
-        return replace(self, depth=depth, world_to_camera=to_camera, unit=unit)
+
+        def longer(lengths: NDArray[np.float32]) -> NDArray[np.float32]:
+            return (lengths * np.float64(factor)).astype(np.float32)
+
+        pixel = factor if self.kind == "height" else 1.0  # where the calibration is in scan units
+        return replace(
+            self,
+            depth=longer(self.depth),
+            xy=None if self.xy is None else longer(self.xy),
+            fx=self.fx / pixel,
+            fy=self.fy / pixel,
+            world_to_camera=to_camera,
+            unit=unit,
+        )
 
     def points(self, normals: bool = False) -> PointCloud:
         """The points of this view alone; see `merge`."""
@@ -113,6 +182,38 @@ class RangeView:
 
     def _camera_to_world(self) -> NDArray[np.floating]:
         return np.linalg.inv(self.world_to_camera[:3, :3])
+
+    def _check_distortion(self) -> None:
+        """Raise InputError where the lens' coefficients are none, or cannot be undone in the picture."""
+        if not self.distortion:
+            return
+        told = ", ".join(f"{value:g}" for value in self.distortion)
+        if self.kind == "height":
+            raise InputError(f"a range view of heights has no lens, but its distortion ({told})")
+        if len(self.distortion) not in COUNTS or not np.isfinite(self.distortion).all():
+            counts = "k1 k2 p1 p2 [k3 [k4 k5 k6]]"
+            raise InputError(f"a range view's distortion is ({told}), expected the numbers {counts}")
+        height, width = self.depth.shape
+        columns, rows = np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)]).T
+        x, y = self._seen(rows, columns)
+        if not can_be_undone(x, -y, self.distortion):
+            raise InputError(
+                f"a range view's distortion ({told}) folds the picture over before its corners",
+                hint="Check the coefficients and their order: k1 k2 p1 p2 k3 k4 k5 k6",
+            )
+
+    def _seen(self, row: NDArray, column: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Places in the picture, x to the right and y up: at depth 1, or of heights in scan units."""
+        return (column + 0.5 - self.cx) / self.fx, (self.cy - row - 0.5) / self.fy
+
+    def _rays(self, row: NDArray, column: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Places as `_seen` gives them, without the lens' distortion."""
+        x, y = self._seen(row, column)
+        if self.distortion:
+            x, y = np.broadcast_arrays(x, y)
+            x, y = undistorted(x, -y, self.distortion)
+            y = -y
+        return x, y
 
     def _from_eye(self) -> NDArray[np.float64]:
         """Offsets from the pod to the points of valid pixels in row order, along the world's axes, (N, 3)."""
@@ -122,11 +223,22 @@ class RangeView:
         for top in range(0, len(valid), height):
             row, column = np.nonzero(valid[top : top + height])
             depth = self.depth[top : top + height][row, column].astype(np.float64)
-            x = (column + 0.5 - self.cx) / self.fx * depth
-            y = (self.cy - (row + top) - 0.5) / self.fy * depth
+            if self.xy is not None:
+                x, y = self.xy[top : top + height][row, column].astype(np.float64).T
+            else:
+                x, y = self._rays(row + top, column)
+                if self.kind == "range":
+                    depth /= np.sqrt(x * x + y * y + 1)
+                if self.kind != "height":
+                    x, y = x * depth, y * depth
             from_eye[done : done + len(row)] = np.stack([x, y, -depth], axis=1) @ turn
             done += len(row)
         return from_eye
+
+
+def mask_of(numbers: NDArray) -> NDArray[np.bool_]:
+    """The mask that numbers of any type mean: True above 0.01."""
+    return numbers > _MASKED_IN
 
 
 def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
@@ -157,7 +269,7 @@ def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
     cloud = PointCloud.from_arrays(
         points,
         normals=np.concatenate([view.normals() for view in views]) if normals else None,
-        colors=of_points("color", srgb8_from_linear),
+        colors=of_points("color", srgb8),
         scalars=scalars if confidence is None else scalars | {"confidence": confidence},
     )
     if not len(cloud):

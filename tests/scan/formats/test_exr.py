@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import OpenEXR
 import pytest
-from range_scenes import sphere_view
+from range_scenes import LENSES, shape_view, sphere_view
 
 from viewer.errors import InputError
 from viewer.scan import formats
@@ -61,6 +61,29 @@ def test_views_come_back_bit_for_bit(center: np.ndarray, tmp_path: Path) -> None
     assert_same_bits(formats.read(save(tmp_path / "f.exr", views)), views)
 
 
+def test_every_kind_of_view_comes_back_bit_for_bit(tmp_path: Path) -> None:
+    colors = np.random.default_rng(2).integers(0, 256, (97, 121, 3), np.uint8)
+    cases = {f"{kind} {lens}": (kind, lens, False) for kind in ("z", "range") for lens in LENSES}
+    cases |= {"height": ("height", "none", False)}
+    cases |= {f"{kind} grid": (kind, "none", True) for kind in ("z", "height")}
+    views = tuple(
+        replace(shape_view("sphere", *case)[0], name=name, color=None if "grid" in name else colors)
+        for name, case in cases.items()
+    )
+    assert_same_bits(formats.read(save(tmp_path / "f.exr", views)), views)
+
+
+def test_matrices_of_heights_are_parallel(tmp_path: Path) -> None:
+    view, points, _ = shape_view("plane", "height")
+    with OpenEXR.File(str(save(tmp_path / "f.exr", (view,))), header_only=True) as file:
+        to_ndc = file.parts[0].header["worldToNDC"]
+    ndc = np.column_stack([points, np.ones(len(points))]) @ to_ndc
+    pixels, depths = view.project(points)
+    assert ndc[:, 3] == pytest.approx(1, abs=1e-6)
+    assert ndc[:, 2] == pytest.approx(depths, abs=1e-4)
+    assert ndc[:, :2] * view.depth.shape[::-1] == pytest.approx(pixels, abs=1e-3)
+
+
 def test_the_file_is_as_documented(tmp_path: Path) -> None:
     views = pods()
     with OpenEXR.File(str(save(tmp_path / "f.exr", views)), separate_channels=True) as file:
@@ -99,7 +122,7 @@ def other(path: Path, *, drop: tuple[str, ...] = (), **changes: object) -> Path:
         header = {k: v for k, v in file.parts[0].header.items() if k not in ("channels", "name", *drop)}
         channels = {k: c.pixels for k, c in file.parts[0].channels.items() if k not in drop}
     for key, value in changes.items():
-        (channels if key in (*channels, "R") else header)[key] = value
+        (channels if key in (*channels, *"RXY") else header)[key] = value
     with open(path, "wb") as stream:
         OpenEXR.File(header, channels).write(stream)
     return path
@@ -138,6 +161,13 @@ def test_a_cropped_picture_keeps_its_rays(tmp_path: Path) -> None:
         (("fx", "cy"), {}, "lacks: attribute fx, attribute cy"),
         (("worldToCamera", "worldToCamera64"), {}, "lacks: attribute worldToCamera"),
         ((), {"fx": np.array([-1.0])}, "calibration is unusable: fx -1"),
+        ((), {"kind": "far"}, "unknown kind of depth 'far'. Known: height, range, z"),
+        ((), {"k1": np.array([0.1])}, r"distortion is \(0.1\), expected the numbers k1 k2 p1 p2"),
+        (
+            (),
+            {"X": np.zeros((40, 48), np.float32), "Y": np.zeros((40, 48), np.float32), "kind": "range"},
+            "beside",
+        ),
         ((), {"cx": "middle"}, "could not convert string"),
         ((), {"worldToCamera64": np.eye(3)}, "cannot reshape"),
         ((), {"worldToCamera64": np.full((4, 4), np.inf)}, "not a rotation and a translation"),

@@ -1,9 +1,13 @@
 """EXR: range views, one multi-part OpenEXR file a frame, a part a pod.
 
-A part has the pod's name, the channels `Z` (float, view-space depth in scan units), and where there are such
-`R G B` (half, linear), `mask` (half, 1: use the depth) and `confidence` (float), and the attributes
+A part has the pod's name, the channels `Z` (float, depth in scan units), and where there are such
+`R G B` (half, linear), `mask` (half, 1: use the depth), `confidence` (float) and `X Y` (float, measured x and
+y in the pod's camera space), and the attributes
 
+- `kind` (string): of depth, `z`, `range` or `height` as `RangeView` has them; without it, `z`;
 - `fx fy cx cy` (double): pixels, pixel centres at +0.5, from the upper left corner of the display window;
+- `k1 k2 p1 p2 k3 k4 k5 k6` (double): the lens' distortion, the first 4, 5 or 8 of these;
+- `color` (string): `srgb8` where the colours were 8 bit, to which they go back;
 - `worldToCamera`, `worldToNDC` (m44f) as OpenEXR's standard attributes: matrices for row vectors; camera
   space is left-handed and looks down +z; NDC runs from 0, 0 in the upper left corner to 1, 1;
 - `worldToCamera64` (m44d): worldToCamera in double precision, since float32 cannot place a pod at UTM
@@ -20,15 +24,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from threading import get_ident
-from typing import Any, BinaryIO, TextIO
+from typing import Any, BinaryIO, TextIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...native import OPENEXR, unsaid
+from ..colors import linear_from_srgb8, srgb8_from_linear
 from ..points import UNKNOWN_UNIT
-from ..range_view import RangeView, memory_of_merging
+from ..range_view import DepthKind, RangeView, mask_of, memory_of_merging
 from ..units import usable_unit
 from ._admission import MOST_MEMBERS, admit, check_count, opened, read_exactly, size_of
 
@@ -36,11 +41,13 @@ TITLE = "EXR"
 SUFFIXES = (".exr",)
 
 _PINHOLE = ("fx", "fy", "cx", "cy")
+_LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_SRGB8 = "srgb8"
 _FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
 _MAGIC_BYTES, _CHANNEL_BYTES = 8, 16  # in front of the headers; behind the name of a channel in a header
 _TYPE_BYTES = {1: 2}  # of a sample of a half; other types have 4
 _MOST_RATIO = 40  # of memory to the file: masks leave little of most pictures
-_VIEW_BYTES = 7  # of a pixel: mask and colour
+_VIEW_BYTES, _SRGB8_BYTES, _XY_BYTES = 7, 3, 8  # of a pixel: mask and linear colour; what not all views have
 
 
 def read_unit(path: Path) -> str | None:
@@ -147,11 +154,14 @@ def _check_form(header: dict[str, Any], name: str) -> None:
 
 def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int]) -> int:
     """Bytes that parts take at a time, decoded and as views. samples: bytes of a pixel of each part."""
-    pixels = []
+    pixels, views = [], []
     for header in headers:
         low, high = (corner.astype(int) for corner in header["dataWindow"])
         pixels.append(math.prod(np.maximum(high - low + 1, 0).tolist()))
-    return sum(map(operator.mul, pixels, samples)) + max(pixels) * _VIEW_BYTES
+        measured = {"X", "Y"} <= {channel.name for channel in header["channels"]}
+        more = _SRGB8_BYTES * ("color" in header) + _XY_BYTES * measured
+        views.append(pixels[-1] * (_VIEW_BYTES + more))
+    return sum(map(operator.mul, pixels, samples)) + max(views)
 
 
 def _pixel_bytes(stream: BinaryIO, parts: int) -> list[int]:
@@ -190,20 +200,30 @@ def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> Rang
     # The corner of what is stored, where a program has cropped the picture.
     left, top = (header["dataWindow"][0] - header["displayWindow"][0]).tolist()
     depth = pixels["Z"].astype(np.float32, copy=False)
-    color = [pixels[channel].astype(np.float16, copy=False) for channel in "RGB" if channel in pixels]
+    color = _stacked(pixels, "RGB", np.float16)
     return RangeView(
         depth=depth,
-        mask=pixels["mask"] > 0.5 if "mask" in pixels else np.ones(depth.shape, bool),
-        color=np.stack(color, axis=2) if len(color) == 3 else None,
+        kind=cast(DepthKind, str(header.get("kind", "z"))),
+        mask=mask_of(pixels["mask"]) if "mask" in pixels else np.ones(depth.shape, bool),
+        color=srgb8_from_linear(color) if color is not None and header.get("color") == _SRGB8 else color,
         confidence=pixels["confidence"].astype(np.float32, copy=False) if "confidence" in pixels else None,
+        xy=_stacked(pixels, "XY", np.float32),
         fx=fx,
         fy=fy,
         cx=cx - left,
         cy=cy - top,
+        distortion=tuple(_number(header[key]) for key in _LENS if key in header),
         world_to_camera=_turned(np.asarray(to_camera, np.float64).reshape(4, 4).T),
         name=name,
         unit=_unit(header) or UNKNOWN_UNIT,
     )
+
+
+def _stacked(pixels: dict[str, NDArray], names: str, dtype: type) -> NDArray | None:
+    """Channels of these names as one image, or None where one is missing."""
+    if not {*names} <= pixels.keys():
+        return None
+    return np.stack([pixels[name].astype(dtype, copy=False) for name in names], axis=2)
 
 
 def _number(value: Any) -> float:
@@ -214,7 +234,11 @@ def _number(value: Any) -> float:
 def _channels(view: RangeView) -> dict[str, NDArray]:
     channels = {"Z": view.depth, "mask": view.mask.astype(np.float16)}
     if view.color is not None:
-        channels |= dict(zip("RGB", np.moveaxis(view.color, 2, 0), strict=True))
+        color: NDArray = view.color
+        linear = linear_from_srgb8(color) if _has_eight_bits(view) else color
+        channels |= dict(zip("RGB", np.moveaxis(linear, 2, 0), strict=True))
+    if view.xy is not None:
+        channels |= dict(zip("XY", np.moveaxis(view.xy, 2, 0), strict=True))
     if view.confidence is not None:
         channels["confidence"] = view.confidence
     return {name: np.ascontiguousarray(channel) for name, channel in channels.items()}
@@ -233,6 +257,11 @@ def _attributes(view: RangeView, width: int, height: int) -> dict[str, Any]:
             [0, 0, 1, 0],
         ]
     )
+    if view.kind == "height":  # nothing is divided by depth
+        to_ndc = to_ndc[:, [0, 1, 3, 2]]
+    calibration = {key: getattr(view, key) for key in _PINHOLE} | dict(
+        zip(_LENS, view.distortion, strict=False)
+    )
     return {
         "type": OpenEXR.scanlineimage,
         "compression": OpenEXR.ZIP_COMPRESSION,
@@ -241,9 +270,15 @@ def _attributes(view: RangeView, width: int, height: int) -> dict[str, Any]:
         "worldToCamera": np.ascontiguousarray(to_camera.T, np.float32),
         "worldToCamera64": np.ascontiguousarray(to_camera.T),
         "worldToNDC": np.ascontiguousarray((to_ndc @ to_camera).T, np.float32),
-        **{key: np.array([getattr(view, key)], np.float64) for key in _PINHOLE},
+        **{key: np.array([value], np.float64) for key, value in calibration.items()},
+        **({"color": _SRGB8} if _has_eight_bits(view) else {}),
+        "kind": view.kind,
         "unit": view.unit,
     }
+
+
+def _has_eight_bits(view: RangeView) -> bool:
+    return view.color is not None and view.color.dtype == np.uint8
 
 
 def _window(width: int, height: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
