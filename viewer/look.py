@@ -17,7 +17,12 @@ from .params import param
 
 # Perceptually uniform and readable with colour-blindness; the tables are the library cmap's.
 COLOR_MAPS = ("batlow", "cividis", "viridis", "lapaz", "oslo", "vik")
-COLOR_BY = ("auto", "own", "plain", "normal", "depth", "height", "id")
+COLOR_BY = ("auto", "own", "plain", "normal", "depth", "height", "id", "level")
+# Of pixels filled from level 1, 2, ..., the last for all above: colours that Okabe and Ito (2008) chose to be
+# told apart with colour-blindness, from cold to warm.
+LEVEL_COLORS = ("#56b4e9", "#009e73", "#f0e442", "#e69f00", "#cc79a7")
+HOLE_COLOR = "#ff0000"
+HOLE_REACH = 8  # pixels: half of the widest gaps that count as holes, which are as wide as a pixel of level 4
 _UNMAPPED = {"color_by": tuple(name for name in COLOR_BY if name not in ("depth", "height"))}
 _FIXED, _FLAT = {"light": ("fixed",)}, {"light": ("flat",)}
 _EYE_DOME = {"eye_dome": (None, True)}
@@ -28,7 +33,8 @@ class Look:
     """Lighting, colouring and background.
 
     `color_by` and `light` are "auto" by default: own colours where the scan has them, a
-    head light where it has normals, else eye-dome lighting, which needs depth alone.
+    head light where it has normals, else eye-dome lighting, which needs depth alone. "level"
+    shows measured pixels in grey, filled ones in a colour for each level that fills.
     """
 
     color_by: str = param(
@@ -52,6 +58,12 @@ class Look:
     up: str = param("+y", "The axis that height is measured along", choices=tuple(AXES), group="Colour")
     plain: str = param("#c8c2b8", "Colour of points that have none, #rrggbb", group="Colour")
     background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa", group="Colour")
+    holes: bool = param(
+        False,
+        f"Paint holes red: gaps of up to {2 * HOLE_REACH} pixels between what is shown",
+        group="Colour",
+        key="Shift+H",
+    )
     light: str = param(
         "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
         choices=("auto", "flat", "head", "fixed"), group="Light",

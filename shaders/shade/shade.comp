@@ -2,6 +2,7 @@
 // COLOR_BY 0 plain, 1 own, 2 normal, 3 value, 4 id. LIGHT 0 flat, 1 head, 2 fixed.
 // OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
 // filled have none. TURNED: the pose is, so that its axes are not the world's. With its colour comes how much of the pixel is covered; the rest is background.
+// LEVEL_COLORS: how many colours there are of filled levels, in place of the colour map; 0: pixels are not coloured by level.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -20,6 +21,9 @@ layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 layout(binding = TEXTURE_IDS) uniform usamplerBuffer ids;
 #if OWN_COLOR
 layout(binding = TEXTURE_OWN_COLORS) uniform samplerBuffer own_colors;
+#endif
+#if OWN_LEVEL
+layout(binding = TEXTURE_LEVELS) uniform usamplerBuffer levels;
 #endif
 layout(std430, binding = STORAGE_PICTURE) writeonly buffer Picture { uint picture[]; };
 
@@ -67,6 +71,18 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #endif
 #endif
 }
+
+#if LEVEL_COLORS
+// Grey where the pixel was measured; color: of what it shows.
+vec3 level_color(int index, uint row, vec3 color) {
+    uint level = uint(row == NOTHING);
+#if OWN_LEVEL
+    level = max(level, texelFetch(levels, index).r);
+#endif
+    if (level == 0u) return to_srgb(vec3(dot(to_linear(color), vec3(0.2126, 0.7152, 0.0722))));
+    return texelFetch(color_map, int(min(level, uint(LEVEL_COLORS))) - 1).rgb;
+}
+#endif
 
 // From what a pixel shows to the eye, view space.
 vec3 eye_direction(ivec2 pixel, float depth) {
@@ -116,6 +132,9 @@ vec3 shade(int index) {
         ? normal / len : transpose(mat3(world_to_view)) * eye_direction(pixel, depth);
 #endif
     vec3 color = base_color(index, row, depth, normal);
+#if LEVEL_COLORS
+    color = level_color(index, row, color);
+#endif
 #if LIGHT != 0 || EYE_DOME
     color = lit(to_linear(color), pixel, depth, normal);
 #if EYE_DOME

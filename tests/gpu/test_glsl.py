@@ -40,8 +40,9 @@ SIZE = (96, 64)
 PASSES = ("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted")
 CAMERA = {"azimuth": 30.0, "elevation": 20.0, "aspect": SIZE[0] / SIZE[1]}
 LOOKS = [
-    *(Look(color_by=color) for color in ("plain", "normal", "depth", "height", "height_of", "id")),
+    *(Look(color_by=color) for color in ("plain", "normal", "depth", "height", "height_of", "id", "level")),
     *(Look(light=light, eye_dome=dome) for light, dome in product(("flat", "head", "fixed"), (False, True))),
+    Look(holes=True),
 ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from viewer.camera import Camera
-from viewer.look import Look
+from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, rgba
 from viewer.output.marks import (
     INK,
     PLATE,
@@ -23,6 +24,7 @@ from viewer.output.marks import (
     round_length,
     scale_bar,
     stamp,
+    swatches,
 )
 from viewer.scan.points import PointCloud
 
@@ -181,6 +183,33 @@ def test_the_colours_of_the_bar_are_those_of_the_surface(draw: Callable[..., Sur
     assert (stripe[rows[-1]] == shown[0]).all()
     nearest = np.abs(stripe[rows].astype(int) - shown[1]).sum(axis=1).argmin()
     assert abs(nearest - len(rows) / 2) <= 1
+
+
+def test_levels_and_holes_have_a_swatch_each_in_the_colour_that_is_shown() -> None:
+    assert not swatches(LEGEND.look)
+    told = swatches(Look(color_by="level", holes=True))
+    assert [text for _, text in told] == [
+        "Measured", "Level 1", "Level 2", "Level 3", "Level 4", "Level 5 and above", "Hole",
+    ]  # fmt: skip
+    assert [color for color, _ in told[1:]] == [rgba(color) for color in (*LEVEL_COLORS, HOLE_COLOR)]
+    for size in (SIZE, (300, 900), (96, 64)):
+        legend = replace(LEGEND, marks=Marks(color_bar=True), look=Look(color_by="level", holes=True))
+        image = marked(gray(size), legend, None)
+        rows = [np.nonzero((image == color).all(axis=2))[0] for color, _ in told[1:]]
+        assert all(len(above) for above in rows)
+        assert all(above.max() < below.min() for above, below in pairwise(rows)), "in their order"
+        left, top, right, bottom = changed(image)
+        assert size[0] / 2 < left < right < size[0]
+        assert size[1] / 8 < top < bottom < size[1]
+
+
+def test_swatches_stand_above_the_colour_bar() -> None:
+    legend = replace(LEGEND, marks=Marks(color_bar=True), look=replace(LEGEND.look, holes=True))
+    image = marked(gray(), legend, VALUES)
+    bar = with_marks(color_bar=True)
+    top = changed(bar)[1]
+    assert (image[top:] == bar[top:]).all()
+    assert (image[:top] == rgba(HOLE_COLOR)).all(axis=2).any()
 
 
 def test_the_range_is_the_one_that_was_shaded_with(draw: Callable[..., Surface]) -> None:

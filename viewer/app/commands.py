@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..backends import Backend, backends
 from ..errors import InputError, unknown_name
-from ..params import Parameter
+from ..look import Look
+from ..params import Parameter, describe
 from . import theme
 from .keys import chords
 from .scene import navigation
@@ -143,6 +144,15 @@ def _mark(name: str, title: str, key: str) -> Command[App]:
     )
 
 
+def _look_switch(parameter: Parameter) -> Command[App]:
+    """Switches a field of the look."""
+    name = parameter.name
+    return Command(
+        f"look_{name}", parameter.title, lambda app: app.rendering.switch_look(name), parameter.key,
+        is_on=lambda app: getattr(app.document.look, name),
+    )  # fmt: skip
+
+
 def _renderers(app: App) -> Iterator[Item]:
     for name, backend in backends().items():
         yield backend.title, partial(app.rendering.choose, name), name == app.rendering.backend
@@ -242,6 +252,7 @@ _VIEW: Menu[App] = Menu("View", (
         ),
     ),
     (_mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C")),
+    tuple(_look_switch(parameter) for parameter in describe(Look) if parameter.key),
     (Listing("Theme", _themes), Command("theme", "Next theme", lambda app: app.next_theme(), "T")),
     (
         Command("text_larger", "Larger text", lambda app: app.change_text(1), "Ctrl+="),

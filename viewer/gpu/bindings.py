@@ -22,6 +22,7 @@ class Texture(IntEnum):
     DEPTHS = 16  # float bits
     ROWS = auto()
     OWN_COLORS = auto()
+    LEVELS = auto()
     # A pose, a texel a row.
     POSITIONS = auto()
     NORMALS = auto()  # of a Surface where the backend wrote them
@@ -69,6 +70,7 @@ class Storage(IntEnum):
     LEVEL = 7
     # Shading, beside a list.
     PICTURE = 0
+    PIXEL_BITS = 1
     # Scatter, beside a list; what says which cells are visited has those from 4 on, without a list from 2 on.
     KEYS = 0
     BEST = 1

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import up_vector
-from ..look import Look, color_table, rgba, value_source
+from ..look import HOLE_COLOR, HOLE_REACH, LEVEL_COLORS, Look, color_table, rgba, value_source
 from . import gl
 from .bindings import Storage, Texture
 from .blocks import Mat4, Vec4
@@ -50,7 +50,8 @@ def shade(surface: Surface, look: Look) -> None:
     cloud = pose.cloud
     source, surface.look = value_source(look, surface.layers.names(cloud.scalars)), look
     value = source if source in (None, "depth", "height") else "scalar"
-    color = "value" if source is not None else "own" if look.color_by == "auto" else look.color_by
+    by_level = look.color_by == "level"
+    color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
         color = "plain"
     light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
@@ -65,6 +66,8 @@ def shade(surface: Surface, look: Look) -> None:
             "EYE_DOME": int(eye_dome),
             "TURNED": int(not surface.layers.place.is_identity),
             "HAS_IDS": int(cloud.ids is not None),
+            "LEVEL_COLORS": len(LEVEL_COLORS) if by_level else 0,
+            "OWN_LEVEL": int(by_level and surface.is_own("level")),
             **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
         },
         params=_shading(surface, look),
@@ -89,10 +92,46 @@ def shade(surface: Surface, look: Look) -> None:
             pose.array("ids").bind(Texture.IDS)
         if value is not None:
             gpu.keep(_color_map, look.color_map).bind(Texture.COLOR_MAP)
-        gl.clear_words(surface.picture, int.from_bytes(bytes(rgba(look.background)), "little"))
+        if by_level:
+            gpu.keep(_level_colors, LEVEL_COLORS).bind(Texture.COLOR_MAP)
+            if surface.is_own("level"):
+                surface.own("level").bind(Texture.LEVELS)
+        gl.clear_words(surface.picture, _word(look.background))
         surface.picture.bind_to_storage_buffer(Storage.PICTURE)
         covered.run(program)
+    if look.holes:
+        _paint_holes(surface)
     surface.shaded_by = shade
+
+
+def _paint_holes(surface: Surface) -> None:
+    """Paint over the background in the picture's holes."""
+    gpu, bits = surface.gpu, surface.keep(_PixelBits)
+    with gpu.timers.measure("holes"):
+        surface.depths.bind(Texture.DEPTHS)
+        surface.picture.bind_to_storage_buffer(Storage.PICTURE)
+        bits.buffer.bind_to_storage_buffer(Storage.PIXEL_BITS)
+        for step in range(3):
+            program = gpu.compute("shade/holes.comp", {"STEP": step, "HOLE_REACH": HOLE_REACH})
+            gpu.set(program, hole_color=_fractions(HOLE_COLOR))
+            gpu.dispatch(program, bits.words)
+
+
+class _PixelBits:
+    """Two bits for each pixel of a picture, in words of 32 pixels of a row."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self.words = -(-size[0] // 32) * size[1]
+        self.nbytes = 8 * self.words
+        self.buffer = gpu.ctx.buffer(reserve=self.nbytes)
+
+    def release(self) -> None:
+        self.buffer.release()
+
+
+def _word(color: str) -> int:
+    """A colour of a look as pictures hold it."""
+    return int.from_bytes(bytes(rgba(color)), "little")
 
 
 def _shading(surface: Surface, look: Look) -> _Shading:
@@ -149,6 +188,10 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
 
 def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:
     return gl.BufferTexture(gpu.ctx.buffer(color_table(name)), gl.RGBA8)
+
+
+def _level_colors(gpu: Gpu, colors: tuple[str, ...]) -> gl.BufferTexture:
+    return gl.BufferTexture(gpu.ctx.buffer(bytes(byte for color in colors for byte in rgba(color))), gl.RGBA8)
 
 
 def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:

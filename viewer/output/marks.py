@@ -1,4 +1,4 @@
-"""Marks on a picture: a scale bar, a colour bar and a stamp, laid out alike in files and in the window.
+"""Marks on a picture: a scale bar, what colours mean, and a stamp, laid out alike in files and in the window.
 
 A `MarkPainter` draws them: `marked` has one for images, the window has one of its own.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
-from ..look import Look, color_table
+from ..look import HOLE_COLOR, LEVEL_COLORS, Look, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
 
@@ -22,6 +22,7 @@ Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 Box = tuple[float, float, float, float]  # left, top, right, bottom; pixels from the upper left corner
 
 INK: Color = (245, 245, 245, 255)
+_MEASURED: Color = (150, 150, 150, 255)
 PLATE: Color = (0, 0, 0, 170)  # light on dark, so that it is read on any picture
 _LINES = 45  # of text that are as high as a picture
 _LEAST_TEXT = 11.0  # pixels, where the picture has room for it
@@ -33,6 +34,7 @@ _MOST_DIGITS = 15  # that a float64 holds
 _MARGIN, _PAD, _GAP = 0.8, 0.5, 0.35
 _TICK, _LINE = 0.5, 0.14  # height of a scale bar's ends, thickness of its line
 _MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
+_SWATCH_LINE = 1.4  # from one swatch to the next
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,10 @@ class Marks:
     scale_bar: bool = param(
         False, "A bar of a round length in scan units; in perspective at the depth of the camera's target"
     )
-    color_bar: bool = param(False, "The colour map and its numbers, where the look colours by a number")
+    color_bar: bool = param(
+        False,
+        "The colour map and its numbers, where the look colours by a number; colours of levels and holes",
+    )
     stamp: bool = param(False, "Number of the frame, and its time")
 
     def __bool__(self) -> bool:
@@ -131,6 +136,16 @@ def number(value: float, span: float) -> str:
     return plain if len(plain) <= len(scientific) + 1 else scientific
 
 
+def swatches(look: Look) -> list[tuple[Color, str]]:
+    """Colours that the look shows something else by than numbers, and what each says."""
+    told = []
+    if look.color_by == "level":
+        levels = [f"Level {number}" for number in range(1, len(LEVEL_COLORS) + 1)]
+        levels[-1] += " and above"
+        told = [(_MEASURED, "Measured"), *zip(map(rgba, LEVEL_COLORS), levels, strict=True)]
+    return [*told, (rgba(HOLE_COLOR), "Hole")] if look.holes else told
+
+
 def stamp(legend: Legend) -> str:
     """The frame, counted from 1, and its time."""
     return f"Frame {legend.pose + 1} of {legend.count}, {legend.time:.3f} s"
@@ -148,14 +163,18 @@ def text_height(size: tuple[int, int]) -> int:
 def draw(
     painter: MarkPainter, size: tuple[float, float], legend: Legend, values: tuple[float, float] | None
 ) -> None:
-    """Draw the legend's marks: scale bar lower left, colour bar lower right, stamp upper left.
+    """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp upper left.
 
     size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar.
     """
     if legend.marks.scale_bar:
         _draw_scale_bar(painter, size, legend)
-    if legend.marks.color_bar and values is not None:
-        _draw_color_bar(painter, size, legend, values)
+    if legend.marks.color_bar:
+        foot = size[1] - _MARGIN * painter.em
+        if values is not None:
+            foot = _draw_color_bar(painter, size, legend, values) - _GAP * painter.em
+        if told := swatches(legend.look):
+            _draw_swatches(painter, size, told, foot)
     if legend.marks.stamp:
         _draw_stamp(painter, size, legend)
 
@@ -189,7 +208,8 @@ def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Leg
 
 def _draw_color_bar(
     painter: MarkPainter, size: tuple[float, float], legend: Legend, values: tuple[float, float]
-) -> None:
+) -> float:
+    """Draw it lower right; returns where it begins at the top, pixels."""
     em, (low, high) = painter.em, values
     title = _shortened(painter, quantity(legend.look, legend.unit), _TEXT_SHARE * size[0])
     shares = (0.0, 0.5, 1.0) if high != low else (0.0,)
@@ -200,13 +220,29 @@ def _draw_color_bar(
     left = round(right - max(widest, painter.width(title)) - 2 * _PAD * em)
     top = round(bottom - height - (2.5 + 2 * _PAD) * em)
     painter.box((left, top, right, bottom), PLATE)
-    left, top = left + round(_PAD * em), top + round(_PAD * em)
-    painter.text(left, top, title)
+    left += round(_PAD * em)
+    painter.text(left, top + round(_PAD * em), title)
     foot = bottom - round((_PAD + 0.5) * em)
     colors = color_table(legend.look.color_map)
     painter.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
     for share, text in zip(shares, texts, strict=True):
         painter.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
+    return top
+
+
+def _draw_swatches(
+    painter: MarkPainter, size: tuple[float, float], told: list[tuple[Color, str]], bottom: float
+) -> None:
+    em, line = painter.em, round(_SWATCH_LINE * painter.em)
+    texts = [_shortened(painter, text, _TEXT_SHARE * size[0]) for _, text in told]
+    right = round(size[0] - _MARGIN * em)
+    left = round(right - max(map(painter.width, texts)) - (_MAP_WIDTH + _GAP + 2 * _PAD) * em)
+    top = round(bottom - _PAD * em) - len(told) * line
+    painter.box((left, top, right, bottom), PLATE)
+    for place, ((color, _), text) in enumerate(zip(told, texts, strict=True)):
+        x, y = left + round(_PAD * em), top + round(_PAD * em) + place * line
+        painter.box((x, y, x + round(_MAP_WIDTH * em), y + round(em)), color)
+        painter.text(x + (_MAP_WIDTH + _GAP) * em, y, text)
 
 
 def _draw_stamp(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> None:

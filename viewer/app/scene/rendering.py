@@ -76,6 +76,11 @@ class Rendering:
             name = edit_name(self._session.document.look, look)
             self._session.change(name, merge=name, look=look)
 
+    def switch_look(self, name: str) -> None:
+        """Switch a field of the look on or off."""
+        look: Any = self._session.document.look
+        self.edit_look(replace(look, **{name: not getattr(look, name)}))
+
     @property
     def switches(self) -> dict[str, bool]:
         """The switches among the backend's parameters, see `params.switches`; none before the first pose."""
