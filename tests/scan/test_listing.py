@@ -164,3 +164,17 @@ def test_whatever_a_user_types_is_a_scan_or_one_message(text: str) -> None:
     assert len(problems) <= 1
     assert scans or problems
     assert scans_beside(text)
+
+
+def test_a_folder_of_range_images_is_one_scan(tmp_path: Path) -> None:
+    folder = tmp_path / "bunny"
+    folder.mkdir()
+    (folder / "bun.conf").write_text("bmesh a.ply 0 0 0 0 0 0 1\nbmesh b.ply 0 0 0 0 0 0 1\n")
+    for name in ("a", "b"):
+        np.savez(folder / f"{name}.npz", xyz=np.zeros((2, 2, 3)))
+    np.save(folder / "model.npy", np.zeros((2, 3)))
+    (folder / "README.txt").write_text("notes\n")
+    assert rows(tmp_path) == [("folder", "bunny", 1)]
+    assert rows(folder) == [("whole", "bunny", 1), ("file", "model.npy", 1)]
+    (folder / "b.npz").unlink()
+    assert rows(tmp_path) == [("folder", "bunny", 0)]

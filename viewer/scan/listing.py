@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..files import absolute
 from . import formats
 from .open import DEMO, NOTES, entries, find_source, folder_frames, matches
+from .range_folders import find_range_frames
 from .times import TIMES_FILE, frame_numbers, natural_key
 
 _NUMBERED = re.compile(r"(.*?)([0-9]+)([^0-9]*)")
@@ -25,7 +26,7 @@ class Listed:
     """Something in a folder.
 
     path: as `open_scan` takes it. title: its name for people. kind: "whole" is the folder itself.
-    frames: files that it plays; 1 for a file, which may hold several, and 0 for a folder that is no scan.
+    frames: that it plays; 1 for a file, which may hold several, and 0 for a folder that is no scan.
     """
 
     path: str
@@ -49,11 +50,11 @@ def list_folder(folder: Path | str) -> list[Listed]:
     inside = sorted(entries(folder), key=lambda entry: natural_key(entry.name))
     folders = [entry for entry in inside if os.path.isdir(entry) and not entry.name.startswith(".")]
     files = _scan_files(inside)
-    whole = [
-        Listed(str(folder), f"All of {folder.resolve().name or folder}", "whole", count)
-        for count in [_frame_count(folder)]
-        if count > 1
-    ]
+    count, own = _frames(folder)
+    if own:
+        files = [file for file in files if file not in own and file.suffix.lower() not in NOTES]
+    all_of_it = Listed(str(folder), f"All of {folder.resolve().name or folder}", "whole", count)
+    whole = [all_of_it] if count > 1 or own else []
     sequences = [
         Listed(pattern, _with_range(members), "sequence", len(members))
         for pattern, members in _sequences(files).items()
@@ -61,7 +62,7 @@ def list_folder(folder: Path | str) -> list[Listed]:
     ]
     return [
         *whole,
-        *(Listed(str(entry), entry.name, "folder", _frame_count(entry)) for entry in folders),
+        *(Listed(str(entry), entry.name, "folder", _frames(entry)[0]) for entry in folders),
         *sequences,
         *(Listed(str(file), file.name, "file", 1) for file in files),
     ]
@@ -138,12 +139,13 @@ def _scan_files(paths: Sequence[Path]) -> list[Path]:
     return scans or files
 
 
-def _frame_count(folder: Path) -> int:
-    """How many files a folder plays as one scan; 0 where it is none."""
+def _frames(folder: Path) -> tuple[int, set[Path]]:
+    """How many frames a folder plays as one scan, 0 where it is none, and the files of its range images."""
     try:
-        return len(folder_frames(folder))
+        found = find_range_frames(folder)
+        return (len(folder_frames(folder)), set()) if found is None else (len(found), set(found.files))
     except InputError:
-        return 0
+        return 0, set()
 
 
 def _sequences(files: Sequence[Path]) -> dict[str, list[Path]]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from . import formats
 from .points import UNKNOWN_UNIT
+from .range_folders import find_range_frames
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
@@ -53,9 +54,9 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
 
 
 def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
-    if isinstance(source, FileSequence):
-        return paced_times([source.label(index) for index in range(len(source))], fps)
-    return np.arange(len(source)) / fps  # perhaps a million, whose labels tell nothing more
+    if isinstance(source, MultiFrameFile):  # of perhaps a million, whose labels tell nothing more
+        return np.arange(len(source)) / fps
+    return paced_times([source.label(index) for index in range(len(source))], fps)
 
 
 def find_source(path: str | os.PathLike[str]) -> FrameSource:
@@ -67,7 +68,8 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
         return DemoSource()
     if os.path.isdir(path):
         folder = Path(path)
-        return _open_frames(folder_frames(folder), folder.resolve().name)
+        found = find_range_frames(folder)
+        return _open_frames(folder_frames(folder), folder.resolve().name) if found is None else found
     if os.path.isfile(path):
         return _open_frames([Path(path)], Path(path).name)
     if os.path.exists(path):
@@ -78,7 +80,7 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
 
 
 def folder_frames(folder: Path) -> list[Path]:
-    """The files that a folder plays as one scan, at least one, in natural order. No file is read.
+    """The scan files that a folder plays as one scan, at least one, in natural order. No file is read.
 
     They are in the folder, or in its folder `frames`, whatever stands beside that. Raises InputError
     where there are none.

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from viewer.bench.scenes import catalog
-from viewer.bench.scenes.real_scans import placed_scans
 from viewer.bench.scenes.subjects import Moment, Subject, smooth
 from viewer.bench.truth.shapes import AnalyticScene
 from viewer.camera import Camera
@@ -259,32 +258,3 @@ def test_the_demo_lies_on_its_mesh_while_it_speaks() -> None:
     first = trace(moment.truth, into, (20, 20))
     carried = subject.carry(index, 0, first)
     assert np.median(np.abs(surface_value(carried, 0.0))) < 0.01
-
-
-@pytest.mark.parametrize(
-    ("conf", "told"),
-    [
-        (None, "no usable .conf"),
-        ("camera 0 0 0 0 0 0 1\n", "bmesh"),
-        ("bmesh a.ply 0 0 zero 0 0 0 1\n", "zero"),
-        ("bmesh a.ply 0 0 0 1\n", "reshape"),
-        ("bmesh a.ply 0 0 0 0 0 0 1\n", "a.npz"),
-    ],
-)
-def test_broken_laser_scans_are_told(tmp_path: Path, conf: str | None, told: str) -> None:
-    if conf is not None:
-        (tmp_path / "scans.conf").write_text(conf)
-    with pytest.raises(InputError, match=told):
-        placed_scans(tmp_path)
-
-
-def test_laser_scans_are_placed_by_the_inverse_of_their_rotation(tmp_path: Path) -> None:
-    # A quarter turn about z: the rotation brings x to y, its inverse y to x.
-    half = np.sqrt(0.5)
-    (tmp_path / "scans.conf").write_text(f"bmesh a.ply 10 0 0 0 0 {half} {half}\nbmesh b.ply 0 0 0 0 0 0 1\n")
-    grid = np.array([[[0, 1, 2], [np.nan] * 3]], np.float32)
-    np.savez(tmp_path / "a.npz", xyz=grid)
-    np.savez(tmp_path / "b.npz", xyz=grid)
-    cloud = placed_scans(tmp_path)
-    np.testing.assert_allclose(cloud.world(), [[11, 0, 2], [0, 1, 2]], atol=1e-6)
-    np.testing.assert_array_equal(cloud.scalars["view"], [0, 1])

@@ -20,7 +20,7 @@ from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
 from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from . import samples
-from .real_scans import DepthFrames, placed_scans
+from .real_scans import DepthFrames
 from .samples import Sampler
 from .simulated import simulated
 from .subjects import Moment, Subject, smooth, with_rows
@@ -157,10 +157,11 @@ def _laser(folder: str, model: str, tolerance: float) -> _Scene:
 
     def make(request: _Request) -> Subject:
         scans, truth = request.paths
+        source = find_source(scans)
 
-        def load(_: int) -> Moment:
+        def load(index: int) -> Moment:
             mesh = smooth(read_mesh(truth))
-            return Moment(Pose(0, 0.0, scans.name, placed_scans(scans)), mesh, mesh)
+            return Moment(Pose.of(index, 0.0, source.label(index), source.load(index)), mesh, mesh)
 
         return Subject(name=request.name, load=load, tolerance=tolerance, credit=_STANFORD)
 

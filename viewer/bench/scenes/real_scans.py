@@ -1,4 +1,4 @@
-"""Scans of real things with a truth: laser scans of Stanford's models, a phone's depth images of a head."""
+"""A scan of a real thing with a truth: a phone's depth images of a head."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from ..truth.isosurface import isosurface
 from .registration import OrientedPoints, register
 from .subjects import Moment
 
-_SCAN = "bmesh"  # a line of a .conf file: this, a file, a translation, a quaternion
-
 # The head is nearer than this, the room behind it begins at a metre.
 _ROOM = 0.75  # m
 # The frame that looks as the reference does: with the middles of both together it finds its place.
@@ -37,47 +35,6 @@ _CELL = 1.5e-3  # m, of the reference's mesh
 _WIDTH = 1.5e-3  # m, standard deviation of the weights that blend surfels
 _SURFELS = 24  # that are blended
 _EDGE = 2e-3  # m, how far the mesh reaches beyond the last surfel
-
-
-def placed_scans(folder: Path) -> PointCloud:
-    """The laser scans of a folder as its .conf file places them; the scalar `view` is the number of the scan.
-
-    A point p of a scan is at transpose(R) p + t, R the rotation of its quaternion x y z w. Raises InputError.
-    """
-    parts = []
-    for name, translation, quaternion in _placements(folder):
-        (grid,) = _arrays(folder / name, "xyz")
-        points = grid[np.isfinite(grid).all(axis=-1)].astype(np.float64)
-        parts.append(points @ _rotation(quaternion) + translation)
-    numbers = np.repeat(np.arange(len(parts), dtype=np.uint16), [len(part) for part in parts])
-    return PointCloud.from_arrays(np.concatenate(parts), scalars={"view": numbers})
-
-
-def _placements(folder: Path) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
-    """The file, translation (3,) and quaternion (4,) of each scan."""
-    try:
-        (conf,) = folder.glob("*.conf")
-        lines = [line.split() for line in conf.read_text(encoding="ascii").splitlines()]
-        scans = [line[1:] for line in lines if line[:1] == [_SCAN]]
-        if not scans:
-            raise ValueError(f"no line starts with {_SCAN}")
-        names = [f"{Path(name).stem}.npz" for name, *_ in scans]
-        numbers = [np.array(placement, float).reshape(7) for _, *placement in scans]
-        return [(name, row[:3], row[3:]) for name, row in zip(names, numbers, strict=True)]
-    except (OSError, ValueError) as error:
-        raise InputError(f"has no usable .conf file: {error}", folder) from error
-
-
-def _rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrix (3, 3) of a quaternion x y z w."""
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 class DepthFrames:

@@ -64,7 +64,7 @@ def frame_count(path: Path | str) -> int:
     """How many moments the file holds; reads no more than its header. Raises InputError."""
     path = Path(path)
     module = _readable(path)
-    with _one_message(path, f"cannot be read as {module.TITLE}"):
+    with one_message(path, f"cannot be read as {module.TITLE}"):
         return module.frame_count(path) if hasattr(module, "frame_count") else 1
 
 
@@ -72,7 +72,7 @@ def read_times(path: Path | str) -> NDArray[np.float64] | None:
     """The times stored with the moments of the file, (T,) seconds, or None. Raises InputError."""
     path = Path(path)
     module = _readable(path)
-    with _one_message(path, f"cannot be read as {module.TITLE}"):
+    with one_message(path, f"cannot be read as {module.TITLE}"):
         return module.read_times(path) if hasattr(module, "read_times") else None
 
 
@@ -83,7 +83,7 @@ def read_unit(path: Path | str) -> str | None:
     """
     path = Path(path)
     module = _readable(path)
-    with _one_message(path, f"cannot be read as {module.TITLE}"):
+    with one_message(path, f"cannot be read as {module.TITLE}"):
         return usable_unit(module.read_unit(path)) if hasattr(module, "read_unit") else None
 
 
@@ -99,7 +99,7 @@ def read(path: Path | str, frame: int = 0) -> Scanned:
     if not 0 <= frame < frames:
         raise InputError(f"has no frame {frame}", path, f"It holds {frames}, counted from 0")
     where = path if frames == 1 else f"{path}, frame {frame}"
-    with _one_message(where, f"cannot be read as {module.TITLE}"):
+    with one_message(where, f"cannot be read as {module.TITLE}"):
         return _with_points(module.read(path, frame))
 
 
@@ -112,7 +112,7 @@ def read_faces(path: Path | str, frame: int = 0) -> Faces:
     module = _readable(path)
     if not hasattr(module, "read_faces"):
         return Faces.joined([])
-    with _one_message(path, f"its faces cannot be read as {module.TITLE}"):
+    with one_message(path, f"its faces cannot be read as {module.TITLE}"):
         held, taken, pieces = path.stat().st_size, 0, []
         for piece in module.read_faces(path, frame):
             taken += piece.nbytes
@@ -128,11 +128,11 @@ def frames(path: Path | str) -> Callable[[int], Scanned]:
     if not hasattr(module, "Frames"):
         return partial(read, path)
     failed = f"cannot be read as {module.TITLE}"
-    with _one_message(path, failed):
+    with one_message(path, failed):
         opened = module.Frames(path)
 
     def read_frame(frame: int) -> Scanned:
-        with _one_message(f"{path}, frame {frame}", failed):
+        with one_message(f"{path}, frame {frame}", failed):
             return _with_points(opened.read(frame))
 
     return read_frame
@@ -153,7 +153,7 @@ def read_points(path: Path | str, frame: int = 0) -> PointCloud:
     scanned = read(path, frame)
     if isinstance(scanned, PointCloud):
         return scanned
-    with _one_message(path, "cannot be turned into points"):
+    with one_message(path, "cannot be turned into points"):
         return merge(in_one_unit(scanned, scanned[0].unit))
 
 
@@ -195,7 +195,7 @@ def check(path: Path | str) -> None:
     """Raise InputError where a file of `write_poses` takes more memory to be read than readers may take."""
     path = Path(path)
     module = _readable(path)
-    with _one_message(path, f"cannot be read as {module.TITLE}"):
+    with one_message(path, f"cannot be read as {module.TITLE}"):
         module.check(path)
 
 
@@ -205,7 +205,7 @@ def _writing(path: Path, module: ModuleType) -> Iterator[Path]:
     if not path.parent.is_dir():
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
     problem = f"cannot be written as {module.TITLE}", "Check free space and permissions"
-    with _one_message(path, *problem), whole_file(path) as temporary:
+    with one_message(path, *problem), whole_file(path) as temporary:
         yield temporary
 
 
@@ -237,7 +237,7 @@ def _readable(path: Path) -> ModuleType:
 
 
 @contextmanager
-def _one_message(
+def one_message(
     where: object, failed: str, hint: str = "Check that it is complete, or export it again"
 ) -> Iterator[None]:
     """Turn whatever goes wrong inside into an InputError that says where.

@@ -99,6 +99,15 @@ def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
         yield from _faces(arrays, size_of(stream))
 
 
+def read_arrays(path: Path, *names: str) -> list[NDArray]:
+    """Some arrays of an archive by name, whatever they hold. Raises InputError where one is not there."""
+    with opened(path) as stream, _arrays(stream) as arrays:
+        if missing := [name for name in names if name not in arrays]:
+            raise InputError(f"has no array '{missing[0]}', only: {', '.join(arrays) or 'none'}")
+        admit(size_of(stream), sum(arrays[name].memory() for name in names))
+        return [arrays[name].read() for name in names]
+
+
 def _shifted(
     positions: NDArray, stored: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

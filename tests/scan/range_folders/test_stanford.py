@@ -1,0 +1,139 @@
+"""Stanford's laser scans: placed by their .conf file, each a height field that keeps what was measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.errors import InputError
+from viewer.scan.formats.npz import read_arrays
+from viewer.scan.open import find_source, open_scan
+from viewer.scan.range_view import RangeView
+
+HALF = np.sqrt(0.5)
+STEP = 0.5
+
+
+def grid(rows: int = 4, columns: int = 5) -> np.ndarray:
+    """Points of a slanted plane, (rows, columns, 3), the lowest row first; one is not there."""
+    y, x = np.mgrid[:rows, :columns] * STEP
+    points = np.stack([x, y, 0.2 * x], axis=2).astype(np.float32)
+    points[0, 1] = np.nan
+    return points
+
+
+def put(folder: Path, conf: str | None, **grids: np.ndarray) -> Path:
+    if conf is not None:
+        (folder / "scans.conf").write_text(conf)
+    for name, xyz in grids.items():
+        np.savez(folder / f"{name}.npz", xyz=xyz)
+    return folder
+
+
+def views_of(folder: Path) -> tuple[RangeView, ...]:
+    views = find_source(folder).load(0)
+    assert isinstance(views, tuple)
+    return views
+
+
+def test_scans_are_placed_by_the_inverse_of_their_rotation(tmp_path: Path) -> None:
+    # A quarter turn about z: the rotation brings x to y, its inverse y to x.
+    conf = f"camera 0 0 -1 0 0 0 1\nbmesh a.ply 10 0 0 0 0 {HALF} {HALF}\nbmesh b.ply 0 0 0 0 0 0 1\n"
+    put(tmp_path, conf, a=grid(), b=grid())
+    with open_scan(tmp_path) as scan:
+        assert (len(scan), scan.unit, scan.name) == (1, "m", tmp_path.name)
+        pose = scan.pose(0)
+    assert [view.name for view in pose.views] == ["a", "b"]
+    points = grid()[::-1]  # the top row is the first
+    points = points[np.isfinite(points).all(axis=2)]
+    x, y, z = points.T
+    np.testing.assert_allclose(pose.views[0].positions(), np.stack([10 + y, -x, z], axis=1), atol=1e-6)
+    np.testing.assert_allclose(pose.views[1].positions(), points, atol=1e-6)
+    np.testing.assert_array_equal(pose.cloud.scalars["view"], np.repeat([0, 1], len(points)))
+
+
+def test_the_calibration_of_a_regular_grid_is_exact(tmp_path: Path) -> None:
+    put(tmp_path, "bmesh a.ply 1 2 3 0 0 0 1\n", a=grid())
+    (view,) = views_of(tmp_path)
+    assert view.kind == "height"
+    pixels, depths = view.project(view.positions())
+    row, column = np.nonzero(view.valid())
+    np.testing.assert_allclose(pixels, np.stack([column, row], axis=1) + 0.5, atol=1e-5)
+    np.testing.assert_allclose(depths, view.depth[row, column], atol=1e-6)
+
+
+def test_the_camera_looks_along_slanted_columns(tmp_path: Path) -> None:
+    # Two planes, one before the other; the columns of the front one are moved by what it is nearer.
+    y, column = np.mgrid[:6, :8] * STEP
+    z = np.where(column < 2, 0.0, 1.0)
+    points = np.stack([column + 0.5 * z, y, z], axis=2)
+    put(tmp_path, "bmesh a.ply 0 0 0 0 0 0 1\n", a=points.astype(np.float32))
+    (view,) = views_of(tmp_path)
+    back = view.world_to_camera[2, :3]
+    np.testing.assert_allclose(back, [1 / np.sqrt(5), 0, 2 / np.sqrt(5)], atol=1e-4)
+    pixels, _ = view.project(view.positions())
+    rows, columns = np.nonzero(view.valid())
+    np.testing.assert_allclose(pixels, np.stack([columns, rows], axis=1) + 0.5, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("conf", "told"),
+    [
+        ("bmesh a.ply 0 0 zero 0 0 0 1\n", "places no scan"),
+        ("bmesh a.ply 0 0 0 1\n", "places no scan"),
+        ("bmesh a.ply 0 0 nan 0 0 0 1\n", "places no scan"),
+        ("bmesh\n", "places no scan"),
+        ("bmesh a.ply 0 0 0 0 0 0 0\n", "no rotation"),
+        ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh c.ply 0 0 0 0 0 0 1\n", "no c.npz"),
+    ],
+)
+def test_a_wrong_placement_is_told_at_opening(tmp_path: Path, conf: str, told: str) -> None:
+    put(tmp_path, conf, a=grid())
+    with pytest.raises(InputError, match=told):
+        find_source(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("xyz", "told"),
+    [
+        (np.zeros((3, 4), np.float32), "xyz"),
+        (np.zeros((3, 4, 3), np.int32), "xyz"),
+        (np.full((3, 4, 3), np.nan, np.float32), "0 points"),
+        (np.stack([np.arange(9.0).reshape(3, 3)] * 3, axis=2), "along a line"),
+        (np.zeros((3, 4, 3)), "along a line"),
+    ],
+)
+def test_a_grid_that_is_no_surface_is_told(tmp_path: Path, xyz: np.ndarray, told: str) -> None:
+    put(tmp_path, "bmesh a.ply 0 0 0 0 0 0 1\n", a=xyz)
+    with open_scan(tmp_path) as scan, pytest.raises(InputError, match=told) as caught:
+        scan.pose(0)
+    assert "a.npz" in str(caught.value)
+
+
+def test_a_conf_file_of_something_else_makes_no_scans(tmp_path: Path) -> None:
+    np.save(tmp_path / "points.npy", np.zeros((4, 3)))
+    (tmp_path / "nginx.conf").write_text("server { listen 80; }\n")
+    (tmp_path / "binary.conf").write_bytes(b"\xff\xfe\0")
+    assert len(find_source(tmp_path)) == 1
+
+
+@pytest.mark.parametrize(
+    ("folder", "scans", "samples"),
+    [("stanford_bunny_scans", 10, 362_272), ("stanford_dragon_stand_scans", 15, 469_193)],
+)
+def test_real_scans_keep_every_sample(folder: str, scans: int, samples: int, data_dir: Path) -> None:
+    place = data_dir / "range" / folder
+    views = views_of(place)
+    assert len(views) == scans
+    assert sum(np.count_nonzero(view.valid()) for view in views) == samples
+    for view in views:
+        (stored,) = read_arrays(place / f"{view.name}.npz", "xyz")
+        assert view.depth.shape == stored.shape[:2]
+        # The columns and rows of the laser's grids are some pixels beside those of a parallel camera.
+        pixels, _ = view.project(view.positions())
+        row, column = np.nonzero(view.valid())
+        off = np.abs(pixels - np.stack([column, row], axis=1) - 0.5)
+        assert np.median(off) < 2
+        assert np.quantile(off, 0.95) < 4.5

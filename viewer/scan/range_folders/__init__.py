@@ -1,0 +1,53 @@
+"""The kinds of folders of range images: one module a kind, found by scanning this folder.
+
+A module declares
+
+- `TITLE: str`, as messages name it;
+- `find(folder, names) -> RangeFrames | None`: its frames, where the folder is of this kind. names: those of
+  all that is in the folder, in natural order. No frame is read, small text files may be. It raises where the
+  folder is of this kind and something is wrong with all of it;
+- `GENERAL = True` where it takes what more special kinds do not.
+
+Modules whose name starts with an underscore are helpers.
+"""
+
+from __future__ import annotations
+
+import os
+import pkgutil
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from ...errors import InputError, explained
+from ..formats import one_message
+from ..times import natural_key
+from ._source import RangeFrames
+
+__all__ = ["RangeFrames", "find_range_frames"]
+
+
+def find_range_frames(folder: Path) -> RangeFrames | None:
+    """The frames of a folder of range images, or None where it is none of a known kind. No frame is read.
+
+    Raises InputError where it is of a known kind and cannot be used.
+    """
+    try:
+        names = sorted(os.listdir(folder), key=natural_key)
+    except OSError as error:
+        raise InputError(f"cannot be listed ({error.strerror})", folder, explained(error)[1]) from error
+    names = [name for name in names if not name.startswith(".")]
+    for kind in _kinds():
+        with one_message(folder, f"cannot be read as {kind.TITLE}"):
+            if (frames := kind.find(folder, names)) is not None:
+                return frames
+    return None
+
+
+@cache
+def _kinds() -> tuple[ModuleType, ...]:
+    """The special ones first."""
+    names = [module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")]
+    kinds = [import_module(f"{__name__}.{name}") for name in names]
+    return tuple(sorted(kinds, key=lambda kind: getattr(kind, "GENERAL", False)))

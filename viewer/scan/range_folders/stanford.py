@@ -1,0 +1,83 @@
+"""Stanford's laser scans: grids of points, and a .conf file that places them around their subject.
+
+A line of the .conf file is `bmesh`, a file, a translation t and a quaternion x y z w. With R the rotation of
+that quaternion, a point p of the scan is at transpose(R) p + t. All scans together are one pose. A grid is
+the array `xyz` (rows, columns, 3) of an NPZ file of that name, the lowest row first, x to the right, y up, z
+towards the scanner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, shortened
+from ...files import read_text
+from ..formats.npz import read_arrays
+from ..range_view import RangeView
+from ._grids import view_of_grid
+from ._poses import from_rotation, rotation_of
+from ._source import RangeFrames
+
+TITLE = "Stanford's laser scans"
+
+_SCAN = "bmesh"
+_MOST_BYTES = 1 << 20
+_UNIT = "m"
+
+
+def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+    """The scans that the folder's .conf file names, as one frame; None where there is no such file."""
+    found = {name: lines for name in names if name.endswith(".conf") if (lines := _lines(folder / name))}
+    if not found:
+        return None
+    if len(found) > 1:
+        raise InputError(f"has several files that place scans: {', '.join(found)}")
+    (conf, lines) = found.popitem()
+    placed = [_placement(folder / conf, line) for line in lines]
+    files = tuple(folder / f"{Path(name).stem}.npz" for name, _ in placed)
+    if missing := [file.name for file in files if not file.is_file()]:
+        raise InputError(f"there is no {missing[0]}, which {conf} places", folder)
+    read = partial(_read, [(file, to_scan) for file, (_, to_scan) in zip(files, placed, strict=True)])
+    return RangeFrames(folder.resolve().name, (conf,), read, (folder / conf, *files), _UNIT)
+
+
+def _lines(conf: Path) -> list[str]:
+    """The lines that place scans; none where the file has none."""
+    try:
+        lines = read_text(conf, _MOST_BYTES).splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []
+    return [line for line in lines if line.split()[:1] == [_SCAN]]
+
+
+def _placement(conf: Path, line: str) -> tuple[str, NDArray[np.float64]]:
+    """The file of a scan, and the matrix (4, 4) from the world to it."""
+    try:
+        _, name, *words = line.split()
+        numbers = np.array(words, np.float64)
+    except ValueError:
+        numbers = np.empty(0)
+    if numbers.shape != (7,) or not np.isfinite(numbers).all():
+        hint = f"A line is {_SCAN}, a file, and 7 numbers: a translation and a quaternion x y z w"
+        raise InputError(f"'{shortened(line)}' places no scan", conf, hint)
+    rotation = rotation_of(numbers[3:])
+    return name, from_rotation(rotation, -rotation @ numbers[:3])
+
+
+def _read(scans: Sequence[tuple[Path, NDArray[np.float64]]], _: int) -> tuple[RangeView, ...]:
+    return tuple(_view(file, to_scan) for file, to_scan in scans)
+
+
+def _view(file: Path, to_scan: NDArray[np.float64]) -> RangeView:
+    try:
+        (grid,) = read_arrays(file, "xyz")
+        if grid.ndim != 3 or grid.shape[2] != 3 or grid.dtype.kind != "f":
+            raise InputError(f"array 'xyz' is {grid.shape} {grid.dtype}, expected (rows, columns, 3) floats")
+        return view_of_grid(grid[::-1], to_scan, file.stem, _UNIT)
+    except InputError as error:
+        raise InputError(error.what, error.where or file, error.hint) from error
