@@ -62,7 +62,7 @@ class Look:
         False,
         f"Paint holes red: gaps of up to {2 * HOLE_REACH} pixels between what is shown",
         group="Colour",
-        key="Shift+H",
+        key="G",
     )
     light: str = param(
         "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
