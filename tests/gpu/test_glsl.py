@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from scenes import sphere, sphere_mesh
 from test_bins import filled, some_visits
 from test_compact import flagged
 from test_pyramid import FILTERS, chain, picture
+from test_range_samples import held, probe, seen_by, stepped_view
 
 from viewer.backends import Backend, backend, backends
 from viewer.bench import baselines
@@ -138,6 +140,13 @@ def use_primitives(gpu: Gpu) -> None:
         subtract_expanded(gpu, fine, coarse, result, how)
         add_expanded(gpu, fine, coarse, result, how)
         gpu.discard(levels, result)
+    view, measured = stepped_view((7, 5)), stepped_view((7, 5), "height", True)
+    bent = replace(stepped_view((7, 5), "range"), distortion=(-0.1, 0.0, 0.0, 0.0))
+    for views, how in product(((view,), (view, measured, bent)), FILTERS.values()):
+        samples = held(gpu, views, how=how)
+        for tiles in (True, False):
+            probe(samples, seen_by(view), 0, 0, tiles)
+        samples.release()
 
 
 @pytest.fixture(scope="module")

@@ -52,6 +52,12 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
+    # Samples of range views.
+    RANGE_DEPTHS = auto()
+    RANGE_LOOKS = auto()
+    RANGE_XY = auto()
+    RANGE_TILES = auto()
+    RANGE_VIEWS = auto()
     SCRATCH = auto()  # where buffers become textures
 
 
@@ -96,6 +102,11 @@ class Storage(IntEnum):
     REACH = 4
     LARGE = 5
     FARTHEST = 7
+    # Samples of range views: a level that is made.
+    RANGE_DEPTHS = 0
+    RANGE_LOOKS = 1
+    RANGE_XY = 2
+    RANGE_TILES = 0
 
 
 @unique

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .. import srgb
-from ..scan import points
+from ..scan import grid_normals, points
 
 NOTHING = points.NOTHING
 NO_DEPTH = 0x7F800000  # +inf as float bits: the depth where nothing is
@@ -13,6 +13,15 @@ LEAST_RADIUS = 0.7072  # pixels: a smaller disc or ball may miss all pixel centr
 BEHIND = 2.0**64  # what depth-buffer values are divided by of splats that fill, behind all others
 GROUP = 256  # invocations of a work group
 GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
+STEEPEST = grid_normals.STEEPEST  # depth step between samples of one surface, in their lateral spacing
+
+# The table of range views: texels of four words.
+RANGE_Z, RANGE_ALONG_RAY, RANGE_HEIGHT = 1, 2, 4  # what a depth is
+RANGE_LEVELS_AT = 11  # of a view's texels, the first of its levels
+RANGE_MOST_LEVELS = 8
+RANGE_ENTRY = RANGE_LEVELS_AT + RANGE_MOST_LEVELS
+RANGE_TILE = 16  # samples along an edge of a tile
+RANGE_TILE_TEXELS = 3
 
 SRGB_SLOPE = srgb.SLOPE
 SRGB_OFFSET = srgb.OFFSET

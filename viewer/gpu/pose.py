@@ -9,8 +9,6 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import product
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -18,11 +16,11 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
-from ..scan.colors import srgb8
 from ..scan.points import PointCloud
 from ..scan.range_view import RangeView
 from . import gl
 from .context import Gpu
+from .range_samples import RangeSamples
 
 # What one texel of each array is.
 FORMATS = {
@@ -33,20 +31,13 @@ FORMATS = {
     "radii": gl.R32F,
     "axes": gl.RGBA32F,
 }
-# Components and type of a texel of each image of a range view, and how texels are made of its values.
-_IMAGES: dict[str, tuple[int, str, Callable[[NDArray], NDArray]]] = {
-    "depth": (1, "f4", lambda depth: depth),
-    "mask": (1, "f1", lambda mask: mask * np.uint8(255)),
-    "color": (4, "f1", lambda color: _opaque(srgb8(color))),
-    "confidence": (1, "f4", lambda confidence: confidence),
-}
-_VIEW = "view:"  # that the keys of images begin with
+_RANGES = "samples"  # the name that samples of range views are uploaded by
 _SAMPLE = 1 << 13  # values that ranges look at
 _SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
 
 
 class GpuPose:
-    """The arrays of one point cloud as buffer textures, indexed by row, and the images of its range views.
+    """The arrays of one point cloud as buffer textures, indexed by row, and the samples of its range views.
 
     A row is a point's place in the cloud's arrays; `cloud.ids` gives its index in the file.
     `stored` is the cloud as the scan has it, `cloud` the same with what was estimated since;
@@ -56,7 +47,7 @@ class GpuPose:
     def __init__(self, gpu: Gpu, cloud: PointCloud, views: tuple[RangeView, ...] = ()) -> None:
         self.gpu = gpu
         self._arrays: dict[Hashable, gl.BufferTexture] = {}  # by name; what is packed, by how
-        self._images: dict[str, moderngl.Texture] = {}
+        self._samples: RangeSamples | None = None
         self._uploads: dict[str, _Upload] = {}  # that have begun
         if len(cloud) > gpu.max_points:
             raise InputError(
@@ -85,26 +76,26 @@ class GpuPose:
         """The attribute on the GPU; None where the scan has none such and none was estimated."""
         return None if getattr(self.cloud, name) is None else self.array(name)
 
-    def image(self, view: int, name: str) -> moderngl.Texture:
-        """depth (float, as read), mask (0 or 1), color (RGBA8, sRGB), confidence (float) of the range view of
-        this number, row 0 at the top, without filtering; uploaded at the first call. Raises InputError where
-        the view has none, or is larger than the driver's images."""
-        key = _image_key(view, name)
-        self.upload([key])
-        return self._images[key]
+    @property
+    def samples(self) -> RangeSamples:
+        """The samples of the range views; uploaded, and their pyramids made, at the first call. Raises
+        InputError where there is no range view, or the driver takes no so many samples."""
+        self.upload([_RANGES])
+        assert self._samples is not None
+        return self._samples
 
     def names_of(self, needs: Iterable[str]) -> list[str]:
-        """The arrays and images that a backend with these needs reads, of those that are there."""
+        """The arrays that a backend with these needs reads, of those that are there, or "samples"."""
         names = [name for name in needs if name != "views" and getattr(self.cloud, name) is not None]
         if "views" not in needs:
             return ["positions", *names]
-        images = product(enumerate(self.views), _IMAGES)
-        there = [_image_key(i, name) for (i, view), name in images if getattr(view, name) is not None]
-        return [*names, *there]
+        return [*names, _RANGES]
 
     def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:
         """Upload what is missing of these arrays, in slices until the time is over; whether all is there."""
-        missing = [name for name in names if name not in self._arrays and name not in self._images]
+        missing = [name for name in names if name not in self._arrays]
+        if self._samples is not None and self._samples.complete:
+            missing = [name for name in missing if name != _RANGES]
         if not missing:
             return True
         with self.preparing("upload"):
@@ -125,24 +116,26 @@ class GpuPose:
         return self._arrays[key]
 
     def _upload(self, name: str, end: float) -> bool:
-        """Go on with an array or image until that time of the performance counter; whether it is there."""
+        """Go on with an array or the samples until that time of the performance counter; whether it is
+        there."""
+        if name == _RANGES:
+            return self._upload_samples(end)
         if name not in self._uploads:
-            self._uploads[name] = self._begin(name)
+            self._uploads[name] = _array_upload(self.gpu, self._values(name))
         if not self._uploads[name].go_on(end):
             return False
-        upload = self._uploads.pop(name)
-        if isinstance(upload.target, moderngl.Texture):
-            self._images[name] = upload.target
-            self.uploaded_bytes += upload.nbytes
-        else:
-            self._keep_array(name, upload, FORMATS.get(name, gl.R32F))
+        self._keep_array(name, self._uploads.pop(name), FORMATS.get(name, gl.R32F))
         return True
 
-    def _begin(self, name: str) -> _Upload:
-        if not name.startswith(_VIEW):
-            return _array_upload(self.gpu, self._values(name))
-        number, image = name.removeprefix(_VIEW).split(":")
-        return _image_upload(self.gpu, self.views[int(number)], image)
+    def _upload_samples(self, end: float) -> bool:
+        if self._samples is None:
+            if not self.views:
+                raise InputError("the scan has no range views")
+            self._samples = RangeSamples(self.gpu, self.views, self.stored.origin)
+        if not self._samples.upload(end):
+            return False
+        self.uploaded_bytes += self._samples.nbytes
+        return True
 
     def _keep_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
         self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
@@ -228,7 +221,7 @@ class GpuPose:
     def __del__(self) -> None:
         begun = (upload.target for upload in self._uploads.values())
         layers = (layer.texels for layer in self._layers.values())
-        self.gpu.discard(*self._arrays.values(), *self._images.values(), *layers, *begun)
+        self.gpu.discard(*self._arrays.values(), *layers, *begun, self._samples)
 
 
 @dataclass(eq=False)
@@ -245,9 +238,9 @@ class Layer:
 
 @dataclass
 class _Upload:
-    """A buffer or texture on its way to the GPU: what it will be, and what is to be done, a slice a step."""
+    """A buffer on its way to the GPU: what it will be, and what is to be done, a slice a step."""
 
-    target: Any
+    target: moderngl.Buffer
     nbytes: int
     steps: deque[Callable[[], object]]
 
@@ -268,36 +261,6 @@ def _array_upload(gpu: Gpu, values: NDArray) -> _Upload:
     slices = range(0, len(words), _SLICE)
     steps = (partial(buffer.write, words[start : start + _SLICE], offset=start) for start in slices)
     return _Upload(buffer, len(words), deque(steps))
-
-
-def _image_upload(gpu: Gpu, view: RangeView, name: str) -> _Upload:
-    values: NDArray | None = getattr(view, name)
-    components, dtype, texels = _IMAGES[name]
-    height, width = view.depth.shape
-    if values is None:
-        raise InputError(f"the range view '{view.name}' has no {name}")
-    if max(width, height) > gl.max_image_edge():
-        most = gl.max_image_edge()
-        raise InputError(f"a range view of {width}x{height} pixels; this driver takes {most:,} along an edge")
-    texture = gpu.ctx.texture((width, height), components, dtype=dtype, alignment=1)
-    texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.NEAREST, moderngl.NEAREST), False, False
-    row_bytes = width * components * int(dtype[1])
-    rows = max(1, _SLICE // row_bytes)
-
-    def write(top: int) -> None:
-        part = slice(top, min(top + rows, height))
-        place = (0, top, width, part.stop - top)
-        texture.write(np.ascontiguousarray(texels(values[part])), viewport=place, alignment=1)
-
-    return _Upload(texture, row_bytes * height, deque(partial(write, top) for top in range(0, height, rows)))
-
-
-def _image_key(view: int, name: str) -> str:
-    return f"{_VIEW}{view}:{name}"
-
-
-def _opaque(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return np.pad(rgb, ((0, 0), (0, 0), (0, 1)), constant_values=255)
 
 
 def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 _WEIGHTS = (1.0, 2.0, 3.0, 2.0, 1.0)  # of neighbours, by how far they are along a row or a column
 _REACH = len(_WEIGHTS) // 2  # pixels
-_STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
+STEEPEST = 10.0  # the steepest depth step on a surface, in pixel footprints: 84 degrees
 _AT_ONCE = 1 << 15  # pixels worked on together: what fits a cache
 _LEAST_SPREAD = 1e-6  # of the neighbours, below which they lie on a line; 15 and more where they do not
 
@@ -55,7 +55,7 @@ def _normals(
 ) -> NDArray[np.float64]:
     """Normals of a strip of rows, the first of which is `top`. around: its depths, places: those of its
     pixels, both with a margin."""
-    slope_x, slope_y, level, seen = _fit(around, _STEEPEST / min(focal), parallel, places)
+    slope_x, slope_y, level, seen = _fit(around, STEEPEST / min(focal), parallel, places)
     alone = np.isnan(slope_x)
     across = np.stack([slope_x * focal[0], -slope_y * focal[1]], axis=1)
     if parallel:  # depth rises by `across` with a unit to the right and one up

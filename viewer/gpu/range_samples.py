@@ -1,0 +1,351 @@
+"""Range samples: all pixels of a pose's range views on the GPU, as they were measured, in pyramids.
+
+A sample is a pixel of a range view. Its depth stays a float32 as it was read, and its place in the picture
+comes from its place in the buffers, so that neither positions nor indices are kept: 8 bytes a sample, and a
+third for the coarser levels. shaders/range/samples.glsl reads them.
+
+Coarser levels are made here, by the filters of viewer/gpu/pyramid.py, of samples that are there and of one
+surface: those within `STEEPEST` times their lateral spacing of the nearest in reach. Depths, colours (in
+linear light) and measured places are means weighted by taps and alphas, alpha is the mean of all, there or
+not. A coarse sample counts as lying in the middle of its reach (`level_to_pixel` in samples.glsl); where only
+some of that is there, it is off by up to half a coarse sample along its surface.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..scan.colors import srgb8
+from ..scan.range_view import RangeView
+from ..view import View
+from . import gl
+from .bindings import Storage, Texture
+from .constants import (
+    RANGE_ALONG_RAY,
+    RANGE_ENTRY,
+    RANGE_HEIGHT,
+    RANGE_LEVELS_AT,
+    RANGE_MOST_LEVELS,
+    RANGE_TILE,
+    RANGE_TILE_TEXELS,
+    RANGE_Z,
+)
+from .context import Gpu
+from .pyramid import BOX, Filter, sizes
+
+LEVELS = 6
+_KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
+_ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
+_SLICE = 1 << 18  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
+
+
+@dataclass(frozen=True)
+class SampleLevel:
+    """Samples of one level of a view.
+
+    first: of its samples, and first_tile: of its tiles, in the buffers. size: columns and rows.
+    """
+
+    first: int
+    first_tile: int
+    size: tuple[int, int]
+
+    @property
+    def count(self) -> int:
+        """How many samples it has."""
+        return self.size[0] * self.size[1]
+
+    @property
+    def tiles(self) -> int:
+        """How many tiles it has."""
+        return -(-self.size[0] // RANGE_TILE) * -(-self.size[1] // RANGE_TILE)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pod:
+    """Pod of a range view: what stays of that when its samples are on the GPU."""
+
+    kind: int
+    size: tuple[int, int]
+    pinhole: tuple[float, float, float, float]
+    distortion: tuple[float, ...]
+    has_xy: bool
+    world_to_camera: NDArray[np.float64]
+
+
+class RangeSamples:
+    """The samples of range views as buffer textures: view after view, each level after level, in row order.
+
+    depths: R32F, of level 0 the bits that were read. looks: RGBA8, sRGB; alpha 0: no sample, else 1 to 255 by
+    the confidence relative to the view's largest. xy: RG32F, measured x and y in the pod's camera space, None
+    where no view has such. tiles: RGBA32F, bounds of 16 x 16 samples of a level each, for
+    shaders/range/tiles.glsl. places: of each view, of each level, where its samples are. levels: of each
+    view; level k has 2^k times fewer columns and rows, rounded up. defines: macros for programs that include
+    range/samples.glsl: what the views have, so that nothing is computed for what none has.
+
+    origin: (3,) float64, the pose's. levels: at most 8; None: 6, or fewer where all views are small. Raises
+    InputError where the driver takes no so many samples.
+    """
+
+    def __init__(
+        self,
+        gpu: Gpu,
+        views: Sequence[RangeView],
+        origin: NDArray[np.float64],
+        levels: int | None = None,
+        how: Filter = BOX,
+    ) -> None:
+        self._gpu, self._origin, self.filter = gpu, origin, how
+        self._pods = [_pod(view) for view in views]
+        self.levels = levels or min(LEVELS, max(len(sizes(pod.size)) for pod in self._pods))
+        self.places, self._total, tiles = _places(self._pods, self.levels)
+        self._check_size()
+        has_xy = any(pod.has_xy for pod in self._pods)
+        self.depths = self._texels(gl.R32F, 4 * self._total)
+        self.looks = self._texels(gl.RGBA8, 4 * self._total)
+        self.xy = self._texels(gl.RG32F, 8 * self._total) if has_xy else None
+        self.tiles = self._texels(gl.RGBA32F, 16 * RANGE_TILE_TEXELS * tiles)
+        self._table = self._texels(gl.RGBA32UI, 16 * RANGE_ENTRY * len(views))
+        self._tabled: tuple[object, ...] | None = None  # what the table holds
+        self.defines: dict[str, object] = {
+            "RANGE_KINDS": int(np.bitwise_or.reduce([pod.kind for pod in self._pods])),
+            "RANGE_DISTORTED": int(any(pod.distortion for pod in self._pods)),
+            "RANGE_HAS_XY": int(has_xy),
+        }
+        self._steps = deque([*self._uploads(views), *self._reductions()])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        textures = (self.depths, self.looks, self.xy, self.tiles, self._table)
+        return sum(texture.buffer.size for texture in textures if texture is not None)
+
+    @property
+    def count(self) -> int:
+        """How many samples the views have, there or not."""
+        return sum(levels[0].count for levels in self.places)
+
+    @property
+    def bytes_per_sample(self) -> float:
+        """Bytes held on the GPU for each sample of the views, coarser levels and all."""
+        return self.nbytes / self.count
+
+    @property
+    def complete(self) -> bool:
+        """Whether all is uploaded, and the coarser levels made."""
+        return not self._steps
+
+    def upload(self, end: float) -> bool:
+        """Upload and reduce, a slice at a time, until that time of `time.perf_counter`, at least one; whether
+        all is there."""
+        while self._steps:
+            self._steps.popleft()()
+            if time.perf_counter() > end:
+                break
+        return self.complete
+
+    def reduce(self, how: Filter) -> None:
+        """Have the coarser levels made by this filter; nothing is done where they are. All is uploaded."""
+        if how == self.filter:
+            return
+        self.filter, self._tabled = how, None
+        for step in self._reductions():
+            step()
+
+    def bind(self, view: View) -> None:
+        """Bind all that shaders/range/samples.glsl and tiles.glsl read, for pictures of this view."""
+        self._write_table(view)
+        self.depths.bind(Texture.RANGE_DEPTHS)
+        self.looks.bind(Texture.RANGE_LOOKS)
+        self.tiles.bind(Texture.RANGE_TILES)
+        self._table.bind(Texture.RANGE_VIEWS)
+        if self.xy is not None:
+            self.xy.bind(Texture.RANGE_XY)
+
+    def release(self) -> None:
+        """Delete all of it."""
+        self._steps.clear()
+        self._gpu.discard(self.depths, self.looks, self.xy, self.tiles, self._table)
+
+    def _texels(self, texel_format: int, nbytes: int) -> gl.BufferTexture:
+        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+
+    def _check_size(self) -> None:
+        """Raise InputError for more samples than a driver takes, in all or of a level that shaders write."""
+        written = max((levels[1].count for levels in self.places if self.levels > 1), default=0)
+        if self._total > self._gpu.max_points or 8 * written > self._gpu.max_storage_bytes:
+            count = sum(levels[0].count for levels in self.places)
+            raise InputError(
+                f"range views of {count:,} pixels in one pose are too many for this driver",
+                hint="Split the scan or make its images smaller",
+            )
+
+    # --- level 0 ----------------------------------------------------------------------
+
+    def _uploads(self, views: Sequence[RangeView]) -> Iterator[Callable[[], object]]:
+        """Steps that upload the samples as they were measured."""
+        for view, levels in zip(views, self.places, strict=True):
+            width, height = levels[0].size
+            most = _most_confidence(view)
+            rows = max(1, _SLICE // width)
+            for top in range(0, height, rows):
+                yield partial(self._write, view, most, top, top + rows, levels[0].first + top * width)
+
+    def _write(self, view: RangeView, most: float, top: int, bottom: int, first: int) -> None:
+        """Upload rows of a view."""
+        part = _rows(view, slice(top, bottom))
+        self.depths.buffer.write(np.ascontiguousarray(part.depth), offset=4 * first)
+        self.looks.buffer.write(_looks(part, most), offset=4 * first)
+        if part.xy is not None:
+            assert self.xy is not None
+            self.xy.buffer.write(np.ascontiguousarray(part.xy), offset=8 * first)
+
+    # --- levels and tiles -------------------------------------------------------------
+
+    def _reductions(self) -> Iterator[Callable[[], object]]:
+        """Steps that make the coarser levels and the tiles."""
+        for number, levels in enumerate(self.places):
+            for level, made in enumerate(levels[1:]):
+                for first in range(0, made.count, _SLICE // 4):
+                    yield partial(self._reduce, number, level, first)
+            for level, made in enumerate(levels):
+                tiles = max(1, _SLICE // RANGE_TILE**2)
+                for first in range(0, made.tiles, tiles):
+                    yield partial(self._bound, number, level, first, tiles)
+
+    def _reduce(self, number: int, level: int, first: int) -> None:
+        """Make samples of the level after this one."""
+        how, made = self.filter, self.places[number][level + 1]
+        taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
+        taken = {"FIRST": how.first, "COUNT": len(how.taps), "TAPS": f"float[]({taps})"}
+        program = self._gpu.compute(
+            "range/reduce.comp", {**self.defines, **taken, "NEAREST": int(how.nearest)}
+        )
+        self._bind_read()
+        for texels, storage, nbytes in (
+            (self.depths, Storage.RANGE_DEPTHS, 4),
+            (self.looks, Storage.RANGE_LOOKS, 4),
+            (self.xy, Storage.RANGE_XY, 8),
+        ):
+            if texels is not None:
+                texels.buffer.bind_to_storage_buffer(
+                    storage, offset=nbytes * made.first, size=nbytes * made.count
+                )
+        self._gpu.set(program, number=number, level=level, first=first)
+        with self._gpu.timers.measure("reduce"):
+            self._gpu.dispatch(program, min(_SLICE // 4, made.count - first))
+
+    def _bound(self, number: int, level: int, first: int, count: int) -> None:
+        """Make tiles of a level."""
+        made = self.places[number][level]
+        program = self._gpu.compute("range/bounds.comp", self.defines)
+        self._bind_read()
+        texel = 16 * RANGE_TILE_TEXELS
+        offset = texel * made.first_tile
+        self.tiles.buffer.bind_to_storage_buffer(Storage.RANGE_TILES, offset=offset, size=texel * made.tiles)
+        self._gpu.set(program, number=number, level=level, first=first)
+        with self._gpu.timers.measure("bounds"):
+            self._gpu.dispatch(program, min(count, made.tiles - first))
+
+    def _bind_read(self) -> None:
+        if self._tabled is None:
+            self._write_table(None)
+        self.depths.bind(Texture.RANGE_DEPTHS)
+        self.looks.bind(Texture.RANGE_LOOKS)
+        self._table.bind(Texture.RANGE_VIEWS)
+        if self.xy is not None:
+            self.xy.bind(Texture.RANGE_XY)
+
+    # --- the table --------------------------------------------------------------------
+
+    def _write_table(self, view: View | None) -> None:
+        """Write what shaders know of each view, as `range_view` of samples.glsl reads it. view: None leaves
+        each in its pod's space."""
+        key = () if view is None else (view.rotation.tobytes(), view.translation.tobytes())
+        if key == self._tabled:
+            return
+        words = np.zeros((len(self._pods), RANGE_ENTRY, 4), np.uint32)
+        first_id = 0
+        for number, (pod, entry) in enumerate(zip(self._pods, words, strict=True)):
+            floats = entry.view(np.float32)
+            to_screen = np.eye(4) if view is None else self._to_screen(pod, view)
+            floats[0:3] = to_screen[:3]
+            floats[3:6] = np.linalg.inv(to_screen)[:3]
+            floats[6] = pod.pinhole
+            floats[7:9].flat[: len(pod.distortion)] = pod.distortion
+            entry[9] = (*pod.size, pod.kind, first_id)
+            entry[10, :3] = bool(pod.distortion), pod.has_xy, len(self.filter.taps) % 2
+            entry[RANGE_LEVELS_AT:] = self._levels_after(number)
+            first_id += pod.size[0] * pod.size[1]
+        self._table.buffer.write(words)
+        self._tabled = key
+
+    def _levels_after(self, number: int) -> NDArray[np.uint32]:
+        """The levels of a view in the table; those that it lacks begin where the next view does."""
+        rest = self.places[number + 1 :]
+        after = rest[0][0].first if rest else self._total
+        rows = np.full((RANGE_MOST_LEVELS, 4), (after, 0, 1, 1), np.uint32)
+        for row, level in zip(rows, self.places[number], strict=False):
+            row[:] = level.first, level.first_tile, *level.size
+        return rows
+
+    def _to_screen(self, pod: _Pod, view: View) -> NDArray[np.float64]:
+        """The way from the pod's space to the picture's, (4, 4)."""
+        to_view = np.eye(4)
+        to_view[:3, :3] = view.rotation
+        to_view[:3, 3] = view.translation - view.rotation @ self._origin
+        return to_view @ np.linalg.inv(pod.world_to_camera)
+
+
+def _pod(view: RangeView) -> _Pod:
+    height, width = view.depth.shape
+    pinhole = (view.fx, view.fy, view.cx, view.cy)
+    has_xy, matrix = view.xy is not None, view.world_to_camera
+    return _Pod(_KINDS[view.kind], (width, height), pinhole, view.distortion, has_xy, matrix)
+
+
+def _places(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:
+    """The places of all levels, and how many samples and tiles there are with what is left free between."""
+    places, samples, tiles = [], 0, 0
+    for pod in pods:
+        own = []
+        for size in sizes(pod.size, levels):
+            own.append(SampleLevel(samples, tiles, size))
+            samples += -(-own[-1].count // _ALIGNED) * _ALIGNED
+            tiles += -(-own[-1].tiles // _ALIGNED) * _ALIGNED
+        places.append(own)
+    return places, samples, tiles
+
+
+def _rows(view: RangeView, rows: slice) -> RangeView:
+    """Some rows of a view, to be looked at alone."""
+    images = ("depth", "mask", "color", "confidence", "xy")
+    there = {name: getattr(view, name) for name in images}
+    return replace(view, **{name: image[rows] for name, image in there.items() if image is not None})
+
+
+def _most_confidence(view: RangeView) -> float:
+    """The largest confidence of a view that is a number; 0 where none is."""
+    if view.confidence is None:
+        return 0.0
+    return float(np.max(view.confidence, initial=0.0, where=np.isfinite(view.confidence)))
+
+
+def _looks(view: RangeView, most: float) -> NDArray[np.uint8]:
+    """Colour and alpha of the samples, (H, W, 4). most: the confidence that counts as full."""
+    looks = np.full((*view.depth.shape, 4), 255, np.uint8)
+    if view.color is not None:
+        looks[..., :3] = srgb8(view.color)
+    if view.confidence is not None and most > 0:
+        part = np.clip(np.nan_to_num(view.confidence / np.float32(most), nan=0.0), 0, 1)
+        looks[..., 3] = 1 + np.rint(254 * part)
+    looks[..., 3][~view.valid()] = 0
+    return looks
