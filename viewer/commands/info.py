@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import shortened
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
+from ..scan.range_view import RangeView
 from ..scan.timeline import Timeline
 from ._console import escaped
 from ._scans import SCAN_HELP, first_readable, open_timeline
@@ -50,7 +51,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         "points": len(cloud),
         "dropped": cloud.dropped,
         "bytes": pose.nbytes,
-        "views": [{"name": view.name, "size": view.depth.shape[::-1]} for view in pose.views],
+        "views": [_view_facts(view) for view in pose.views],
         "origin": cloud.origin.tolist(),
         "bounds": {"low": (cloud.origin + low).tolist(), "high": (cloud.origin + high).tolist()},
         "attributes": {
@@ -58,6 +59,16 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
             for name, values in _attributes(cloud).items()
         },
     }  # fmt: skip
+
+
+def _view_facts(view: RangeView) -> dict[str, Any]:
+    facts = {"name": view.name, "size": view.depth.shape[::-1]}
+    return facts | ({"assumed": view.assumed} if view.assumed else {})
+
+
+def _told(view: dict[str, Any]) -> str:
+    told = "{}, {} x {} pixels".format(view["name"], *view["size"])
+    return f"{told}; {view['assumed']}" if "assumed" in view else told
 
 
 def _attributes(cloud: PointCloud) -> dict[str, NDArray]:
@@ -85,7 +96,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         ("poses", poses),
         ("pose", f"{facts['pose']}, {facts['label']}"),
         ("points", points),
-        *(("view", "{}, {} x {} pixels".format(view["name"], *view["size"])) for view in facts["views"]),
+        *(("view", _told(view)) for view in facts["views"]),
         ("unit", unit),
         ("size", " x ".join(f"{b - a:g}" for a, b in zip(low, high, strict=True))),
         ("from", ", ".join(f"{value:g}" for value in low)),

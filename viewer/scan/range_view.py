@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ DepthKind = Literal["z", "range", "height"]
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _MASKED_IN = 0.01  # above which a number in a mask says that the depth is used (Farooq 2013, 4.3)
+_FIELD_OF_VIEW = 45.0  # degrees, where nothing tells it
 _AT_ONCE = 1 << 17  # pixels worked on together
 _MERGED_BYTES, _MERGING_BYTES = 52, 20 << 20  # that `merge` takes for a point, and beside all points
 
@@ -42,6 +44,7 @@ class RangeView:
     distortion:      the lens' 4, 5 or 8 coefficients, see `viewer/scan/lens.py`; none where depth is height
     world_to_camera: (4, 4) float64, a rotation and a translation, for column vectors
     name:            the pod's. unit: the name of the unit of length
+    assumed:         what was assumed since nothing tells it, to be told to the user; else empty
 
     With x = (column + 0.5 - cx) / fx and y = (cy - row - 0.5) / fy, less the lens' distortion, a pixel sees
     the point d (x, y, -1) in camera space where its depth d is z, d (x, y, -1) / |(x, y, -1)| where it is
@@ -64,6 +67,7 @@ class RangeView:
     world_to_camera: NDArray[np.float64]
     name: str = ""
     unit: str = UNKNOWN_UNIT
+    assumed: str = ""
 
     def __post_init__(self) -> None:
         shape = np.shape(self.depth)
@@ -234,6 +238,14 @@ class RangeView:
             from_eye[done : done + len(row)] = np.stack([x, y, -depth], axis=1) @ turn
             done += len(row)
         return from_eye
+
+
+def assumed_pinhole(width: int, height: int) -> dict[str, Any]:
+    """A calibration for pictures of this size where nothing tells it, and `assumed`, as a RangeView has them:
+    45 degrees across the longer edge."""
+    focal = max(width, height) / (2 * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
+    told = f"no calibration is told: a field of view of {_FIELD_OF_VIEW:g} degrees is assumed"
+    return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": told}
 
 
 def mask_of(numbers: NDArray) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from ..task import Cancelled, Task
 from .cache import PoseCache, default_budget
 from .faces import Faces
@@ -34,10 +34,11 @@ class ScanMessage:
 
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
     coordinate were left out), "shortened" (splats far larger than the scan were), "unit" (lengths in
-    another unit than the scan's) or "times". index: the frame; None where it concerns all.
+    another unit than the scan's), "assumed" (what of range views nothing tells) or "times". index: the
+    frame; None where it concerns all.
     """
 
-    kind: Literal["broken", "dropped", "shortened", "unit", "times"]
+    kind: Literal["broken", "dropped", "shortened", "unit", "assumed", "times"]
     text: str
     index: int | None = None
 
@@ -339,6 +340,8 @@ class Timeline:
                 scanned = self._source.load(index)
                 if not isinstance(scanned, PointCloud):
                     scanned = self._in_unit(index, scanned)
+                    for assumed in {view.assumed for view in scanned if view.assumed}:
+                        self._tell_once("assumed", f"{label}: {shortened(assumed)}", index)
                 return Pose.of(index, float(self.times[index]), label, scanned)
         except InputError as error:
             if error.where is None:
@@ -357,10 +360,13 @@ class Timeline:
             what = (
                 f"{self._source.label(index)} is in {others[0]}, the scan in {unit}: other units are {done}"
             )
-            with self._state:
-                if not any(notice.kind == "unit" for notice in self.messages):
-                    self.messages.append(ScanMessage("unit", what, index))
+            self._tell_once("unit", what, index)
         return converted
+
+    def _tell_once(self, kind: Literal["unit", "assumed"], text: str, index: int) -> None:
+        with self._state:
+            if not any(notice.kind == kind for notice in self.messages):
+                self.messages.append(ScanMessage(kind, text, index))
 
 
 def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]:

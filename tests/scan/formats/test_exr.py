@@ -185,6 +185,116 @@ def test_what_is_no_range_scan(
     assert caught.value.hint
 
 
+Channels = dict[str, np.ndarray]
+
+
+def parts(path: Path, *several: tuple[str, dict[str, object], Channels]) -> Path:
+    """A file of other programs: name, attributes beside those that all pictures have, and channels a part."""
+    kinds = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    with open(path, "wb") as stream:
+        OpenEXR.File(
+            [OpenEXR.Part(kinds | header, channels, name) for name, header, channels in several]
+        ).write(stream)
+    return path
+
+
+def rendered(**camera: object) -> tuple[RangeView, dict[str, object], Channels]:
+    """A sphere without a mask, and attributes and channels of its picture as other programs write it."""
+    view = replace(sphere_view((0.3, 0, 4)), mask=np.ones((40, 48), bool), confidence=None)
+    seen = view.valid()
+    channels = {name: np.ascontiguousarray(view.color[..., i]) for i, name in enumerate("RGB")}
+    channels |= {"A": seen.astype(np.float16), "Z": np.where(seen, view.depth, np.float32(1e10))}
+    return view, camera, channels
+
+
+def cameras_of(path: Path, view: RangeView) -> dict[str, object]:
+    """The standard matrices of a view."""
+    with OpenEXR.File(str(save(path, (view,))), header_only=True) as file:
+        header = dict(file.parts[0].header)
+    return {name: header[name] for name in ("worldToCamera", "worldToNDC")}
+
+
+def test_pictures_of_other_programs_stand_where_their_matrices_say(tmp_path: Path) -> None:
+    for kind in ("z", "height"):
+        shape, _, _ = shape_view("sphere", kind)
+        camera = cameras_of(tmp_path / "ours.exr", shape)
+        (view,) = formats.read(parts(tmp_path / "f.exr", ("beauty", camera, {"Z": shape.depth})))
+        assert (view.kind, view.name, view.unit, view.assumed) == (kind, "beauty", "units", "")
+        assert view.positions() == pytest.approx(shape.positions(), abs=1e-5)
+
+
+def test_a_camera_that_nothing_tells_is_assumed(tmp_path: Path) -> None:
+    shape, header, channels = rendered()
+    path = parts(tmp_path / "f.exr", ("beauty", header, channels))
+    (view,) = formats.read(path)
+    assert "a field of view of 45 degrees is assumed" in view.assumed
+    assert view.fx == view.fy == pytest.approx(24 / np.tan(np.radians(22.5)))
+    assert (view.cx, view.cy) == (24, 20)
+    assert np.array_equal(view.valid(), shape.valid()), "without alpha nothing was seen"
+    with open_scan(path) as scan:
+        scan.pose(0)
+        assert [(message.kind, message.text) for message in scan.messages] == [
+            ("assumed", f"f.exr: {view.assumed}")
+        ]
+    assert_same_bits(formats.read(save(tmp_path / "again.exr", (view,))), (view,))
+    header |= {"screenWindowWidth": 0.5, "screenWindowCenter": np.array([0.125, 0.25], np.float32)}
+    (view,) = formats.read(parts(path, ("beauty", header, channels)))
+    assert (view.fx, view.fy, view.cx, view.cy, view.assumed) == (96, 96, 24 - 12, 20 + 24, "")
+
+
+def test_depth_and_colours_are_found_in_layers(tmp_path: Path) -> None:
+    shape, header, channels = rendered()
+    half = {name: (0.5 * channels[name]).astype(np.float16) for name in "RGBA"}  # half transparent
+    layers = {f"Scene.Combined.{name}": half[name] for name in "RGBA"} | {"Scene.Depth.Z": channels["Z"]}
+    layers |= {f"Scene.Normal.{name}": channels["R"] for name in "XYZ"}
+    (view,) = formats.read(parts(tmp_path / "f.exr", ("", header, layers)))
+    seen = shape.valid()
+    assert np.array_equal(view.depth[seen], shape.depth[seen])
+    assert view.color[seen] == pytest.approx(shape.color[seen], abs=1e-3)
+    # Colours of other pixels are none of these.
+    colors = {name: channels[name][1:].copy() for name in "RGB"}
+    header |= {"displayWindow": (np.zeros(2, np.int32), np.array([47, 39], np.int32))}
+    (view,) = formats.read(
+        parts(tmp_path / "f.exr", ("a", header, {"Z": channels["Z"]}), ("b", header, colors))
+    )
+    assert view.color is None
+    assert np.array_equal(view.valid(), seen), "1e10 is where nothing is"
+
+
+def test_eyes_count_where_their_cameras_are_known(tmp_path: Path) -> None:
+    left, right = shape_view("sphere", "z")[0], replace(shape_view("plane", "z")[0], name="other")
+    eyes = {"left": left, "right": right}
+    path = tmp_path / "f.exr"
+    for known in (True, False):
+        several = []
+        for name, eye in eyes.items():
+            header = {"view": name} | (cameras_of(path, eye) if known else {})
+            several.append((f"depth_{name}", header, {"Z": eye.depth}))
+        views = formats.read(parts(path, *several))
+        assert [view.name for view in views] == (["left", "right"] if known else ["left"])
+        assert [view.depth.tobytes() for view in views] == [
+            e.depth.tobytes() for e in (left, right)[: 1 + known]
+        ]
+
+
+@pytest.mark.parametrize(
+    ("camera", "reason"),
+    [
+        ({"worldToCamera": np.eye(4, dtype=np.float32)}, "its worldToNDC is no camera's"),
+        ({"worldToCamera": np.zeros((4, 4), np.float32)}, "Singular matrix"),
+        ({"worldToCamera": np.full((4, 4), np.nan, np.float32)}, "not a rotation|no camera's"),
+        ({"screenWindowWidth": 0.0}, "calibration is unusable: fx inf|division by zero"),
+    ],
+)
+def test_cameras_of_other_programs_that_are_none(
+    camera: dict[str, object], reason: str, tmp_path: Path
+) -> None:
+    _, _, channels = rendered()
+    to_ndc = {"worldToNDC": np.ones((4, 4), np.float32)}
+    with pytest.raises(InputError, match=reason):
+        formats.read(parts(tmp_path / "f.exr", ("beauty", to_ndc | camera, channels)))
+
+
 def test_damaged_parts_are_refused_and_standard_output_stays_clean(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -277,18 +387,35 @@ def test_a_sequence_opens_with_its_unit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("odd/exr/AllHalfValues.exr", "lacks: channel Z, attribute worldToCamera, attribute fx"),
-        ("odd/exr/WideFloatRange.exr", "lacks: channel Z, attribute worldToCamera, attribute fx"),
-        ("odd/exr/damaged_asan_561_c28c.exr", "lacks: channel Z"),
+        ("odd/exr/AllHalfValues.exr", "is no range view: it has no channel Z. Depth of other programs"),
+        ("odd/exr/WideFloatRange.exr", "it has no channel Z"),
+        ("odd/exr/damaged_asan_561_c28c.exr", "it has no channel Z"),
         ("odd/exr/damaged_fuzz_5936.exr", "is no EXR file, or damaged"),
-        ("range/openexr_beachball/singlepart.0001.exr", "'rgba' is no range view, it lacks: attribute world"),
-        ("range/openexr_beachball/multipart.0001.exr", "'rgba_right' is no range view, it lacks: channel Z"),
         ("range/openexr_deep/LowResLeftView_Balls.exr", "'rgba.left' is a deep image"),
     ],
 )
 def test_other_pictures_are_refused(name: str, reason: str, data_dir: Path) -> None:
     with pytest.raises(InputError, match=reason):
         formats.read(data_dir / name)
+
+
+def test_a_rendered_ball(data_dir: Path) -> None:
+    """Two eyes without cameras: the first of them, whatever the parts are, where the data window lies."""
+    single, several = (
+        formats.read(data_dir / f"range/openexr_beachball/{name}.0001.exr")
+        for name in ("singlepart", "multipart")
+    )
+    for (view,), top in ((single, 245), (several, 245)):
+        assert (view.name, view.unit) == ("right", "units")
+        assert (view.cx, view.cy) == (1024 - 654, 778 - top)
+        assert "45 degrees" in view.assumed
+        assert view.color.max() < 1
+        assert len(view.positions()) == 595_673
+        assert view.depth[view.valid()].min() == 9
+    assert np.array_equal(single[0].positions(), several[0].positions())
+    (beyond,) = formats.read(data_dir / "range/openexr_beachball/singlepart.0008.exr")
+    assert beyond.depth.shape == (889, 926)  # to the right of the display window, and through its edge
+    assert (beyond.cx, beyond.cy) == (1024 - 1384, 778 - 328)
 
 
 def test_a_head_from_a_phone(data_dir: Path, tmp_path: Path) -> None:

@@ -12,7 +12,9 @@ y in the pod's camera space), and the attributes
   space is left-handed and looks down +z; NDC runs from 0, 0 in the upper left corner to 1, 1;
 - `worldToCamera64` (m44d): worldToCamera in double precision, since float32 cannot place a pod at UTM
   coordinates; it counts where it is there;
-- `unit` (string): the name of the unit of length.
+- `unit` (string): the name of the unit of length; `assumed` (string): what of all this nobody told.
+
+Pictures with depth that other programs have written open as well; see `_exr_renders`.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ from ..points import UNKNOWN_UNIT
 from ..range_view import DepthKind, RangeView, mask_of, memory_of_merging
 from ..units import usable_unit
 from ._admission import MOST_MEMBERS, admit, check_count, opened, read_exactly, size_of
+from ._exr_renders import rendered_eyes, view_of_eye
 
 TITLE = "EXR"
 SUFFIXES = (".exr",)
@@ -44,10 +47,12 @@ _PINHOLE = ("fx", "fy", "cx", "cy")
 _LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _SRGB8 = "srgb8"
 _FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
+_FLAT = "Flatten it to a picture with a channel Z"
 _MAGIC_BYTES, _CHANNEL_BYTES = 8, 16  # in front of the headers; behind the name of a channel in a header
 _TYPE_BYTES = {1: 2}  # of a sample of a half; other types have 4
 _MOST_RATIO = 40  # of memory to the file: masks leave little of most pictures
-_VIEW_BYTES, _SRGB8_BYTES, _XY_BYTES = 7, 3, 8  # of a pixel: mask and linear colour; what not all views have
+# Of a pixel: mask and linear colour; what not all views have; what an eye of other programs' pictures takes.
+_VIEW_BYTES, _SRGB8_BYTES, _XY_BYTES, _EYE_BYTES = 7, 3, 8, 30
 
 
 def read_unit(path: Path) -> str | None:
@@ -57,15 +62,27 @@ def read_unit(path: Path) -> str | None:
 
 
 def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
-    """The views in the order of the parts. Raises InputError where a part is damaged or no range view."""
+    """The views in the order of the parts, or those of other programs' pictures.
+
+    Raises InputError where a part is damaged or no range view.
+    """
     with opened(path) as stream:
         headers = _headers(stream)
         check_count(len(headers), MOST_MEMBERS, "parts")
+        is_ours = any(key in header for header in headers for key in _PINHOLE)
         for number, header in enumerate(headers):
-            _check_form(header, _name(header, number))
-        admit(size_of(stream), _memory(headers, _pixel_bytes(stream, len(headers))), _MOST_RATIO)
+            _check_flat(header, _name(header, number))
+            if is_ours:
+                _check_form(header, _name(header, number))
+        eyes = [] if is_ours else rendered_eyes(headers)
+        needed = _memory(headers, _pixel_bytes(stream, len(headers)), len(eyes))
+        admit(size_of(stream), needed, _MOST_RATIO)
         images = _decoded(stream, len(headers))
-        views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
+        if is_ours:
+            views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
+        else:
+            views = tuple(view_of_eye(headers, images, eye) for eye in eyes)
+            del images
         admit(size_of(stream), memory_of_merging(views), _MOST_RATIO)
     return views
 
@@ -137,12 +154,16 @@ def _unit(header: dict[str, Any]) -> str | None:
     return usable_unit(str(header["unit"])) if "unit" in header else None
 
 
-def _check_form(header: dict[str, Any], name: str) -> None:
-    """Raise InputError where a part is no range view, and say what is missing."""
+def _check_flat(header: dict[str, Any], name: str) -> None:
+    """Raise InputError where a part has other than one depth a pixel."""
     import OpenEXR
 
     if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
-        raise InputError(f"'{name}' is a deep image, several depths a pixel, not a range view", hint=_FORM)
+        raise InputError(f"'{name}' is a deep image, several depths a pixel, not a range view", hint=_FLAT)
+
+
+def _check_form(header: dict[str, Any], name: str) -> None:
+    """Raise InputError where a part of our form is no range view, and say what is missing."""
     missing = [f"attribute {key}" for key in _PINHOLE if key not in header]
     if not {"worldToCamera", "worldToCamera64"} & header.keys():
         missing.insert(0, "attribute worldToCamera")
@@ -152,14 +173,15 @@ def _check_form(header: dict[str, Any], name: str) -> None:
         raise InputError(f"'{name}' is no range view, it lacks: {', '.join(missing)}", hint=_FORM)
 
 
-def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int]) -> int:
-    """Bytes that parts take at a time, decoded and as views. samples: bytes of a pixel of each part."""
+def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int], eyes: int) -> int:
+    """Bytes that parts take at a time, decoded and as views. samples: bytes of a pixel of each part. eyes: of
+    other programs' pictures."""
     pixels, views = [], []
     for header in headers:
         low, high = (corner.astype(int) for corner in header["dataWindow"])
         pixels.append(math.prod(np.maximum(high - low + 1, 0).tolist()))
         measured = {"X", "Y"} <= {channel.name for channel in header["channels"]}
-        more = _SRGB8_BYTES * ("color" in header) + _XY_BYTES * measured
+        more = _SRGB8_BYTES * ("color" in header) + _XY_BYTES * measured + _EYE_BYTES * eyes
         views.append(pixels[-1] * (_VIEW_BYTES + more))
     return sum(map(operator.mul, pixels, samples)) + max(views)
 
@@ -216,6 +238,7 @@ def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> Rang
         world_to_camera=_turned(np.asarray(to_camera, np.float64).reshape(4, 4).T),
         name=name,
         unit=_unit(header) or UNKNOWN_UNIT,
+        assumed=str(header.get("assumed", "")),
     )
 
 
@@ -273,6 +296,7 @@ def _attributes(view: RangeView, width: int, height: int) -> dict[str, Any]:
         **{key: np.array([value], np.float64) for key, value in calibration.items()},
         **({"color": _SRGB8} if _has_eight_bits(view) else {}),
         "kind": view.kind,
+        **({"assumed": view.assumed} if view.assumed else {}),
         "unit": view.unit,
     }
 
