@@ -14,7 +14,7 @@ from typing import Literal
 from ..errors import InputError
 from ..files import absolute
 from . import formats
-from .open import DEMO, NOTES, entries, find_source, folder_frames, matches
+from .open import DEMO, entries, find_source, folder_frames, matches
 from .range_folders import find_range_frames
 from .times import TIMES_FILE, frame_numbers, natural_key
 
@@ -52,7 +52,7 @@ def list_folder(folder: Path | str) -> list[Listed]:
     files = _scan_files(inside)
     count, own = _frames(folder)
     if own:
-        files = [file for file in files if file not in own and file.suffix.lower() not in NOTES]
+        files = [file for file in files if file not in own and file.suffix.lower() not in formats.NOTES]
     all_of_it = Listed(str(folder), f"All of {folder.resolve().name or folder}", "whole", count)
     whole = [all_of_it] if count > 1 or own else []
     sequences = [
@@ -135,7 +135,7 @@ def _scan_files(paths: Sequence[Path]) -> list[Path]:
         and path.name != TIMES_FILE
         and os.path.isfile(path)
     ]
-    scans = [file for file in files if file.suffix.lower() not in NOTES]
+    scans = [file for file in files if file.suffix.lower() not in formats.NOTES]
     return scans or files
 
 

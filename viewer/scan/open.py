@@ -23,7 +23,9 @@ from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
 from .units import checked_unit
 
 DEMO = "demo"
-NOTES = {".txt", ".csv"}  # beside frames of another kind these are notes, not frames
+_PICTURES = {  # beside which text tables are no points
+    ".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".tif", ".tiff", ".bmp",
+}  # fmt: skip
 _PRINTF = re.compile("%(0?[0-9]{0,2})d")
 _NAMES_TO_COMPARE = 5000
 
@@ -126,7 +128,7 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     """The frames among the files, in natural order; empty where there is none.
 
     Left aside: hidden files, times.csv, unknown suffixes, and TXT and CSV beside frames of
-    another kind. Raises InputError where two kinds remain.
+    another kind. Raises InputError where two kinds remain, and where TXT and CSV stand beside pictures alone.
     """
     known = set(formats.known_suffixes())
     by_kind: dict[str, list[Path]] = {}
@@ -135,8 +137,11 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
         is_left_aside = file.name.startswith(".") or file.name == TIMES_FILE
         if kind in known and not is_left_aside and os.path.isfile(file):
             by_kind.setdefault(kind, []).append(file)
-    if by_kind.keys() - NOTES:
-        by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in NOTES}
+    if by_kind.keys() - formats.NOTES:
+        by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in formats.NOTES}
+    elif by_kind and any(file.suffix.lower() in _PICTURES for file in files):
+        hint = "Depth is read from 16-bit PNG with a camera.json; name tables of points as '*.txt'"
+        raise InputError("holds pictures, and text tables that are no scan beside them", where, hint)
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
         most = max(by_kind, key=lambda kind: len(by_kind[kind]))

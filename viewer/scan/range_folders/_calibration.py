@@ -1,0 +1,148 @@
+"""The calibration of a depth camera, as a small file beside its pictures tells it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from ...errors import InputError, explained, shortened, unknown_name
+from ...files import parsed_json, read_text
+from ..range_view import DepthKind
+from ..units import checked_unit
+
+FILES = ("camera.json", "camera.txt")  # beside the pictures
+
+_CENTER = 0.5  # of a pixel: in these files that of the first one is at 0, 0
+_MATRIX = "intrinsic_matrix"  # by columns, as Open3D writes it
+_MOST_BYTES = 1 << 20
+_FORM = "It should have fx, fy, cx and cy in pixels, and for depth pictures depth_scale and unit"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """A pinhole, its lens, and what the numbers of its depth pictures mean.
+
+    fx, fy, cx, cy, distortion, kind, unit: as `RangeView` has them. depth_scale: how many of the numbers are
+    one unit, for example 1000 for millimetres where the unit is m. width, height: of the pictures that it is
+    for, None: of any.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = ()
+    kind: DepthKind = "z"
+    depth_scale: float = 1000.0
+    unit: str = "m"
+    width: int | None = None
+    height: int | None = None
+
+    def check_size(self, size: Sequence[int], where: Path) -> None:
+        """Raise InputError where a picture of this size, width and height, is not what it is for."""
+        told = (self.width, self.height)
+        if None not in told and tuple(size) != told:
+            what = "has {} x {} pixels, its calibration is for {} x {}".format(*size, *told)
+            raise InputError(what, where)
+
+
+def of_pinhole(f: float, cx: float, cy: float, **others: Any) -> Calibration:
+    """The calibration of a lens as a data set's page gives it: pixel centres at whole numbers."""
+    return Calibration(fx=f, fy=f, cx=cx + _CENTER, cy=cy + _CENTER, **others)
+
+
+PRIMESENSE = of_pinhole(525.0, 319.5, 239.5)
+
+
+def beside(folder: Path, names: Sequence[str], default: Calibration | None = None) -> Calibration | None:
+    """The calibration of the folder's camera.json or camera.txt; what it does not tell is as in the default.
+
+    Without such a file it is the default. Raises InputError.
+    """
+    found = next((name for name in FILES if name in names), None)
+    return default if found is None else read_calibration(folder / found, default)
+
+
+def read_calibration(path: Path, default: Calibration | None = None) -> Calibration:
+    """The calibration in a file; what it does not tell is as in the default. Raises InputError.
+
+    JSON has the numbers by name, or Open3D's `intrinsic_matrix`; text has a 3 x 3 or a 4 x 4 matrix, or one
+    line: fx fy cx cy and perhaps the coefficients of the distortion.
+    """
+    try:
+        text = read_text(path, _MOST_BYTES)
+        told = _from_json(parsed_json(text)) if path.suffix.lower() == ".json" else _from_text(text)
+        return _checked(told, default)
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    except InputError as error:
+        raise InputError(error.what, path, error.hint) from error
+    except ValueError as error:  # of the text's encoding as well
+        raise InputError(f"is no calibration: {shortened(str(error))}", path, _FORM) from error
+
+
+def _from_json(stored: Any) -> dict[str, Any]:
+    """The fields that a file tells, others left aside."""
+    if not isinstance(stored, dict):
+        raise InputError("is no calibration: it is no JSON object", hint=_FORM)
+    told = {field.name: stored[field.name] for field in fields(Calibration) if field.name in stored}
+    if _MATRIX in stored:
+        matrix = np.array(stored[_MATRIX], np.float64)
+        if matrix.shape != (9,):
+            raise InputError(f"{_MATRIX} has shape {matrix.shape}, expected 9 numbers, by columns")
+        told |= dict(zip(("fx", "fy", "cx", "cy"), matrix[[0, 4, 6, 7]].tolist(), strict=True))
+    return told
+
+
+def _from_text(text: str) -> dict[str, Any]:
+    rows = [line.split() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    numbers = [float(word) for row in rows for word in row]
+    if [len(row) for row in rows] in ([3] * 3, [4] * 4):
+        matrix = np.array(numbers).reshape(len(rows), -1)
+        numbers = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]
+    if len(numbers) < 4:
+        raise InputError(f"is no calibration: it has {len(numbers)} numbers", hint=_FORM)
+    return dict(zip(("fx", "fy", "cx", "cy"), numbers, strict=False)) | {"distortion": numbers[4:]}
+
+
+def _checked(told: dict[str, Any], default: Calibration | None) -> Calibration:
+    """The calibration of what a file tells. Raises InputError where it is none, and says why."""
+    if missing := [name for name in ("fx", "fy", "cx", "cy") if name not in told]:
+        raise InputError(f"is no calibration: it lacks {', '.join(missing)}", hint=_FORM)
+    given = {**told, "distortion": tuple(_number("distortion", each) for each in _listed(told))}
+    for name in ("fx", "fy", "cx", "cy", "depth_scale"):
+        if name in given:
+            given[name] = _number(name, given[name])
+    if min(given["fx"], given["fy"]) <= 0:
+        raise InputError(f"is no calibration: fx is {given['fx']:g} and fy {given['fy']:g}", hint=_FORM)
+    if len(given["distortion"]) not in (0, 4, 5, 8):
+        raise InputError(f"has {len(given['distortion'])} coefficients of distortion, expected 4, 5 or 8")
+    if given.get("depth_scale", 1) < 1:
+        hint = "It is how many of the numbers make one unit, such as 1000 for millimetres where the unit is m"
+        raise InputError(f"its depth_scale is {given['depth_scale']:g}", hint=hint)
+    if "kind" in given and given["kind"] not in (kinds := get_args(DepthKind)):
+        raise unknown_name("kind of depth", shortened(given["kind"]), kinds)
+    if "unit" in given:
+        checked_unit(given["unit"] if isinstance(given["unit"], str) else "")
+    given["cx"], given["cy"] = given["cx"] + _CENTER, given["cy"] + _CENTER
+    return Calibration(**given) if default is None else replace(default, **given)
+
+
+def _listed(told: dict[str, Any]) -> Sequence[Any]:
+    values = told.get("distortion", ())
+    if not isinstance(values, list | tuple):
+        raise InputError("its distortion is no list of numbers")
+    return values
+
+
+def _number(name: str, value: Any) -> float:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (is_number and math.isfinite(value)):
+        raise InputError(f"is no calibration: {name} is {shortened(value)}", hint=_FORM)
+    return float(value)

@@ -1,0 +1,157 @@
+"""Depth pictures and what belongs to each: colours of the same pixels, and where the camera stood."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, explained
+from ...files import read_text
+from ..range_view import RangeView
+from ..times import natural_key
+from ._calibration import FILES, Calibration
+from ._pictures import COLOR_SUFFIXES, DEPTH_SUFFIX, depth_view, is_depth
+from ._poses import from_camera_to_world
+from ._source import RangeFrames
+
+DEPTH_FOLDER = "depth"
+
+_DEPTH, _POSE = "depth", "pose"  # in the names of files, and of folders
+_COLORS = ("color", "colour", "rgb", "image")
+_POSE_SUFFIXES = (".pose.txt", ".txt")
+_MOST_BYTES = 1 << 16  # of one pose
+
+
+@dataclass(frozen=True)
+class DepthPicture:
+    """A depth picture, its colours, and its pose, which stand in other files or are not there."""
+
+    depth: Path
+    color: Path | None = None
+    pose: Path | None = None
+
+
+def frames_of_pictures(
+    folder: Path,
+    pictures: Sequence[DepthPicture],
+    calibration: Calibration,
+    pose: Callable[[int], NDArray[np.float64]],
+    beside: Sequence[str] = (),
+    recorded: NDArray[np.float64] | None = None,
+) -> RangeFrames:
+    """Frames of one view each. pose: the world_to_camera of each. beside: names of other files that are read.
+
+    recorded: the times of the frames, (T,) seconds.
+    """
+
+    def read(index: int) -> tuple[RangeView, ...]:
+        return (depth_view(pictures[index].depth, pictures[index].color, calibration, pose(index)),)
+
+    used = [
+        path
+        for picture in pictures
+        for path in (picture.depth, picture.color, picture.pose)
+        if path is not None
+    ]
+    others = [folder / name for name in (*FILES, *beside) if (folder / name).is_file()]
+    labels = tuple(picture.depth.relative_to(folder).as_posix() for picture in pictures)
+    files = tuple(dict.fromkeys([*used, *others]))
+    return RangeFrames(folder.resolve().name, labels, read, files, calibration.unit, lambda: recorded)
+
+
+def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
+    """The depth pictures of a folder with their partners, in natural order.
+
+    They are in its folder `depth`, with partners of the same name in folders `color` (or `rgb`, `image`) and
+    `pose`; or in the folder itself, where partners have `color` and `pose` in the place of `depth`, or the
+    same name and another suffix.
+    """
+    if DEPTH_FOLDER in names:
+        return list(_in_folders(folder, names))
+    there = set(names)
+    return [
+        DepthPicture(
+            folder / name,
+            _first(folder, there, _color_names(name)),
+            _first(folder, there, _pose_names(name)),
+        )
+        for name in depth_names(folder, names)
+    ]
+
+
+def depth_names(folder: Path, names: Sequence[str]) -> list[str]:
+    """The names of depth pictures: PNG that say so, or else all PNG where the first is 16-bit grey."""
+    pictures = [name for name in names if name.lower().endswith(DEPTH_SUFFIX)]
+    told = [name for name in pictures if _DEPTH in name.lower()]
+    return told or (pictures if pictures and is_depth(folder / pictures[0]) else [])
+
+
+def names_in(folder: Path) -> list[str]:
+    """The names in a folder, in natural order; none where there is no such folder."""
+    try:
+        names = os.listdir(folder)
+    except OSError:
+        return []
+    return sorted((name for name in names if not name.startswith(".")), key=natural_key)
+
+
+def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
+    """The world_to_camera that the picture's pose file tells, a 4 x 4 matrix from the camera to the world.
+
+    Raises InputError.
+    """
+    if picture.pose is None:
+        raise InputError("has no pose: no file beside it tells one", picture.depth)
+    try:
+        numbers = np.array(read_text(picture.pose, _MOST_BYTES).split(), np.float64)
+        if numbers.shape != (16,):
+            raise InputError(f"holds {numbers.size} numbers, where a pose is a 4 x 4 matrix")
+        return from_camera_to_world(numbers.reshape(4, 4))
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", picture.pose, hint) from error
+    except InputError as error:
+        raise InputError(error.what, picture.pose, error.hint) from error
+    except ValueError as error:
+        raise InputError("is no pose: it holds more than numbers", picture.pose) from error
+
+
+def _in_folders(folder: Path, names: Sequence[str]) -> Iterator[DepthPicture]:
+    colors = next((name for name in _COLORS if name in names), None)
+    of_color = {Path(name).stem: name for name in names_in(folder / colors)} if colors else {}
+    poses = {Path(name).stem: name for name in names_in(folder / _POSE)}
+    for name in names_in(folder / DEPTH_FOLDER):
+        if name.lower().endswith(DEPTH_SUFFIX):
+            stem = Path(name).stem
+            color = folder / str(colors) / of_color[stem] if stem in of_color else None
+            pose = folder / _POSE / poses[stem] if stem in poses else None
+            yield DepthPicture(folder / DEPTH_FOLDER / name, color, pose)
+
+
+def _color_names(depth: str) -> Iterator[str]:
+    stem, lower = Path(depth).stem, Path(depth).stem.lower()
+    stems = [_replaced(stem, color) for color in _COLORS] if _DEPTH in lower else [stem]
+    for suffix in COLOR_SUFFIXES:
+        yield from (name for one in stems if (name := one + suffix) != depth)
+
+
+def _pose_names(depth: str) -> Iterator[str]:
+    stem = Path(depth).stem
+    if _DEPTH in stem.lower():
+        yield _replaced(stem, _POSE) + ".txt"
+    yield from (stem + suffix for suffix in _POSE_SUFFIXES)
+
+
+def _replaced(stem: str, word: str) -> str:
+    """The name with a word in the place of `depth`."""
+    at = stem.lower().rindex(_DEPTH)
+    return stem[:at] + word + stem[at + len(_DEPTH) :]
+
+
+def _first(folder: Path, there: set[str], names: Iterator[str]) -> Path | None:
+    return next((folder / name for name in names if name in there), None)

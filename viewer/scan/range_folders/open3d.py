@@ -1,0 +1,69 @@
+"""Open3D's RGB-D folders: depth/ and color/, poses in trajectory.log or odometry.log, pairs in rgbd.match.
+
+Depth is in millimetres. Each record of a log is three whole numbers and a matrix from the camera to the
+world, in metres, in the order of the frames. Without a camera.json the camera is Open3D's default, a
+PrimeSense: f 525, c 319.5, 239.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...files import read_text
+from . import _calibration
+from ._calibration import PRIMESENSE
+from ._partners import DEPTH_FOLDER, DepthPicture, frames_of_pictures, named_pictures
+from ._poses import UPRIGHT, from_camera_to_world
+from ._source import RangeFrames
+
+TITLE = "Open3D's RGB-D images"
+
+_PAIRS = "rgbd.match"
+_LOGS = ("trajectory.log", "odometry.log")  # the better one first
+_RECORD = 19  # numbers: three that count, and a matrix
+_MOST_BYTES = 64 << 20
+
+
+def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+    """A frame for each depth picture, where a log or a list of pairs stands beside the folder `depth`."""
+    known = [name for name in (_PAIRS, *_LOGS) if name in names]
+    if not known or DEPTH_FOLDER not in names:
+        return None
+    pictures = _pairs(folder) if _PAIRS in known else named_pictures(folder, names)
+    if not pictures:
+        raise InputError("holds no depth pictures", folder / DEPTH_FOLDER, "They are 16-bit PNG")
+    calibration = _calibration.beside(folder, names, PRIMESENSE) or PRIMESENSE
+    log = next((name for name in _LOGS if name in names), None)
+    poses = None if log is None else read_log(folder / log)
+
+    def pose(index: int) -> NDArray[np.float64]:
+        if poses is None:
+            return UPRIGHT
+        if index >= len(poses):
+            raise InputError(f"has no pose: {log} holds {len(poses)}", pictures[index].depth)
+        return from_camera_to_world(poses[index])
+
+    return frames_of_pictures(folder, pictures, calibration, pose, known)
+
+
+def read_log(path: Path) -> NDArray[np.float64]:
+    """The matrices of a log, (N, 4, 4), from the camera to the world. Raises InputError."""
+    try:
+        numbers = np.array(read_text(path, _MOST_BYTES).split(), np.float64)
+        return numbers.reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
+    except ValueError as error:  # of the text's encoding as well
+        hint = "A record is three whole numbers and a 4 x 4 matrix"
+        raise InputError("is damaged, or no log of poses", path, hint) from error
+
+
+def _pairs(folder: Path) -> list[DepthPicture]:
+    lines = read_text(folder / _PAIRS, _MOST_BYTES).splitlines()
+    pairs = [line.split() for line in lines if line.strip()]
+    if any(len(pair) != 2 for pair in pairs):
+        raise InputError("has a line that is no pair of names", folder / _PAIRS, "First depth, then colour")
+    return [DepthPicture(folder / depth, folder / color) for depth, color in pairs]

@@ -1,0 +1,35 @@
+"""Microsoft's 7-Scenes: frame-NNNNNN.depth.png, .color.jpg (or .png) and .pose.txt.
+
+Depth is in millimetres, a pose is from the camera to the world in metres. Without a `camera-intrinsics.txt`
+the camera is the one that the data set's page gives, f 585, c 320, 240.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from . import _calibration
+from ._calibration import of_pinhole, read_calibration
+from ._partners import frames_of_pictures, named_pictures, pose_of_file
+from ._source import RangeFrames
+
+TITLE = "7-Scenes"
+
+_DEPTH, _POSE = ".depth.png", ".pose.txt"
+_INTRINSICS = "camera-intrinsics.txt"
+_KINECT = of_pinhole(585.0, 320.0, 240.0)
+
+
+def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+    """A frame for each depth picture, where some name ends as 7-Scenes has it."""
+    if not all(any(name.endswith(end) for name in names) for end in (_DEPTH, _POSE)):
+        return None
+    pictures = named_pictures(folder, names)
+    if _INTRINSICS in names:
+        calibration = read_calibration(folder / _INTRINSICS, _KINECT)
+    else:
+        calibration = _calibration.beside(folder, names, _KINECT) or _KINECT
+    return frames_of_pictures(
+        folder, pictures, calibration, lambda i: pose_of_file(pictures[i]), [_INTRINSICS]
+    )

@@ -1,0 +1,118 @@
+"""TUM's RGB-D folders: rgb.txt, depth.txt and groundtruth.txt, whose rows begin with a time in seconds.
+
+Depth is in 1/5000 m. A pose is a translation and a quaternion x y z w, from the camera to the world, in
+metres. To each depth picture belong the colours and the pose nearest in time, within 0.02 s, each of them
+once. Without a camera.json the camera is the one that the data set's page gives for all of it, ROS's
+default: f 525, c 319.5, 239.5, without distortion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, explained, shortened
+from ...files import read_text
+from . import _calibration
+from ._calibration import PRIMESENSE
+from ._partners import DepthPicture, frames_of_pictures
+from ._poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
+from ._source import RangeFrames
+
+TITLE = "TUM's RGB-D images"
+
+_DEPTH, _COLOR, _POSES = "depth.txt", "rgb.txt", "groundtruth.txt"
+_KINECT = replace(PRIMESENSE, depth_scale=5000.0)
+_MOST_APART = 0.02  # s
+_MOST_BYTES = 64 << 20
+
+
+def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+    """A frame for each depth picture that is listed; None where nothing lists them."""
+    if _DEPTH not in names or not {_COLOR, _POSES} & {*names}:
+        return None
+    times, rows = _rows(folder / _DEPTH)
+    if not len(rows):
+        raise InputError("lists no depth pictures", folder / _DEPTH)
+    colors = _partners(times, folder / _COLOR) if _COLOR in names else [None] * len(rows)
+    poses = _partners(times, folder / _POSES) if _POSES in names else None
+    pictures = [
+        DepthPicture(folder / words[0], folder / color[0] if color else None)
+        for words, color in zip(rows, colors, strict=True)
+    ]
+    calibration = _calibration.beside(folder, names, _KINECT) or _KINECT
+
+    def pose(index: int) -> NDArray[np.float64]:
+        if poses is None:
+            return UPRIGHT
+        if (words := poses[index]) is None:
+            what = f"has no pose: none of {_POSES} is within {_MOST_APART} s"
+            raise InputError(what, pictures[index].depth)
+        return _pose(words, folder / _POSES)
+
+    lists = [name for name in (_DEPTH, _COLOR, _POSES) if name in names]
+    return frames_of_pictures(folder, pictures, calibration, pose, lists, times - times[0])
+
+
+def nearest_once(times: NDArray[np.float64], others: NDArray[np.float64], most: float) -> NDArray[np.int64]:
+    """The number of the nearest other of each time, no other twice; -1 where none is within `most`.
+
+    times, others: (N,) and (M,), increasing. The nearest pairs come first.
+    """
+    first, last = np.searchsorted(others, times - most), np.searchsorted(others, times + most, "right")
+    pairs = [
+        (abs(others[other] - times[one]), one, other)
+        for one in range(len(times))
+        for other in range(first[one], last[one])
+    ]
+    found, taken = np.full(len(times), -1), set[int]()
+    for _, one, other in sorted(pairs):
+        if found[one] < 0 and other not in taken:
+            found[one] = other
+            taken.add(other)
+    return found
+
+
+def _rows(path: Path) -> tuple[NDArray[np.float64], list[list[str]]]:
+    """Times (N,), increasing, and the words behind them. Raises InputError."""
+    try:
+        lines = [line.split() for line in read_text(path, _MOST_BYTES).splitlines()]
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    by_time: dict[float, list[str]] = {}
+    for number, words in enumerate(lines, start=1):
+        if words and not words[0].startswith("#"):
+            by_time.setdefault(_time(words, path, number), words[1:])
+    times = sorted(by_time)
+    return np.array(times), [by_time[time] for time in times]
+
+
+def _time(words: list[str], path: Path, line: int) -> float:
+    try:
+        time = float(words[0])
+    except ValueError:
+        time = np.nan
+    if not np.isfinite(time) or len(words) < 2:
+        where = f"{path}, line {line}"
+        raise InputError(f"'{shortened(' '.join(words))}' is no row", where, "A row is seconds, and a name")
+    return time
+
+
+def _partners(times: NDArray[np.float64], path: Path) -> list[list[str] | None]:
+    """The words of the row that belongs to each time, or None."""
+    others, rows = _rows(path)
+    return [rows[at] if at >= 0 else None for at in nearest_once(times, others, _MOST_APART)]
+
+
+def _pose(words: list[str], path: Path) -> NDArray[np.float64]:
+    try:
+        numbers = np.array(words, np.float64).reshape(7)
+    except ValueError:
+        hint = "A row is seconds, tx ty tz qx qy qz qw"
+        raise InputError(f"'{shortened(' '.join(words))}' is no pose", path, hint) from None
+    return from_camera_to_world(from_rotation(rotation_of(numbers[3:]), numbers[:3]))
