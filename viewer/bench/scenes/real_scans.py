@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,10 @@ from ...errors import InputError
 from ...mesh.scene import Rays
 from ...mesh.triangles import Mesh
 from ...scan.formats import read
+from ...scan.open import find_source
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.range_view import RangeView
-from ...scan.times import natural_key
 from ...srgb import bytes_from_linear, linear_from_bytes
 from ..truth.isosurface import isosurface
 from .registration import OrientedPoints, register
@@ -29,6 +28,7 @@ _ROOM = 0.75  # m
 _FIRST = 9
 _REACHES = (0.05, 0.02, 0.005)  # m, how far partners may be
 _EVERY = 8  # pixels that are registered
+_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])  # from an image's axes to a camera's, that looks down -z
 _MOST_RMS, _LEAST_SHARE = 1e-3, 0.9  # m to the planes of partners, and of points that have some
 
 _CELL = 1.5e-3  # m, of the reference's mesh
@@ -44,21 +44,22 @@ class DepthFrames:
     """
 
     def __init__(self, folder: Path, reference: Path) -> None:
-        self._files = sorted(folder.glob("frame-*.npz"), key=lambda file: natural_key(file.name))
-        if len(self._files) <= _FIRST:
-            raise InputError(f"holds {len(self._files)} frames, more than {_FIRST} are needed", folder)
-        self._camera = _intrinsics(folder / "camera_intrinsics.json")
+        self._source = find_source(folder)
+        if len(self._source) <= _FIRST:
+            raise InputError(f"holds {len(self._source)} frames, more than {_FIRST} are needed", folder)
+        times = self._source.times()
+        self._times = np.zeros(len(self)) if times is None else times
         surfels = read(reference)
         assert isinstance(surfels, PointCloud), "the reference holds surfels"
         self._surfels = surfels
 
     def __len__(self) -> int:
-        return len(self._files)
+        return len(self._source)
 
     def moment(self, index: int) -> Moment:
         """One frame. Raises InputError where it cannot be registered."""
-        view, time = self._view(index, self._motions[index])
-        pose = Pose.of(index, time - self._view(0)[1], self._files[index].name, (view,))
+        view = self._view(index, self._motions[index])
+        pose = Pose.of(index, float(self._times[index]), self._source.label(index), (view,))
         return Moment(pose, self._truth, self._truth)
 
     @cached_property
@@ -80,7 +81,7 @@ class DepthFrames:
         return motions
 
     def _points(self, index: int) -> Rays:
-        return self._view(index)[0].positions()[::_EVERY]
+        return self._view(index).positions()[::_EVERY]
 
     def _registered(
         self, index: int, target: OrientedPoints, start: NDArray[np.float64]
@@ -88,48 +89,17 @@ class DepthFrames:
         motion, rms, share = register(self._points(index), target, start, _REACHES)
         if rms > _MOST_RMS or share < _LEAST_SHARE:
             found = f"{1e3 * rms:.2f} mm rms, {share:.0%} of the points"
-            raise InputError(f"does not fit its reference: {found}", self._files[index])
+            raise InputError(f"does not fit its reference: {found}", self._source.label(index))
         return motion
 
-    def _view(self, index: int, motion: NDArray[np.float64] | None = None) -> tuple[RangeView, float]:
-        """A frame and its time in seconds. motion: from the image's axes (+y down, +z ahead) to the world."""
-        depth, color, time = _arrays(self._files[index], "depth", "color", "timestamp")
-        linear = color / 255  # as it is stored: encoded as sRGB, it is that of the reference
-        fx, fy, cx, cy = self._camera * depth.shape[1]
-        down = np.diag([1.0, -1.0, -1.0, 1.0])  # from an image's axes to a camera's that looks down -z
+    def _view(self, index: int, motion: NDArray[np.float64] | None = None) -> RangeView:
+        """The view of a frame. motion: from the image's axes (+y down, +z ahead) to the world."""
+        views = self._source.load(index)
+        assert isinstance(views, tuple), "a phone's frames are range views"
+        (view,) = views
         world_to_image = np.eye(4) if motion is None else np.linalg.inv(motion).astype(np.float64)
-        view = RangeView(
-            depth=depth,
-            mask=np.isfinite(depth) & (np.nan_to_num(depth) < _ROOM),
-            color=linear.astype(np.float16),
-            fx=fx,
-            fy=fy,
-            cx=cx + 0.5,  # stored for pixels whose centres are whole numbers
-            cy=cy + 0.5,
-            world_to_camera=down @ world_to_image,
-            name="truedepth",
-            unit="m",
-        )
-        return view, float(time)
-
-
-def _intrinsics(file: Path) -> NDArray[np.float64]:
-    """fx, fy, cx and cy in widths of the picture, (4,)."""
-    try:
-        stored = json.loads(file.read_text(encoding="utf-8"))
-        matrix = np.array(stored["intrinsic_matrix"], float)  # 3 x 3, by columns
-        return matrix[[0, 4, 6, 7]] / float(stored["intrinsic_matrix_reference_dimensions_width"])
-    except (OSError, ValueError, KeyError, IndexError) as error:
-        raise InputError(f"is no calibration: {error}", file) from error
-
-
-def _arrays(file: Path, *names: str) -> list[NDArray]:
-    """Some arrays of an NPZ file. Raises InputError."""
-    try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return [arrays[name] for name in names]
-    except (OSError, ValueError, KeyError, BadZipFile) as error:
-        raise InputError(f"cannot be read: {error}", file) from error
+        near = view.mask & (np.nan_to_num(view.depth) < _ROOM)
+        return replace(view, mask=near, world_to_camera=_DOWN @ world_to_image)
 
 
 def blended(surfels: PointCloud) -> Mesh:

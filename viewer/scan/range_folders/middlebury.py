@@ -1,0 +1,78 @@
+"""A stereo pair of Middlebury's: calibration.json, *_disp.npz with `disparity`, and *_left.png.
+
+Depth is baseline * focal length / (disparity + the distance of the principal points), in millimetres. An
+infinite disparity is unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError, shortened
+from ...files import parsed_json, read_text
+from ..formats.npz import read_arrays
+from ..range_view import RangeView
+from ._pictures import read_color
+from ._poses import UPRIGHT
+from ._source import RangeFrames
+
+TITLE = "a stereo pair of Middlebury's"
+
+_CALIBRATION, _DISPARITY, _LEFT = "calibration.json", "_disp.npz", "_left.png"
+_NUMBERS = (
+    "focal_length_px", "principal_point_left_x_px", "principal_point_y_px", "principal_point_dx_px",
+    "baseline_mm",
+)  # fmt: skip
+_CENTER = 0.5  # of a pixel: in the calibration that of the first one is at 0, 0
+_MOST_BYTES = 1 << 20
+
+
+def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+    """The left view; None where there is no disparity with such a calibration."""
+    pairs = [name.removesuffix(_DISPARITY) for name in names if name.endswith(_DISPARITY)]
+    if len(pairs) != 1 or _CALIBRATION not in names:
+        return None
+    numbers = _numbers(folder / _CALIBRATION)
+    (pair,) = pairs
+    disparity, left = folder / f"{pair}{_DISPARITY}", folder / f"{pair}{_LEFT}"
+    color = left if left.name in names else None
+    files = (disparity, folder / _CALIBRATION, *([color] if color else []))
+
+    def read(_: int) -> tuple[RangeView, ...]:
+        return (_view(disparity, color, numbers),)
+
+    return RangeFrames(folder.resolve().name, (disparity.name,), read, files, "mm")
+
+
+def _view(file: Path, left: Path | None, numbers: Sequence[float]) -> RangeView:
+    (disparity,) = read_arrays(file, "disparity")
+    color = None if left is None else read_color(left)
+    focal, cx, cy, apart, baseline = numbers
+    between = disparity.astype(np.float64) + apart
+    known = np.isfinite(between) & (between > 0)
+    depth = np.full(disparity.shape, np.nan, np.float32)
+    depth[known] = baseline * focal / between[known]
+    return RangeView(
+        depth=depth,
+        mask=known,
+        color=color,
+        fx=focal,
+        fy=focal,
+        cx=cx + _CENTER,
+        cy=cy + _CENTER,
+        world_to_camera=UPRIGHT,
+        name="left",
+        unit="mm",
+    )
+
+
+def _numbers(file: Path) -> list[float]:
+    """Numbers of the calibration in their order. Raises InputError."""
+    try:
+        stored = parsed_json(read_text(file, _MOST_BYTES))
+        return [float(stored[name]) for name in _NUMBERS]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"is no calibration: {shortened(str(error))}", file) from error
