@@ -369,7 +369,7 @@ def test_releasing_ends_what_is_being_prepared(renderer: Renderer, deriving: Bac
 
 def test_large_arrays_are_uploaded_in_slices(renderer: Renderer) -> None:
     points = np.random.default_rng(0).random((1_000_000, 3), dtype=np.float32)
-    pose = GpuPose(renderer.gpu, PointCloud.from_arrays(points, colors=points))
+    pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", PointCloud.from_arrays(points, colors=points)))
     calls = 1
     while not pose.upload(["positions", "colors"], budget_ms=0):
         calls += 1
@@ -383,7 +383,7 @@ def test_large_arrays_are_uploaded_in_slices(renderer: Renderer) -> None:
 
 def test_an_upload_that_has_begun_is_finished_when_something_reads_it(renderer: Renderer) -> None:
     points = np.random.default_rng(0).random((1_000_000, 3), dtype=np.float32)
-    pose = GpuPose(renderer.gpu, PointCloud.from_arrays(points))
+    pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", PointCloud.from_arrays(points)))
     assert not pose.upload(["positions"], budget_ms=0)
     uploaded = np.frombuffer(pose.array("positions").buffer.read(), np.float32).reshape(-1, 3)
     np.testing.assert_array_equal(uploaded, pose.cloud.positions)

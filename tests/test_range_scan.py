@@ -12,8 +12,14 @@ from range_scenes import looking_at, sphere_view
 import viewer
 from viewer import cli
 from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.frame import Request, bring, is_prepared, render_frame
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
 from viewer.scan import formats
 from viewer.scan.open import open_scan
+from viewer.scan.pose import Pose
 from viewer.scan.range_view import merge
 
 EYES = {"left": (-1.0, 0.0, 4.0), "right": (1.5, 0.5, 4.0)}
@@ -77,3 +83,56 @@ def test_is_drawn_where_it_was_seen(scan: Path) -> None:
     u, v = seen % view.depth.shape[1] + 0.5, seen // view.depth.shape[1] + 0.5
     assert np.abs(size / 2 + size * (u - view.cx) / view.fx - (column + 0.5)).max() <= 0.51
     assert np.abs(size / 2 + size * (v - view.cy) / view.fy - (row + 0.5)).max() <= 0.51
+
+
+@pytest.mark.parametrize("backend", ["points", "surfels", "voxels"])
+def test_points_are_merged_when_a_backend_draws_them_and_the_picture_is_theirs(
+    scan: Path, backend: str, renderer: Renderer
+) -> None:
+    with open_scan(scan) as timeline:
+        pose = timeline.pose(1)
+    camera, look = Camera.orbit(pose.bounds, 20, 10), Look(color_by="height", up="+x")
+    assert not pose.is_merged
+    views = Pose.of(1, pose.time, pose.label, pose.views)
+    normals = np.concatenate([view.normals() for view in pose.views])
+    points = Pose(1, pose.time, pose.label, merge(pose.views))
+    own = Renderer(renderer.gpu)
+    if backend != "points":
+        own.resident(points).add_estimates({"normals": normals})
+    pictures = []
+    for one in (views, points):
+        surface = Surface(own.gpu, (90, 70))
+        while render_frame(own, Request(one, camera, backend, look=look), surface):
+            pass
+        pictures.append((surface.image(), surface.depth, surface.id))
+    for drawn, expected in zip(*pictures, strict=True):
+        np.testing.assert_array_equal(drawn, expected)
+    assert views.is_merged
+    own.release()
+
+
+def test_a_window_has_points_merged_by_a_worker(scan: Path, renderer: Renderer) -> None:
+    with open_scan(scan) as timeline:
+        pose = timeline.pose(0)
+    own, request = Renderer(renderer.gpu), Request(pose, Camera.orbit(pose.bounds), "points")
+    assert not is_prepared(own, request, (64, 48))
+    while not bring(own, request, budget_ms=1000):
+        assert own.preparing is None or own.preparing.name == "Merging range views"
+    assert pose.is_merged
+    assert is_prepared(own, request, (64, 48))
+    assert own.resident(pose).stored is pose.cloud
+    assert own.bytes_of(pose) == 12 * len(pose.cloud)
+    own.release()
+
+
+def test_more_points_than_the_driver_takes_are_not_even_merged(
+    scan: Path, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_scan(scan) as timeline:
+        pose = timeline.pose(2)
+    monkeypatch.setattr(renderer.gpu, "max_points", 100)
+    with pytest.raises(InputError, match="points in one pose; this driver takes 100"):
+        render_frame(
+            renderer, Request(pose, Camera.orbit(pose.bounds), "points"), Surface(renderer.gpu, (64, 48))
+        )
+    assert not pose.is_merged

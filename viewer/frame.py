@@ -63,7 +63,7 @@ def render_frame(
     timers.start_frame()
 
     pose = renderer.resident(request.pose)
-    request.layers.check(pose.stored)
+    request.layers.check(request.pose)
     backend, params = _chosen(request)
     view = _view(request, pose, surface.size)
     prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
@@ -100,12 +100,15 @@ def render_frame(
 
 
 def bring(renderer: Renderer, request: Request, budget_ms: float) -> bool:
-    """Upload what the backend reads of the pose, for as long as this; whether all of it is there.
+    """Upload what the backend reads of the pose, for as long as this; whether all of it is there. Points of
+    range views are merged by a worker before.
 
-    A window calls it again and again before `render_frame`, so that it is not stopped by uploads.
+    A window calls it again and again before `render_frame`, so that it is stopped by neither.
     """
     pose = renderer.resident(request.pose)
     backend, params = _chosen(request)
+    if not backend.draws_samples(request.pose, params) and not renderer.merge(pose):
+        return False
     return pose.upload(pose.names_of(backend.needs(request.pose, params)), budget_ms)
 
 
@@ -124,7 +127,7 @@ def fallback(request: Request) -> Request:
 
 
 def _view(request: Request, pose: GpuPose, size: tuple[int, int]) -> View:
-    return View.of(request.camera, size, pose.cloud.origin, pose.bounds, request.layers.place)
+    return View.of(request.camera, size, pose.origin, pose.bounds, request.layers.place)
 
 
 def _chosen(request: Request) -> tuple[Backend, Any]:

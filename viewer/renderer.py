@@ -20,6 +20,7 @@ from .look import Look, wants_normals
 from .scan.estimate import estimate
 from .scan.points import PointCloud
 from .scan.pose import Pose
+from .scan.spacing import spacings
 from .task import Task
 from .view import View
 
@@ -58,10 +59,9 @@ class _Job:
 
 @dataclass
 class _Resident:
-    """pose: as it was given, told: the same without keeping that alive."""
+    """pose: as it was given; that of the GpuPose is the same without keeping it alive."""
 
     pose: weakref.ref[Pose]
-    told: Pose
     gpu_pose: GpuPose
     derived: OrderedDict[DerivedKey, Prepared] = field(default_factory=OrderedDict)  # last used last
     jobs: dict[Any, _Job] = field(default_factory=dict)
@@ -91,12 +91,12 @@ class _Resident:
     @property
     def held_bytes(self) -> int:
         """Bytes on the GPU, and of the estimates that it keeps on the CPU."""
-        return self.nbytes + self.gpu_pose.cloud.nbytes - self.gpu_pose.stored.nbytes
+        return self.nbytes + self.gpu_pose.estimated_bytes
 
     @property
     def current(self) -> Pose:
-        """The pose with what was estimated of it."""
-        return replace(self.told, cloud=self.gpu_pose.cloud)
+        """The pose with what was estimated of its points, which this merges."""
+        return self.gpu_pose.pose.with_cloud(self.gpu_pose.cloud)
 
     def release(self) -> None:
         for job in self.jobs.values():
@@ -143,13 +143,18 @@ class Renderer:
         for gone in [k for k, r in self._resident.items() if r.pose() is None]:
             self._resident.pop(gone).release()
         if key not in self._resident:
-            self._resident[key] = _Resident(
-                weakref.ref(pose), replace(pose), GpuPose(self.gpu, pose.cloud, pose.views)
-            )
+            self._resident[key] = _Resident(weakref.ref(pose), GpuPose(self.gpu, replace(pose)))
         self._resident.move_to_end(key)
         while len(self._resident) > 1 and self._held_bytes > self.budget_bytes:
             self._resident.popitem(last=False)[1].release()
         return self._resident[key].gpu_pose
+
+    def merge(self, gpu_pose: GpuPose) -> bool:
+        """Have a worker merge the points of range views; whether they are there."""
+        if gpu_pose.pose.is_merged:
+            return True
+        entry, args = self._entry(gpu_pose), (gpu_pose,)
+        return bool(self._run(entry, _merge, "Merging range views", _merge, args, wait=False, on_thread=True))
 
     def prepare(
         self, gpu_pose: GpuPose, backend: Backend, params: Any, look: Look, wait: bool, view: View
@@ -162,20 +167,21 @@ class Renderer:
         the pose has no range views and the backend needs them.
         """
         entry = self._entry(gpu_pose)
-        missing = _missing(entry.current, backend, params, look)
+        missing = _missing(gpu_pose, backend, params, look)
         if missing:
             name = f"Estimating {' and '.join(missing)}"
             result = self._run(entry, missing, name, estimate, (_bare(entry.current), missing), wait)
             if result is None:
                 return None
-            gpu_pose.cloud = replace(gpu_pose.cloud, **result)
+            gpu_pose.add_estimates(result)
         if backend.derive is None:
             return Prepared(None)
         key = _derived_key(backend, params, view)
         entry.drop_passed(key.view)
         if key not in entry.derived:
             name = f"Preparing {backend.title}"
-            args = (entry.current, params, *([view] if backend.derived_by_camera else []))
+            pose = gpu_pose.pose if backend.draws_samples(gpu_pose.pose, params) else entry.current
+            args = (pose, params, *([view] if backend.derived_by_camera else []))
             result = self._run(entry, key, name, backend.derive, args, wait, backend.derives_on_thread)
             if result is None:
                 return None
@@ -185,9 +191,11 @@ class Renderer:
         return entry.derived[key]
 
     def is_prepared(self, pose: Pose, backend: Backend, params: Any, look: Look, view: View) -> bool:
-        """Whether `prepare` would have nothing to estimate or derive."""
+        """Whether `prepare` would have nothing to merge, estimate or derive."""
+        if not (pose.is_merged or backend.draws_samples(pose, params)):
+            return False
         entry = self._entry(self.resident(pose))
-        if _missing(entry.current, backend, params, look):
+        if _missing(entry.gpu_pose, backend, params, look):
             return False
         return backend.derive is None or _derived_key(backend, params, view) in entry.derived
 
@@ -250,21 +258,30 @@ class Renderer:
         self.gpu.collect()
 
 
-def _missing(pose: Pose, backend: Backend, params: Any, look: Look) -> tuple[str, ...]:
-    """The attributes of the points to be estimated."""
-    wanted = {*backend.needs(pose, params), *(("normals",) if wants_normals(look) else ())}
+def _merge(pose: GpuPose) -> bool:
+    """Merge the points of range views, and find what drawing asks of them."""
+    spacings(pose.stored)
+    return True
+
+
+def _missing(pose: GpuPose, backend: Backend, params: Any, look: Look) -> tuple[str, ...]:
+    """The attributes of the points to be estimated. Looks at no point where the backend draws samples."""
+    wanted = set(backend.needs(pose.pose, params))
     if "views" in wanted and not pose.views:
         raise InputError(f"{backend.title} draws range views, and this scan has none", hint="Choose another")
+    if wants_normals(look) and not backend.draws_samples(pose.pose, params):
+        wanted.add("normals")
     wanted.discard("views")
-    cloud = pose.cloud
-    return tuple(sorted(name for name in wanted if getattr(cloud, name) is None)) if len(cloud) else ()
+    return tuple(sorted(name for name in wanted if getattr(pose.cloud, name) is None and len(pose.cloud)))
 
 
 def _bare(pose: Pose) -> Pose:
     """The pose with all that estimates look at and nothing more, as it may have to go to another process."""
-    cloud = PointCloud(pose.cloud.positions, pose.cloud.origin, ids=pose.cloud.ids)
+    bare = pose.with_cloud(PointCloud(pose.cloud.positions, pose.cloud.origin, ids=pose.cloud.ids))
+    if isinstance(bare.points, PointCloud):
+        return bare
     views = tuple(replace(view, color=None, confidence=None) for view in pose.views)
-    return replace(pose, cloud=cloud, views=views)
+    return replace(bare, points=replace(bare.points, views=views))
 
 
 def _derived_key(backend: Backend, params: Any, view: View) -> DerivedKey:

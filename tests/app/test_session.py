@@ -78,7 +78,7 @@ def test_a_saved_session_takes_the_place_of_what_is_there_and_can_be_undone() ->
 
 
 def test_a_frame_without_the_chosen_scalar_is_drawn_in_other_colours_and_the_choice_stays() -> None:
-    with_q = replace(BARE, cloud=replace(BARE.cloud, scalars={"q": np.zeros(3, np.float32)}))
+    with_q = replace(BARE, points=replace(BARE.cloud, scalars={"q": np.zeros(3, np.float32)}))
     document = Document(camera=Camera(), look=Look(color_by="q", light="flat"))
     assert document.request(with_q).look == document.look
     assert document.request(BARE).look == Look(color_by="auto", light="flat")
@@ -127,7 +127,7 @@ def test_what_tools_lay_is_merged_and_goes_with_the_scan() -> None:
 
 
 def test_a_pose_that_is_replayed_stands_where_it_was_and_has_its_own_numbers() -> None:
-    pose = replace(BARE, cloud=replace(BARE.cloud, scalars={"q": np.zeros(3)}))
+    pose = replace(BARE, points=replace(BARE.cloud, scalars={"q": np.zeros(3)}))
     laid = Session("one").laid
     laid.lay("a", lambda pose: {"q": np.ones(3), "a": np.ones(3)}, moved)
     laid.replay(pose.index, moved(-1))

@@ -237,7 +237,7 @@ void main() {
 def test_points_take_what_a_compute_pass_made(renderer: Renderer, tmp_path: Path, feed: str) -> None:
     gpu, count = renderer.gpu, len(CLOUD)
     (shader := tmp_path / "making.comp").write_text(_MAKING, encoding="utf-8")
-    bare = GpuPose(gpu, PointCloud.from_arrays(CLOUD.positions))
+    bare = GpuPose(gpu, Pose(0, 0.0, "test", PointCloud.from_arrays(CLOUD.positions)))
     normals = gl.BufferTexture(gpu.ctx.buffer(reserve=12 * count), gl.RGB32F)
     radii = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * count), gl.R32F)
     for binding, made in enumerate((bare.array("positions"), normals, radii)):
@@ -253,7 +253,7 @@ def test_points_take_what_a_compute_pass_made(renderer: Renderer, tmp_path: Path
     pictures = []
     for points in (
         Points(bare, use_radii=True, count=count, buffers=buffers),
-        Points(GpuPose(gpu, stored), use_radii=True, count=count),
+        Points(GpuPose(gpu, Pose(0, 0.0, "test", stored)), use_radii=True, count=count),
     ):
         surface = Surface(gpu, SIZE)
         surface.start(points.pose, View.of(CAMERAS["inside"], SIZE, stored.origin, stored.bounds()))

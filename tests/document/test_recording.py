@@ -83,7 +83,7 @@ def test_an_entry_has_the_place_that_the_scan_is_moved_to() -> None:
 
 
 def test_colours_by_numbers_that_are_in_no_file_are_refused() -> None:
-    pose = replace(POSE, cloud=replace(POSE.cloud, scalars={"heat": np.arange(3.0)}))
+    pose = replace(POSE, points=replace(POSE.cloud, scalars={"heat": np.arange(3.0)}))
     layers = Layers({"deviation": np.arange(3.0)})
 
     def entry(color_by: str, layers: Layers) -> Entry:

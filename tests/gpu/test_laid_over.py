@@ -88,7 +88,7 @@ def test_numbers_come_without_the_points(renderer: Renderer, backend: str) -> No
     assert own.bytes_of(POSE) - before <= 4 * len(CLOUD), "a number a point, and nothing else"
     rows = [surface.point_of(row) for row in surface.row[surface.row != NOTHING]]
     np.testing.assert_array_equal(surface.value[surface.row != NOTHING], DEVIATION[rows].astype(np.float32))
-    stored = replace(POSE, cloud=replace(CLOUD, scalars={"deviation": DEVIATION}))
+    stored = replace(POSE, points=replace(CLOUD, scalars={"deviation": DEVIATION}))
     np.testing.assert_array_equal(surface.image(), drawn(own, stored, camera, None, backend, look).image())
     own.release()
 

@@ -446,13 +446,14 @@ def test_places_project_to_samples_of_a_measured_grid(renderer: Renderer, kind: 
 
 
 def test_a_pose_brings_its_samples(renderer: Renderer) -> None:
-    pose = GpuPose(renderer.gpu, Pose.of(0, 0.0, "x", VIEWS).cloud, VIEWS)
+    pose = GpuPose(renderer.gpu, Pose.of(0, 0.0, "x", VIEWS))
     assert pose.names_of(("views",)) == ["samples"]
     assert pose.uploaded_bytes == 0
     samples = pose.samples
     assert pose.samples is samples
     assert samples.complete
     assert pose.uploaded_bytes == samples.nbytes
+    assert not pose.pose.is_merged
     assert pose.upload(["samples"])
     np.testing.assert_array_equal(read(samples)[1][0].depth, VIEWS[1].depth)
 
@@ -462,7 +463,7 @@ def test_samples_come_in_slices(renderer: Renderer, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         range_samples, "_SLICE", 5 * 47 + 3
     )  # five rows of the first view, eleven of the other
-    pose = GpuPose(renderer.gpu, Pose.of(0, 0.0, "x", VIEWS).cloud, VIEWS)
+    pose = GpuPose(renderer.gpu, Pose.of(0, 0.0, "x", VIEWS))
     calls = 1
     while not pose.upload(["samples"], budget_ms=0):
         calls += 1
@@ -484,7 +485,7 @@ def test_samples_go_with_the_pose(renderer: Renderer) -> None:
 
 
 def test_a_pose_without_range_views_has_no_samples(renderer: Renderer) -> None:
-    pose = GpuPose(renderer.gpu, Pose.of(0, 0.0, "x", VIEWS).cloud)
+    pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", Pose.of(0, 0.0, "x", VIEWS).cloud))
     with pytest.raises(InputError, match="no range views"):
         _ = pose.samples
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from range_scenes import sphere_view
 
 from viewer.errors import InputError
 from viewer.scan.cache import PoseCache, default_budget
@@ -57,6 +58,26 @@ def test_the_same_pose_twice_counts_once() -> None:
     cache.put(pose(0))
     cache.put(pose(0, points=20))
     assert cache.nbytes == 240
+
+
+def test_what_is_merged_later_is_counted() -> None:
+    views = (sphere_view((0, 0, 4)),)
+    poses = [Pose.of(index, 0.0, "", views) for index in range(4)]
+    before = poses[0].nbytes
+    cache = PoseCache(4 * before)
+    assert all(cache.put(pose) for pose in poses[:3])
+    assert cache.nbytes == 3 * before
+    grown = poses[0].cloud.nbytes
+    assert cache.nbytes == 3 * before + grown == before + cache.size_of(0) + cache.size_of(1)
+    assert cache.put(poses[3])
+    assert list(cache) == [1, 2, 3], "all four are more than it holds"
+    for pose in poses[1:]:
+        assert pose.cloud.nbytes == grown
+    cache.trim()
+    assert cache.nbytes == sum(cache.size_of(index) for index in cache) <= cache.budget
+    assert list(cache)[-1] == 3, "the least recently used went first"
+    cache.clear()
+    assert cache.nbytes == 0
 
 
 def test_touch_sets_the_order() -> None:

@@ -22,6 +22,7 @@ from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 from viewer.view import View
 
 SURFELS = backend("surfels")
@@ -76,7 +77,7 @@ def main() -> None:
     print(f"{'points':>10} {'order':8}" + "".join(f"{way:>16}" for way in WAYS))
     for count in options.counts:
         for order in ORDERS:
-            pose = GpuPose(gpu, sphere(count, order))
+            pose = GpuPose(gpu, Pose(0, 0.0, "sphere", sphere(count, order)))
             eye = options.away * np.array([0.3, 0.5, 2.6])
             camera = Camera(eye=tuple(eye), target=(0, 0, 0), fov_y=46)
             surface.start(pose, View.of(camera, surface.size, pose.cloud.origin, pose.bounds))

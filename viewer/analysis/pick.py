@@ -126,7 +126,7 @@ def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:
     surface may be that still is the place's own.
     """
     unmoved = surface.layers.place.inverse.points(np.asarray(position, np.float64))
-    offset = (unmoved - surface.pose.cloud.origin)[None]
+    offset = (unmoved - surface.pose.origin)[None]
     if not surface.view.contains(offset)[0]:
         return False
     pixels, depths = surface.view.project(offset)

@@ -17,6 +17,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from ..backends import backend
 from ..document.document import Document
 from ..document.saved_session import SavedSession, kept
 from ..errors import InputError, Scan4DError
@@ -24,6 +25,7 @@ from ..folders import user_folder
 from ..gpu.context import Gpu
 from ..renderer import Renderer
 from ..scan.open import open_scan
+from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
 from . import keys, settings, theme
@@ -31,7 +33,7 @@ from .commands import Commands
 from .failures import Failures
 from .files.browser import Browser
 from .files.keeping import Keeping
-from .files.opening import Opened, Opening, begin
+from .files.opening import Opened, Opening, begin, find_facts
 from .files.scans import Scans, title
 from .files.sessions import Sessions
 from .help import Help
@@ -242,6 +244,11 @@ class App:
         find = (lambda: self._kept(scan)) if left is None else lambda: left
         self._opening.start(scan, title(scan), find, lambda: open_scan(scan, self._unit, self._fps), session)
 
+    def _find_facts(self, pose: Pose) -> None:
+        """Find what drawing as it is chosen asks of a pose, on the thread that has read it."""
+        name, params = self.session.document.chosen(pose)
+        find_facts(pose, of_points=not backend(name).draws_samples(pose, params))
+
     def _kept(self, scan: str) -> SavedSession | None:
         """Find what was kept of a scan. Raises InputError where that is damaged."""
         found = kept(known_as(scan))
@@ -295,6 +302,7 @@ class App:
 
     def _start(self, opened: Opened) -> None:
         timeline, self.session.hash_found, left, problem, session = opened
+        timeline.finish = self._find_facts
         if problem:
             self.note(problem)
         if session is not None:

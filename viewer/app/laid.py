@@ -81,6 +81,6 @@ class Laid:
             scalars |= numbers_of(pose)
         self.names |= scalars.keys()
         if self._replayed is not None and self._replayed[0] == pose.index:
-            scalars = {name: values for name, values in scalars.items() if name not in pose.cloud.scalars}
+            scalars = {name: values for name, values in scalars.items() if name not in pose.overview.scalars}
         place = self.place(pose.index)
         return Layers(scalars, place) if scalars or not place.is_identity else NO_LAYERS

@@ -48,7 +48,7 @@ def draw(app: App) -> None:
             _draw_renderer(app.session, app.rendering, pose)
         if _section("Look"):
             look = app.document.look
-            colors = _colors(look, app.session.laid.layers(pose).names(pose.cloud.scalars))
+            colors = _colors(look, app.session.laid.layers(pose).names(pose.overview.scalars))
             app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": colors}))
             _draw_projection(app.steering, app.document.camera)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
@@ -138,7 +138,7 @@ def _draw_statistics(app: App) -> None:
     x, y, z = bounds.high - bounds.low
     _row(
         "Points",
-        f"{len(pose.cloud):,}" + (f" ({pose.cloud.dropped:,} dropped)" if pose.cloud.dropped else ""),
+        f"{pose.count:,}" + (f" ({pose.dropped:,} dropped)" if pose.dropped else ""),
     )
     for name, number in counting.words(app.viewport, app.counting.counts):
         _row(name, number)

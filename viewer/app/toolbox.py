@@ -277,7 +277,7 @@ class Toolbox:
 
 def _checked(numbers: Numbers, pose: Pose) -> Numbers:
     """The numbers, which are as many as the pose's points. Raises InputError where they are not."""
-    Layers(numbers).check(pose.cloud)
+    Layers(numbers).check(pose)
     return numbers
 
 

@@ -160,6 +160,10 @@ class Backend:
         """Names of what it needs of this pose: "normals", "radii", "views"."""
         return self.module.needs(pose, params)
 
+    def draws_samples(self, pose: Pose, params: Any) -> bool:
+        """Whether it draws this pose from samples of its range views alone: nothing is read of its points."""
+        return self.rows == "samples" and set(self.needs(pose, params)) == {"views"}
+
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw; True if a later call would refine the picture."""
         return self.module.draw(pose, frame, surface)

@@ -85,7 +85,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 def _touching(pose: GpuPose, view: View) -> int:
     """The size at which squares in the middle of the scan touch their neighbours, pixels."""
     reach = pose.stored.remember(_reach)
-    depth = max(float(view.depths(pose.bounds.center - pose.cloud.origin)), view.near)
+    depth = max(float(view.depths(pose.bounds.center - pose.origin)), view.near)
     pixels = reach * view.scale / (depth if view.perspective else 1.0)
     return min(max(math.ceil(pixels), 1), _LARGEST)
 

@@ -355,7 +355,7 @@ class Bench:
 def _request(contender: Contender, moment: Moment, camera: Camera) -> Request:
     """The request that draws a contender."""
     if contender.backend == CEILING:
-        pose = replace(moment.pose, cloud=moment.mesh.points, views=())
+        pose = replace(moment.pose, points=moment.mesh.points)
         return Request(pose, camera, baselines.mesh(moment.mesh), look=LOOK)
     drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
     return Request(moment.pose, camera, drawn, contender.params, LOOK)

@@ -108,9 +108,9 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
     boxes = []
     for index in spread:
         with suppress(InputError):
-            boxes.append(timeline.pose(index).cloud.bounds())
+            boxes.append(timeline.pose(index).bounds)
     if not boxes:  # there may be a readable one between
-        return next(read_poses(timeline, indices)).cloud.bounds()
+        return next(read_poses(timeline, indices)).bounds
     return Bounds(np.min([b.low for b in boxes], axis=0), np.max([b.high for b in boxes], axis=0))
 
 
@@ -124,12 +124,12 @@ def check_color_source(look: Look, timeline: Timeline, indices: Sequence[int]) -
     readable, scalars = False, dict[str, None]()
     for index in indices:
         try:
-            cloud = timeline.pose(index).cloud
+            named = timeline.pose(index).overview.scalars
         except InputError:
             continue
-        if drawable(look, cloud.scalars) is look:
+        if drawable(look, named) is look:
             return
-        readable, scalars = True, scalars | dict.fromkeys(cloud.scalars)
+        readable, scalars = True, scalars | dict.fromkeys(named)
     if readable:
         error = unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars])
         where = timeline.name if len(indices) > 1 else frame_title(timeline, indices[0])

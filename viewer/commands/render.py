@@ -200,7 +200,7 @@ def _requests(
     camera_of = _camera(args, timeline, shots, size) if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or backend_for(pose, args.backend, values)
-        own = drawable(look, pose.cloud.scalars)
+        own = drawable(look, pose.overview.scalars)
         if own is not look:
             title = frame_title(timeline, pose.index)
             warn(f"{timeline.name}: {title} has no '{look.color_by}', and is drawn in other colours")

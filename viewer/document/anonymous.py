@@ -16,8 +16,9 @@ from ..camera import Camera
 from ..frame import Request
 from ..geometry import up_vector
 from ..look import Look, drawable, unnamed, value_source
-from ..scan.points import UNKNOWN_UNIT
+from ..scan.points import UNKNOWN_UNIT, PointCloud
 from ..scan.pose import Pose
+from ..scan.range_points import RangePoints
 from ..scan.range_view import RangeView
 from ..scan.units import is_length
 
@@ -33,7 +34,7 @@ def anonymous_request(request: Request, start: float) -> Request:
     """
     pose = request.pose
     middle = middle_of(pose)
-    look = raised(unnamed(request.look, request.layers.names(pose.cloud.scalars)), -middle)
+    look = raised(unnamed(request.look, request.layers.names(pose.overview.scalars)), -middle)
     layers = replace(request.layers, place=request.layers.place.in_frame(middle))
     anonymous, camera = anonymous_pose(pose, start), request.camera.moved(-middle)
     return replace(request, pose=anonymous, camera=camera, look=look, layers=layers)
@@ -44,9 +45,12 @@ def anonymous_pose(pose: Pose, start: float) -> Pose:
     """The pose with its middle at zero, seconds counted from `start`, and without names."""
     middle = middle_of(pose)
     views = tuple(_anonymous_view(view, middle, number) for number, view in enumerate(pose.views))
-    cloud = replace(pose.cloud, origin=pose.cloud.origin - middle)
+    if isinstance(pose.points, PointCloud):
+        points: PointCloud | RangePoints = replace(pose.points, origin=pose.origin - middle)
+    else:
+        points = pose.points.moved(views, -middle)
     time = round(pose.time - start, _DECIMALS)  # no rest of a large number tells that it was one
-    return Pose(pose.index, time, f"frame {pose.index}", cloud, views)
+    return Pose(pose.index, time, f"frame {pose.index}", points)
 
 
 def middle_of(pose: Pose) -> NDArray[np.float64]:
@@ -54,7 +58,7 @@ def middle_of(pose: Pose) -> NDArray[np.float64]:
 
     The origin of the cloud would not do: it is zero where the scan is no farther from it than it is wide.
     """
-    bounds = pose.cloud.bounds()
+    bounds = pose.bounds
     extent = float((bounds.high - bounds.low).max())
     if extent <= np.finfo(np.float64).eps * np.abs(bounds.center).max():
         return bounds.center
@@ -70,7 +74,7 @@ def anonymous_unit(unit: str) -> str:
 def in_place(camera: Camera, look: Look, pose: Pose) -> tuple[Camera, Look]:
     """Camera and look of an anonymous picture, for the pose as the scan has it."""
     middle = middle_of(pose)
-    scalar = value_source(drawable(look, pose.cloud.scalars), pose.cloud.scalars)
+    scalar = value_source(drawable(look, pose.overview.scalars), pose.overview.scalars)
     return camera.moved(middle), raised(replace(look, color_by=scalar or look.color_by), middle)
 
 

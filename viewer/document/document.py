@@ -190,5 +190,5 @@ class Document:
         """
         assert self.camera is not None
         name, params = self.chosen(pose)
-        look = drawable(self.look, layers.names(pose.cloud.scalars))
+        look = drawable(self.look, layers.names(pose.overview.scalars))
         return Request(pose, self.camera, name, params, look, layers)

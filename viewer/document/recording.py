@@ -120,7 +120,7 @@ class Entry:
         Raises InputError where its colours come from a layer: these numbers are in no file.
         """
         layers = request.layers
-        source = value_source(request.look, layers.names(request.pose.cloud.scalars))
+        source = value_source(request.look, layers.names(request.pose.overview.scalars))
         if source in layers.scalars:
             what = f"the colours come from '{source}', which is computed and not in the scan's files"
             raise InputError(what, hint="It can be drawn again in other colours")

@@ -19,6 +19,7 @@ from ..errors import InputError, Scan4DError
 from ..files import whole_file
 from ..folders import cache_folder
 from ..scan.points import PointCloud
+from ..scan.pose import Pose
 from ..view import View
 from .context import Gpu
 from .pose import GpuPose
@@ -91,7 +92,7 @@ def _trial(gpu: Gpu) -> tuple[GpuPose, Surface]:
     points = np.random.default_rng(0).permutation(points)
     radii = np.full(_TRIAL_POINTS, 1.5 * (4 * np.pi / _TRIAL_POINTS) ** 0.5)
     cloud = PointCloud.from_arrays(points, normals=points, colors=0.5 * points + 0.5, radii=radii)
-    pose, surface = GpuPose(gpu, cloud), Surface(gpu, _TRIAL_SIZE)
+    pose, surface = GpuPose(gpu, Pose(0, 0.0, "trial", cloud)), Surface(gpu, _TRIAL_SIZE)
     camera = Camera.orbit(pose.bounds, aspect=_TRIAL_SIZE[0] / _TRIAL_SIZE[1])
     surface.start(pose, View.of(camera, _TRIAL_SIZE, cloud.origin, pose.bounds))
     return pose, surface

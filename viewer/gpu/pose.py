@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
-from ..scan.points import PointCloud
+from ..scan.points import PointCloud, strided
+from ..scan.pose import Pose
 from ..scan.range_view import RangeView
 from . import gl
 from .context import Gpu
@@ -32,40 +34,73 @@ FORMATS = {
     "axes": gl.RGBA32F,
 }
 _RANGES = "samples"  # the name that samples of range views are uploaded by
-_SAMPLE = 1 << 13  # values that ranges look at
 _SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
 
 
 class GpuPose:
-    """The arrays of one point cloud as buffer textures, indexed by row, and the samples of its range views.
+    """The arrays of a pose's points as buffer textures, indexed by row, and the samples of its range views.
 
     A row is a point's place in the cloud's arrays; `cloud.ids` gives its index in the file.
     `stored` is the cloud as the scan has it, `cloud` the same with what was estimated since;
-    whatever is chosen automatically looks at `stored`, so that it does not change by history.
+    whatever is chosen automatically looks at `stored`, so that it does not change by history. Points of
+    range views are merged when either is first read. pose: as it was given.
     """
 
-    def __init__(self, gpu: Gpu, cloud: PointCloud, views: tuple[RangeView, ...] = ()) -> None:
+    def __init__(self, gpu: Gpu, pose: Pose) -> None:
         self.gpu = gpu
+        self.pose = pose
         self._arrays: dict[Hashable, gl.BufferTexture] = {}  # by name; what is packed, by how
         self._samples: RangeSamples | None = None
         self._uploads: dict[str, _Upload] = {}  # that have begun
-        if len(cloud) > gpu.max_points:
-            raise InputError(
-                f"{len(cloud):,} points in one pose; this driver takes {gpu.max_points:,}",
-                hint="Split the scan or thin it out",
-            )
-        self.stored = self.cloud = cloud
-        self.views = views
+        self._estimated: PointCloud | None = None
         self.uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._layers: dict[int, Layer] = {}
         self._height_axis: tuple[float, ...] | None = None
 
+    @cached_property
+    def stored(self) -> PointCloud:
+        """The points as the scan has them. Raises InputError for more than the driver takes."""
+        if self.pose.count > self.gpu.max_points:
+            raise InputError(
+                f"{self.pose.count:,} points in one pose; this driver takes {self.gpu.max_points:,}",
+                hint="Split the scan or thin it out",
+            )
+        return self.pose.cloud
+
+    @property
+    def cloud(self) -> PointCloud:
+        """The points with what was estimated of them."""
+        return self._estimated or self.stored
+
+    def add_estimates(self, arrays: Mapping[str, Any]) -> None:
+        """Take in attributes that the scan lacks, by name."""
+        self._estimated = replace(self.cloud, **arrays)
+
+    @property
+    def estimated_bytes(self) -> int:
+        """Bytes on the CPU of what was estimated."""
+        return 0 if self._estimated is None else self._estimated.nbytes - self.stored.nbytes
+
+    @property
+    def views(self) -> tuple[RangeView, ...]:
+        """The pose's range views."""
+        return self.pose.views
+
+    @property
+    def overview(self) -> PointCloud:
+        """The pose's cloud that tells origin and attributes."""
+        return self.pose.overview
+
+    @property
+    def origin(self) -> NDArray[np.float64]:
+        """The origin that positions are relative to, (3,) scan units."""
+        return self.pose.origin
+
     @property
     def bounds(self) -> Bounds:
-        """The robust bounds of the cloud; a box of two units where there is no point."""
-        cloud = self.stored
-        return cloud.bounds() if len(cloud) else Bounds(cloud.origin - 1, cloud.origin + 1)
+        """The pose's robust bounds; a box of two units where there is no point."""
+        return self.pose.bounds if len(self.overview) else Bounds(self.origin - 1, self.origin + 1)
 
     def array(self, name: str) -> gl.BufferTexture:
         """positions, normals, colors, radii, axes, ids, or 'scalar:NAME'; uploaded at the first call."""
@@ -131,7 +166,7 @@ class GpuPose:
         if self._samples is None:
             if not self.views:
                 raise InputError("the scan has no range views")
-            self._samples = RangeSamples(self.gpu, self.views, self.stored.origin)
+            self._samples = RangeSamples(self.gpu, self.views, self.origin)
         if not self._samples.upload(end):
             return False
         self.uploaded_bytes += self._samples.nbytes
@@ -155,14 +190,17 @@ class GpuPose:
 
     def scalar(self, name: str) -> NDArray:
         """The named scalar, (N,); raises InputError that lists the known ones."""
-        if name not in self.cloud.scalars:
-            raise unknown_name("scalar", name, list(self.cloud.scalars))
+        self._check_scalar(name)
         return self.cloud.scalars[name]
+
+    def _check_scalar(self, name: str) -> None:
+        if name not in self.overview.scalars:
+            raise unknown_name("scalar", name, list(self.overview.scalars))
 
     def scalar_range(self, name: str) -> tuple[float, float]:
         """The 2 % and 98 % quantiles of a scalar's finite values."""
-        self.scalar(name)  # raises for one that is not there
-        return self.cloud.remember(_scalar_range, name)
+        self._check_scalar(name)
+        return self.overview.remember(_scalar_range, name)
 
     def layer(self, values: NDArray) -> Layer:
         """Numbers of the scan's points that are not part of it, (N,): kept, where they are uploaded, for as
@@ -173,7 +211,7 @@ class GpuPose:
                 self.uploaded_bytes -= gone.texels.buffer.size
                 self.gpu.discard(gone.texels)
         if id(values) not in self._layers:
-            self._layers[id(values)] = Layer(weakref.ref(values), robust_range(_strided(values)))
+            self._layers[id(values)] = Layer(weakref.ref(values), robust_range(strided(values)))
         return self._layers[id(values)]
 
     def layer_texels(self, values: NDArray, zero: float, rows: NDArray[np.uint32] | None) -> gl.BufferTexture:
@@ -200,7 +238,7 @@ class GpuPose:
     @cached_property
     def sample(self) -> NDArray[np.float64]:
         """Some of the positions, (M, 3), relative to the origin: for ranges."""
-        return _strided(self.cloud.positions).astype(np.float64)
+        return self.pose.sample
 
     @contextmanager
     def preparing(self, kind: str) -> Iterator[None]:
@@ -264,15 +302,11 @@ def _array_upload(gpu: Gpu, values: NDArray) -> _Upload:
 
 
 def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:
-    return robust_range(_strided(cloud.scalars[name]))
+    return robust_range(strided(cloud.scalars[name]))
 
 
 def _heights(cloud: PointCloud, axis: tuple[float, ...]) -> NDArray[np.float32]:
     return cloud.positions @ np.array(axis, np.float32)
-
-
-def _strided(values: NDArray) -> NDArray:
-    return values[:: max(1, len(values) // _SAMPLE)]
 
 
 def as_float32(values: NDArray, zero: float = 0.0) -> NDArray[np.float32]:

@@ -47,14 +47,14 @@ class _Shading:
 def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
     pose, gpu = surface.pose, surface.gpu
-    cloud = pose.cloud
+    cloud = pose.overview
     source, surface.look = value_source(look, surface.layers.names(cloud.scalars)), look
     value = source if source in (None, "depth", "height") else "scalar"
     by_level = look.color_by == "level"
     color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
         color = "plain"
-    light = look.light if look.light != "auto" else "flat" if pose.stored.normals is None else "head"
+    light = look.light if look.light != "auto" else "flat" if cloud.normals is None else "head"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
     surface.color_range = None if source is None else value_range(surface, look)
     program = gpu.compute(
@@ -179,7 +179,7 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     if source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample))
     elif source == "height":
-        world = surface.layers.place.points(pose.sample + pose.cloud.origin)
+        world = surface.layers.place.points(pose.sample + pose.origin)
         low, high = robust_range(world @ up_vector(look.up))
     else:
         low, high = surface.scalar_range(source or "", pose)

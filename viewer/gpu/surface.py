@@ -271,7 +271,7 @@ class Surface:
     @property
     def value_source(self) -> str | None:
         """Source of the number that the look colours by ("depth", "height", a scalar's name), else None."""
-        return value_source(self.look, self.layers.names(self._cloud.scalars))
+        return value_source(self.look, self.layers.names(self.pose.overview.scalars))
 
     @property
     def values_key(self) -> tuple[object, ...]:
@@ -287,7 +287,7 @@ class Surface:
         far from zero keep their steps."""
         source = self.value_source
         if source == "height":
-            return float(self.layers.place.points(self._cloud.origin) @ up_vector(self.look.up))
+            return float(self.layers.place.points(self.pose.origin) @ up_vector(self.look.up))
         return 0.0 if source in (None, "depth") else self.scalar_range(source, self.pose)[0]
 
     def scalar_range(self, name: str, pose: GpuPose) -> tuple[float, float]:

@@ -33,15 +33,26 @@ def megabytes(variable: str) -> int | None:
 
 
 class PoseCache:
-    """Poses by index, never more than `budget` bytes of them; the least recently used goes first.
+    """Poses by index, never more than `budget` bytes of them when one comes in; the least recently used goes
+    first.
 
-    Not thread-safe: its owner holds a lock.
+    Poses grow when their points are merged, so that those which may are counted again. Not thread-safe: its
+    owner holds a lock.
     """
 
     def __init__(self, budget: int) -> None:
         self.budget = budget
-        self.nbytes = 0
         self._poses: OrderedDict[int, Pose] = OrderedDict()  # least recently used first
+        self._sizes: dict[int, int] = {}  # bytes of each
+        self._unmerged: set[int] = set()  # that may have grown
+        self._counted = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the poses hold now."""
+        for index in tuple(self._unmerged):
+            self._count(index)
+        return self._counted
 
     def __contains__(self, index: int) -> bool:
         return index in self._poses
@@ -60,31 +71,49 @@ class PoseCache:
     def put(self, pose: Pose, keep: Callable[[int], bool] = lambda _: False) -> bool:
         """Hold this pose and evict others for it, but none to `keep`; False where it does not fit."""
         self._drop(pose.index)
-        room, victims = self.budget - self.nbytes, []
-        for index, held in self._poses.items():
-            if room >= pose.nbytes:
+        room, needed, victims = self.budget - self.nbytes, pose.nbytes, []
+        for index in self._poses:
+            if room >= needed:
                 break
             if not keep(index):
                 victims.append(index)
-                room += held.nbytes
-        if room < pose.nbytes:
+                room += self._sizes[index]
+        if room < needed:
             return False
         for index in victims:
             self._drop(index)
         self._poses[pose.index] = pose
-        self.nbytes += pose.nbytes
+        self._sizes[pose.index] = 0
+        self._count(pose.index)
         return True
+
+    def trim(self) -> None:
+        """Evict the least recently used while the poses have grown beyond the budget."""
+        while self.nbytes > self.budget:
+            self._drop(next(iter(self._poses)))
+
+    def size_of(self, index: int) -> int | None:
+        """Bytes that a pose holds; None where it is not here."""
+        return self._poses[index].nbytes if index in self._poses else None
 
     def touch(self, indices: Iterable[int]) -> None:
         """Count poses that are here as used, the last one as the most recent."""
         for index in indices:
             self._poses.move_to_end(index)
 
-    def _drop(self, index: int) -> None:
-        if index in self._poses:
-            self.nbytes -= self._poses.pop(index).nbytes
-
     def clear(self) -> None:
         """Drop all."""
-        self._poses.clear()
-        self.nbytes = 0
+        for index in tuple(self._poses):
+            self._drop(index)
+
+    def _count(self, index: int) -> None:
+        pose, before = self._poses[index], self._sizes[index]
+        (self._unmerged.discard if pose.is_merged else self._unmerged.add)(index)  # before what it grew by
+        self._sizes[index] = pose.nbytes
+        self._counted += self._sizes[index] - before
+
+    def _drop(self, index: int) -> None:
+        if index in self._poses:
+            del self._poses[index]
+            self._unmerged.discard(index)
+            self._counted -= self._sizes.pop(index)

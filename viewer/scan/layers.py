@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..rigid import STILL, Rigid
-from .points import PointCloud
+from .pose import Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +25,12 @@ class Layers:
     scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     place: Rigid = STILL
 
-    def check(self, cloud: PointCloud) -> None:
+    def check(self, pose: Pose) -> None:
         """Raise InputError where there are not as many numbers as points."""
         for name, values in self.scalars.items():
-            if np.shape(values) != (len(cloud),) or values.dtype.kind not in "fiub":
+            if np.shape(values) != (len(pose.cloud),) or values.dtype.kind not in "fiub":
                 found = f"{np.shape(values)} {values.dtype}"
-                raise InputError(f"the layer '{name}' is {found}, expected {len(cloud):,} numbers")
+                raise InputError(f"the layer '{name}' is {found}, expected {len(pose.cloud):,} numbers")
 
     def names(self, scalars: Iterable[str]) -> list[str]:
         """The names of all numbers there are: the scan's first."""

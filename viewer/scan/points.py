@@ -234,8 +234,18 @@ def choose_origin(points: NDArray) -> NDArray[np.float64]:
     return np.round(median / grid) * grid + 0.0  # + 0.0: no negative zero
 
 
+def stride(count: int) -> int:
+    """The step at which so many values are looked at by robust statistics."""
+    return max(1, count // _SAMPLE)
+
+
+def strided(values: NDArray) -> NDArray:
+    """Some thousands of the values (N, ...), spread evenly: what robust statistics look at."""
+    return values[:: stride(len(values))]
+
+
 def _sample(points: NDArray) -> NDArray[np.float64]:
-    return np.asarray(points[:: max(1, len(points) // _SAMPLE)], np.float64)
+    return np.asarray(strided(points), np.float64)
 
 
 def _robust_extent(points: NDArray) -> float:

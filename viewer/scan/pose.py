@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from .points import PointCloud
-from .range_view import RangeView, merge
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bounds import Bounds
+from .points import PointCloud, strided
+from .range_points import RangePoints
+from .range_view import RangeView
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 
@@ -14,24 +19,77 @@ Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 class Pose:
     """One moment of a scan, on the CPU.
 
-    index: its place on the timeline. time: seconds. label: the file or frame it came from.
-    cloud: its points; those of the range views where it was scanned as such.
+    index: its place on the timeline. time: seconds. label: the file or frame it came from. points: its
+    points, or those of the range views where it was scanned as such.
+
+    To merge the points of range views takes time and memory, and is done where something reads `cloud`. What
+    is told of them by the `overview` needs no merging.
     """
 
     index: int
     time: float
     label: str
-    cloud: PointCloud
-    views: tuple[RangeView, ...] = ()
+    points: PointCloud | RangePoints
 
     @classmethod
     def of(cls, index: int, time: float, label: str, scanned: Scanned) -> Pose:
         """The pose of what a frame holds. Raises InputError where range views see nothing."""
-        if isinstance(scanned, PointCloud):
-            return cls(index, time, label, scanned)
-        return cls(index, time, label, merge(scanned), scanned)
+        points = scanned if isinstance(scanned, PointCloud) else RangePoints.of(scanned)
+        return cls(index, time, label, points)
+
+    @property
+    def cloud(self) -> PointCloud:
+        """All its points; those of range views are merged at the first call, on any thread, and kept."""
+        return self.points if isinstance(self.points, PointCloud) else self.points.cloud
+
+    @property
+    def is_merged(self) -> bool:
+        """Whether `cloud` is there, rather than to be merged."""
+        return isinstance(self.points, PointCloud) or self.points.is_merged
+
+    @property
+    def views(self) -> tuple[RangeView, ...]:
+        """The range views that it was scanned as; none where it holds points alone."""
+        return () if isinstance(self.points, PointCloud) else self.points.views
+
+    @property
+    def overview(self) -> PointCloud:
+        """A cloud with the origin and the attributes of `cloud`, to find facts by: of range views some
+        thousands of the points, spread evenly; else `cloud` itself."""
+        return self.points if isinstance(self.points, PointCloud) else self.points.overview
+
+    @property
+    def count(self) -> int:
+        """Number of points; of range views, of the pixels that see one."""
+        return len(self.points) if isinstance(self.points, PointCloud) else self.points.count
+
+    @property
+    def dropped(self) -> int:
+        """Number of points that were left out of `cloud`; 0 before it is there."""
+        return self.cloud.dropped if self.is_merged else 0
+
+    @property
+    def origin(self) -> NDArray[np.float64]:
+        """The origin that positions are relative to, (3,) scan units."""
+        return self.overview.origin
+
+    @property
+    def bounds(self) -> Bounds:
+        """The box around the body of the points, see `PointCloud.bounds`; of the `overview`. Raises
+        InputError where there is no point."""
+        return self.overview.bounds()
+
+    @property
+    def sample(self) -> NDArray[np.float64]:
+        """Some of the positions, (M, 3), relative to the origin: for ranges."""
+        return strided(self.overview.positions).astype(np.float64)
 
     @property
     def nbytes(self) -> int:
-        """Bytes held by its arrays."""
-        return self.cloud.nbytes + sum(view.nbytes for view in self.views)
+        """Bytes held by its arrays: more once points are merged."""
+        return self.points.nbytes
+
+    def with_cloud(self, cloud: PointCloud) -> Pose:
+        """Put a cloud that has more attributes of the same points in place of `cloud`."""
+        points = cloud if isinstance(self.points, PointCloud) else self.points.with_cloud(cloud)
+        return replace(self, points=points)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, unknown_name
 from ..rigid import is_rigid
@@ -253,12 +253,13 @@ def mask_of(numbers: NDArray) -> NDArray[np.bool_]:
     return numbers > _MASKED_IN
 
 
-def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
+def merge(views: Sequence[RangeView], normals: bool = False, origin: ArrayLike | None = None) -> PointCloud:
     """The points that all views see, in view order and then in row order.
 
     ids count all pixels in that order, so they tell the pixel. Colours and the scalar `confidence` are
     there where every view has them; the scalar `view` is the number of the view. normals: whether to
-    make them, see `RangeView.normals`. Raises InputError where no view sees a point.
+    make them, see `RangeView.normals`. origin: as for `PointCloud.from_arrays`. Raises InputError where no
+    view sees a point.
     """
     valid = [view.valid() for view in views]
     counts = [int(np.count_nonzero(pixels)) for pixels in valid]
@@ -283,6 +284,7 @@ def merge(views: Sequence[RangeView], normals: bool = False) -> PointCloud:
         normals=np.concatenate([view.normals() for view in views]) if normals else None,
         colors=of_points("color", srgb8),
         scalars=scalars if confidence is None else scalars | {"confidence": confidence},
+        origin=origin,
     )
     if not len(cloud):
         raise InputError("holds no points: no pixel inside the masks has a depth")

@@ -242,6 +242,7 @@ class Timeline:
         if self._closed:
             return
         self._wanted, self._in_use = index, self._held(index)
+        self._cache.trim()
         if self._worker is None:
             self._worker = threading.Thread(target=self._work, name="scan4d-poses", daemon=True)
             self._worker.start()
@@ -280,12 +281,16 @@ class Timeline:
         for step in range(len(self)):
             index = (self._playhead + self._direction * step) % len(self)
             if self._is_missing(index):
-                size = self._sizes.get(index, self._typical_size)
-                if nearer_bytes + size > self._cache.budget and index != self._wanted:
+                if nearer_bytes + self._size_of(index) > self._cache.budget and index != self._wanted:
                     return
                 yield index
             if index in self._cache or index in self._loading:
-                nearer_bytes += self._sizes.get(index, self._typical_size)
+                nearer_bytes += self._size_of(index)
+
+    def _size_of(self, index: int) -> int:
+        """Bytes of a pose as it is, else as it was read before, else of another one."""
+        held = self._cache.size_of(index)
+        return self._sizes.get(index, self._typical_size) if held is None else held
 
     def _is_missing(self, index: int) -> bool:
         in_use = self._in_use is not None and self._in_use.index == index
@@ -318,14 +323,14 @@ class Timeline:
             return
         with self._state:
             del self._loading[index]
-            if pose.cloud.dropped and index not in self._sizes:
-                what = f"{pose.label}: {pose.cloud.dropped} points without finite coordinates are left out"
+            if pose.dropped and index not in self._sizes:
+                what = f"{pose.label}: {pose.dropped} points without finite coordinates are left out"
                 self.messages.append(ScanMessage("dropped", what, index))
-            if pose.cloud.shortened and index not in self._sizes:
-                what = f"{pose.label}: {pose.cloud.shortened} splats far larger than the scan are shortened"
+            if (shortened := pose.overview.shortened) and index not in self._sizes:
+                what = f"{pose.label}: {shortened} splats far larger than the scan are shortened"
                 self.messages.append(ScanMessage("shortened", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
-            self._topologies[index] = pose.cloud.topology
+            self._topologies[index] = pose.overview.topology
             if not self._closed:
                 distance = self._distance(index) if ahead else 0
                 self._cache.put(pose, keep=lambda other: self._distance(other) < distance)

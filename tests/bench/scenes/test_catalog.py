@@ -161,7 +161,7 @@ def test_sequences_carry_their_surface_where_faces_stay(name: str, data_dir: Pat
         return
     next_mesh = subject.moment(1).mesh
     cloud = PointCloud.from_arrays(moved + next_mesh.origin)
-    there = Moment(replace(moment.pose, cloud=cloud), next_mesh, next_mesh)
+    there = Moment(replace(moment.pose, points=cloud), next_mesh, next_mesh)
     assert distances(there).max() < 1e-5 * next_mesh.bounds.radius
 
 

@@ -19,11 +19,18 @@ log = logging.getLogger(__name__)
 _MANY = 200_000  # points, of which facts take longer to find than a window may stop for
 
 
-def find_facts(pose: Pose) -> None:
-    """Find what drawing asks of a large pose, on the thread that has read it."""
-    if len(pose.cloud) > _MANY:
-        pose.cloud.bounds()
-        spacings(pose.cloud)
+def find_facts(pose: Pose, of_points: bool = False) -> None:
+    """Find what drawing asks of a large pose, on the thread that has read it.
+
+    of_points: whether its points are drawn, so that those of range views are merged.
+    """
+    large = pose.count > _MANY
+    if large:
+        pose.overview.bounds()
+    if of_points or pose.is_merged:
+        cloud = pose.cloud
+        if large:
+            spacings(cloud)
 
 
 class Opened(NamedTuple):

@@ -31,7 +31,7 @@ class Rendering:
             stand_in = backends()[self._session.document.defaults(pose)[0]].title
             self._note(f"This Scan4D has no renderer '{chosen_backend}': {stand_in} draws in its place.")
         missed = self._session.scan, look.color_by
-        names = self._session.laid.layers(pose).names(pose.cloud.scalars)
+        names = self._session.laid.layers(pose).names(pose.overview.scalars)
         if missed not in self._missed and drawable(look, names) != look:
             self._missed.add(missed)
             chosen = missed[1]

@@ -88,7 +88,8 @@ class Viewport:
             return False
         try:
             if not bring(self.renderer, request, _UPLOAD_MS):
-                self._prepared_at = now  # until then the picture before stays
+                later = 0.0 if self.renderer.preparing is None else _PREPARED_LATER
+                self._prepared_at = now + later  # until then the picture before stays
                 return False
             self._drawn, self.request, self._picked = wanted, request, None
             self.problem, self._prepared_at = None, math.inf
@@ -108,7 +109,7 @@ class Viewport:
     def _note_drawn(self, request: Request, surface: Surface, refinable: bool) -> None:
         if surface.stats.backend == str(request.backend):
             self._asked_for = request
-        drew, count = surface.stats.backend, len(request.pose.cloud) - surface.stats.left_out
+        drew, count = surface.stats.backend, request.pose.count - surface.stats.left_out
         now = self.shown_at = time.monotonic()
         self.number += 1
         self._times.append(now)
@@ -123,7 +124,7 @@ class Viewport:
         if self._asked_for is not None:
             before = replace(
                 self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers,
-                look=drawable(self._asked_for.look, request.layers.names(request.pose.cloud.scalars)),
+                look=drawable(self._asked_for.look, request.layers.names(request.pose.overview.scalars)),
             )  # fmt: skip
             if is_prepared(self.renderer, before, self.size):
                 return before
@@ -161,7 +162,7 @@ class Viewport:
         if self.problem is not None or surface is None or request is None:
             return
         if surface.stats.backend == str(request.backend):
-            self._detail(request).note(ms, self._quality, goal_ms, len(request.pose.cloud))
+            self._detail(request).note(ms, self._quality, goal_ms, request.pose.count)
 
     def _detail(self, request: Request) -> Detail:
         return self._details[str(request.backend)]
@@ -223,7 +224,7 @@ class Viewport:
     def bounds(self, pose: Pose) -> Bounds:
         """The robust bounds of a pose, unmoved, found once; also of one that is too large to draw."""
         if self._bounded is None or self._bounded[0] is not pose:
-            self._bounded = pose, pose.cloud.bounds()
+            self._bounded = pose, pose.bounds
         return self._bounded[1]
 
     @property

@@ -106,7 +106,7 @@ def needs(pose: Pose, params: Params) -> tuple[str, ...]:
 
 def suits(pose: Pose) -> Suited | None:
     """Scans that store normals."""
-    return None if pose.cloud.normals is None else Suited(1)
+    return None if pose.overview.normals is None else Suited(1)
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:

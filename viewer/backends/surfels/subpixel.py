@@ -36,7 +36,7 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     """
     pose, view = points.pose, surface.view
     nearest = float(view.depths(pose.cloud.remember(_box)).min())
-    usually_nearest = float(view.depths(pose.bounds.corners() - pose.cloud.origin).min())
+    usually_nearest = float(view.depths(pose.bounds.corners() - pose.origin).min())
     if view.perspective and min(nearest, usually_nearest) <= view.near:
         return 0.0
     usual = largest = splats.uniform_radius

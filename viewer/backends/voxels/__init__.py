@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -280,7 +280,7 @@ class Voxels:
             scalars=_Scalars(pose.cloud.scalars, rows),
             ids=cut.numbers(self.octree),  # in the cut's order, near first: no row is looked for by them
         )
-        return _Shown(cut, GpuPose(self._gpu, cloud), rows)
+        return _Shown(cut, GpuPose(self._gpu, replace(pose.pose, points=cloud)), rows)
 
 
 def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:

@@ -11,6 +11,7 @@ from ...gpu.surface import Surface
 from ...look import Look
 from ...mesh.reference import Reference
 from ...scan.points import NOTHING, PointCloud
+from ...scan.pose import Pose
 from ...srgb import bytes_from_linear
 
 
@@ -32,7 +33,7 @@ def reference_surface(reference: Reference, gpu: Gpu, look: Look | None = None) 
     rows = np.full(reference.depth.shape, NOTHING, np.uint32)
     rows[reference.covered] = np.arange(len(hits))
     surface = Surface(gpu, reference.view.size)
-    surface.start(GpuPose(gpu, hits), reference.view)
+    surface.start(GpuPose(gpu, Pose(0, 0.0, "reference", hits)), reference.view)
     surface.depths.buffer.write(reference.depth.astype(np.float32))
     surface.rows.buffer.write(rows)
     shade(surface, look or Look())
