@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pytest
+from range_scenes import sphere_view
 from scenes import plane, sphere_mesh
 
 from viewer.bench.judge import Judge, Walk
@@ -16,6 +18,7 @@ from viewer.bench.truth.shapes import AnalyticScene, Plane, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.look import Look, rgba
+from viewer.mesh.range_mesh import triangulated
 from viewer.mesh.reference import trace
 from viewer.mesh.scene import Scene
 from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
@@ -103,6 +106,25 @@ def test_far_points_of_one_sheet_are_no_wrong_layer(renderer: Renderer) -> None:
         errors = judge(renderer, truth, camera, cloud).errors(drawn)
         assert errors["depth_rmse_px"] > 0.1
         assert errors["wrong_layer_percent"] == 0
+
+
+def test_holes_where_nothing_was_scanned_are_told_from_the_others(renderer: Renderer) -> None:
+    pod = sphere_view((4, 0, 0), size=(120, 100))  # sees the half to the right
+    pod = replace(pod, mask=np.isfinite(pod.depth))
+    truth = AnalyticScene((Sphere(),))
+    seen = Judge.of(renderer.gpu, truth, AHEAD, SIZE, LOOK, pod.points(), None, (pod,))
+    assert seen.scanned is not None
+    columns = np.flatnonzero(seen.scanned.any(axis=0))
+    assert SIZE[0] / 2 <= columns[0] < SIZE[0] / 2 + 20  # it sees not quite to its horizon
+    drawn = picture(renderer, truth)
+    assert seen.errors(drawn)["psnr_scanned"] == math.inf
+    empty = seen.errors(picture(renderer, AnalyticScene((Sphere(center=(0, 0, 99)),))))
+    assert empty["hole_scanned_percent"] == 100
+    half = seen.errors(picture(renderer, triangulated([pod])))
+    assert half["hole_percent"] > 40
+    assert half["hole_scanned_percent"] < 1
+    assert half["psnr_scanned"] > half["psnr"] + 6
+    assert "hole_scanned_percent" not in judge(renderer, truth).errors(drawn)
 
 
 def test_an_empty_picture_is_all_hole_and_hides_nothing(renderer: Renderer) -> None:

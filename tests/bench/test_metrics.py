@@ -37,6 +37,14 @@ def test_a_disc_missing_inside_is_its_area_of_holes_and_moves_no_outline() -> No
     assert errors["spill_percent"] == errors["boundary_mean"] == errors["boundary_p95"] == 0
 
 
+@pytest.mark.parametrize("k", [1, 20])
+def test_spill_reaches_as_far_as_an_edge_moved(k: int) -> None:
+    column = np.indices(SIZE)[1]
+    errors = metrics.coverage(column < 40 + k, column < 40)
+    assert errors["spill_p95"] == pytest.approx(k, abs=0.05 * k)
+    assert metrics.coverage(column < 40 - k, column < 40)["spill_p95"] == 0
+
+
 def test_a_disc_beside_the_silhouette_is_its_area_of_spill() -> None:
     true, blob = disc(12), disc(4, (30, 70))
     errors = metrics.coverage(true | blob, true)
@@ -101,7 +109,20 @@ def test_the_sign_of_the_bias_is_positive_behind() -> None:
 
 def test_pixels_that_one_picture_lacks_have_no_depth_error() -> None:
     errors = metrics.depth(np.full(SIZE, np.inf), np.ones(SIZE), np.ones(SIZE), 1)
+    assert errors.pop("through_percent") == 0
     assert all(math.isnan(value) for value in errors.values())
+
+
+def test_through_counts_what_lies_behind_in_parts_of_the_silhouette() -> None:
+    true = np.where(np.indices(SIZE)[1] < 40, 5.0, np.inf)
+    drawn = np.full(SIZE, 5.0)
+    drawn[:, :10] += 1  # shows through
+    drawn[:, 10:20] -= 1  # floats before it
+    drawn[:, 20:30] = np.inf  # a hole
+    drawn[:, 30:40] += 0.35  # of one sheet still
+    errors = metrics.depth(drawn, true, np.ones(SIZE), step=0.1)
+    assert errors["through_percent"] == 25
+    assert errors["wrong_layer_percent"] == pytest.approx(100 * 2 / 3)
 
 
 # --- normals -------------------------------------------------------------------------------

@@ -140,6 +140,28 @@ def test_a_backend_that_cannot_draw_a_scene_is_left_out_and_said(
     assert any("points" in note and "needs range views" in note for note in bench.notes)
 
 
+def test_a_zoom_of_range_views_stands_beside_their_mesh(renderer: Renderer) -> None:
+    contenders = (*DEFAULTS, Contender("range-mesh"))
+    bench = Bench(renderer, SETTINGS)
+    group = Group("torus-pair", contenders, noise=0.0, zoom=4.0, sweep="zoom")
+    found = by_backend(bench.measure(group))
+    assert not bench.notes
+    assert {(row["zoom"], row["sweep"], row["frames"]) for row in found.values()} == {(4.0, "zoom", 2)}
+    assert not any("flicker" in name for row in found.values() for name in row["errors"])
+    errors = {name: row["errors"] for name, row in found.items()}
+    assert errors["gl-points"]["hole_scanned_percent"] > 80  # a point for sixteen pixels
+    assert errors["range-mesh"]["hole_scanned_percent"] < 0.01
+    assert errors["range-mesh"]["psnr_scanned"] > errors["gl-points"]["psnr_scanned"] + 20
+    assert errors["mesh"]["psnr"] > errors["range-mesh"]["psnr"]
+
+
+def test_points_have_no_range_mesh(renderer: Renderer) -> None:
+    bench = Bench(renderer, SETTINGS)
+    rows = bench.measure(replace(TORUS, contenders=(Contender("gl-points"), Contender("range-mesh"))))
+    assert [row["backend"] for row in rows] == ["gl-points"]
+    assert any("range-mesh is left out" in note for note in bench.notes)
+
+
 def test_measuring_ticks_as_often_as_it_said(renderer: Renderer) -> None:
     ticks: list[None] = []
     bench = Bench(renderer, SETTINGS)

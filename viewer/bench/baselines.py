@@ -1,6 +1,7 @@
 """What every backend is held against: plain GL_POINTS, the floor, and the true mesh, the ceiling.
 
-They have what a backend's module has, and draw to the same Surface, but no user chooses them.
+And what pictures of range views are held against: the mesh of neighbours in their grids. They have what a
+backend's module has, and draw to the same Surface, but no user chooses them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from ..mesh.triangles import Mesh
 from ..scan.faces import Triangles
 from ..scan.pose import Pose
 
-FLOOR, CEILING = "gl-points", "mesh"
+FLOOR, CEILING, RANGE_MESH = "gl-points", "mesh", "range-mesh"
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,9 @@ def gl_points() -> Backend:
     return Backend(FLOOR, _Points())
 
 
-def mesh(truth: Mesh) -> Backend:
+def mesh(drawn: Mesh, name: str = CEILING) -> Backend:
     """The triangles of a mesh, rasterised; for a pose whose cloud are the vertices, with normals."""
-    return Backend(CEILING, _Triangles(truth.faces))
+    return Backend(name, _Triangles(drawn.faces))
 
 
 class _Points:

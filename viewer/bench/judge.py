@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -14,9 +14,11 @@ from ..camera import Camera
 from ..gpu.context import Gpu
 from ..gpu.surface import Surface
 from ..look import Look
+from ..mesh.range_mesh import was_scanned
 from ..mesh.reference import Reference, both_see, footprint, trace, visible
 from ..mesh.scene import Rays, Scene
 from ..scan.points import PointCloud
+from ..scan.range_view import RangeView
 from ..scan.spacing import typical_spacing
 from . import metrics
 from .metrics import Errors
@@ -48,7 +50,8 @@ class Judge:
     """The truth of one view, which judges any Surface of it.
 
     image: (H, W, 4) uint8, the reference, shaded in `look`. steps: (H, W), how far depths of one
-    sheet may lie apart, scan units.
+    sheet may lie apart, scan units. scanned: (H, W) bool, what of the truth range views have measured; None
+    where the scan has none.
     """
 
     reference: Reference
@@ -56,6 +59,7 @@ class Judge:
     image: NDArray[np.uint8]
     steps: NDArray[np.float64]
     probes: Probes
+    scanned: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(
@@ -67,12 +71,13 @@ class Judge:
         look: Look,
         cloud: PointCloud,
         tolerance: float | None,
+        views: Sequence[RangeView] = (),
     ) -> Judge:
         """Trace the reference picture and find which points can truly be seen.
 
-        cloud: what backends draw of the truth. size: (width, height), pixels. tolerance: how far its points
-        may lie off the truth, scan units; None: they are exact (`reference.visible`). The look says its own
-        light, since clouds without normals and the reference would choose differently.
+        cloud, views: what backends draw of the truth. size: (width, height), pixels. tolerance: how far its
+        points may lie off the truth, scan units; None: they are exact (`reference.visible`). The look says
+        its own light, since clouds without normals and the reference would choose differently.
         Raises InputError for a size that is no picture.
         """
         reference = trace(truth, camera, size)
@@ -83,6 +88,7 @@ class Judge:
             image=reference_surface(reference, gpu, look).image(),
             steps=steps,
             probes=_probes(truth, camera, reference, cloud, steps, tolerance),
+            scanned=_scanned(reference, views) if views else None,
         )
 
     def errors(self, surface: Surface) -> Errors:
@@ -94,12 +100,15 @@ class Judge:
         true, drawn = reference.covered, surface.coverage > 0
         both = drawn & true
         true_depth = reference.depth.astype(np.float32)  # rounded as what is drawn is
+        image = surface.image(self.look)
+        of_scanned = {} if self.scanned is None else metrics.scanned(drawn, image, self.image, self.scanned)
         return (
             metrics.coverage(drawn, true)
             | metrics.depth(depth, true_depth, footprint(reference.view, true_depth), self.steps)
             | metrics.normals(surface.normal[both], reference.normal[both])
-            | metrics.color(surface.image(self.look), self.image, true)
+            | metrics.color(image, self.image, true)
             | metrics.visibility(self.probes.found(depth), self.probes.seen)
+            | of_scanned
         )
 
 
@@ -147,6 +156,13 @@ def _steps(reference: Reference, spacing: float) -> NDArray[np.float64]:
     depth = np.where(reference.covered, reference.depth, 0.0)
     slant = np.where(reference.covered, reference.incidence(), 1.0)
     return np.maximum(spacing, footprint(reference.view, depth) / np.maximum(slant, _STEEPEST))
+
+
+def _scanned(reference: Reference, views: Sequence[RangeView]) -> NDArray[np.bool_]:
+    """Pixels (H, W) whose true surface the views have measured."""
+    scanned = reference.covered.copy()
+    scanned[scanned] = was_scanned(views, reference.positions() + reference.origin)
+    return scanned
 
 
 def _probes(

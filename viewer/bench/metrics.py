@@ -24,15 +24,18 @@ def coverage(drawn: Mask, true: Mask) -> Errors:
     """Holes, spill and distance of the outlines of two silhouettes, (H, W) bool.
 
     Holes that are wholly inside the true silhouette have no part in the outline: they are counted already.
+    How far spill reaches is 0 where there is none.
     """
     box = _box(drawn | true, 1)  # an outline's pixel has a neighbour outside
     drawn, true = drawn[box], true[box]
     area = _count(true)
     outline, true_outline = _outline(drawn | _enclosed(~drawn, true)), _outline(true)
     distances = np.concatenate([_distance(true_outline)[outline], _distance(outline)[true_outline]])
+    spill = drawn & ~true
     return {
         "hole_percent": _percent(_count(true & ~drawn), area),
-        "spill_percent": _percent(_count(drawn & ~true), area),
+        "spill_percent": _percent(_count(spill), area),
+        "spill_p95": _quantile(_distance(true)[spill], 0.95) if spill.any() else 0.0,
         "boundary_mean": _mean(distances),
         "boundary_p95": _quantile(distances, 0.95),
     }
@@ -61,8 +64,11 @@ def depth(
             f"depth_median{unit}": _quantile(size, 0.5),
             f"depth_p95{unit}": _quantile(size, 0.95),
         }
-    wrong = _count(np.abs(error) > WRONG_LAYER * step)
-    return errors | {"wrong_layer_percent": _percent(wrong, len(error))}
+    limit = WRONG_LAYER * step
+    return errors | {
+        "wrong_layer_percent": _percent(_count(np.abs(error) > limit), len(error)),
+        "through_percent": _percent(_count(error > limit), _count(np.isfinite(true))),
+    }
 
 
 def normals(drawn: NDArray[np.floating], true: NDArray[np.floating]) -> Errors:
@@ -107,6 +113,18 @@ def color(drawn: NDArray[np.uint8], true: NDArray[np.uint8], inside: Mask) -> Er
     for name, values in maps.items():
         errors |= {name: _mean(values[inside]), f"{name}_frame": _mean(values)}
     return errors
+
+
+def scanned(drawn: Mask, image: NDArray[np.uint8], true: NDArray[np.uint8], inside: Mask) -> Errors:
+    """Holes and PSNR (dB) where the scan has measured what is seen, `inside` (H, W).
+
+    drawn: (H, W), what is covered. image, true: shaded pictures (H, W, 3 or 4).
+    """
+    squares = (image[inside, :3].astype(np.float64) - true[inside, :3]) ** 2
+    return {
+        "hole_scanned_percent": _percent(_count(inside & ~drawn), _count(inside)),
+        "psnr_scanned": _psnr(squares),
+    }
 
 
 def visibility(found: Mask, true: Mask) -> Errors:

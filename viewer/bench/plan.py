@@ -34,15 +34,17 @@ class Contender:
 class Group:
     """A scene and the contenders that take turns on it.
 
-    count, noise: None for the scene's own. sweep: "n" or "noise" where the group is a step of such a
-    sweep, or the parameter that all its contenders vary; else empty. judged: whether errors are found,
-    which takes longer than drawing.
+    count, noise: None for the scene's own. zoom: pixels of the picture for a sample of its range views,
+    which cameras then look at (`pod_viewpoints`); None: they look from all round. sweep: "n", "noise" or
+    "zoom" where the group is a step of such a sweep, or the parameter that all its contenders vary; else
+    empty. judged: whether errors are found, which takes longer than drawing.
     """
 
     scene: str
     contenders: tuple[Contender, ...]
     count: int | None = None
     noise: float | None = None
+    zoom: float | None = None
     sweep: str = ""
     judged: bool = True
 

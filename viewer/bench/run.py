@@ -26,12 +26,13 @@ from ..files import whole_file
 from ..frame import Request
 from ..gpu.surface import Surface
 from ..look import Look
+from ..mesh.range_mesh import triangulated
 from ..mesh.reference import footprint
 from ..renderer import Renderer
 from ..signals import Interrupts
 from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from . import baselines, numerics
-from .baselines import CEILING, FLOOR
+from .baselines import CEILING, FLOOR, RANGE_MESH
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
 from .plan import Contender, Group
@@ -39,7 +40,7 @@ from .report.pictures import picture_path, side_by_side
 from .report.results import SPREADS, Row, spread
 from .scenes import catalog
 from .scenes.subjects import Moment, Subject
-from .scenes.viewpoints import viewpoints
+from .scenes.viewpoints import pod_viewpoints, viewpoints
 
 LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the scan
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
@@ -128,7 +129,8 @@ class Bench:
         self.stopped = False
         self.notes: list[str] = []
         self.subject = lru_cache(maxsize=1)(settings.subject)
-        self._looked_at: tuple[Moment, list[Camera]] | None = None
+        self._looked_at: tuple[Moment, float | None, list[Camera]] | None = None
+        self._triangulated = lru_cache(maxsize=1)(triangulated)
 
     def measure(self, group: Group) -> list[Row]:
         """The rows of a group. Where Ctrl-C stopped it, of the views that all have seen; `stopped` is set.
@@ -162,8 +164,8 @@ class Bench:
         return len(group.contenders) * (self.settings.views + self.walks(group))
 
     def walks(self, group: Group) -> int:
-        """How many walks of frames a group has at most."""
-        if not group.judged or self.settings.frames < 2:
+        """How many walks of frames a group has at most; none where it is zoomed."""
+        if not group.judged or group.zoom is not None or self.settings.frames < 2:
             return 0
         return 2 if self.subject(group).moments > 1 else 1
 
@@ -222,15 +224,15 @@ class Bench:
 
     def _view(self, group: Group, subject: Subject, view: int, tallies: dict[Contender, _Tally]) -> None:
         """Let all contenders draw a view, time them and judge them."""
-        moment, camera = self.seen(subject, view)
+        moment, camera = self.seen(subject, view, group.zoom)
         judge = self._judge(subject, moment, camera) if group.judged else None
         turn = view % max(1, len(tallies))  # who is first changes, so that drift hits all alike
         for contender in (*list(tallies)[turn:], *list(tallies)[:turn]):
             surface, tally = Surface(self.renderer.gpu, self.settings.size), tallies[contender]
             anew = not tally.knows_preparation  # then of a pose that the renderer has not seen
             shown = replace(moment, pose=replace(moment.pose)) if anew else moment
-            request = _request(contender, shown, camera)
             try:
+                request = self._request(contender, shown, camera)
                 self._time(request, surface, tally, anew)
             except InputError as error:
                 self.note(f"{subject.name}: {contender.backend} is left out: {error}")
@@ -245,8 +247,10 @@ class Bench:
             self.tick()
 
     def _judge(self, subject: Subject, moment: Moment, camera: Camera) -> Judge:
-        size, cloud = self.settings.size, moment.pose.cloud
-        return Judge.of(self.renderer.gpu, moment.truth, camera, size, LOOK, cloud, subject.tolerance)
+        pose, size = moment.pose, self.settings.size
+        return Judge.of(
+            self.renderer.gpu, moment.truth, camera, size, LOOK, pose.cloud, subject.tolerance, pose.views
+        )
 
     def _time(self, request: Request, surface: Surface, tally: _Tally, anew: bool) -> None:
         """Add what one view takes: the preparation of a pose that is new to the GPU, then warm draws."""
@@ -268,21 +272,25 @@ class Bench:
         tally.passes.append({name: spread([run[name] for run in runs])["median"] for name in runs[0]})
         tally.peak_rss.append(peak_rss())
 
-    def seen(self, subject: Subject, view: int) -> Frame:
-        """The moment that a view shows, and from where."""
+    def seen(self, subject: Subject, view: int, zoom: float | None = None) -> Frame:
+        """The moment that a view shows, and from where; zoom as `Group` has it."""
         moment = subject.moment(view * subject.moments // self.settings.views)
-        return moment, self._cameras(subject, moment)[view]
+        return moment, self._cameras(subject, moment, zoom)[view]
 
-    def _cameras(self, subject: Subject, moment: Moment) -> list[Camera]:
+    def _cameras(self, subject: Subject, moment: Moment, zoom: float | None) -> list[Camera]:
         """Cameras of all views, which look to where the subject is at a moment."""
-        if self._looked_at is None or self._looked_at[0] is not moment:
+        if self._looked_at is None or self._looked_at[0] is not moment or self._looked_at[1] != zoom:
             views, size, seed = self.settings.views, self.settings.size, self.settings.seed
             try:
-                cameras = viewpoints(moment.mesh, views, size, up=subject.up, seed=seed)
+                if zoom is None:
+                    cameras = viewpoints(moment.mesh, views, size, up=subject.up, seed=seed)
+                else:
+                    pods = moment.pose.views
+                    cameras = pod_viewpoints(pods, zoom, views, size, up=subject.up, seed=seed)
             except InputError as error:
                 raise InputError(error.what, subject.name) from error
-            self._looked_at = moment, cameras
-        return self._looked_at[1]
+            self._looked_at = moment, zoom, cameras
+        return self._looked_at[2]
 
     # --- from frame to frame ----------------------------------------------------------
 
@@ -294,7 +302,7 @@ class Bench:
         if not self.walks(group):
             return
         first, frames = subject.moment(0), self.settings.frames
-        start = self._cameras(subject, first)[0]
+        start = self._cameras(subject, first, None)[0]
         orbit = [(first, start.orbited(_ORBIT_STEP * frame, 0)) for frame in range(frames)]
         judges = [self._judge(subject, *frame) for frame in orbit]
         yield "orbit", orbit, Walk(judges, [None] * (frames - 1))
@@ -318,9 +326,19 @@ class Bench:
         """One Surface, drawn anew for each frame."""
         surface = Surface(self.renderer.gpu, self.settings.size)
         for moment, camera in frames:
-            draw(self.renderer, _request(contender, moment, camera), surface)
+            draw(self.renderer, self._request(contender, moment, camera), surface)
             yield surface
         surface.release()
+
+    def _request(self, contender: Contender, moment: Moment, camera: Camera) -> Request:
+        """The request that draws a contender. Raises InputError where the moment has not what it draws."""
+        if contender.backend in (CEILING, RANGE_MESH):
+            truth = contender.backend == CEILING
+            mesh = moment.mesh if truth else self._triangulated(moment.pose.views)
+            pose = replace(moment.pose, points=mesh.points)
+            return Request(pose, camera, baselines.mesh(mesh, contender.backend), look=LOOK)
+        drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
+        return Request(moment.pose, camera, drawn, contender.params, LOOK)
 
     # --- rows -------------------------------------------------------------------------
 
@@ -338,6 +356,7 @@ class Bench:
                 "credit": subject.credit,
                 "n": len(cloud),
                 "noise": subject.noise,
+                "zoom": group.zoom,
                 "params": {} if contender.params is None else asdict(contender.params),
                 "sweep": contender.sweep or group.sweep,
                 "size": list(settings.size),
@@ -350,15 +369,6 @@ class Bench:
             }
             for contender, tally in tallies.items()
         ]
-
-
-def _request(contender: Contender, moment: Moment, camera: Camera) -> Request:
-    """The request that draws a contender."""
-    if contender.backend == CEILING:
-        pose = replace(moment.pose, points=moment.mesh.points)
-        return Request(pose, camera, baselines.mesh(moment.mesh), look=LOOK)
-    drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
-    return Request(moment.pose, camera, drawn, contender.params, LOOK)
 
 
 def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:

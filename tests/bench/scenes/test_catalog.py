@@ -17,6 +17,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.range_view import merge
 
 ANALYTIC = ["sphere", "plane", "box", "torus"]
+OWN = ["demo", "hand-before-face"]
 STILL = ["bunny", "armadillo", "horse", "dragon-100k", "igea", "dragon"]
 MOVING = ["crane", "horse-gallop", "owlii"]
 
@@ -44,9 +45,11 @@ def tetrahedron(tmp_path: Path) -> Path:
 
 def test_all_scenes_are_listed_and_say_what_they_lack(tmp_path: Path) -> None:
     listed = catalog.scene_names(None)
-    assert list(listed)[:6] == [*ANALYTIC, "demo", "bunny"]
-    assert [name for name, reason in listed.items() if not reason] == [*ANALYTIC, "demo", "torus-simulated"]
-    assert {f"{name}-simulated" for name in ["torus", *STILL, *MOVING]} <= set(listed)
+    scanned = [f"{name}-{pods}" for pods in ("simulated", "pair") for name in ("torus", *OWN)]
+    assert list(listed)[:7] == [*ANALYTIC, *OWN, "bunny"]
+    assert [name for name, reason in listed.items() if not reason] == [*ANALYTIC, *OWN, *scanned]
+    for pods in ("simulated", "pair"):
+        assert {f"{name}-{pods}" for name in ["torus", *OWN, *STILL, *MOVING]} <= set(listed)
     assert set(REAL) <= set(listed)
     assert "models/stanford_bunny_35947.ply" in catalog.scene_names(tmp_path)["bunny"]
     assert str(tmp_path) in catalog.scene_names(tmp_path)["bunny"]
@@ -204,6 +207,37 @@ def test_simulated_scans_are_as_noisy_as_asked_for() -> None:
     nearer = (truth[0].depth[both].mean() / np.linalg.norm(views[0].eye)) ** 2
     assert abs(off.std() / (noisy.tolerance / 4 * nearer) - 1) < 0.1
     assert distances(still.moment(0)).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "turns"), [("torus-simulated", [0, 90, 180, 270]), ("torus-pair", [-27.5, 27.5])]
+)
+def test_pods_stand_all_round_or_left_and_right_of_the_front(name: str, turns: list[float]) -> None:
+    views = catalog.subject(name, None, noise=0.0).moment(0).pose.views
+    found = [np.degrees(np.arctan2(*view.eye[[0, 2]])) % 360 for view in views]
+    np.testing.assert_allclose(found, np.array(turns) % 360, atol=1e-6)
+
+
+def test_the_demo_is_scanned_while_it_speaks() -> None:
+    subject = catalog.subject("demo-pair", None, noise=0.0)
+    assert subject.moments == 64
+    first, later = subject.moment(0), subject.moment(20)
+    assert len(first.pose.views) == 2
+    assert not np.array_equal(first.pose.views[0].depth, later.pose.views[0].depth, equal_nan=True)
+
+
+def test_the_hand_is_before_the_face_and_shows_it_between_its_fingers() -> None:
+    moment = catalog.subject("hand-before-face", None).moment(0)
+    ahead = Camera((-5.0, 60.0, 600.0), (-5.0, 60.0, 0.0), projection="orthographic", height=60.0)
+    picture = trace(moment.truth, ahead, (120, 60))
+    depth = picture.depth[picture.covered]
+    hand = depth < 600 - 150
+    assert 0.1 < hand.mean() < 0.9
+    assert depth[~hand].min() > depth[hand].max() + 20
+    assert (
+        np.einsum("ij,ij->i", moment.mesh.areas(), moment.mesh.points.normals[moment.mesh.faces[:, 0]]) >= 0
+    ).mean() > 0.99
+    assert len(catalog.subject("hand-before-face", None, count=5000).moment(0).pose.cloud) == 5000
 
 
 def test_noise_is_half_a_footprint_unless_told() -> None:

@@ -42,7 +42,8 @@ _SUMMARY = (
 )  # fmt: skip
 _JUDGED = _SUMMARY[4:]
 _PLOTTED = (
-    *_JUDGED, "boundary_mean", "depth_bias_px", "depth_rmse_px", "depth_p95_px", "normal_signed_mean",
+    *_JUDGED, "through_percent", "spill_p95", "boundary_mean", "depth_bias_px", "depth_rmse_px",
+    "depth_p95_px", "normal_signed_mean",
     "flicker_orbit_color", "flicker_orbit_normal", "flicker_pose_color", "flicker_pose_normal",
 )  # fmt: skip
 _SWEPT_COSTS = ("gpu_ms", "prepare_ms", "bytes_gpu")

@@ -62,7 +62,7 @@ _STYLE: Any = {
 
 
 def time_against_error(rows: Sequence[Row], metric: Metric) -> Figure:
-    """A panel for each scene: gpu_ms of all rows but those of other counts or noise, and the Pareto front.
+    """A panel for each scene: gpu_ms of its rows and the Pareto front, without other counts, noise or zooms.
 
     Defaults are large and have their 5th to 95th percentile as a bar; a thin line joins a sweep.
     """
@@ -71,7 +71,7 @@ def time_against_error(rows: Sequence[Row], metric: Metric) -> Figure:
     looks = _looks(rows)
 
     def panel(axes: Axes, scene: str) -> None:
-        shown = [row for row in scenes[scene] if row["sweep"] not in ("n", "noise")]
+        shown = [row for row in scenes[scene] if row["sweep"] not in ("n", "noise", "zoom")]
         ceiling = [row for row in shown if row["backend"] == CEILING and row["sweep"] == ""]
         others = [row for row in shown if row["backend"] != CEILING]
         for backend in distinct(others, "backend"):

@@ -21,7 +21,7 @@ OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
-_IDENTITY = ("backend", "scene", _SCENE, "n", "noise", "params", "size", "seed", "views")
+_IDENTITY = ("backend", "scene", _SCENE, "n", "noise", "zoom", "params", "size", "seed", "views")
 _NEEDED: dict[str, dict[str, Any]] = {
     RESULTS: {
         "backend": str, "scene": str, _SCENE: str, "n": int, "noise": int | float, "params": dict,
@@ -73,7 +73,9 @@ COSTS = [
 ]
 _ERRORS = [
     Metric("hole_percent", "%", "true silhouette that is left empty"),
+    Metric("hole_scanned_percent", "%", "what is seen and was scanned that is left empty"),
     Metric("spill_percent", "%", "covered pixels outside the true silhouette, in parts of it"),
+    Metric("spill_p95", "px", "distance of such pixels to the true silhouette, 95th percentile"),
     Metric("boundary_mean", "px", "distance between drawn and true outline, mean"),
     Metric("boundary_p95", "px", "distance between drawn and true outline, 95th percentile"),
     *(
@@ -87,6 +89,7 @@ _ERRORS = [
         )
     ),
     Metric("wrong_layer_percent", "%", "pixels more than four point spacings off in depth"),
+    Metric("through_percent", "%", "true silhouette where a farther sheet shows through"),
     *(
         Metric(f"normal{suffix}_{name}", "°", f"angle to the true normal, {text}{sign}")
         for suffix, sign in (("", ", sign ignored"), ("_signed", ""))
@@ -100,6 +103,9 @@ _ERRORS = [
             ("ssim", "", "structural similarity of the shaded picture, 1 is equal", "high"),
             ("flip", "", "difference that an eye sees when pictures alternate, 0 to 1", "low"),
         )
+    ),
+    Metric(
+        "psnr_scanned", "dB", "PSNR of the shaded picture where the scan has measured what is seen", "high"
     ),
     Metric("false_positives", "points", "points found visible that are hidden"),
     Metric("false_negatives", "points", "points found hidden that are visible"),
@@ -218,10 +224,12 @@ _SAME_TIME, _SAME_MS = 1.1, 0.1  # ratio and difference of times that are the sa
 
 
 def row_title(row: Row) -> str:
-    """A row in words: backend, scene, points, noise, and the parameter that it varies."""
+    """A row in words: backend, scene, points, noise, zoom, and the parameter that it varies."""
     words = [f"{row['backend']}, {row['scene']}, {row['n']} points"]
     if row["noise"]:
         words.append(f"noise {row['noise']:g}")
+    if row.get("sweep") == "zoom":
+        words.append(f"zoom {row['zoom']:g}")
     if row.get("sweep") in row["params"]:
         words.append(f"{row['sweep']}={row['params'][row['sweep']]}")
     return ", ".join(words)
@@ -260,7 +268,7 @@ def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
 
 
 def _identity(row: Row, names: Iterable[str]) -> str:
-    return json.dumps([_to_json(row[name]) for name in names], sort_keys=True)
+    return json.dumps([_to_json(row.get(name)) for name in names], sort_keys=True)
 
 
 def _machine(row: Row) -> str:

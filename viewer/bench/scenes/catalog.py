@@ -152,6 +152,16 @@ def _demo(request: _Request) -> Subject:
     return Subject(name=request.name, load=load, moments=len(source), tolerance=_HEAD_TOLERANCE)
 
 
+def _hand(request: _Request) -> Subject:
+    """The demo's head with a hand before its face."""
+    from ..truth.hand_mesh import hand_before_face
+
+    def load(_: int) -> Moment:
+        return _of_mesh(hand_before_face(), request, 0, 0.0, request.name)
+
+    return Subject(name=request.name, load=load)
+
+
 def _laser(folder: str, model: str, tolerance: float) -> _Scene:
     """Laser scans, put together as they were for the model that was made of them."""
 
@@ -180,11 +190,12 @@ def _phone(request: _Request) -> Subject:
     )
 
 
-def _simulated(name: str, scene: _Scene) -> _Scene:
-    """A scene of what a virtual scanner, four pods all round, sees of another scene."""
+def _simulated(name: str, scene: _Scene, pods: int) -> _Scene:
+    """A scene of what a virtual scanner sees of another scene."""
 
     def make(request: _Request) -> Subject:
-        return simulated(scene.make(replace(request, name=name)), request.noise, request.seed)
+        scanned = scene.make(replace(request, name=name))
+        return simulated(scanned, request.name, pods, request.noise, request.seed)
 
     return replace(scene, make=make, counts=False, noise=_NOISE)
 
@@ -195,6 +206,7 @@ _ANALYTIC = {
     "box": _analytic(Cuboid(), samples.on_cube, tessellation.cube_mesh),
     "torus": _analytic(Torus(), samples.on_torus, tessellation.torus_mesh),
     "demo": _Scene(_demo),
+    "hand-before-face": _Scene(_hand, counts=True),
 }
 _MESHES = {
     "bunny": _model("stanford_bunny_35947.ply", _STANFORD),
@@ -207,9 +219,11 @@ _MESHES = {
     "horse-gallop": _sequence("horse_gallop_48", "Sumner and Popovic"),
     "owlii": _sequence("owlii_basketball_player_10", "Owlii"),
 }
+_SCANNED = {name: _ANALYTIC[name] for name in ("torus", "demo", "hand-before-face")} | _MESHES
 _SIMULATED = {
-    f"{name}-simulated": _simulated(name, scene)
-    for name, scene in ({"torus": _ANALYTIC["torus"]} | _MESHES).items()
+    f"{name}-{suffix}": _simulated(name, scene, pods)
+    for suffix, pods in (("simulated", 4), ("pair", 2))
+    for name, scene in _SCANNED.items()
 }
 _REAL = {
     "dragon-scans": _laser("stanford_dragon_stand_scans", "stanford_dragon_437645.ply", 1e-3),

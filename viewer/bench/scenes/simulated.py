@@ -12,30 +12,30 @@ from ...scan.pose import Pose
 from ...simulate.scanner import Faults, around, capture, rig
 from .subjects import Moment, Subject
 
-_PODS = 4
 _SIZE = (640, 480)  # of a range image
 _FRAMED = 5  # moments that the pods are placed for
 _SIGMAS = 4  # of noise that still belong to the surface: all but one point in 16 000
 
 
-def simulated(subject: Subject, noise: float, seed: int = 0) -> Subject:
-    """The range views that four pods all round a subject measure, a moment each.
+def simulated(subject: Subject, name: str, pods: int, noise: float, seed: int = 0) -> Subject:
+    """The range views that pods measure of a subject, a moment each.
 
-    noise: standard deviation of depth in footprints, what a pod's pixel covers at the subject's distance.
-    The truth stays the same; the tolerance is four standard deviations of the noise.
+    pods: how many, placed as `around` says. noise: standard deviation of depth in footprints, what a pod's
+    pixel covers at the subject's distance. The truth stays the same; the tolerance is four standard
+    deviations of the noise.
     """
-    pods = rig(_framed(subject), around(_PODS), aspect=_SIZE[0] / _SIZE[1], up=subject.up)
-    deviations = [noise * _footprint(pod) for pod in pods]
+    cameras = rig(_framed(subject), around(pods), aspect=_SIZE[0] / _SIZE[1], up=subject.up)
+    deviations = [noise * _footprint(camera) for camera in cameras]
     faults = [Faults(noise=deviation) for deviation in deviations]
 
     def load(index: int) -> Moment:
         moment = subject.moment(index)
-        views = capture(moment.truth, pods, _SIZE, faults, seed=seed, frame=index)
+        views = capture(moment.truth, cameras, _SIZE, faults, seed=seed, frame=index)
         pose = Pose.of(index, moment.pose.time, moment.pose.label, views)
         return replace(moment, pose=pose)
 
     tolerance = _SIGMAS * max(deviations) or None
-    return replace(subject, name=f"{subject.name}-simulated", load=load, noise=noise, tolerance=tolerance)
+    return replace(subject, name=name, load=load, noise=noise, tolerance=tolerance)
 
 
 def _framed(subject: Subject) -> Bounds:

@@ -1,6 +1,8 @@
-"""Where a benchmark looks from: all round a subject, from far and from near."""
+"""Where a benchmark looks from: all round a subject, or from where its pods are, from far and from near."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from ...geometry import Vector, up_vector
 from ...mesh.reference import trace
 from ...mesh.scene import Rays
 from ...mesh.triangles import Mesh
+from ...scan.range_view import RangeView
 from .samples import evenly
 
 COVERAGE = (0.25, 0.85)  # of the picture's pixels (Slomp 2014, VII)
@@ -19,6 +22,8 @@ _PIXELS = 2400  # of the pictures that coverage is measured in
 _NEAREST, _FARTHEST = 0.05, 20.0  # distances to the subject that are tried, in radii of its bounds
 _HALVINGS = 16
 _TRIES = 50  # directions a view
+_ASIDE = 20.0  # degrees from a pod's direction that every second view of its samples looks from
+_FAR = 4.0  # distance of the eye from what a parallel projection measured, in longest edges of its box
 
 
 def viewpoints(
@@ -45,6 +50,60 @@ def viewpoints(
             return cameras
     raise InputError(
         f"only {len(cameras)} of {count} views fill {COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of a picture"
+    )
+
+
+def pod_viewpoints(
+    views: Sequence[RangeView],
+    zoom: float,
+    count: int,
+    size: tuple[int, int],
+    *,
+    up: str = "+y",
+    seed: int = 0,
+) -> list[Camera]:
+    """Cameras that look at samples of range views, by turns from the pod's direction and 20 degrees aside.
+
+    zoom: how many pixels of the picture a sample is wide and high at the sample looked at, where the eye is
+    as far as the pod: s z / (d f), s the view's pixels per unit, d the distance of the eye, z the sample's
+    depth, f the pod's focal length in pixels (parallel projection: s / (d f)). The lens makes the zoom.
+    count: of cameras. size: (width, height) of the pictures, pixels. Samples are spread evenly over each
+    pod's picture, the pods take turns, and every zoom looks at the same ones.
+    """
+    shift = np.random.default_rng(seed).random(2)
+    cameras = []
+    for pair, place in enumerate(evenly(np.arange((count + 1) // 2), shift)):
+        view = views[pair % len(views)]
+        camera = _from_pod(view, _sample_near(view, place), zoom, size, up)
+        cameras += [camera, camera.orbited(_ASIDE, 0)]
+    return cameras[:count]
+
+
+def _sample_near(view: RangeView, place: NDArray[np.float64]) -> Rays:
+    """The world position (3,) of the sample nearest to a place in the box around all of them, 0 to 1."""
+    pixels = np.argwhere(view.valid())
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    nearest = np.square(pixels - (low + place * (high - low))).sum(axis=1).argmin()
+    return view.positions()[nearest]
+
+
+def _from_pod(view: RangeView, target: Rays, zoom: float, size: tuple[int, int], up: str) -> Camera:
+    """A camera in the pod's direction from a sample (3,), at a zoom."""
+    rotation, translation = view.world_to_camera[:3, :3], view.world_to_camera[:3, 3]
+    focal = float(np.sqrt(view.fx * view.fy))
+    if view.kind == "height":
+        distance = _FAR * float(np.ptp(view.positions(), axis=0).max())
+        eye, density = target + distance * rotation[2], focal
+    else:
+        eye = view.eye
+        density = focal / -float(rotation[2] @ target + translation[2])
+        distance = float(np.linalg.norm(target - eye))
+    tangent = size[1] / (2 * zoom * density * distance)
+    return Camera(
+        eye=_vector(eye),
+        target=_vector(target),
+        up=up_vector(up),
+        fov_y=float(np.degrees(2 * np.arctan(tangent))),
     )
 
 
