@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_the_camera_looks_along_slanted_columns(tmp_path: Path) -> None:
         ("bmesh a.ply 0 0 nan 0 0 0 1\n", "places no scan"),
         ("bmesh\n", "places no scan"),
         ("bmesh a.ply 0 0 0 0 0 0 0\n", "no rotation"),
-        ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh c.ply 0 0 0 0 0 0 1\n", "no c.npz"),
+        ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh c.ply 0 0 0 0 0 0 1\n", "no c.ply"),
     ],
 )
 def test_a_wrong_placement_is_told_at_opening(tmp_path: Path, conf: str, told: str) -> None:
@@ -110,6 +111,46 @@ def test_a_grid_that_is_no_surface_is_told(tmp_path: Path, xyz: np.ndarray, told
     with open_scan(tmp_path) as scan, pytest.raises(InputError, match=told) as caught:
         scan.pose(0)
     assert "a.npz" in str(caught.value)
+
+
+def write_range_grid(path: Path, xyz: np.ndarray, places: list[str] | None = None, size: str = "") -> None:
+    """Write a scan as the Stanford repository has it."""
+    valid = np.isfinite(xyz).all(axis=2)
+    points = xyz[valid]
+    numbers = iter(range(len(points)))
+    places = places or [f"1 {next(numbers)}" if is_there else "0" for is_there in valid.ravel()]
+    size = size or f"obj_info num_cols {xyz.shape[1]}\nobj_info num_rows {xyz.shape[0]}\n"
+    path.write_text(
+        f"ply\nformat ascii 1.0\n{size}element vertex {len(points)}\nproperty float x\nproperty float y\n"
+        f"property float z\nelement range_grid {len(places)}\nproperty list uchar int vertex_indices\n"
+        "end_header\n" + "".join(f"{x} {y} {z} \n" for x, y, z in points) + "\n".join(places) + "\n"
+    )
+
+
+def test_range_grids_are_read_as_arrays_are(tmp_path: Path) -> None:
+    put(tmp_path, "bmesh a.ply 0 0 0 0 0 0 1\nbmesh b.ply 0 0 0 0 0 0 1\n", a=grid())
+    write_range_grid(tmp_path / "b.ply", grid())
+    one, other = views_of(tmp_path)
+    np.testing.assert_array_equal(one.depth, other.depth)
+    np.testing.assert_array_equal(one.xy, other.xy)
+
+
+@pytest.mark.parametrize(
+    ("places", "size"),
+    [
+        (["0"] * 19, ""),
+        (["1 0"] * 19 + ["1 99"], ""),
+        (["2 0 1"] * 20, ""),
+        (["0"] * 20, "obj_info num_cols 5\n"),
+        (["0"] * 20, "obj_info num_cols 0\nobj_info num_rows 4\n"),
+        (["0"] * 20, "obj_info num_cols 999999999\nobj_info num_rows 999999999\n"),
+    ],
+)
+def test_a_range_grid_that_is_none_is_told(tmp_path: Path, places: list[str], size: str) -> None:
+    put(tmp_path, "bmesh a.ply 0 0 0 0 0 0 1\n")
+    write_range_grid(tmp_path / "a.ply", grid(), places, size)
+    with pytest.raises(InputError, match=r"a\.ply: .*range grid"):
+        views_of(tmp_path)
 
 
 def test_a_conf_file_of_something_else_makes_no_scans(tmp_path: Path) -> None:
@@ -137,3 +178,13 @@ def test_real_scans_keep_every_sample(folder: str, scans: int, samples: int, dat
         off = np.abs(pixels - np.stack([column, row], axis=1) - 0.5)
         assert np.median(off) < 2
         assert np.quantile(off, 0.95) < 4.5
+
+
+def test_the_repository_has_the_same_scans(tmp_path: Path, data_dir: Path) -> None:
+    stored = data_dir / "range" / "stanford_bunny_scans"
+    (tmp_path / "bun.conf").write_text((stored / "bun.conf").read_text().splitlines()[1] + "\n")
+    shutil.copy(stored / "original" / "bun000.ply", tmp_path)
+    (view,) = views_of(tmp_path)
+    expected = views_of(stored)[0]
+    np.testing.assert_array_equal(view.depth, expected.depth)
+    np.testing.assert_array_equal(view.world_to_camera, expected.world_to_camera)

@@ -6,7 +6,9 @@ with lists are walked, since only the lengths in them tell where the next one be
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import sys
 from array import array
 from collections.abc import Iterable, Iterator
@@ -21,7 +23,7 @@ from ...errors import InputError
 from ...task import checkpoint
 from ..faces import Faces
 from ..points import PointCloud
-from ._admission import opened, read_exactly, read_records, size_of, too_few, whole_number
+from ._admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
 from ._columns import (
     Columns,
     cloud_from_columns,
@@ -51,6 +53,7 @@ TITLE = "PLY"
 SUFFIXES = (".ply",)
 
 _ROWS_AT_ONCE = 1 << 12  # of text
+_GRID, _PLACE_BYTES = "range_grid", 64  # bytes of memory for a place of it
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
@@ -85,10 +88,41 @@ def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
         yield from _faces(stream, header)
 
 
-def _faces(stream: BinaryIO, header: PlyHeader, passed: int = 0) -> Iterator[Faces]:
-    """The faces, from a stream that stands behind so many elements."""
+def read_range_grid(path: Path) -> NDArray[np.float64]:
+    """The points of a range grid, (rows, columns, 3), NaN where the grid has none. Raises InputError.
+
+    So Stanford's scans are stored: the element `range_grid` has a list for each place in the grid, with one
+    vertex or none, and remarks of the header tell how many rows and columns there are.
+    """
+    with opened(path) as stream:
+        head = stream.read(LONGEST_HEADER)
+        header = parse_header(head)
+        sizes = [int(size) for name in (b"rows", b"cols") for size in _grid_sizes(head[: header.size], name)]
+        places = sum(element.count for element in header.elements if element.name == _GRID)
+        if len(sizes) != 2 or not places or math.prod(sizes) != places:
+            found = " x ".join(map(str, sizes)) or "no size"
+            raise InputError(f"has no range grid: {places} places for {found}")
+        admit(size_of(stream), places * _PLACE_BYTES)
+        stream.seek(header.size)
+        lists = Faces.joined(_faces(stream, header, of=_GRID))
+    cloud = read(path)
+    points = np.full((len(cloud) + cloud.dropped, 3), np.nan)
+    points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
+    if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():
+        raise InputError("its range grid has more than one vertex in a place, or one that is not there")
+    grid = np.full((places, 3), np.nan)
+    grid[lists.sizes == 1] = points[lists.corners]
+    return grid.reshape(*sizes, 3)
+
+
+def _grid_sizes(head: bytes, name: bytes) -> list[bytes]:
+    return re.findall(rb"\nobj_info num_%b ([0-9]{1,9})\s" % name, head)
+
+
+def _faces(stream: BinaryIO, header: PlyHeader, passed: int = 0, of: str = "face") -> Iterator[Faces]:
+    """The faces, from a stream that stands behind so many elements. of: the element that has them."""
     names = [element.name for element in header.elements]
-    at = names.index("face") if "face" in names else -1
+    at = names.index(of) if of in names else -1
     if at < 0 or not header.elements[at].count:
         return
     if at < passed:

@@ -1,9 +1,9 @@
 """Stanford's laser scans: grids of points, and a .conf file that places them around their subject.
 
 A line of the .conf file is `bmesh`, a file, a translation t and a quaternion x y z w. With R the rotation of
-that quaternion, a point p of the scan is at transpose(R) p + t. All scans together are one pose. A grid is
-the array `xyz` (rows, columns, 3) of an NPZ file of that name, the lowest row first, x to the right, y up, z
-towards the scanner.
+that quaternion, a point p of the scan is at transpose(R) p + t. All scans together are one pose. A scan is a
+PLY file with a range grid, or an NPZ file of that name with the array `xyz` (rows, columns, 3): the lowest row
+first, x to the right, y up, z towards the scanner.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, shortened
 from ...files import read_text
 from ..formats.npz import read_arrays
+from ..formats.ply import read_range_grid
 from ..range_view import RangeView
 from ._grids import view_of_grid
 from ._poses import from_rotation, rotation_of
@@ -39,7 +40,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         raise InputError(f"has several files that place scans: {', '.join(found)}")
     (conf, lines) = found.popitem()
     placed = [_placement(folder / conf, line) for line in lines]
-    files = tuple(folder / f"{Path(name).stem}.npz" for name, _ in placed)
+    files = tuple(_file(folder / name) for name, _ in placed)
     if missing := [file.name for file in files if not file.is_file()]:
         raise InputError(f"there is no {missing[0]}, which {conf} places", folder)
     read = partial(_read, [(file, to_scan) for file, (_, to_scan) in zip(files, placed, strict=True)])
@@ -69,13 +70,18 @@ def _placement(conf: Path, line: str) -> tuple[str, NDArray[np.float64]]:
     return name, from_rotation(rotation, -rotation @ numbers[:3])
 
 
+def _file(named: Path) -> Path:
+    as_arrays = named.with_suffix(".npz")
+    return as_arrays if as_arrays.is_file() else named
+
+
 def _read(scans: Sequence[tuple[Path, NDArray[np.float64]]], _: int) -> tuple[RangeView, ...]:
     return tuple(_view(file, to_scan) for file, to_scan in scans)
 
 
 def _view(file: Path, to_scan: NDArray[np.float64]) -> RangeView:
     try:
-        (grid,) = read_arrays(file, "xyz")
+        grid = read_arrays(file, "xyz")[0] if file.suffix == ".npz" else read_range_grid(file)
         if grid.ndim != 3 or grid.shape[2] != 3 or grid.dtype.kind != "f":
             raise InputError(f"array 'xyz' is {grid.shape} {grid.dtype}, expected (rows, columns, 3) floats")
         return view_of_grid(grid[::-1], to_scan, file.stem, _UNIT)
