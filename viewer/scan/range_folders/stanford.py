@@ -1,9 +1,9 @@
 """Stanford's laser scans: grids of points, and a .conf file that places them around their subject.
 
 A line of the .conf file is `bmesh`, a file, a translation t and a quaternion x y z w. With R the rotation of
-that quaternion, a point p of the scan is at transpose(R) p + t. All scans together are one pose. A scan is a
-PLY file with a range grid, or an NPZ file of that name with the array `xyz` (rows, columns, 3): the lowest row
-first, x to the right, y up, z towards the scanner.
+that quaternion, a point p of the scan is at transpose(R) p + t. All scans together are one pose. A scan is
+a PLY file with a range grid, or an NPZ file of its name with the array `xyz` (rows, columns, 3): the lowest
+row first, x to the right, y up, z towards the scanner.
 """
 
 from __future__ import annotations
