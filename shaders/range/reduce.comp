@@ -14,30 +14,36 @@ layout(std430, binding = STORAGE_RANGE_XY) writeonly buffer Xy { vec2 out_xy[]; 
 
 uniform int number;  // of the view
 uniform int level;   // that is read
-uniform uint first;  // sample that is made by this call
+uniform int run;     // samples of a row that an invocation makes
+uniform uint first;  // run that is made by this call
 
 const float taps[] = TAPS;
+const int REACH = COUNT * COUNT;
 
-void main() {
-    uint i = first + item();
-    if (item() >= item_count) return;
-    RangeView view = range_view(number);
-    RangeLevel fine = range_level(view, level), coarse = range_level(view, level + 1);
-    ivec2 at = ivec2(int(i) % coarse.size.x, int(i) / coarse.size.x);
-    ivec2 begin = 2 * at + FIRST, low = max(begin, 0), high = min(begin + COUNT, fine.size);
+void reduce(RangeView view, RangeLevel fine, ivec2 at, int i) {
+    ivec2 begin = 2 * at + FIRST;
+    float depths[REACH], weights[REACH];  // of what is in reach; 0: not there
+    vec3 colors[REACH];
+    int indices[REACH];
     float nearest = uintBitsToFloat(NO_DEPTH), present = 0.0, inside = 0.0;
+    vec3 color = vec3(0.0);
     int chosen = 0;
-    for (int y = low.y; y < high.y; ++y)
-        for (int x = low.x; x < high.x; ++x) {
-            int index = sample_index(fine, ivec2(x, y));
-            float tap = taps[x - begin.x] * taps[y - begin.y];
-            float alpha = round(255.0 * sample_look(index).a), depth = sample_depth(index);
-            inside += tap;
-            present += tap * alpha;
-            bool nearer = alpha > 0.0 && depth < nearest;
-            nearest = nearer ? depth : nearest;
-            chosen = nearer ? index : chosen;
-        }
+    for (int k = 0; k < REACH; ++k) {
+        ivec2 uv = begin + ivec2(k % COUNT, k / COUNT);
+        bool within = all(greaterThanEqual(uv, ivec2(0))) && all(lessThan(uv, fine.size));
+        indices[k] = sample_index(fine, within ? uv : ivec2(0));
+        vec4 look = sample_look(indices[k]);
+        float tap = within ? taps[k % COUNT] * taps[k / COUNT] : 0.0;
+        depths[k] = sample_depth(indices[k]);
+        weights[k] = tap * round(255.0 * look.a);
+        colors[k] = look.rgb;
+        inside += tap;
+        present += weights[k];
+        bool nearer = weights[k] > 0.0 && depths[k] < nearest;
+        nearest = nearer ? depths[k] : nearest;
+        chosen = nearer ? indices[k] : chosen;
+        color = nearer ? look.rgb : color;
+    }
     if (present == 0.0) {
         out_depths[i] = 0.0;
         out_looks[i] = 0u;
@@ -46,39 +52,45 @@ void main() {
 #endif
         return;
     }
-    float alpha = max(floor(present / inside + 0.5), 1.0);
-#if NEAREST
-    out_depths[i] = nearest;
-    out_looks[i] = packUnorm4x8(vec4(sample_look(chosen).rgb, alpha / 255.0));
+    float depth = nearest;
 #if RANGE_HAS_XY
-    out_xy[i] = texelFetch(range_xy, chosen).xy;
+    vec2 place = texelFetch(range_xy, chosen).xy;
 #endif
-#else
+#if !NEAREST
     // Relative to the nearest, so that what is the same everywhere stays the same.
     precise float weight = 0.0, farther = 0.0;
-    precise vec3 color = vec3(0.0);
+    precise vec3 light = vec3(0.0);
 #if RANGE_HAS_XY
-    vec2 zero = texelFetch(range_xy, chosen).xy;
     precise vec2 aside = vec2(0.0);
 #endif
-    for (int y = low.y; y < high.y; ++y)
-        for (int x = low.x; x < high.x; ++x) {
-            int index = sample_index(fine, ivec2(x, y));
-            vec4 look = sample_look(index);
-            float depth = sample_depth(index);
-            if (!(look.a > 0.0 && same_surface(view, level, nearest, depth))) continue;
-            float part = taps[x - begin.x] * taps[y - begin.y] * round(255.0 * look.a);
-            weight += part;
-            farther += part * (depth - nearest);
-            color += part * to_linear(look.rgb);
+    for (int k = 0; k < REACH; ++k) {
+        if (!(weights[k] > 0.0 && same_surface(view, level, nearest, depths[k]))) continue;
+        weight += weights[k];
+        farther += weights[k] * (depths[k] - nearest);
+        light += weights[k] * to_linear(colors[k]);
 #if RANGE_HAS_XY
-            aside += part * (texelFetch(range_xy, index).xy - zero);
+        aside += weights[k] * (texelFetch(range_xy, indices[k]).xy - place);
 #endif
-        }
-    out_depths[i] = nearest + farther / weight;
-    out_looks[i] = packUnorm4x8(vec4(to_srgb(color / weight), alpha / 255.0));
+    }
+    depth += farther / weight;
+    color = to_srgb(light / weight);
 #if RANGE_HAS_XY
-    out_xy[i] = zero + aside / weight;
+    place += aside / weight;
 #endif
 #endif
+    out_depths[i] = depth;
+    out_looks[i] = packUnorm4x8(vec4(color, max(floor(present / inside + 0.5), 1.0) / 255.0));
+#if RANGE_HAS_XY
+    out_xy[i] = place;
+#endif
+}
+
+void main() {
+    if (item() >= item_count) return;
+    RangeView view = range_view(number);
+    RangeLevel fine = range_level(view, level), coarse = range_level(view, level + 1);
+    int runs = (coarse.size.x + run - 1) / run, which = int(first + item());
+    ivec2 at = ivec2(run * (which % runs), which / runs);
+    int end = min(at.x + run, coarse.size.x);
+    for (; at.x < end; ++at.x) reduce(view, fine, at, at.y * coarse.size.x + at.x);
 }

@@ -111,10 +111,8 @@ float sample_depth(int index) { return texelFetch(range_depths, index).r; }
 // Colour (sRGB) and alpha.
 vec4 sample_look(int index) { return texelFetch(range_looks, index); }
 
-bool is_sample(int index, float least) {
-    float alpha = texelFetch(range_looks, index).a;
-    return alpha > 0.0 && alpha >= least;
-}
+// Whether there is a sample, of which more than such a part is known.
+bool is_sample(int index, float least) { return texelFetch(range_looks, index).a > least; }
 
 bool is_sample(int index) { return is_sample(index, 0.0); }
 
@@ -166,8 +164,8 @@ vec2 undistorted(RangeView v, vec2 seen) {
     for (int i = 0; i < LENS_STEPS; ++i) {
         vec3 j;
         precise vec2 missed = seen - distorted(v, ideal, j);
-        precise float spread = j.x * j.z - j.y * j.y;
-        ideal += vec2(j.z * missed.x - j.y * missed.y, j.x * missed.y - j.y * missed.x) / spread;
+        precise vec2 moved = vec2(j.z * missed.x - j.y * missed.y, j.x * missed.y - j.y * missed.x);
+        ideal += moved / (j.x * j.z - j.y * j.y);
     }
     return ideal;
 }

@@ -69,7 +69,8 @@ bool faces_away(RangeView v, RangeTile tile) {
     return away;
 }
 
-// Pixels between neighbouring samples, where these lie across the line of sight: the least and the largest.
+// Pixels between neighbouring samples: the least, where these lie across the line of sight, and the most that there
+// can be in the picture.
 vec2 footprint(RangeView v, RangeTile tile) {
     float nearest = uintBitsToFloat(NO_DEPTH), farthest = 0.0;
     for (int i = 0; i < 8; ++i) {
@@ -77,6 +78,7 @@ vec2 footprint(RangeView v, RangeTile tile) {
         nearest = min(nearest, depth);
         farthest = max(farthest, depth);
     }
-    if (view_perspective) nearest = max(nearest, view_near);
-    return tile.spacing * vec2(scale_at(farthest), scale_at(nearest));
+    if (!view_perspective) return tile.spacing * view_scale;
+    float aside = length(0.5 * vec2(view_size)) / view_scale;  // in the picture's corners, along the line of sight
+    return tile.spacing * vec2(scale_at(farthest), scale_at(max(nearest, view_near)) * sqrt(1.0 + aside * aside));
 }

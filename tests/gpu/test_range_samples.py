@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from range_scenes import LENSES, looking_at, shape_view, sphere_view
 
+from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.gpu import gl, range_samples
@@ -281,8 +283,6 @@ def seen_by(
     view: RangeView, projection: str = "perspective", size: tuple[int, int] = (160, 120), **orbit: float
 ) -> View:
     """A view of a picture on what a range view sees."""
-    from viewer.bounds import Bounds
-
     places = view.positions()
     bounds = Bounds(places.min(axis=0), places.max(axis=0))
     camera = Camera.orbit(bounds, projection=projection, aspect=size[0] / size[1], **orbit)
@@ -442,6 +442,109 @@ def test_places_project_to_samples_of_a_measured_grid(renderer: Renderer, kind: 
     samples.release()
 
 
+# --- tiles ----------------------------------------------------------------------------
+
+
+def tiles_of(level: range_samples.SampleLevel) -> NDArray[np.int64]:
+    """The number of each sample's tile, (H, W)."""
+    row, column = np.indices(level.size[::-1]) // RANGE_TILE
+    return row * -(-level.size[0] // RANGE_TILE) + column
+
+
+def some_views(rng: np.random.Generator, center: NDArray, radius: float, count: int) -> list[View]:
+    """Pictures of what is about a place: from afar and from within, some from behind."""
+    views = []
+    for number in range(count):
+        eye = center + rng.normal(size=3) * radius * rng.choice([0.5, 2, 5])
+        target = center + rng.normal(size=3) * radius * 0.7
+        camera = Camera(
+            eye=tuple(eye),
+            target=tuple(target),
+            projection=("perspective", "orthographic")[number % 2],
+            fov_y=float(rng.choice([5, 40, 100])),
+            height=float(radius * rng.choice([0.1, 1, 3])),
+            near=float(radius * rng.choice([0.01, 1])),
+            far=float(radius * rng.choice([2, 20])),
+        )
+        bounds = Bounds(center - radius, center + radius)
+        views.append(View.of(camera, (160, 120), np.zeros(3), bounds))
+    return views
+
+
+@pytest.mark.parametrize(("shape", "kind", "lens", "measured"), SHAPES)
+def test_no_tile_is_left_out_that_shows_something(
+    renderer: Renderer, shape: str, kind: DepthKind, lens: str, measured: bool
+) -> None:
+    """Neither samples in the picture nor such as face the eye are in tiles that are told to be outside or to
+    face away; and there are many of these."""
+    own, _, _ = shape_view(shape, kind, lens, measured)
+    rng = np.random.default_rng(3)
+    holes = rng.random(own.depth.shape) < 0.02
+    holes[:32, :48] = True  # some tiles are empty
+    own = replace(own, mask=own.mask & ~holes)
+    samples, places = held(renderer.gpu, (own,)), own.positions()
+    counts = {"outside": 0, "invisible": 0, "away": 0, "all away": 0, "empty": 0, "tiles": 0}
+    for view in some_views(rng, np.median(places, axis=0), 2.0, 24):
+        for level in (0, 1, 3):
+            place, number = samples.places[0][level], tiles_of(samples.places[0][level])
+            found, margin = probe(samples, view, 0, level), float(rng.choice([0, 5]))
+            there = found[..., 0, 3] > 0
+            tiles = probe(samples, view, 0, level, tiles=True, margin=margin)
+            empty, outside, away = (tiles[:, 0, :3] > 0).T
+
+            def any_of(which: NDArray, number: NDArray = number, count: int = place.tiles) -> NDArray:
+                return np.bincount(number[which], minlength=count) > 0
+
+            np.testing.assert_array_equal(empty & any_of(there), False)
+            at = found[..., 1, :3].astype(float)
+            depth = -at[..., 2]
+            scale = view.scale / depth if view.perspective else np.full_like(depth, view.scale)
+            pixel = np.abs(at[..., :2] * scale[..., None])
+            in_picture = (pixel <= np.array(view.size) / 2 + margin).all(axis=2)
+            visible = there & in_picture & (depth >= view.near) & (depth <= view.far)
+            assert not (outside & any_of(visible)).any()
+            normal = found[..., 2, :3]
+            sight = at if view.perspective else np.array([0, 0, -1.0])
+            faces = there & ((normal * sight).sum(axis=2) <= 0)
+            assert not (away & any_of(faces)).any()
+            counts["outside"] += outside[~empty].sum()
+            counts["invisible"] += (any_of(there) & ~any_of(visible)).sum()
+            counts["away"] += away[~empty].sum()
+            counts["all away"] += (any_of(there) & ~any_of(faces)).sum()
+            counts["empty"] += empty.sum()
+            counts["tiles"] += place.tiles
+    assert counts["outside"] > 0.8 * counts["invisible"] > 0.1 * counts["tiles"]
+    assert counts["away"] > 0.4 * counts["all away"] > 0.05 * counts["tiles"]
+    assert counts["empty"] > 0
+    samples.release()
+
+
+def test_pixels_between_samples_are_within_what_is_told(renderer: Renderer) -> None:
+    own, _, _ = shape_view("sphere", "z")
+    samples = held(renderer.gpu, (own,))
+    for view in some_views(np.random.default_rng(4), np.median(own.positions(), axis=0), 2.0, 12):
+        for level in (0, 2):
+            number, found = tiles_of(samples.places[0][level]), probe(samples, view, 0, level)
+            told = probe(samples, view, 0, level, tiles=True)[:, 1].astype(float)
+            at, there = found[..., 1, :3].astype(float), found[..., 0, 3] > 0
+            depth = -at[..., 2]
+            seen = there & (depth >= view.near) & (np.abs(at[..., 0]) < depth) & (np.abs(at[..., 1]) < depth)
+            both = seen[:, 1:] & seen[:, :-1]
+            apart = np.linalg.norm(at[:, 1:] - at[:, :-1], axis=2)
+            spacing = told[number[:, :-1], 2:]
+            same = both & (apart <= spacing[..., 1] * 1.001)
+            assert same.sum() > 0.95 * both.sum()
+            assert (apart[same] >= spacing[same, 0] * 0.999).all()
+            scale = view.scale / depth if view.perspective else np.full_like(depth, view.scale)
+            pixel = at[..., :2] * scale[..., None]
+            inside = same & (np.abs(pixel) <= np.array(view.size) / 2).all(axis=2)[:, :-1]
+            pixels = np.linalg.norm(pixel[:, 1:] - pixel[:, :-1], axis=2)
+            assert (pixels[inside] <= told[number[:, :-1][inside], 1] * 1.001).all()
+            least = apart * np.minimum(scale[:, 1:], scale[:, :-1])
+            assert (least[inside] >= told[number[:, :-1][inside], 0] * 0.999).all()
+    samples.release()
+
+
 # --- as it is uploaded ----------------------------------------------------------------
 
 
@@ -509,7 +612,85 @@ def test_levels_and_bytes(renderer: Renderer) -> None:
     assert all(level.first % 64 == 0 for levels in samples.places for level in levels)
 
 
+def test_far_from_the_world_s_zero_nothing_is_lost(renderer: Renderer) -> None:
+    view, far = seen_by(VIEWS[0]), np.array([512_345.0, 5_400_123.0, 80.0])
+    matrix = VIEWS[0].world_to_camera.copy()
+    matrix[:3, 3] -= matrix[:3, :3] @ far
+    near, moved = held(renderer.gpu, VIEWS[:1]), replace(VIEWS[0], world_to_camera=matrix)
+    expected = probe(near, view, 0, 0)[VIEWS[0].valid()]
+    samples = RangeSamples(renderer.gpu, (moved,), far)
+    samples.upload(np.inf)
+    np.testing.assert_allclose(probe(samples, view, 0, 0)[moved.valid()][:, :4], expected[:, :4], atol=1e-5)
+
+
 def test_too_many_samples_are_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(renderer.gpu, "max_points", 2000)
     with pytest.raises(InputError, match="range views of 2,433 pixels in one pose are too many"):
         held(renderer.gpu, VIEWS)
+    with pytest.raises(ValueError, match="at most 8"):
+        held(renderer.gpu, VIEWS, levels=9)
+
+
+@pytest.mark.slow
+def test_two_views_of_3000x4500_are_held(renderer: Renderer, capsys: pytest.CaptureFixture[str]) -> None:
+    """27 million samples: a buffer is larger than what shaders may write of one at a time."""
+    y, x = np.mgrid[-1.5:1.5:4500j, -1:1:3000j].astype(np.float32)
+    inside = x * x + y * y < 0.9
+    depth = np.where(inside, 3 - np.sqrt(np.where(inside, 1 - x * x - y * y, 1)), np.float32(np.nan))
+    color = np.random.default_rng(2).integers(0, 256, (4500, 3000, 3), np.uint8)
+    view = RangeView(
+        depth=depth,
+        mask=np.ones(depth.shape, bool),
+        color=color,
+        fx=3600.0,
+        fy=3600.0,
+        cx=1500.0,
+        cy=2250.0,
+        world_to_camera=np.eye(4),
+    )
+    gpu = renderer.gpu
+    held(gpu, VIEWS[:1]).release()  # programs are built
+    start = time.perf_counter()
+    samples = RangeSamples(gpu, (view, view), np.zeros(3))
+    slices = []
+    while not samples.complete:
+        before = time.perf_counter()
+        samples.upload(0)
+        slices.append(time.perf_counter() - before)
+    gpu.ctx.finish()
+    seconds = time.perf_counter() - start
+    with capsys.disabled():
+        print(
+            f"\n{samples.count / 1e6:.0f} M samples in {seconds:.2f} s, "
+            f"slices up to {max(slices) * 1e3:.0f} ms, {samples.bytes_per_sample:.2f} bytes a sample"
+        )
+    if gpu.software:
+        assert samples.depths.buffer.size > gpu.max_storage_bytes
+    assert samples.bytes_per_sample < 8 * 4 / 3 + 0.3
+    levels = read(samples)[1]
+    assert levels[0].depth.tobytes() == depth.tobytes()
+    for number, (fine, coarse) in enumerate(pairwise(levels)):
+        middle = fine.depth.shape[0] // 4 * 2
+        left, width = fine.depth.shape[1] // 16 * 2, min(64, fine.depth.shape[1] // 8 * 2)
+
+        def part(level: Image, rows: slice, columns: slice) -> Image:
+            return Image(level.depth[rows, columns], level.look[rows, columns], None)
+
+        crop = part(fine, slice(middle, middle + 40), slice(left, left + width))
+        expected = reduced(view, crop, number, BOX)
+        height, width = expected.depth.shape
+        found = part(coarse, slice(middle // 2, middle // 2 + height), slice(left // 2, left // 2 + width))
+        np.testing.assert_allclose(found.depth, expected.depth, rtol=1e-6)
+        assert np.abs(found.look.astype(int) - expected.look).max() <= 1
+    last = samples.places[1][0]
+    tiles = np.frombuffer(samples.tiles.buffer.read(), np.float32).reshape(-1, 12)[last.first_tile :][
+        : last.tiles
+    ]
+    nearest = np.fmin.reduceat(
+        np.fmin.reduceat(depth, range(0, 4500, 16), axis=0), range(0, 3000, 16), axis=1
+    )
+    nearest = np.where(np.isnan(nearest), np.inf, nearest).ravel()
+    assert (tiles[:, 2] <= nearest).all()
+    np.testing.assert_allclose(tiles[np.isfinite(nearest), 2], nearest[np.isfinite(nearest)], rtol=2e-3)
+    samples.release()
+    gpu.collect()

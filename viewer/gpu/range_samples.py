@@ -9,15 +9,19 @@ surface: those within `STEEPEST` times their lateral spacing of the nearest in r
 linear light) and measured places are means weighted by taps and alphas, alpha is the mean of all, there or
 not. A coarse sample counts as lying in the middle of its reach (`level_to_pixel` in samples.glsl); where only
 some of that is there, it is off by up to half a coarse sample along its surface.
+
+That is 10.9 bytes a sample with all levels and tiles; Farooq 2013 (4.4) has 39 for a mesh, 23 for a strip,
+14.7 for a pyramid and 9.5 where tiles share indices. Shaders do well to work on several samples of a row at
+once, 16 or so: on software drivers what an invocation does before costs more than the sample.
 """
 
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +48,8 @@ from .pyramid import BOX, Filter, sizes
 LEVELS = 6
 _KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
 _ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
-_SLICE = 1 << 18  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
+_SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
+_SOFTWARE_RUN = 16  # samples of a row that an invocation makes where it is invocations that take long
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,8 @@ class RangeSamples:
         how: Filter = BOX,
     ) -> None:
         self._gpu, self._origin, self.filter = gpu, origin, how
+        if not 0 <= (levels or 0) <= RANGE_MOST_LEVELS:
+            raise ValueError(f"{levels} levels; at most {RANGE_MOST_LEVELS}")
         self._pods = [_pod(view) for view in views]
         self.levels = levels or min(LEVELS, max(len(sizes(pod.size)) for pod in self._pods))
         self.places, self._total, tiles = _places(self._pods, self.levels)
@@ -114,13 +121,15 @@ class RangeSamples:
         self.xy = self._texels(gl.RG32F, 8 * self._total) if has_xy else None
         self.tiles = self._texels(gl.RGBA32F, 16 * RANGE_TILE_TEXELS * tiles)
         self._table = self._texels(gl.RGBA32UI, 16 * RANGE_ENTRY * len(views))
+        self._run = _SOFTWARE_RUN if gpu.software else 1
         self._tabled: tuple[object, ...] | None = None  # what the table holds
         self.defines: dict[str, object] = {
             "RANGE_KINDS": int(np.bitwise_or.reduce([pod.kind for pod in self._pods])),
             "RANGE_DISTORTED": int(any(pod.distortion for pod in self._pods)),
             "RANGE_HAS_XY": int(has_xy),
         }
-        self._steps = deque([*self._uploads(views), *self._reductions()])
+        self._steps: Iterator[Callable[[], object]] = chain(self._uploads(views), self._reductions())
+        self.complete = False  # all is uploaded, and the coarser levels made
 
     @property
     def nbytes(self) -> int:
@@ -138,16 +147,15 @@ class RangeSamples:
         """Bytes held on the GPU for each sample of the views, coarser levels and all."""
         return self.nbytes / self.count
 
-    @property
-    def complete(self) -> bool:
-        """Whether all is uploaded, and the coarser levels made."""
-        return not self._steps
-
     def upload(self, end: float) -> bool:
         """Upload and reduce, a slice at a time, until that time of `time.perf_counter`, at least one; whether
         all is there."""
-        while self._steps:
-            self._steps.popleft()()
+        while not self.complete:
+            step = next(self._steps, None)
+            if step is None:
+                self.complete = True
+            else:
+                step()
             if time.perf_counter() > end:
                 break
         return self.complete
@@ -157,7 +165,7 @@ class RangeSamples:
         if how == self.filter:
             return
         self.filter, self._tabled = how, None
-        for step in self._reductions():
+        for step in self._reductions(tiled_from=1):
             step()
 
     def bind(self, view: View) -> None:
@@ -172,7 +180,7 @@ class RangeSamples:
 
     def release(self) -> None:
         """Delete all of it."""
-        self._steps.clear()
+        self._steps = iter(())
         self._gpu.discard(self.depths, self.looks, self.xy, self.tiles, self._table)
 
     def _texels(self, texel_format: int, nbytes: int) -> gl.BufferTexture:
@@ -180,8 +188,9 @@ class RangeSamples:
 
     def _check_size(self) -> None:
         """Raise InputError for more samples than a driver takes, in all or of a level that shaders write."""
-        written = max((levels[1].count for levels in self.places if self.levels > 1), default=0)
-        if self._total > self._gpu.max_points or 8 * written > self._gpu.max_storage_bytes:
+        sample = 8 if any(pod.has_xy for pod in self._pods) else 4
+        written = max((sample * levels[1].count for levels in self.places if self.levels > 1), default=0)
+        if self._total > self._gpu.max_points or written > self._gpu.max_storage_bytes:
             count = sum(levels[0].count for levels in self.places)
             raise InputError(
                 f"range views of {count:,} pixels in one pose are too many for this driver",
@@ -210,19 +219,21 @@ class RangeSamples:
 
     # --- levels and tiles -------------------------------------------------------------
 
-    def _reductions(self) -> Iterator[Callable[[], object]]:
-        """Steps that make the coarser levels and the tiles."""
+    def _reductions(self, tiled_from: int = 0) -> Iterator[Callable[[], object]]:
+        """Steps that make the coarser levels, and the tiles from a level on."""
         for number, levels in enumerate(self.places):
             for level, made in enumerate(levels[1:]):
-                for first in range(0, made.count, _SLICE // 4):
-                    yield partial(self._reduce, number, level, first)
-            for level, made in enumerate(levels):
+                runs = made.size[1] * -(-made.size[0] // self._run)
+                at_once = max(1, _SLICE // (4 * self._run))
+                for first in range(0, runs, at_once):
+                    yield partial(self._reduce, number, level, first, min(at_once, runs - first))
+            for level, made in enumerate(levels[tiled_from:], tiled_from):
                 tiles = max(1, _SLICE // RANGE_TILE**2)
                 for first in range(0, made.tiles, tiles):
                     yield partial(self._bound, number, level, first, tiles)
 
-    def _reduce(self, number: int, level: int, first: int) -> None:
-        """Make samples of the level after this one."""
+    def _reduce(self, number: int, level: int, first: int, count: int) -> None:
+        """Make runs of samples of the level after this one."""
         how, made = self.filter, self.places[number][level + 1]
         taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
         taken = {"FIRST": how.first, "COUNT": len(how.taps), "TAPS": f"float[]({taps})"}
@@ -239,9 +250,9 @@ class RangeSamples:
                 texels.buffer.bind_to_storage_buffer(
                     storage, offset=nbytes * made.first, size=nbytes * made.count
                 )
-        self._gpu.set(program, number=number, level=level, first=first)
+        self._gpu.set(program, number=number, level=level, first=first, run=self._run)
         with self._gpu.timers.measure("reduce"):
-            self._gpu.dispatch(program, min(_SLICE // 4, made.count - first))
+            self._gpu.dispatch(program, count)
 
     def _bound(self, number: int, level: int, first: int, count: int) -> None:
         """Make tiles of a level."""
