@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import InputError
-from viewer.scan.formats import read, write
+from viewer.scan.formats import read, read_points, write
 from viewer.scan.points import PointCloud
 
 ROWS = np.array(
@@ -184,3 +184,76 @@ def test_a_field_that_is_there_twice(encoding: str, path: Path) -> None:
 def test_a_field_of_millions_of_values_is_refused(path: Path) -> None:
     with pytest.raises(InputError, match="has 4,000,005 values a point, more than the 4,096"):
         read(save(path, COUNT="1 1 1 1 4000000 1"))
+
+
+def organised(path: Path, encoding: str = "binary", fields: str = "x y z rgba", **changes: str) -> np.ndarray:
+    """A cloud that a pinhole has measured, its points (12, 16, 3) float32 with a hole."""
+    row, column = np.mgrid[:12, :16].astype(float)
+    depth = 2 + 0.01 * row + 0.02 * column
+    grid = np.stack([(column - 7) * depth / 20, (row - 5) * depth / 21, depth], axis=2).astype(np.float32)
+    grid[3, 4] = np.nan
+    rows = np.zeros((12, 16), [("p", "<f4", 3), ("rgba", "<u4")])
+    rows["p"], rows["rgba"] = grid, np.arange(192).reshape(12, 16) * 0x10101
+    kinds = {"FIELDS": fields, "SIZE": "4 4 4 4", "TYPE": "F F F U", "COUNT": "1 1 1 1"}
+    kinds |= {"WIDTH": "16", "HEIGHT": "12", "POINTS": "192"}
+    save(path, encoding, rows.tobytes(), **kinds | changes)
+    return grid
+
+
+def test_an_organised_cloud_is_a_range_view(path: Path) -> None:
+    grid = organised(path)
+    (view,) = read(path)
+    seen = np.isfinite(grid).all(axis=2)
+    assert (view.fx, view.fy, view.cx, view.cy) == pytest.approx((20, 21, 7.5, 5.5), abs=1e-4)
+    assert np.array_equal(view.depth[seen], grid[seen][:, 2])
+    assert np.array_equal(view.valid(), seen)
+    assert view.positions() == pytest.approx(grid[seen], abs=1e-6)  # as the file has them
+    assert np.array_equal(view.color[..., 0], np.arange(192).reshape(12, 16))
+    assert (view.unit, view.name) == ("units", "camera")
+    cloud = read_points(path)
+    assert (len(cloud), cloud.dropped) == (191, 0)
+    assert np.array_equal(cloud.ids, np.flatnonzero(seen))
+
+
+def test_its_viewpoint_is_the_pose_of_the_camera(path: Path) -> None:
+    grid = organised(path, VIEWPOINT="1 2 3 0 0 0 2")  # half a turn about z, of any length
+    (view,) = read(path)
+    seen = np.isfinite(grid).all(axis=2)
+    assert view.eye.tolist() == [1, 2, 3]
+    assert view.positions() == pytest.approx(grid[seen] * (-1, -1, 1) + (1, 2, 3), abs=1e-6)
+    for words in ("1 2 3 0 0 0 0", "1 2 3 nan 0 0 0", "1 2 3", "a b c d e f g"):
+        organised(path, VIEWPOINT=words)
+        with pytest.raises(InputError, match=r"its VIEWPOINT is no pose|is no rotation"):
+            read(path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"WIDTH": "192", "HEIGHT": "1"},
+        {"WIDTH": "1", "HEIGHT": "192"},
+        {"WIDTH": "16", "HEIGHT": "11"},
+        {"WIDTH": "32", "HEIGHT": "6"},  # which no pinhole has measured
+        {"fields": "x y z label"},
+        {"fields": "z x y rgba"},
+    ],
+)
+def test_other_clouds_stay_points(changes: dict[str, str], path: Path) -> None:
+    organised(path, **changes)
+    cloud = read(path)
+    assert isinstance(cloud, PointCloud)
+    assert len(cloud) == 191
+    assert cloud.dropped == 1
+
+
+def test_clouds_of_real_cameras(data_dir: Path) -> None:
+    for file in sorted((data_dir / "range/pcl_pairwise_kinect_5").glob("*.pcd")):
+        (view,) = read(file)
+        assert (view.fx, view.fy, view.cx, view.cy) == pytest.approx((525, 525, 320, 240), abs=1e-4)
+        assert view.xy is None
+        assert view.world_to_camera == pytest.approx(np.eye(4))  # its VIEWPOINT sets it upright
+    (mug,) = read(next((data_dir / "range/pcl_organised").glob("*.pcd")))
+    assert mug.xy is not None  # written with five decimals
+    assert mug.color.dtype == np.uint8
+    assert np.count_nonzero(mug.valid()) == 209_280
+    assert np.einsum("ij,ij->i", mug.normals(), mug.positions()).max() < 0  # all face the camera

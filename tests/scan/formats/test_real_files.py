@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import InputError
-from viewer.scan.formats import known_suffixes, read
+from viewer.scan.formats import known_suffixes, read, read_points
 
 REFUSED = {
     "odd/ply/assimp_issue623.ply": "row 0 of vertex ends before its vertex_indices",
@@ -83,7 +83,7 @@ def test_every_file_is_read_as_stated_or_refused(folder: str, data_dir: Path) ->
     ],
 )
 def test_sequences(pattern: str, files: int, fewest: int, most: int, data_dir: Path) -> None:
-    counts = [len(read(path)) for path in sorted(data_dir.glob(pattern))]
+    counts = [len(read_points(path)) for path in sorted(data_dir.glob(pattern))]
     assert (len(counts), min(counts), max(counts)) == (files, fewest, most)
 
 

@@ -1,7 +1,11 @@
 """PCD: the Point Cloud Library's format, versions 0.5 to 0.7, all three encodings.
 
 Read here and not by a library because those at hand lose columns, alpha or whole files (upper-case
-names, 64-bit types). VIEWPOINT is where the sensor stood, not a transform, and is not applied.
+names, 64-bit types).
+
+An organised cloud (HEIGHT above 1) of x, y, z and colours alone is a range view where a pinhole has these
+points in its pixels; VIEWPOINT then is the pose of the camera. Of other clouds it is where the sensor stood,
+not a transform, and is not applied.
 """
 
 from __future__ import annotations
@@ -9,15 +13,19 @@ from __future__ import annotations
 import math
 import re
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, unknown_name
-from ..points import PointCloud
+from ...errors import InputError, shortened, unknown_name
+from ..grids import view_of_camera
+from ..image_poses import from_camera_to_world, from_rotation, rotation_of
+from ..points import UNKNOWN_UNIT, PointCloud
+from ..pose import Scanned
+from ..range_view import RangeView
 from ._admission import (
     MOST_COLUMNS,
     admit,
@@ -46,6 +54,9 @@ SUFFIXES = (".pcd",)
 _HEADER_LIMIT = 1 << 16  # bytes looked at for the header
 _TYPES = {"F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8"}
 _PADDING = "_"
+_HERE = ["0", "0", "0", "1", "0", "0", "0"]  # the viewpoint that nobody tells
+_OF_VIEWS = {"x", "y", "z", "red", "green", "blue", "alpha"}  # columns that range views have
+_VIEW_BYTES, _WORK = 64, 20 << 20  # bytes of a point as it becomes a view, and beside all
 _LONGEST_WORD = 40  # of a file, in a message
 _LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
 
@@ -67,6 +78,8 @@ class _Header:
     points: int
     encoding: str
     size: int  # bytes
+    grid: tuple[int, int] | None  # rows and columns of an organised cloud
+    viewpoint: list[str]
 
     @property
     def dtype(self) -> np.dtype:
@@ -74,8 +87,8 @@ class _Header:
         return np.dtype([(str(i), f"<{f.type}", (f.count,)) for i, f in enumerate(self.fields)])
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
-    """All finite points of a PCD file. Raises InputError."""
+def read(path: Path, frame: int = 0) -> Scanned:
+    """All finite points of a PCD file, or the range view that they are. Raises InputError."""
     with opened(path) as stream:
         header = _read_header(stream.read(_HEADER_LIMIT))
         if header.encoding not in _ENCODINGS:
@@ -83,7 +96,35 @@ def read(path: Path, frame: int = 0) -> PointCloud:
         stream.seek(header.size)
         columns = _ENCODINGS[header.encoding](stream, header)
         packed = header.encoding == "binary_compressed"
+        if header.grid and {name.lower() for name in columns} <= _OF_VIEWS:
+            admit(size_of(stream), header.points * (header.dtype.itemsize + _VIEW_BYTES) + _WORK)
+            if (view := _camera_view(columns, header.grid, header.viewpoint)) is not None:
+                return (view,)
         return cloud_from_columns(columns, held=size_of(stream) if packed else None)
+
+
+def _camera_view(columns: Columns, shape: tuple[int, int], viewpoint: list[str]) -> RangeView | None:
+    """The range view of an organised cloud, or None where it is no camera's."""
+    named = {name.lower(): column for name, column in columns.items()}
+    if not {*"xyz"} <= named.keys():
+        return None
+    grid = np.stack([named[name] for name in "xyz"], axis=1).reshape(*shape, 3)
+    view = view_of_camera(grid, _world_to_camera(viewpoint), "camera", UNKNOWN_UNIT)
+    if view is None or not {"red", "green", "blue"} <= named.keys():
+        return view
+    color = np.stack([named[name] for name in ("red", "green", "blue")], axis=1)
+    return replace(view, color=color.reshape(*shape, 3)) if color.dtype == np.uint8 else None
+
+
+def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
+    """The pose of a VIEWPOINT: a translation and a quaternion w x y z, from an image's axes to the world."""
+    try:
+        numbers = np.array(viewpoint or _HERE, np.float64)
+    except ValueError:
+        numbers = np.empty(0)
+    if numbers.shape != (7,) or not np.isfinite(numbers).all():
+        raise InputError(f"its VIEWPOINT is no pose: {shortened(' '.join(viewpoint))}")
+    return from_camera_to_world(from_rotation(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
 
 
 def write(path: Path, cloud: PointCloud) -> None:
@@ -101,7 +142,7 @@ def write(path: Path, cloud: PointCloud) -> None:
         "COUNT": [1] * len(columns),
         "WIDTH": [len(cloud)],
         "HEIGHT": [1],
-        "VIEWPOINT": [0, 0, 0, 1, 0, 0, 0],
+        "VIEWPOINT": _HERE,
         "POINTS": [len(cloud)],
         "DATA": ["binary"],
     }
@@ -134,7 +175,18 @@ def _read_header(head: bytes) -> _Header:
         raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
     check_count(sum(counts), MOST_COLUMNS, "values a point")
     fields = [_Field(n, (t + s).lower(), c) for n, t, s, c in zip(names, types, sizes, counts, strict=True)]
-    return _Header(fields, points, end[1].decode().lower(), end.end())
+    return _Header(
+        fields, points, end[1].decode().lower(), end.end(), _grid(words, points), words.get("VIEWPOINT", [])
+    )
+
+
+def _grid(words: dict[str, list[str]], points: int) -> tuple[int, int] | None:
+    """Rows and columns, where the header has several of both and they are the points."""
+    sides = [*words.get("HEIGHT", []), *words.get("WIDTH", [])]
+    if len(sides) != 2:
+        return None
+    height, width = (whole_number(side, "the number of points") for side in sides)
+    return (height, width) if min(height, width) > 1 and height * width == points else None
 
 
 def _read_ascii(stream: BinaryIO, header: _Header) -> Columns:

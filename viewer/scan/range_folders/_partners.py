@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, explained
 from ...files import read_text
+from ..image_poses import from_camera_to_world
 from ..range_view import RangeView
 from ..times import natural_key
 from ._calibration import FILES, Calibration
 from ._pictures import COLOR_SUFFIXES, DEPTH_SUFFIX, depth_view, is_depth
-from ._poses import from_camera_to_world
 from ._source import RangeFrames
 
 DEPTH_FOLDER = "depth"

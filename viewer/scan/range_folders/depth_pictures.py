@@ -7,10 +7,10 @@ from pathlib import Path
 
 from ...errors import InputError
 from .. import formats
+from ..image_poses import UPRIGHT
 from . import _calibration
 from ._partners import frames_of_pictures, named_pictures, pose_of_file
 from ._pictures import is_depth
-from ._poses import UPRIGHT
 from ._source import RangeFrames
 
 TITLE = "depth pictures"

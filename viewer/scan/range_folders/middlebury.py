@@ -14,9 +14,9 @@ import numpy as np
 from ...errors import InputError, shortened
 from ...files import parsed_json, read_text
 from ..formats.npz import read_arrays
+from ..image_poses import UPRIGHT
 from ..range_view import RangeView
 from ._pictures import read_color
-from ._poses import UPRIGHT
 from ._source import RangeFrames
 
 TITLE = "a stereo pair of Middlebury's"

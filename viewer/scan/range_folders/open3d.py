@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import read_text
+from ..image_poses import UPRIGHT, from_camera_to_world
 from . import _calibration
 from ._calibration import PRIMESENSE
 from ._partners import DEPTH_FOLDER, DepthPicture, frames_of_pictures, named_pictures
-from ._poses import UPRIGHT, from_camera_to_world
 from ._source import RangeFrames
 
 TITLE = "Open3D's RGB-D images"

@@ -19,9 +19,9 @@ from ...errors import InputError, shortened
 from ...files import read_text
 from ..formats.npz import read_arrays
 from ..formats.ply import read_range_grid
+from ..grids import view_of_grid
+from ..image_poses import from_rotation, rotation_of
 from ..range_view import RangeView
-from ._grids import view_of_grid
-from ._poses import from_rotation, rotation_of
 from ._source import RangeFrames
 
 TITLE = "Stanford's laser scans"

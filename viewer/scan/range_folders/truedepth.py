@@ -16,8 +16,8 @@ from ...errors import InputError, shortened
 from ...files import parsed_json, read_text
 from ...srgb import bytes_from_linear
 from ..formats.npz import read_arrays
+from ..image_poses import UPRIGHT
 from ..range_view import RangeView
-from ._poses import UPRIGHT
 from ._source import RangeFrames
 
 TITLE = "TrueDepth frames"

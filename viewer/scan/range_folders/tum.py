@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, explained, shortened
 from ...files import read_text
+from ..image_poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
 from . import _calibration
 from ._calibration import PRIMESENSE
 from ._partners import DepthPicture, frames_of_pictures
-from ._poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
 from ._source import RangeFrames
 
 TITLE = "TUM's RGB-D images"

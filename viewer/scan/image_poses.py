@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...rigid import is_rigid
+from ..errors import InputError
+from ..rigid import is_rigid
 
 UPRIGHT = np.eye(4)  # of a camera whose place nobody tells: the world is its own space
 _IMAGE_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # +y down and +z ahead, to up and back
