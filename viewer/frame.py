@@ -11,6 +11,7 @@ from typing import Any
 from .backends import Backend, FrameView, backends
 from .backends import backend as find_backend
 from .camera import Camera
+from .geometry import UP
 from .gpu.pose import GpuPose
 from .gpu.shade import shade
 from .gpu.surface import Surface
@@ -178,7 +179,8 @@ def render(
     name, chosen = backend_for(pose, backend, params)
     request = Request(
         pose=pose,
-        camera=camera or Camera.orbit(layers.place.bounds(resident.bounds), aspect=size[0] / size[1]),
+        camera=camera
+        or Camera.orbit(layers.place.bounds(resident.bounds), aspect=size[0] / size[1], up=pose.up or UP),
         backend=name,
         params=chosen,
         look=look or Look(),

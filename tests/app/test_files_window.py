@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from depth_folders import write_color, write_depth, write_matrix
 from virtual_screen import PATIENCE, RunningApp, Screen, kept_of, running_app
 
 from viewer.app.settings import FILE, load
@@ -139,4 +140,26 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
         app.see(is_replaying=True)
         app.see(is_replaying=False)
         app.settle()
+        close(app)
+
+
+def test_a_folder_of_range_images_plays_upright(screen: Screen, tmp_path: Path, study: Path) -> None:
+    scene = tmp_path / "scene"
+    for number in range(3):  # their world is an image's: y goes down
+        write_depth(scene / f"frame-{number:06d}.depth.png", np.full((30, 40), 1000 + 50 * number, np.uint16))
+        write_color(scene / f"frame-{number:06d}.color.png", np.full((30, 40, 3), 200, np.uint8))
+        write_matrix(scene / f"frame-{number:06d}.pose.txt", np.eye(4))
+    with running_app(screen, tmp_path, study / "two.npy") as app:
+        app.settle()
+        app.drop(scene)
+        app.see(scan=str(scene), frame=0, unit="m")
+        assert app.settle().camera["up"] == [0, -1, 0]
+        screen.do("key", "Right")
+        app.see(frame=1)
+        app.drop(study / "three.npy")
+        app.see(scan=str(study / "three.npy"))
+        assert app.settle().camera["up"] == [0, 1, 0], "what is up was of the scan before"
+        close(app)
+    with running_app(screen, tmp_path, scene) as app:
+        assert app.settle().camera["up"] == [0, -1, 0]
         close(app)

@@ -63,6 +63,16 @@ def test_a_scan_begins_drawn_as_the_one_before() -> None:
     assert session.history.undoes is None
 
 
+def test_what_is_up_in_one_scan_says_nothing_of_the_next() -> None:
+    session = Session("one", Document(look=Look(light="flat", up="-y")))
+    session.turn_to("two")
+    assert session.document.look == Look(light="flat")
+    session.turn_to("three", up="+z")
+    assert session.document.look.up == "+z"
+    session.turn_to("one", up="+z")
+    assert session.document.look.up == "-y", "as it was left"
+
+
 def test_a_saved_session_takes_the_place_of_what_is_there_and_can_be_undone() -> None:
     session = Session("one", Document(camera=Camera()))
     session.turn_to("two")

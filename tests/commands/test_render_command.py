@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
+from depth_folders import write_color, write_depth, write_matrix
 from small_scans import FRAMES, SMALL, front, names, stored
 from written import bits, film, picture
 
@@ -77,6 +78,25 @@ def test_orbit_and_up(
     assert np.array_equal(picture(tmp_path / "a.png"), expected)
     assert run(*ball, f"--up={up}", f"--orbit={argument}", "--force").code == 0
     assert np.array_equal(picture(tmp_path / "a.png"), expected)
+
+
+def test_range_views_tell_what_is_up(run: Run, tmp_path: Path) -> None:
+    """As the poses of 7-Scenes do: the world is the first camera's space, where y goes down."""
+    folder = tmp_path / "scene"
+    write_depth(folder / "frame-000000.depth.png", np.full((30, 40), 1500, np.uint16))
+    colors = np.zeros((30, 40, 3), np.uint8)
+    colors[:15, :, 0] = colors[15:, :, 2] = 255
+    write_color(folder / "frame-000000.color.png", colors)
+    write_matrix(folder / "frame-000000.pose.txt", np.eye(4))
+    draw = ("render", folder, *SMALL, "--force", "-o", tmp_path / "a.png")
+    shown = {}
+    for up in ("", "-y", "+y"):
+        assert run(*draw, *(["--up", up] if up else [])).code == 0
+        shown[up] = picture(tmp_path / "a.png")
+    assert np.array_equal(shown[""], shown["-y"])
+    assert not np.array_equal(shown[""], shown["+y"])
+    assert run("render", folder, *SMALL, "--look", "up=+z", "--force", "-o", tmp_path / "a.png").code == 0
+    assert np.array_equal(picture(tmp_path / "a.png"), shown[""])  # --look is of colours by height alone
 
 
 def test_a_camera_file(run: Run, scans: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from viewer.errors import InputError
 from viewer.scan.colors import linear_from_srgb8, srgb8_from_linear
 from viewer.scan.estimate import estimate, estimate_normals
 from viewer.scan.pose import Pose
-from viewer.scan.range_view import RangeView, mask_of, merge
+from viewer.scan.range_view import RangeView, mask_of, merge, up_axis
 
 EYE = (2.0, 1.5, 4.0)
 UTM = np.array([665187.25, 5648349.5, 241.75])
@@ -297,6 +297,26 @@ def test_a_mask_of_numbers() -> None:
     numbers = np.array([0, 0.005, 0.02, 1], np.float16)
     assert mask_of(numbers).tolist() == [False, False, True, True]
     assert mask_of(np.array([0, 1, 255], np.uint8)).tolist() == [False, True, True]
+
+
+def turned_to(up: tuple[float, float, float], ahead: tuple[float, float, float]) -> RangeView:
+    """A view of a pod that looks ahead, with something of the world up in its picture."""
+    back = -np.array(ahead, float)
+    matrix = np.eye(4)
+    matrix[:3, :3] = [np.cross(up, back), up, back]
+    return replace(flat([[1, 1], [1, 1]]), world_to_camera=matrix)
+
+
+def test_what_is_up_is_what_is_up_in_the_pictures() -> None:
+    down, along = turned_to((0, -1, 0), (0, 0, 1)), turned_to((0, 0, 1), (1, 0, 0))
+    assert up_axis([flat([[1, 1], [1, 1]])]) == "+y"
+    assert up_axis([down]) == "-y"
+    assert up_axis([along, turned_to((0, 0, 1), (0, -1, 0))]) == "+z"
+    assert up_axis([turned_to((0.6, 0.8, 0), (0, 0, -1))]) == "+y"
+    assert up_axis([down, turned_to((0, 1, 0), (0, 0, -1))]) is None
+    assert up_axis([]) is None
+    assert Pose.of(0, 0.0, "", (down,)).up == "-y"
+    assert Pose.of(0, 0.0, "", down.points()).up is None
 
 
 MIRROR = np.diag([1.0, 1, -1, 1])

@@ -121,8 +121,9 @@ class App:
         self.pointer: Pointer = Pointer(self.viewport, self.playback)
         self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
         self.steering: Steering = Steering(
-            self.session, self.playback, self.viewport, self.pointer, remembered.cube, remembered.turn_seconds
-        )
+            self.session, self.playback, self.viewport, self.pointer, remembered.cube,
+            remembered.turn_seconds, up is not None,
+        )  # fmt: skip
         self.marks: ViewMarks = ViewMarks(
             self.session, self.playback, self.viewport, self.steering, remembered.marks
         )
@@ -295,7 +296,7 @@ class App:
             # It may wait for a pose that is being read.
             in_background(Task("Closing"), self.playback.timeline.close)
             self.keeping.leave()
-            self.session.turn_to(scan, begun.left)
+            self.session.turn_to(scan, begun.left, self._up)
             self._start(begun)
             self.playback.begin(begun.timeline, begun.first)
             log.debug("opened %s", scan)

@@ -12,6 +12,7 @@ from ..document.history import History
 from ..document.part import Part
 from ..document.saved_session import SavedSession
 from ..files import absolute
+from ..geometry import UP
 from ..scan.open import DEMO
 from .laid import Laid
 from .playing.player import Pace
@@ -80,12 +81,13 @@ class Session:
         history, index = self._left.get(known_as(scan), (None, 0))
         return None if history is None else SavedSession(known_as(scan), None, index, history.document)
 
-    def turn_to(self, scan: str, left: SavedSession | None = None) -> None:
+    def turn_to(self, scan: str, left: SavedSession | None = None, up: str | None = None) -> None:
         """Go to another scan, as it was left; what can be undone of one that was open stays.
 
-        left: None where it was never open: it begins drawn as this one.
+        left: None where it was never open: it begins drawn as this one. up: its up axis then, where the user
+        tells one.
         """
-        begun = History(self.document.for_another() if left is None else left.document)
+        begun = History(self.document.for_another(up or UP) if left is None else left.document)
         self._left[known_as(self.scan)] = self.history, self.index
         beginning = begun, 0 if left is None else left.pose
         self.history, self.index = self._left.pop(known_as(scan), beginning)

@@ -17,6 +17,7 @@ import numpy as np
 from ..bounds import Bounds
 from ..errors import InputError, unknown_name
 from ..files import absolute, printable, whole_file
+from ..geometry import UP
 from ..look import COLOR_BY, Look, drawable
 from ..output.export import is_pattern, numbered
 from ..scan import formats
@@ -112,6 +113,16 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
     if not boxes:  # there may be a readable one between
         return next(read_poses(timeline, indices)).bounds
     return Bounds(np.min([b.low for b in boxes], axis=0), np.max([b.high for b in boxes], axis=0))
+
+
+def told_up(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> str:
+    """The axis that is up: as the arguments tell, else the first of these poses that can be read, else +y."""
+    if args.up:
+        return args.up
+    for index in indices:
+        with suppress(InputError):
+            return timeline.pose(index).up or UP
+    return UP
 
 
 def check_color_source(look: Look, timeline: Timeline, indices: Sequence[int]) -> None:

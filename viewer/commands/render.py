@@ -13,6 +13,7 @@ import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,6 @@ from ..document.recording import Entry, fingerprint, new_salt
 from ..errors import InputError
 from ..files import whole_file
 from ..frame import Request, backend_for
-from ..geometry import UP
 from ..look import Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..output.marks import MARKS, Legend, marks_of
@@ -48,6 +48,7 @@ from ._scans import (
     framing,
     open_timeline,
     read_poses,
+    told_up,
 )
 
 _SIZE = (1920, 1280)
@@ -127,7 +128,7 @@ def run(args: Namespace) -> int:
 @contextmanager
 def _planned(args: Namespace) -> Iterator[Plan]:
     """The pictures that the arguments describe."""
-    look, values = parse(Look, {"up": args.up or UP, **dict(args.look)}, "look"), dict(args.set)
+    look, values = parse(Look, dict(args.look), "look"), dict(args.set)
     if args.backend:
         find_backend(args.backend).params(values)  # wrong names are told before anything is read
     camera = Camera.load(args.camera) if args.camera else None
@@ -137,6 +138,9 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         shots = drawing.shots(indices, args.turntable)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
         outputs = drawing.outputs(args.out, [shot.number for shot in shots], args.stats)
+        up = told_up(args, timeline, indices)
+        if "up" not in dict(args.look):
+            look = replace(look, up=up)
         claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
         check_color_source(look, timeline, indices)
         fps = drawing.film_rate(timeline, indices, args.fps)
@@ -145,7 +149,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         marks = marks_of(args.marks)
 
         def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
-            for shot, request in _requests(args, timeline, shots, size, look, values, camera):
+            for shot, request in _requests(args, timeline, shots, size, look, values, camera, up):
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
@@ -191,13 +195,14 @@ def _requests(
     look: Look,
     values: dict[str, object],
     camera: Camera | None,
+    up: str,
 ) -> Iterator[tuple[Shot, Request]]:
     """Requests for each shot. The first pose settles the backend, several the camera if there is none.
 
     A pose without the scalar that the look colours by is reported, and has colours of its own choice.
     """
     chosen = None
-    camera_of = _camera(args, timeline, shots, size) if camera is None else lambda shot: camera
+    camera_of = _camera(args, timeline, shots, size, up) if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or backend_for(pose, args.backend, values)
         own = drawable(look, pose.overview.scalars)
@@ -210,14 +215,14 @@ def _requests(
 
 
 def _camera(
-    args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int]
+    args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int], up: str
 ) -> Callable[[Shot], Camera]:
     """The camera of each shot, fitted."""
     aspect = size[0] / size[1]
     bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:
-        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, args.up or UP)
-    camera = Camera.orbit(bounds, *(args.orbit or ()), aspect=aspect, up=args.up or UP)
+        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, up)
+    camera = Camera.orbit(bounds, *(args.orbit or ()), aspect=aspect, up=up)
     return lambda shot: camera
 
 

@@ -20,7 +20,6 @@ from ..document.saved_session import SavedSession, is_session
 from ..errors import InputError, NoOpenGLError, explained
 from ..files import printable
 from ..frame import Request
-from ..geometry import UP
 from ..look import Look
 from ..output.export import contact_sheet, film, thumbnail, write_png
 from ..scan.inputs import scan_inputs
@@ -32,7 +31,7 @@ from ..unfinished import remove_leftovers
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
-from ._scans import SCAN_HELP, framing, open_timeline, read_poses
+from ._scans import SCAN_HELP, framing, open_timeline, read_poses, told_up
 from .doctor import display
 
 _SIZE = (1200, 800)
@@ -150,8 +149,9 @@ def _files(folder: Path, prefix: str, timeline: Timeline) -> list[Path]:
 
 def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     """Draw all poses of a scan into the folder, and say what is there."""
-    name, up = _stem(args.fallback, prefix, timeline), args.up or UP
+    name = _stem(args.fallback, prefix, timeline)
     indices = list(range(len(timeline)))
+    up = told_up(args, timeline, indices)
     on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
     fps = drawing.film_rate(timeline, indices, args.fps)
     thumbnails = []

@@ -12,7 +12,7 @@ from ..backends import backends
 from ..camera import Camera
 from ..errors import InputError, shortened
 from ..frame import Request, backend_for
-from ..geometry import Vector, up_vector
+from ..geometry import UP, Vector, up_vector
 from ..look import Look, drawable
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Pose
@@ -166,9 +166,10 @@ class Document:
         is_upright = above @ up_vector(up) >= _UPRIGHT * np.linalg.norm(above)
         return turned if is_upright else replace(turned, camera=None, pivot=None)
 
-    def for_another(self) -> Document:
-        """The document that a scan begins with which is opened after this one: drawn alike, all else anew."""
-        return Document(look=self.look, backend=self.backend, params=self.params)
+    def for_another(self, up: str = UP) -> Document:
+        """The document that a scan begins with which is opened after this one: drawn alike, all else anew.
+        up: its up axis."""
+        return Document(look=replace(self.look, up=up), backend=self.backend, params=self.params)
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and the parameters that it begins with; the pose's

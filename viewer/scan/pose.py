@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..bounds import Bounds
 from .points import PointCloud, strided
 from .range_points import RangePoints
-from .range_view import RangeView
+from .range_view import RangeView, up_axis
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 
@@ -51,6 +51,11 @@ class Pose:
     def views(self) -> tuple[RangeView, ...]:
         """The range views that it was scanned as; none where it holds points alone."""
         return () if isinstance(self.points, PointCloud) else self.points.views
+
+    @property
+    def up(self) -> str | None:
+        """The name of the axis that its range views tell is up; None without any, or where they disagree."""
+        return up_axis(self.views)
 
     @property
     def overview(self) -> PointCloud:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, unknown_name
+from ..geometry import AXES
 from ..rigid import is_rigid
 from .colors import srgb8
 from .grid_normals import normals_of_grid
@@ -20,6 +21,7 @@ from .units import conversion
 
 DepthKind = Literal["z", "range", "height"]
 
+_LEAST_UPRIGHT = 0.5  # the cosine of how far from an axis the pictures' common up may be
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _MASKED_IN = 0.01  # above which a number in a mask says that the depth is used (Farooq 2013, 4.3)
 _FIELD_OF_VIEW = 45.0  # degrees, where nothing tells it
@@ -299,6 +301,15 @@ def merged_normals(views: Sequence[RangeView], cloud: PointCloud) -> NDArray[np.
     assert cloud.ids is not None  # some were dropped
     seen = np.concatenate([view.valid().ravel() for view in views])
     return normals[np.isin(np.flatnonzero(seen), cloud.ids)]
+
+
+def up_axis(views: Sequence[RangeView]) -> str | None:
+    """The name of the axis of the world nearest to what is up in the pictures; None where they disagree."""
+    if not views:
+        return None
+    up = np.mean([view.world_to_camera[1, :3] for view in views], axis=0)
+    nearest = max(AXES, key=lambda name: float(up @ AXES[name]))
+    return nearest if up @ AXES[nearest] > _LEAST_UPRIGHT else None
 
 
 def in_one_unit(views: Sequence[RangeView], unit: str) -> tuple[RangeView, ...]:

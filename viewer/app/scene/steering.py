@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 from ...bounds import Bounds
 from ...camera import Camera
@@ -34,13 +35,15 @@ class Steering:
         pointer: Pointer,
         cube: bool,
         turn_seconds: float,
+        up_is_told: bool,
     ) -> None:
-        """cube: whether it is shown. turn_seconds: that the turntable takes."""
+        """cube: whether it is shown. turn_seconds: that the turntable takes. up_is_told: whether the user
+        tells what is up in all scans."""
         self._session, self._playback, self._viewport, self._pointer = session, playback, viewport, pointer
         self.gesture: str | None = None
         self.cube: OrientationCube = OrientationCube(cube)
         self.turntable: Turntable = Turntable(turn_seconds)
-        self._is_checked = False
+        self._is_checked, self._up_is_told = False, up_is_told
         self._wheeled = -math.inf  # by the clock, when the wheel was turned last
 
     @property
@@ -130,12 +133,15 @@ class Steering:
     def settle(self, pose: Pose) -> None:
         """Fit the camera to a pose that is to be drawn where there is none, or one that shows nothing of it.
 
-        The latter is looked at once a scan: its file may have changed since it was left.
+        The latter is looked at once a scan: its file may have changed since it was left. Where there is none
+        at first, the pose tells what is up, unless the user did.
         """
         camera = self._session.document.camera
         bounds, aspect = self.bounds(pose), self._viewport.aspect
         if not self._is_checked:
             self._is_checked = True
+            if camera is None and pose.up and not self._up_is_told:
+                self._session.amend(look=replace(self._session.document.look, up=pose.up))
             if camera is not None and not navigation.shows(camera, bounds, aspect):
                 camera = None
         if camera is None:
