@@ -68,7 +68,8 @@ void main() {
         low -= ROUNDING * abs(low);
         high += ROUNDING * abs(high);
     }
-    out_tiles[RANGE_TILE_TEXELS * i] = vec4(low, spacing.x);
-    out_tiles[RANGE_TILE_TEXELS * i + 1u] = vec4(high, spacing.y);
-    out_tiles[RANGE_TILE_TEXELS * i + 2u] = vec4(axis, cosine);
+    uint at = uint(RANGE_TILE_TEXELS) * (uint(found.first_tile) + i);
+    out_tiles[at] = vec4(low, spacing.x);
+    out_tiles[at + 1u] = vec4(high, spacing.y);
+    out_tiles[at + 2u] = vec4(axis, cosine);
 }

@@ -259,9 +259,7 @@ class RangeSamples:
         made = self.places[number][level]
         program = self._gpu.compute("range/bounds.comp", self.defines)
         self._bind_read()
-        texel = 16 * RANGE_TILE_TEXELS
-        offset = texel * made.first_tile
-        self.tiles.buffer.bind_to_storage_buffer(Storage.RANGE_TILES, offset=offset, size=texel * made.tiles)
+        self.tiles.buffer.bind_to_storage_buffer(Storage.RANGE_TILES)
         self._gpu.set(program, number=number, level=level, first=first)
         with self._gpu.timers.measure("bounds"):
             self._gpu.dispatch(program, min(count, made.tiles - first))
@@ -324,14 +322,14 @@ def _pod(view: RangeView) -> _Pod:
 
 
 def _places(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:
-    """The places of all levels, and how many samples and tiles there are with what is left free between."""
+    """The places of all levels, how many samples there are with what is left free between, and tiles."""
     places, samples, tiles = [], 0, 0
     for pod in pods:
         own = []
         for size in sizes(pod.size, levels):
             own.append(SampleLevel(samples, tiles, size))
             samples += -(-own[-1].count // _ALIGNED) * _ALIGNED
-            tiles += -(-own[-1].tiles // _ALIGNED) * _ALIGNED
+            tiles += own[-1].tiles
         places.append(own)
     return places, samples, tiles
 
