@@ -116,6 +116,11 @@ def view_of_grid(grid: NDArray[np.floating], to_grid: NDArray[np.float64], name:
     )
 
 
+def is_seen_from_behind(view: RangeView, to_grid: NDArray[np.float64]) -> bool:
+    """Whether a view of `view_of_grid` looks along the z of its grid, as where the lowest row came first."""
+    return bool((view.world_to_camera @ np.linalg.inv(to_grid))[2, 2] < 0)
+
+
 def _axes(
     points: NDArray[np.float64], column: NDArray[np.integer], row: NDArray[np.integer]
 ) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..rigid import is_rigid
 
 UPRIGHT = np.eye(4)  # of a camera whose place nobody tells: the world is its own space
-_IMAGE_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # +y down and +z ahead, to up and back
+IMAGE_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # +y down and +z ahead, to up and back; and from there
 _ROUNDED = 1e-2  # how far a rotation may be from orthonormal: files of three digits are
 
 
@@ -21,7 +21,14 @@ def from_camera_to_world(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     if not is_rigid(pose, _ROUNDED):
         raise InputError("its pose is not a rotation and a translation")
     left, _, right = np.linalg.svd(pose[:3, :3])
-    return _IMAGE_AXES @ from_rotation((left @ right).T, -(left @ right).T @ pose[:3, 3])
+    return IMAGE_AXES @ from_rotation((left @ right).T, -(left @ right).T @ pose[:3, 3])
+
+
+def from_world_to_camera(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The world_to_camera of a range view, (4, 4), of the inverse of such a matrix. Raises InputError."""
+    if not is_rigid(matrix, _ROUNDED):
+        raise InputError("its pose is not a rotation and a translation")
+    return from_camera_to_world(np.asarray(np.linalg.inv(matrix), np.float64))
 
 
 def from_rotation(rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> NDArray[np.float64]:

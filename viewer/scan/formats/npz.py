@@ -4,7 +4,8 @@
 uint8 or float in 0..1, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N)
 by their names, `origin` (3,) that is to be added to the positions, `times` (T,) in seconds, `faces` (F, 3)
 whole numbers, which tell the topology of all frames. Attributes of a sequence may lack T: then all frames
-share them. Arrays of other shapes are left alone.
+share them. Arrays of other shapes are left alone. Without `positions`, `depth`, `xyz` or `elevation` make a
+range view; see `_array_views`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..faces import Faces
 from ..points import PointCloud, choose_origin
+from ..pose import Scanned
 from ._admission import MOST_MEMBERS, admit, check_count, opened, size_of
+from ._array_views import makes_views, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
 from ._deferred import Deferred, cloud_of
 from ._stored import StoredArray
@@ -43,6 +46,7 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
     "axes": [(4,)],
 }
 _OF_ALL = {"origin", "times"}
+_FORM = "Name points 'positions', (N, 3) or (T, N, 3), and range images 'depth', (H, W)"
 _SAVE_ANEW = "Save it with numpy.savez"
 _MOST_RATIO, _FREE = 64, 180 << 20  # bytes to unpack for those packed, and beyond: scans pack to a tenth
 _ENCRYPTED = 1  # a bit of a member's flags
@@ -59,19 +63,27 @@ _FAR = 16  # radii of the points from their origin, where float32 still tells a 
 def frame_count(path: Path) -> int:
     """T of (T, N, 3) positions, else 1."""
     with opened(path) as stream, _arrays(stream) as arrays:
-        return math.prod(_positions(arrays).sequence)
+        return 1 if _is_range_scan(arrays) else math.prod(_positions(arrays).sequence)
+
+
+def read_unit(path: Path) -> str | None:
+    """The array `unit` of a range view, or None."""
+    with opened(path) as stream, _arrays(stream) as arrays:
+        return unit_of_arrays(arrays) if _is_range_scan(arrays) else None
 
 
 def read_times(path: Path) -> NDArray[np.float64] | None:
     """The array `times`, (T,) float64 seconds, or None."""
     with opened(path) as stream, _arrays(stream) as arrays:
-        sequence = _positions(arrays).sequence
+        sequence = () if _is_range_scan(arrays) else _positions(arrays).sequence
         return _vector(arrays["times"], *sequence) if sequence and "times" in arrays else None
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
+def read(path: Path, frame: int = 0) -> Scanned:
     """One frame; arrays that are not needed and other frames are not kept. Raises InputError."""
     with opened(path) as stream, _arrays(stream) as arrays:
+        if _is_range_scan(arrays):
+            return (view_of_arrays(arrays, size_of(stream)),)
         shares = _shares(arrays, frame)
         share, held = shares.pop("positions"), size_of(stream)
         admit(held, arrays["positions"].memory(share))
@@ -210,10 +222,14 @@ def _shares(arrays: dict[str, StoredArray], frame: int) -> dict[str, int | None]
     return shares
 
 
+def _is_range_scan(arrays: dict[str, StoredArray]) -> bool:
+    return "positions" not in arrays and makes_views(arrays)
+
+
 def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
     if "positions" not in arrays:
         found = f"has no array 'positions', only: {', '.join(arrays) or 'none'}"
-        raise InputError(found, hint="Name the points 'positions', (N, 3) or (T, N, 3)")
+        raise InputError(found, hint=_FORM)
     return arrays["positions"]
 
 

@@ -1,0 +1,207 @@
+"""Range views from named arrays: depth, an organised grid of points, or the heights of a terrain.
+
+| array | what it is |
+|---|---|
+| `depth` (H, W) | of the kind that `kind` tells (z, range, height), any real; whole numbers: 0 is none |
+| `depth_scale` | how many of its numbers are one unit; 1 where it is missing |
+| `xyz` (H, W, 3) | instead: points in an image's axes, or with x right, y up and z towards the scanner |
+| `elevation` (H, W) | instead: heights of a terrain, in metres or the unit that is told |
+| `color` (H, W), (H, W, 3 or 4) | uint8, or floats in 0..1, sRGB |
+| `mask` (H, W), `confidence` (H, W) | above 0.01: use the depth; any real |
+| `intrinsics` (3, 3), or `fx` `fy` `cx` `cy` | pixels, the centre of the first one at 0, 0 |
+| `distortion` (4,), (5,) or (8,) | as OpenCV has it |
+| `pose`, or `world_to_camera`, (4, 4) | from the camera to the world, or back, in an image's axes |
+| `unit` | of length |
+| `dx` `dy`; `xmin` `xmax` `ymin` `ymax` | of a terrain: a cell's sides; outer edges, ymin of the first row |
+
+An image's axes are x to the right, y down and z ahead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ..grids import is_seen_from_behind, view_of_camera, view_of_grid
+from ..image_poses import IMAGE_AXES, UPRIGHT, from_camera_to_world, from_world_to_camera
+from ..points import UNKNOWN_UNIT
+from ..range_view import DepthKind, RangeView, assumed_pinhole, mask_of
+from ..terrain import METRE, Ground, are_degrees, terrain_view
+from ..units import usable_unit
+from ._admission import admit
+from ._stored import StoredArray
+
+_IMAGES = ("depth", "xyz", "elevation")  # of which one makes a view
+_PINHOLE = ("fx", "fy", "cx", "cy")
+_EDGES = ("xmin", "xmax", "ymin", "ymax")
+_MOST_RATIO = 40  # of memory to the file: what is masked packs well
+_BYTES = 80  # of memory for a pixel as it becomes a view, beside what is stored
+_LONGEST = 1024  # numbers, or bytes of a word, where few are expected
+_CENTER = 0.5  # of a pixel: in these arrays that of the first one is at 0, 0
+_AS_THEY_ARE = (slice(None), slice(None))
+_UPSIDE_DOWN = (slice(None, None, -1), slice(None))
+
+_Arrays = Mapping[str, StoredArray]
+_Turned = tuple[slice, slice]  # rows and columns of a view in those of its file
+
+
+def makes_views(arrays: _Arrays) -> bool:
+    """Whether there is an array that makes a range view."""
+    return _source(arrays) is not None
+
+
+def _source(arrays: _Arrays) -> str | None:
+    """The array that makes one; a list of points is none."""
+    return next((name for name in _IMAGES if name in arrays and arrays[name].shape[1:] != (3,)), None)
+
+
+def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
+    """The range view of the arrays of a file of `held` bytes. Raises InputError."""
+    source = _source(arrays)
+    assert source is not None
+    shape, deep = arrays[source].shape, (3,) if source == "xyz" else ()
+    if len(shape) < 2 or 0 in shape or shape[2:] != deep:
+        raise InputError(f"array '{source}' has shape {shape}, expected (H, W{', 3' if deep else ''})")
+    images = [name for name in (source, "color", "mask", "confidence") if name in arrays]
+    for name in images:
+        image = arrays[name].shape
+        if image[:2] != shape[:2] or (name != source and image[2:] and name != "color"):
+            raise InputError(f"array '{name}' has shape {image}, '{source}' {shape}")
+    stored = sum(arrays[name].memory() for name in images)
+    admit(held, stored + shape[0] * shape[1] * _BYTES, _MOST_RATIO)
+    make = {"depth": _of_depth, "xyz": _of_grid, "elevation": _of_terrain}[source]
+    view, turned = make(_numbers(arrays[source]), arrays)
+    changes: dict[str, Any] = {}
+    if "mask" in images:
+        changes["mask"] = view.mask & mask_of(_numbers(arrays["mask"])[turned])
+    if "color" in images:
+        changes["color"] = np.ascontiguousarray(_colors(_numbers(arrays["color"]))[turned])
+    if "confidence" in images:
+        changes["confidence"] = _numbers(arrays["confidence"])[turned].astype(np.float32)
+    return replace(view, **changes)
+
+
+def unit_of_arrays(arrays: _Arrays) -> str | None:
+    """The name of the unit of length that the arrays tell."""
+    return usable_unit(_word(arrays, "unit", "")) if "unit" in arrays else None
+
+
+def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
+    scale = _number(arrays, "depth_scale", 1.0)
+    if not (np.isfinite(scale) and scale > 0):
+        raise InputError(f"its depth_scale is {scale:g}", hint="It is how many of the numbers are one unit")
+    depth = stored.astype(np.float32)
+    if scale != 1:
+        depth /= np.float32(scale)
+    kind = cast(DepthKind, _word(arrays, "kind", "z"))
+    view = RangeView(
+        depth=depth,
+        kind=kind,
+        mask=np.ones(depth.shape, bool) if stored.dtype.kind == "f" else stored != 0,
+        **_calibration(arrays, depth.shape[0], depth.shape[1], kind),
+        distortion=tuple(_vector(arrays, "distortion").tolist()) if "distortion" in arrays else (),
+        world_to_camera=UPRIGHT if (told := _world_to_camera(arrays)) is None else told,
+        name="camera",
+        unit=unit_of_arrays(arrays) or UNKNOWN_UNIT,
+    )
+    return view, _AS_THEY_ARE
+
+
+def _of_grid(grid: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
+    if grid.dtype.kind != "f":
+        raise InputError(f"array 'xyz' is of type {grid.dtype}, expected floats")
+    unit, told = unit_of_arrays(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
+    view = view_of_camera(grid, UPRIGHT if told is None else told, "camera", unit)
+    if view is not None:
+        return view, _AS_THEY_ARE
+    to_grid = np.eye(4) if told is None else IMAGE_AXES @ told
+    view = view_of_grid(grid, to_grid, "scanner", unit)
+    if is_seen_from_behind(view, to_grid):
+        return view_of_grid(grid[_UPSIDE_DOWN], to_grid, "scanner", unit), _UPSIDE_DOWN
+    return view, _AS_THEY_ARE
+
+
+def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
+    rows, columns = heights.shape
+    if all(name in arrays for name in _EDGES):
+        left, end, first, last = (_number(arrays, name) for name in _EDGES)
+        right, down = (end - left) / columns, (last - first) / rows
+    elif "dx" in arrays and "dy" in arrays:
+        left, first, right, down = 0.0, 0.0, abs(_number(arrays, "dx")), -abs(_number(arrays, "dy"))
+    else:
+        raise InputError("has heights, but nothing tells the ground", hint="Add dx and dy, or xmin to ymax")
+    there = np.isfinite(heights)
+    span = float(np.ptp(heights[there])) if there.any() else 0.0
+    degrees = are_degrees(left, first, right * columns, down * rows, span)
+    unit = unit_of_arrays(arrays) or (METRE if degrees else UNKNOWN_UNIT)
+    ground = Ground(left=left, first=first, right=right, down=down, degrees=degrees, unit=unit)
+    return terrain_view(heights, there, ground, "terrain"), ground.turned
+
+
+def _calibration(arrays: _Arrays, height: int, width: int, kind: str) -> dict[str, Any]:
+    """The pinhole; one that is assumed where nothing tells it."""
+    if "intrinsics" in arrays:
+        matrix = _vector(arrays, "intrinsics", 9).reshape(3, 3)
+        fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    elif missing := [name for name in _PINHOLE if name not in arrays]:
+        if len(missing) < len(_PINHOLE) or kind == "height":
+            raise InputError(f"its calibration lacks {', '.join(missing)}")
+        return assumed_pinhole(width, height)
+    else:
+        fx, fy, cx, cy = (_number(arrays, name) for name in _PINHOLE)
+    return {"fx": fx, "fy": fy, "cx": cx + _CENTER, "cy": cy + _CENTER}
+
+
+def _world_to_camera(arrays: _Arrays) -> NDArray[np.float64] | None:
+    for name, made in (("pose", from_camera_to_world), ("world_to_camera", from_world_to_camera)):
+        if name in arrays:
+            return made(_vector(arrays, name, 16).reshape(4, 4))
+    return None
+
+
+def _colors(stored: NDArray) -> NDArray[np.uint8]:
+    """sRGB, (H, W, 3), of grey or colour with or without alpha."""
+    if stored.ndim > 3 or stored.shape[2:] not in ((), (1,), (3,), (4,)):
+        raise InputError(f"array 'color' has shape {stored.shape}, expected (H, W), (H, W, 3) or (H, W, 4)")
+    if stored.dtype.kind == "f":
+        stored = np.rint(np.clip(np.nan_to_num(stored), 0, 1) * 255).astype(np.uint8)
+    if stored.dtype != np.uint8:
+        raise InputError(f"array 'color' is of type {stored.dtype}, expected uint8 or floats in 0..1")
+    colors = stored if stored.ndim == 3 else stored[..., None]
+    return colors[..., :3] if colors.shape[2] >= 3 else colors.repeat(3, axis=2)
+
+
+def _numbers(array: StoredArray) -> NDArray:
+    if array.dtype.kind not in "fiub":
+        raise InputError(f"array '{array.name}' is of type {array.dtype}, expected numbers")
+    values = array.read()
+    return values.astype(values.dtype.newbyteorder("="), copy=False)
+
+
+def _vector(arrays: _Arrays, name: str, length: int | None = None) -> NDArray[np.float64]:
+    """The numbers of a small array, one after the other."""
+    array = arrays[name]
+    count = math.prod(array.shape)
+    if count > _LONGEST or count != (length or count) or array.dtype.kind not in "fiu":
+        raise InputError(f"array '{name}' is {array.shape} {array.dtype}, expected {length or 'few'} numbers")
+    return array.read().ravel().astype(np.float64)
+
+
+def _number(arrays: _Arrays, name: str, default: float = math.nan) -> float:
+    return float(_vector(arrays, name, 1)[0]) if name in arrays else default
+
+
+def _word(arrays: _Arrays, name: str, default: str) -> str:
+    if name not in arrays:
+        return default
+    array = arrays[name]
+    if array.dtype.kind not in "US" or math.prod(array.shape) != 1 or array.nbytes > _LONGEST:
+        raise InputError(f"array '{name}' is {array.shape} {array.dtype}, expected a word")
+    word = array.read().ravel()[0]
+    return word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word)

@@ -1,0 +1,94 @@
+"""Terrains: grids of heights over the ground, as range views seen from straight above."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .range_view import RangeView
+from .units import conversion
+
+METRE = "m"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ground:
+    """The place of a grid of heights: the corner of its first cell, and the steps from cell to cell.
+
+    left: x of the first column's outer edge, first: y of the first row's. right: how x grows with a column,
+    down: how y grows with a row, so below 0 where the first row is the northern one. degrees: whether all
+    that is longitude and latitude, else it is in the unit of the heights. unit: of the heights.
+    """
+
+    left: float
+    first: float
+    right: float
+    down: float
+    degrees: bool
+    unit: str
+
+    @property
+    def turned(self) -> tuple[slice, slice]:
+        """Rows and columns in the order in which the northern row and the western column come first."""
+        return slice(None, None, -1 if self.down > 0 else 1), slice(None, None, -1 if self.right < 0 else 1)
+
+
+def are_degrees(left: float, first: float, right: float, down: float, span: float) -> bool:
+    """Whether a grid's ground is longitude and latitude, where nothing tells: from left and first, its width
+    and height are such numbers, and the heights span more than them, which makes cliffs of anything else."""
+    x, y = (left, left + right), (first, first + down)
+    inside = max(map(abs, x)) <= 360 and max(map(abs, y)) <= 90
+    return inside and span > max(abs(right), abs(down))
+
+
+def metres_of_a_degree(latitude: float) -> tuple[float, float]:
+    """Metres of a degree of longitude and of latitude, there, on the WGS84 ellipsoid.
+
+    latitude: degrees. The usual series in cosines, good to a decimetre.
+    """
+    angle = math.radians(latitude)
+    east = 111_412.84 * math.cos(angle) - 93.5 * math.cos(3 * angle) + 0.118 * math.cos(5 * angle)
+    north = (
+        111_132.92 - 559.82 * math.cos(2 * angle) + 1.175 * math.cos(4 * angle) - 0.0023 * math.cos(6 * angle)
+    )
+    return east, north
+
+
+def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, name: str) -> RangeView:
+    """The range view of heights (H, W) of any real type: x is east, y north and z up, in the heights' unit.
+
+    there: (H, W), False where nothing is known. Degrees become lengths by those of a degree in the middle of
+    the grid, which then is at 0, 0. Raises InputError for a grid of no extent, and for degrees beside heights
+    of an unknown unit.
+    """
+    rows, columns = heights.shape
+    x, y = ground.left + ground.right * columns / 2, ground.first + ground.down * rows / 2
+    right, down = ground.right, ground.down
+    if not (np.isfinite([x, y]).all() and right and down):
+        raise InputError(f"its cells measure {right:g} x {down:g} from {ground.left:g}, {ground.first:g}")
+    if ground.degrees:
+        if abs(y) >= 90:
+            raise InputError(f"its middle is at {y:g} degrees of latitude")
+        metre = conversion(METRE, ground.unit)
+        if metre is None:
+            raise InputError(f"its heights are in '{ground.unit}', over degrees", hint="Give them in metres")
+        east, north = metres_of_a_degree(y)
+        x, y, right, down = 0.0, 0.0, right * east * metre, down * north * metre
+    to_camera = np.eye(4)
+    to_camera[:2, 3] = -x, -y
+    return RangeView(
+        kind="height",
+        depth=np.negative(heights[ground.turned], dtype=np.float32),
+        mask=there[ground.turned].copy(),
+        fx=1 / abs(right),
+        fy=1 / abs(down),
+        cx=columns / 2,
+        cy=rows / 2,
+        world_to_camera=to_camera,
+        name=name,
+        unit=ground.unit,
+    )
