@@ -22,6 +22,19 @@ int tile_index(RangeLevel level, ivec2 uv) {
     return level.first_tile + uv.y / RANGE_TILE * ((level.size.x + RANGE_TILE - 1) / RANGE_TILE) + uv.x / RANGE_TILE;
 }
 
+// The view and the level of a tile, or of what is left free behind one's tiles.
+ivec2 level_of_tile(int index, int view_count) {
+    int low = 0, high = view_count * RANGE_MOST_LEVELS - 1;
+    while (low < high) {
+        int middle = (low + high + 1) / 2;
+        int entry = middle / RANGE_MOST_LEVELS * RANGE_ENTRY + RANGE_LEVELS_AT + middle % RANGE_MOST_LEVELS;
+        bool after = int(texelFetch(range_views, entry).y) > index;
+        low = after ? low : middle;
+        high = after ? middle - 1 : high;
+    }
+    return ivec2(low / RANGE_MOST_LEVELS, low % RANGE_MOST_LEVELS);
+}
+
 RangeTile range_tile(int index) {
     vec4 low = texelFetch(range_tiles, RANGE_TILE_TEXELS * index);
     vec4 high = texelFetch(range_tiles, RANGE_TILE_TEXELS * index + 1);

@@ -1,6 +1,8 @@
 // The best visit of each cell, by an order-preserving uint key. PASS 0 keeps the least key, PASS 1 the lowest
 // item among those that have it, PASS 2 lists the cells that were hit. Two 32-bit passes: 64-bit
 // atomics are not everywhere.
+#include "common/list.glsl"
+
 #if PASS == 0
 layout(std430, binding = STORAGE_KEYS) buffer Keys { uint keys[]; };
 #else
@@ -10,7 +12,6 @@ layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;
 layout(std430, binding = STORAGE_BEST) buffer Best { uint best[]; };
 #elif PASS == 2
 layout(binding = TEXTURE_BEST) uniform usamplerBuffer best;
-#include "common/list.glsl"
 #endif
 
 void visit(uint cell, uint key, uint item_id) {

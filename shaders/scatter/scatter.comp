@@ -1,5 +1,6 @@
 // Scatter: items go to cells. A file with `scatter(i)` says which an item visits; what becomes of a visit
 // says another: the best per cell (scatter/best.glsl), sums (scatter/sums.glsl), a list (bins/lists.glsl).
+// ITEMS: how many there are; list_count: as a list has, which the first file then includes.
 #include "common/item.glsl"
 
 #include <target>
@@ -7,5 +8,5 @@
 
 void main() {
     uint i = item();
-    if (i < item_count) scatter(i);
+    if (i < ITEMS) scatter(i);
 }

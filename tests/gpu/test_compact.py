@@ -71,7 +71,7 @@ def flagged(gpu: Gpu, flags: NDArray[np.bool_]) -> NDArray[np.uint32]:
     words = gpu.ctx.buffer(flags.astype(np.uint32) if flags.size else bytes(4))
     listed = IndexList(gpu, max(len(flags), 1))
     list_flagged(gpu, f"{PARTS}/flags.glsl", len(flags), listed, lambda _: words.bind_to_storage_buffer(0))
-    indices = np.frombuffer(listed._indices.read(), np.uint32)[: len(listed)]
+    indices = np.frombuffer(listed.texels.buffer.read(), np.uint32)[: len(listed)]
     listed.release()
     words.release()
     return indices

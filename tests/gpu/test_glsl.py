@@ -14,6 +14,7 @@ import filling
 import moderngl
 import numpy as np
 import pytest
+from range_scenes import sphere_view
 from scenes import sphere, sphere_mesh
 from test_bins import filled, some_visits
 from test_compact import flagged
@@ -71,6 +72,15 @@ def clouds() -> Iterator[PointCloud]:
     yield PointCloud.from_arrays(cloud.positions, normals=cloud.normals, scalars=numbers)
 
 
+def range_poses() -> Iterator[Pose]:
+    """Range views of one kind, and of several, with lens distortion and measured x and y."""
+    pods = tuple(sphere_view(eye) for eye in ((0, 0, 3), (3, 0, 0)))
+    yield Pose.of(0, 0.0, "one kind", pods)
+    heights = stepped_view((40, 30), "height", measured=True)
+    bent = replace(pods[1], kind="range", distortion=(0.1, -0.02, 0.001, 0.002), color=None)
+    yield Pose.of(0, 0.0, "several", (pods[0], heights, bent))
+
+
 def settings() -> Iterator[tuple[str, dict[str, object]]]:
     """Each backend with its defaults, and with each word and switch of one of its parameters."""
     for one in backends().values():
@@ -85,16 +95,16 @@ def draw_all(renderer: Renderer) -> None:
     surface = Surface(renderer.gpu, SIZE)
 
     def draw(
-        cloud: PointCloud,
+        scanned: PointCloud | Pose,
         which: str | Backend,
         look: Look = LOOKS[0],
         projection: str = "perspective",
         share: float = 1.0,
         **params: object,
     ) -> None:
-        camera = Camera.orbit(cloud.bounds(), projection=projection, **CAMERA)
+        pose = scanned if isinstance(scanned, Pose) else Pose(0, 0.0, "test", scanned)
+        camera = Camera.orbit(pose.bounds, projection=projection, **CAMERA)
         given = backend(which).params(params) if isinstance(which, str) else None
-        pose = Pose(0, 0.0, "test", cloud)
         render_frame(renderer, Request(pose, camera, which, given, look), surface, share=share)
 
     for cloud in clouds():
@@ -120,6 +130,12 @@ def draw_all(renderer: Renderer) -> None:
         draw(cloud, baselines.gl_points())
         for look in LOOKS:
             draw(cloud, filling.BACKEND, look)
+    for pose in range_poses():
+        for name, setting in settings():
+            if name == "pyramidal":
+                draw(pose, name, **setting)
+        draw(pose, "pyramidal", Look(light="flat"), primitive="points", fill=False, hide=False)
+        draw(pose, "pyramidal", projection="orthographic", primitive="points", cull_back=True)
     draw(sphere(1500), "surfels", radius_scale=0.01)
     mesh = sphere_mesh(16)
     draw(mesh.points, baselines.mesh(mesh))

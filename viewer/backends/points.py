@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ..gpu.bindings import Texture
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
@@ -19,7 +17,7 @@ from ..gpu.surface import Surface
 from ..params import param
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
-from ..scan.spacing import spacings
+from ..scan.spacing import sparse_spacing, typical_spacing
 from ..view import View
 from . import FrameView, Suited
 
@@ -31,7 +29,7 @@ _LIST_BELOW = 0.25
 # Points are not on a grid, and not everywhere equally dense: squares that cover 1.6 times the
 # usual spacing, and 1.25 times that of the sparsest tenth unless it is sparser still, leave
 # few gaps.
-_USUAL_OVERLAP, _SPARSE_OVERLAP, _SPARSEST = 1.6, 1.25, 2.0
+_USUAL_OVERLAP, _SPARSE_OVERLAP = 1.6, 1.25
 _LARGEST = 32  # pixels
 
 
@@ -92,5 +90,4 @@ def _touching(pose: GpuPose, view: View) -> int:
 
 def _reach(cloud: PointCloud) -> float:
     """The edge of squares that touch, scan units."""
-    usual, sparse = (float(v) for v in np.quantile(spacings(cloud), [0.5, 0.9]))
-    return max(_USUAL_OVERLAP * usual, _SPARSE_OVERLAP * min(sparse, _SPARSEST * usual))
+    return max(_USUAL_OVERLAP * typical_spacing(cloud), _SPARSE_OVERLAP * sparse_spacing(cloud))

@@ -23,6 +23,8 @@ class Texture(IntEnum):
     ROWS = auto()
     OWN_COLORS = auto()
     LEVELS = auto()
+    OWN_NORMALS = auto()
+    OWN_VALUES = auto()
     # A pose, a texel a row.
     POSITIONS = auto()
     NORMALS = auto()  # of a Surface where the backend wrote them
@@ -41,6 +43,10 @@ class Texture(IntEnum):
     PAIRS = auto()
     STARTS = auto()
     LISTED = auto()
+    # Targets of pyramidal projection, with keys and best.
+    SPOTS = auto()
+    SHOWN = auto()
+    RANGE_NORMALS = auto()  # of samples of range views
     # A level of a pyramid that is read, and one that is added to it.
     SAMPLES = auto()
     WEIGHTS = auto()
@@ -77,7 +83,7 @@ class Storage(IntEnum):
     # Shading, beside a list.
     PICTURE = 0
     PIXEL_BITS = 1
-    # Scatter, beside a list; what says which cells are visited has those from 4 on, without a list from 2 on.
+    # Scatter, beside a list; what says which cells are visited has those from 4 on.
     KEYS = 0
     BEST = 1
     # Bins, beside what says which cells are visited, which has those from 2 on.
@@ -92,6 +98,13 @@ class Storage(IntEnum):
     # A level of a pyramid that is written.
     SAMPLES = 0
     WEIGHTS = 1
+    # Targets of pyramidal projection, with keys and best.
+    SPOTS = 2
+    SHOWN = 3
+    # Tiles of range views that are drawn, beside a list.
+    RANGE_NORMALS = 0
+    RANGE_ROWS = 1
+    TILE_COUNTS = 4
     # Sums of splats, beside a Surface's colours, normals and lists.
     SUMS = 0
     # Tiles of splats, beside bins, prefix sums and a Surface's depths, rows and lists.

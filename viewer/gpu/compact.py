@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 import moderngl
 
+from . import gl
 from .bindings import Storage
 from .constants import GROUP, GROUP_LIMIT
 from .context import Gpu, Program
@@ -19,15 +20,19 @@ Bind = Callable[[Program], None]  # what a program reads: sets its uniforms, bin
 
 
 class IndexList:
-    """Indices in a buffer, with an indirect dispatch of one invocation each (common/list.glsl)."""
+    """Indices in a buffer, with an indirect dispatch over them (common/list.glsl).
 
-    def __init__(self, gpu: Gpu, capacity: int) -> None:
+    texels: the indices, for shaders that only read them. each: invocations for an index, whose length in the
+    list that is: `reserve` takes, and `list_count` counts, so many at a time.
+    """
+
+    def __init__(self, gpu: Gpu, capacity: int, each: int = 1) -> None:
         self._gpu = gpu
         self.capacity = capacity
         self.nbytes = 4 * capacity + 16
-        self._indices = gpu.ctx.buffer(reserve=4 * capacity)
+        self.texels = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * capacity), gl.R32UI)
         # The three work group counts of an indirect dispatch, then the length of the list.
-        self._rows = -(-capacity // (GROUP * GROUP_LIMIT))
+        self._rows = -(-capacity * each // (GROUP * GROUP_LIMIT))
         self._dispatch = gpu.ctx.buffer(reserve=16)
 
     def clear(self) -> None:
@@ -36,21 +41,21 @@ class IndexList:
 
     def bind(self) -> None:
         """Bind where shaders that include common/list.glsl find it."""
-        self._indices.bind_to_storage_buffer(Storage.LIST)
+        self.texels.buffer.bind_to_storage_buffer(Storage.LIST)
         self._dispatch.bind_to_storage_buffer(Storage.DISPATCH)
 
     def run(self, program: moderngl.ComputeShader) -> None:
-        """Run one invocation for each index, without the CPU knowing how many there are."""
+        """Run the invocations of all indices, without the CPU knowing how many there are."""
         self.bind()
         self._gpu.dispatch_indirect(program, self._dispatch)
 
     def __len__(self) -> int:
-        """How many indices there are; waits for the GPU."""
+        """How many invocations that is; waits for the GPU."""
         return int(struct.unpack("4I", self._dispatch.read())[3])
 
     def release(self) -> None:
         """Delete both buffers."""
-        self._indices.release()
+        self.texels.release()
         self._dispatch.release()
 
 

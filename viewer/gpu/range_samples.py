@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,6 +33,7 @@ from ..scan.range_view import RangeView
 from ..view import View
 from . import gl
 from .bindings import Storage, Texture
+from .compact import IndexList
 from .constants import (
     RANGE_ALONG_RAY,
     RANGE_ENTRY,
@@ -50,6 +52,7 @@ _KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
 _ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
 _SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
 _SOFTWARE_RUN = 16  # samples of a row that an invocation makes where it is invocations that take long
+_PAGE = 1 << 24  # normals that a shader writes at a time: 64 MiB
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,19 @@ class _Pod:
     world_to_camera: NDArray[np.float64]
 
 
+@dataclass
+class _Normals:
+    """Normals of samples. rows: which rows of tiles have them, a word each; filter: of the levels."""
+
+    words: gl.BufferTexture
+    rows: moderngl.Buffer
+    filter: Filter | None = None
+
+    @property
+    def nbytes(self) -> int:
+        return self.words.buffer.size + self.rows.size
+
+
 class RangeSamples:
     """The samples of range views as buffer textures: view after view, each level after level, in row order.
 
@@ -113,13 +129,13 @@ class RangeSamples:
             raise ValueError(f"{levels} levels; at most {RANGE_MOST_LEVELS}")
         self._pods = [_pod(view) for view in views]
         self.levels = levels or min(LEVELS, max(len(sizes(pod.size)) for pod in self._pods))
-        self.places, self._total, tiles = _places(self._pods, self.levels)
+        self.places, self._total, self.tile_count = _places(self._pods, self.levels)
         self._check_size()
         has_xy = any(pod.has_xy for pod in self._pods)
         self.depths = self._texels(gl.R32F, 4 * self._total)
         self.looks = self._texels(gl.RGBA8, 4 * self._total)
         self.xy = self._texels(gl.RG32F, 8 * self._total) if has_xy else None
-        self.tiles = self._texels(gl.RGBA32F, 16 * RANGE_TILE_TEXELS * tiles)
+        self.tiles = self._texels(gl.RGBA32F, 16 * RANGE_TILE_TEXELS * self.tile_count)
         self._table = self._texels(gl.RGBA32UI, 16 * RANGE_ENTRY * len(views))
         self._run = _SOFTWARE_RUN if gpu.software else 1
         self._tabled: tuple[object, ...] | None = None  # what the table holds
@@ -127,7 +143,10 @@ class RangeSamples:
             "RANGE_KINDS": int(np.bitwise_or.reduce([pod.kind for pod in self._pods])),
             "RANGE_DISTORTED": int(any(pod.distortion for pod in self._pods)),
             "RANGE_HAS_XY": int(has_xy),
+            "RANGE_COUNT": len(views),
         }
+        self.has_color = any(view.color is not None for view in views)
+        self._normals: _Normals | None = None
         self._steps: Iterator[Callable[[], object]] = chain(self._uploads(views), self._reductions())
         self.complete = False  # all is uploaded, and the coarser levels made
 
@@ -135,7 +154,8 @@ class RangeSamples:
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         textures = (self.depths, self.looks, self.xy, self.tiles, self._table)
-        return sum(texture.buffer.size for texture in textures if texture is not None)
+        normals = self._normals.nbytes if self._normals else 0
+        return sum(texture.buffer.size for texture in textures if texture is not None) + normals
 
     @property
     def count(self) -> int:
@@ -178,8 +198,40 @@ class RangeSamples:
         if self.xy is not None:
             self.xy.bind(Texture.RANGE_XY)
 
+    def normals(self, tiles: IndexList) -> gl.BufferTexture:
+        """Normals of the samples in these tiles, which have `RANGE_TILE` invocations each, and of others that
+        were asked for before: R32UI, in the pod's space, as shaders/common/octahedron.glsl has them.
+
+        Each is found once, when it is first asked for: 4 bytes a sample where anything asks for any.
+        """
+        gpu = self._gpu
+        if self._normals is None:
+            self._normals = _Normals(
+                self._texels(gl.R32UI, 4 * self._total),
+                gpu.ctx.buffer(reserve=4 * RANGE_TILE * self.tile_count),
+            )
+        known = self._normals
+        if known.filter != self.filter:
+            gl.clear_words(known.words.buffer, 0)
+            gl.clear_words(known.rows, 0)
+            known.filter = self.filter
+        program = gpu.compute("range/normals.comp", self.defines)
+        self._bind_read()
+        tiles.texels.bind(Texture.DRAWN_ROWS)
+        with gpu.timers.measure("normals"):
+            for first in range(0, self._total, _PAGE):
+                size = min(_PAGE, self._total - first)
+                words = known.words.buffer
+                words.bind_to_storage_buffer(Storage.RANGE_NORMALS, offset=4 * first, size=4 * size)
+                known.rows.bind_to_storage_buffer(Storage.RANGE_ROWS)
+                gpu.set(program, page=first, page_size=size)
+                tiles.run(program)
+        return known.words
+
     def release(self) -> None:
         """Delete all of it."""
+        if self._normals is not None:
+            self._gpu.discard(self._normals.words, self._normals.rows)
         self._steps = iter(())
         self._gpu.discard(self.depths, self.looks, self.xy, self.tiles, self._table)
 
@@ -301,7 +353,8 @@ class RangeSamples:
         """The levels of a view in the table; those that it lacks begin where the next view does."""
         rest = self.places[number + 1 :]
         after = rest[0][0].first if rest else self._total
-        rows = np.full((RANGE_MOST_LEVELS, 4), (after, 0, 1, 1), np.uint32)
+        tiles_after = rest[0][0].first_tile if rest else self.tile_count
+        rows = np.full((RANGE_MOST_LEVELS, 4), (after, tiles_after, 1, 1), np.uint32)
         for row, level in zip(rows, self.places[number], strict=False):
             row[:] = level.first, level.first_tile, *level.size
         return rows

@@ -26,7 +26,8 @@ class Visits:
 
     cells: the shader file that says so; its `scatter(i)` calls `visit(cell, key, item)` for each cell that
     the i-th of `count` items goes to. bind: sets what that file reads. defines: its macros. params: what it
-    finds in `<params>`.
+    finds in `<params>`. listed: has an invocation for each item in place of `count`, where only the GPU knows
+    how many there are.
     """
 
     cells: str
@@ -34,15 +35,21 @@ class Visits:
     bind: Callable[[Program], None]
     defines: Mapping[str, object] = field(default_factory=dict)
     params: Values | None = None
+    listed: IndexList | None = None
 
     def send(self, gpu: Gpu, target: str, bind: Callable[[Program], None], **defines: object) -> None:
         """Send the items to their cells. target: the shader file that says what becomes of a visit; bind:
         sets what that one reads and writes."""
         parts = {"target": target, "cells": self.cells}
-        program = gpu.compute("scatter/scatter.comp", {**defines, **self.defines}, parts, self.params)
+        items = "item_count" if self.listed is None else "list_count"
+        given = {"ITEMS": items, **defines, **self.defines}
+        program = gpu.compute("scatter/scatter.comp", given, parts, self.params)
         bind(program)
         self.bind(program)
-        gpu.dispatch(program, self.count)
+        if self.listed is None:
+            gpu.dispatch(program, self.count)
+        else:
+            self.listed.run(program)
 
 
 def scatter(

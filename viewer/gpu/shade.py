@@ -54,7 +54,8 @@ def shade(surface: Surface, look: Look) -> None:
     color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
         color = "plain"
-    light = look.light if look.light != "auto" else "flat" if cloud.normals is None else "head"
+    lit = cloud.normals is not None or surface.is_own("normal")
+    light = look.light if look.light != "auto" else "head" if lit else "flat"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
     surface.color_range = None if source is None else value_range(surface, look)
     program = gpu.compute(

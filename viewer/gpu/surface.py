@@ -113,6 +113,7 @@ class Surface:
         self.picture = gpu.ctx.buffer(reserve=4 * width * height)
         self._block = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._shown: tuple[GpuPose, View] | None = None
+        self._shows_samples = False
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
         self.look = Look()
         self.layers = NO_LAYERS
@@ -135,6 +136,7 @@ class Surface:
         self.bind_view()
         self._covered_known = False
         self._written.clear()
+        self._shows_samples = False
         self.stats = Stats()
 
     def take_changes(self, wanted: dict[str, object]) -> frozenset[str]:
@@ -163,6 +165,10 @@ class Surface:
         """Say that rows are those of another pose with the same origin: for a backend that shows something
         made of the points in place of these. points: the row of the point that each of them stands for."""
         self._shown, self._stood_for = (pose, self.view), (self.pose, points)
+
+    def show_samples(self) -> None:
+        """Say that rows are numbers of samples of the pose's range views, in place of points' rows."""
+        self._shows_samples = True
 
     def take_covered(self) -> IndexList:
         """The list of covered pixels, for a backend that can fill it at less than the cost of
@@ -364,7 +370,9 @@ class Surface:
 
     @property
     def id(self) -> NDArray[np.uint32]:
-        """(H, W) uint32, the point's index in the file; 0xFFFFFFFF where none."""
+        """(H, W) uint32, the index of the point or the sample in the file; 0xFFFFFFFF where none."""
+        if self._shows_samples:
+            return self.row
         ids = self._cloud.ids
         return self.row if ids is None else self._fetch(ids, np.uint32(NOTHING))
 

@@ -15,6 +15,7 @@ _DISTANCES = 2_000_000  # point-to-point distances looked at
 _NEAREST = (128, 8192)  # of these: six neighbours, each with twenty copies or with a thousand
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
 _CHUNK = 1 << 14  # points compared at a time, so that they stay in the processor's cache
+_SPARSEST = 2.0  # times the usual spacing: what is sparser is left aside
 _CUT = 4  # times the points that are wanted: so many candidates are thinned out
 
 
@@ -24,6 +25,13 @@ def typical_spacing(cloud: PointCloud) -> float:
     See `spacings`.
     """
     return float(np.median(spacings(cloud)))
+
+
+def sparse_spacing(cloud: PointCloud) -> float:
+    """The distance between neighbours where they are far apart, scan units: the 90 % quantile, but at most
+    twice the median. See `spacings`."""
+    usual, sparse = (float(v) for v in np.quantile(spacings(cloud), [0.5, 0.9]))
+    return min(sparse, _SPARSEST * usual)
 
 
 def spacings(cloud: PointCloud) -> NDArray[np.float64]:

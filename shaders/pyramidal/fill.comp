@@ -1,0 +1,99 @@
+// Pixels without a sample show what those of the finest target around them give (Farooq 2013, 4.3.3). Depth-aware: only
+// samples of one surface are blended, of the nearest that encloses the pixel, so that outlines do not grow (the limit of
+// 4.4.4). UPSAMPLING 0 nearest, 1 bilinear, 2 bicubic.
+#include "common/item.glsl"
+#include "common/list.glsl"
+#include <params>
+#define REACH (UPSAMPLING == 2 ? 2 : 1)
+#include "pyramidal/around.glsl"
+#include "pyramidal/pixels.glsl"
+
+layout(binding = TEXTURE_SHOWN) uniform usamplerBuffer shown;  // by the targets' samples
+layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed_cells;
+
+const float LEAST = 1e-3;  // weight of samples beyond a kernel's reach, before distance
+
+float kernel(float x) {
+    x = abs(x);
+#if UPSAMPLING == 2
+    return x < 1.0 ? 2.0 / 3.0 - x * x * (1.0 - 0.5 * x) : x < 2.0 ? pow(2.0 - x, 3.0) / 6.0 : 0.0;
+#else
+    return max(1.0 - x, 0.0);
+#endif
+}
+
+// Weight of a sample at an offset from the pixel, in cells.
+float weight_of(vec2 offset) {
+#if UPSAMPLING == 0
+    return 1.0 / (1e-6 + dot(offset, offset));
+#else
+    return kernel(offset.x) * kernel(offset.y) + LEAST / (1.0 + dot(offset, offset));
+#endif
+}
+
+// Whether what is empty around a pixel is no larger than `widest` cells are wide: a hole, and no gap between outlines.
+bool is_hole(Window window, int level) {
+    int below = level - density, filled = 0;
+    EACH_CELL(window, cell) filled += int(count_filled(texelFetch(shown, cell)));
+    ivec2 cells = window.high - window.low + 1;
+    return float((cells.x * cells.y << 2 * below) - filled) <= widest * widest * float(1 << 2 * below);
+}
+
+// Fills a pixel from a target; whether it could.
+bool fill(int i, ivec2 pixel, int level) {
+    Window window = window_of(level, pixel);
+    if (level > density + sparse && !is_hole(window, level)) return false;
+    vec2 around = depths_around(window), span = vec2(0.0);
+    if (isinf(around.x)) return false;
+    for (int n = 0; n < SURFACES; ++n) {
+        span = surface_beyond(window, around, span.y, level);
+        if (isinf(span.x)) return false;
+        Sides sides = NO_SIDES;
+        float total = 0.0, depth = 0.0;
+        Seen sum = UNSEEN;
+        EACH_CELL(window, cell) {
+            float here = depth_of(cell);
+            if (here < span.x || here > span.y) continue;
+            vec2 offset = offset_to(window, cell);
+            extend(sides, offset);
+            float weight = weight_of(offset);
+            Seen one = unpack_seen(texelFetch(shown, cell));
+#if UPSAMPLING == 0
+            if (weight <= total) continue;
+            total = weight;
+            depth = here;
+            sum = one;
+#else
+            total += weight;
+            depth += weight * here;
+            sum.color += weight * one.color;
+            sum.normal += weight * one.normal;
+            sum.value += weight * one.value;
+#endif
+        }
+        if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
+#if UPSAMPLING != 0
+        depth /= total;
+        sum.color /= total;
+        sum.value /= total;
+#endif
+        store(i, depth, NOTHING, level, sum);
+        return true;
+    }
+    return false;
+}
+
+void main() {
+    uint n = item();
+    if (n >= list_count) return;
+    int edge = 1 << coarsest, columns = target_size(view_size, coarsest).x;
+    int cell = int(texelFetch(listed_cells, int(n) / (edge * edge)).r), within = int(n) % (edge * edge);
+    ivec2 pixel = edge * ivec2(cell % columns, cell / columns) + ivec2(within % edge, within / edge);
+    if (any(greaterThanEqual(pixel, view_size))) return;
+    int i = pixel.y * view_size.x + pixel.x;
+    if (rows[i] != NOTHING && (levels & 1) != 0) return;
+    for (int level = 1; level <= coarsest; ++level)
+        if ((levels >> level & 1) != 0 && fill(i, pixel, level)) return;
+    depths[i] = NO_DEPTH;
+    rows[i] = NOTHING;
+}

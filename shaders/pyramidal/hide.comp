@@ -1,0 +1,29 @@
+// Samples that are seen through the holes of a nearer surface are taken away: where, in the target whose cells the
+// samples of that surface all fill, it encloses the pixel (Farooq 2013, 6.3.2).
+#include "common/item.glsl"
+#include <params>
+#define REACH 1
+#include "pyramidal/around.glsl"
+
+layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
+layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
+
+void main() {
+    int i = int(item());
+    if (i >= view_size.x * view_size.y || rows[i] == NOTHING) return;
+    float depth = uintBitsToFloat(depths[i]);
+    float apart = spacing * scale_at(depth);
+    int level = clamp(int(ceil(log2(max(apart, 1.0)))), 0, coarsest);
+    if (level == 0) return;
+    Window window = window_of(level, ivec2(i % view_size.x, i / view_size.x));
+    vec2 around = depths_around(window);
+    if (around.x + tolerance * cell_width(level, around.x) >= depth) return;
+    vec2 span = surface_beyond(window, around, 0.0, level);
+    if (span.y + tolerance * cell_width(level, span.x) >= depth) return;
+    Sides sides = NO_SIDES;
+    EACH_CELL(window, cell)
+        if (depth_of(cell) <= span.y) extend(sides, offset_to(window, cell));
+    if (!encloses(sides, 0.0)) return;
+    depths[i] = NO_DEPTH;
+    rows[i] = NOTHING;
+}

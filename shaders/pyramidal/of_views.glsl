@@ -1,0 +1,227 @@
+// Samples of range views. POLYGONS: a pixel shows a triangle between samples, else a sample. BLEND 0 the nearest view's,
+// 1 all views that see the same surface, 2 the best of these. FADE: finer levels fade into coarser ones as their samples
+// come to lie closer than pixels.
+#include <params>
+#include "pyramidal/views/grid.glsl"
+
+#if NORMAL
+layout(binding = TEXTURE_RANGE_NORMALS) uniform usamplerBuffer range_normals;
+#endif
+#if VALUE
+layout(binding = TEXTURE_VALUES) uniform samplerBuffer values;
+#endif
+
+vec3 place_of(uint row) {
+    ivec4 at = sample_of_id(row, RANGE_COUNT);
+    RangeView v = range_view(at.x);
+    return to_screen_view(v, sample_place(v, 0, vec2(at.zw), sample_depth(sample_index(v, 0, at.zw))));
+}
+
+// A unit normal along the pose's axes of one in screen view space.
+vec3 along_pose(vec3 normal) { return normal * mat3(world_to_view); }
+
+// The sample of the first level for (u, v) of a level that is there: the one nearest to a pixel coordinate among those
+// that it was made of.
+ivec2 measured_under(RangeView v, int level, ivec2 uv, vec2 pixel) {
+    for (; level > 0; --level) {
+        RangeLevel finer = range_level(v, level - 1);
+        float least = 1e30;
+        ivec2 chosen = min(2 * uv, finer.size - 1);
+        for (int k = 0; k < 9; ++k) {
+            ivec2 at = 2 * uv + ivec2(k % 3, k / 3) - (v.centered ? 1 : 0);
+            if (!v.centered && (k % 3 == 2 || k / 3 == 2)) continue;
+            if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, finer.size))) continue;
+            vec2 apart = level_to_pixel(v, level - 1, vec2(at)) - pixel;
+            if (dot(apart, apart) >= least || !is_sample(sample_index(finer, at))) continue;
+            least = dot(apart, apart);
+            chosen = at;
+        }
+        uv = chosen;
+    }
+    return uv;
+}
+
+vec3 normal_of(RangeView v, int index) {
+#if NORMAL
+    uint word = texelFetch(range_normals, index).r;
+    return word == 0u ? vec3(0.0) : turned(v.screen, unpack_normal(word));
+#else
+    return vec3(0.0);
+#endif
+}
+
+// What a pixel shows: a mix of up to three samples of a level of a view. shares: sum 1. uv: the place between them.
+// nearest: the sample with the largest share. facing: the normal of the triangle, 0 where it is a sample alone.
+struct Mixture {
+    vec3 shares;
+    ivec3 index;
+    vec2 uv;
+    ivec2 nearest;
+    vec3 facing;
+};
+
+#if POLYGONS
+// Whether a pixel shows this triangle, by its depth. x_at, ...: of the corners from the first of the quad.
+bool shows(Corner x, Corner y, Corner z, ivec2 x_at, ivec2 y_at, ivec2 z_at, vec2 pixel, float depth, inout Mixture shown) {
+    vec3 shares = shares_at(x, y, z, pixel);
+    if (!is_inside(shares) || depth_at(x, y, z, shares) != depth) return false;
+    if (view_perspective) shares /= -vec3(x.place.z, y.place.z, z.place.z);
+    float sum = shares.x + shares.y + shares.z;
+    shown.shares = sum == 0.0 ? vec3(1.0, 0.0, 0.0) : shares / sum;
+    shown.index = ivec3(x.index, y.index, z.index);
+    bool first = shown.shares.x >= max(shown.shares.y, shown.shares.z);
+    ivec2 most = first ? x_at : shown.shares.y >= shown.shares.z ? y_at : z_at;
+    shown.uv += shown.shares.x * vec2(x_at) + shown.shares.y * vec2(y_at) + shown.shares.z * vec2(z_at);
+    shown.nearest += most;
+    shown.facing = cross(y.place - x.place, z.place - x.place);
+    return true;
+}
+#endif
+
+// The normal of a triangle towards its pod, in screen view space; zero where it has none.
+vec3 triangle_normal(RangeView v, vec3 facing, vec3 place) {
+    vec3 to_eye = v.kind == RANGE_HEIGHT ? turned(v.screen, vec3(0.0, 0.0, 1.0)) : to_screen_view(v, vec3(0.0)) - place;
+    float size = length(facing);
+    return size > 0.0 ? facing * (dot(facing, to_eye) < 0.0 ? -1.0 : 1.0) / size : vec3(0.0);
+}
+
+#if BLEND
+const int AROUND = 3;       // levels above a sample's: how far from an edge of the mask it is told by its share there
+const float AGREE = 4.0;    // how far apart depths of one surface may be that two views measured, in samples
+const float LEAST_WEIGHT = 1e-3;
+
+// Weight of a place of a view: of its mask and confidence, falling towards the mask's edges, and how it faces the pod
+// (Farooq 2013, GRAPP 2009, eq. 1: S C V). cosine: of the normal and the direction to the pod.
+float weight_of(RangeView v, int level, vec2 pixel, float cosine) {
+    int coarse = min(level + AROUND, last_level);
+    RangeLevel found = range_level(v, coarse);
+    vec2 uv = clamp(pixel_to_level(v, coarse, pixel), vec2(0.0), vec2(found.size - 1));
+    ivec2 first = ivec2(uv), last = min(first + 1, found.size - 1);
+    vec2 part = uv - vec2(first);
+    float low = mix(sample_look(sample_index(found, first)).a, sample_look(sample_index(found, ivec2(last.x, first.y))).a, part.x);
+    float high = mix(sample_look(sample_index(found, ivec2(first.x, last.y))).a, sample_look(sample_index(found, last)).a, part.x);
+    return clamp(2.0 * mix(low, high, part.y) - 1.0, 0.0, 1.0) * max(cosine, 0.0) * max(cosine, 0.0);
+}
+
+vec3 direction_to_pod(RangeView v, vec3 place) {
+    return v.kind == RANGE_HEIGHT ? turned(v.screen, vec3(0.0, 0.0, 1.0)) : normalize(to_screen_view(v, vec3(0.0)) - place);
+}
+
+// What another view shows at a place (screen view space) of a surface with a normal; its weight, 0: nothing. ahead: how far
+// its surface is from the place towards its pod.
+float other_view(RangeView v, int level, vec3 place, vec3 normal, out float ahead, out Seen seen) {
+    seen = UNSEEN;
+    ahead = 0.0;
+    vec3 to_pod_there = direction_to_pod(v, place);
+    float cosine = dot(normal, to_pod_there);
+    if (cosine <= 0.1) return 0.0;
+    vec3 projected = project_to(v, place);
+    RangeLevel found = range_level(v, level);
+    vec2 uv = pixel_to_level(v, level, projected.xy);
+    if (!(all(greaterThanEqual(uv, vec2(0.0))) && all(lessThanEqual(uv, vec2(found.size - 1))))) return 0.0;
+    ivec2 first = min(ivec2(uv), found.size - 2);
+    vec2 part = uv - vec2(first);
+    if (any(lessThan(found.size, ivec2(2)))) return 0.0;
+    float depth = 0.0, closest = 0.0;
+    float spacing_there = sample_spacing(v, level, projected.z);
+    for (int k = 0; k < 4; ++k) {
+        ivec2 at = first + ivec2(k & 1, k >> 1);
+        int index = sample_index(found, at);
+        float share = ((k & 1) != 0 ? part.x : 1.0 - part.x) * ((k >> 1) != 0 ? part.y : 1.0 - part.y);
+        float there = sample_depth(index);
+        if (!is_sample(index) || abs(there - projected.z) > (AGREE + 1.0 / cosine) * spacing_there) return 0.0;
+        depth += share * there;
+#if COLOR
+        seen.color += share * to_linear(sample_look(index).rgb);
+#endif
+#if NORMAL
+        seen.normal += share * normal_of(v, index);
+#endif
+    }
+    ahead = projected.z - depth;
+    if (abs(ahead) > AGREE * spacing_there) return 0.0;
+    return weight_of(v, level, projected.xy, cosine);
+}
+
+// Blends what other views see of the surface that a pixel shows. normal: of it, screen view space, unit length.
+void blend(int number, RangeView v, int level, vec2 pixel, vec3 place, vec3 normal, inout float depth, inout Seen seen) {
+    float total = max(weight_of(v, level, pixel, dot(normal, direction_to_pod(v, place))), LEAST_WEIGHT);
+    vec3 ray = view_perspective ? place / -place.z : vec3(0.0, 0.0, -1.0);
+    float steep = dot(normal, ray), moved = 0.0;
+#if BLEND == 1
+    seen.color *= total;
+    seen.normal *= total;
+#endif
+    for (int n = 0; n < RANGE_COUNT; ++n) {
+        if (n == number) continue;
+        RangeView other = range_view(n);
+        float ahead;
+        Seen there;
+        float weight = other_view(other, level, place, normal, ahead, there);
+        if (weight <= 0.0) continue;
+        // Along the pixel's ray, as far as the other's surface is from this one.
+        float change = ahead * dot(normal, direction_to_pod(other, place)) / steep;
+#if BLEND == 1
+        total += weight;
+        moved += weight * change;
+        seen.color += weight * there.color;
+        seen.normal += weight * there.normal;
+#else
+        if (weight <= total) continue;
+        total = weight;
+        moved = change;
+        seen.color = there.color;
+        if (there.normal != vec3(0.0)) seen.normal = there.normal;
+#endif
+    }
+#if BLEND == 1
+    moved /= total;
+    seen.color /= total;
+#endif
+    if (steep < -0.05) depth += moved;
+}
+#endif
+
+// What a pixel shows. row: of the sample that it shows most of.
+void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, out Seen seen) {
+    int index = int(item_index);
+    ivec4 at = sample_at(index, RANGE_COUNT);
+    RangeView v = range_view(at.x);
+    Mixture shown = Mixture(vec3(1.0, 0.0, 0.0), ivec3(index), vec2(at.zw), at.zw, vec3(0.0));
+    vec2 middle = vec2(pixel) + 0.5;
+#if POLYGONS
+    RangeLevel found = range_level(v, at.y);
+    Corner a = corner_at(v, found, at.y, at.zw), b = corner_at(v, found, at.y, at.zw + ivec2(1, 0));
+    Corner c = corner_at(v, found, at.y, at.zw + ivec2(0, 1)), d = corner_at(v, found, at.y, at.zw + 1);
+    int drawn = triangles(v, at.y, a, b, c, d);
+    const ivec2 A = ivec2(0), B = ivec2(1, 0), C = ivec2(0, 1), D = ivec2(1);
+    bool done = (drawn & 1) != 0 && shows(b, c, d, B, C, D, middle, depth, shown);
+    done = done || (drawn & 2) != 0 && shows(a, c, d, A, C, D, middle, depth, shown);
+    done = done || (drawn & 4) != 0 && shows(a, b, d, A, B, D, middle, depth, shown);
+    done = done || (drawn & 8) != 0 && shows(a, b, c, A, B, C, middle, depth, shown);
+#endif
+    row = sample_id(v, measured_under(v, at.y, shown.nearest, level_to_pixel(v, at.y, shown.uv)));
+    seen = UNSEEN;
+    for (int k = 0; k < (POLYGONS != 0 ? 3 : 1); ++k) {
+#if COLOR
+        seen.color += shown.shares[k] * to_linear(sample_look(shown.index[k]).rgb);
+#endif
+#if NORMAL
+        seen.normal += shown.shares[k] * normal_of(v, shown.index[k]);
+#endif
+    }
+    vec3 place = from_pixel(middle, depth), normal = triangle_normal(v, shown.facing, place);
+#if NORMAL
+    if (dot(seen.normal, seen.normal) > 1e-6) normal = normalize(seen.normal);
+    seen.normal = normal;
+#endif
+#if BLEND
+    if (normal != vec3(0.0)) blend(at.x, v, at.y, level_to_pixel(v, at.y, shown.uv), place, normal, depth, seen);
+#endif
+#if NORMAL
+    if (seen.normal != vec3(0.0)) seen.normal = along_pose(normalize(seen.normal));
+#endif
+#if VALUE
+    seen.value = texelFetch(values, int(row)).r;
+#endif
+}

@@ -1,0 +1,69 @@
+// Four neighbouring samples, and the triangles between those of one surface (Farooq 2013, 8.6.1).
+#include "common/view.glsl"
+#include "range/samples.glsl"
+
+// A sample in the picture. there: whether it is one, and between near and far.
+struct Corner {
+    bool there;
+    float depth;  // of its view's kind
+    vec3 place;   // screen view space
+    vec2 pixel;
+    int index;
+};
+
+Corner corner_at(RangeView v, RangeLevel found, int level, ivec2 uv) {
+    Corner corner;
+    corner.there = all(greaterThanEqual(uv, ivec2(0))) && all(lessThan(uv, found.size));
+    corner.index = sample_index(found, corner.there ? uv : ivec2(0));
+    corner.there = corner.there && is_sample(corner.index, level > 0 ? least_mask : 0.0);
+    corner.depth = sample_depth(corner.index);
+    corner.place = to_screen_view(v, sample_place(v, level, vec2(uv), corner.depth));
+    corner.there = corner.there && in_depth_range(-corner.place.z);
+    corner.pixel = to_pixel(corner.place);
+    corner.there = corner.there && all(lessThan(abs(corner.pixel), vec2(1e6)));
+    return corner;
+}
+
+// Corners of a quad: 0 at (u, v), 1 to the right, 2 below, 3 below to the right. A triangle goes by the corner that it
+// lacks.
+
+bool joined(RangeView v, int level, Corner a, Corner b) {
+    return a.there && b.there && same_surface(v, level, a.depth, b.depth);
+}
+
+// The triangles of a quad that are surface, a bit each: two, on either side of the flatter diagonal; one where a corner
+// is missing, or lies on another surface.
+int triangles(RangeView v, int level, Corner a, Corner b, Corner c, Corner d) {
+    bool ab = joined(v, level, a, b), ac = joined(v, level, a, c), bd = joined(v, level, b, d);
+    bool cd = joined(v, level, c, d), ad = joined(v, level, a, d), bc = joined(v, level, b, c);
+    int whole = int(bc && bd && cd) | int(ac && ad && cd) << 1 | int(ab && ad && bd) << 2 | int(ab && ac && bc) << 3;
+    if (whole != 15) return whole;
+    return abs(a.depth - d.depth) <= abs(b.depth - c.depth) ? 6 : 9;
+}
+
+// Twice the area to one side of an edge, from the corner that comes first, so that triangles that share it agree.
+float beside(Corner from, Corner to, vec2 pixel) {
+    precise vec2 edge = to.pixel - from.pixel, away = pixel - from.pixel;
+    precise float area = edge.x * away.y - edge.y * away.x;
+    return area;
+}
+
+// Shares of a triangle's corners at a pixel, not divided by their sum; all of one sign inside.
+vec3 shares_at(Corner x, Corner y, Corner z, vec2 pixel) {
+    return vec3(beside(y, z, pixel), -beside(x, z, pixel), beside(x, y, pixel));
+}
+
+bool is_inside(vec3 shares) {
+    return all(greaterThanEqual(shares, vec3(0.0))) || all(lessThanEqual(shares, vec3(0.0)));
+}
+
+// The depth of a triangle's plane at a pixel, between those of its corners.
+float depth_at(Corner x, Corner y, Corner z, vec3 shares) {
+    precise vec3 inverse = view_perspective ? 1.0 / vec3(-x.place.z, -y.place.z, -z.place.z) : vec3(1.0);
+    precise float sum = shares.x + shares.y + shares.z;
+    precise float depth = view_perspective
+        ? sum / (shares.x * inverse.x + shares.y * inverse.y + shares.z * inverse.z)
+        : -(shares.x * x.place.z + shares.y * y.place.z + shares.z * z.place.z) / sum;
+    float low = -max(x.place.z, max(y.place.z, z.place.z)), high = -min(x.place.z, min(y.place.z, z.place.z));
+    return sum == 0.0 ? low : clamp(depth, low, high);
+}

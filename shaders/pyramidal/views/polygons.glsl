@@ -1,0 +1,47 @@
+// Quads of neighbouring samples go to the pixels whose centres their triangles hold; a sample of no triangle to the one
+// that it lies in. What a pixel keeps is the place of the quad's first corner in the buffers. CULL_BACK: triangles that
+// show their backs are left out.
+#include <params>
+#include "pyramidal/views/grid.glsl"
+#include "range/rows.glsl"
+
+void visit_point(Corner a) {
+    if (any(lessThan(a.pixel, vec2(0.0))) || any(greaterThanEqual(a.pixel, vec2(view_size)))) return;
+    ivec2 at = ivec2(a.pixel);
+    visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), uint(a.index));
+}
+
+void visit_triangle(Corner x, Corner y, Corner z, float front, uint index) {
+    vec2 low = min(x.pixel, min(y.pixel, z.pixel)), high = max(x.pixel, max(y.pixel, z.pixel));
+    ivec2 first = max(ivec2(ceil(low - 0.5)), ivec2(0)), last = min(ivec2(floor(high - 0.5)), view_size - 1);
+#if CULL_BACK
+    if (beside(x, y, z.pixel) * front < 0.0) return;
+#endif
+    for (int row = first.y; row <= last.y; ++row)
+        for (int column = first.x; column <= last.x; ++column) {
+            vec3 shares = shares_at(x, y, z, vec2(column, row) + 0.5);
+            if (!is_inside(shares)) continue;
+            uint key = floatBitsToUint(depth_at(x, y, z, shares));
+            visit(uint(row * view_size.x + column), key, index);
+        }
+}
+
+void scatter(uint i) {
+    RowOfSamples row;
+    if (!row_of_samples(i, row)) return;
+    ivec2 uv = row.first;
+    Corner a = corner_at(row.view, row.range, row.level, uv), c = corner_at(row.view, row.range, row.level, uv + ivec2(0, 1));
+    for (; uv.x < row.last.x; ++uv.x) {
+        Corner b = corner_at(row.view, row.range, row.level, uv + ivec2(1, 0));
+        Corner d = corner_at(row.view, row.range, row.level, uv + ivec2(1, 1));
+        int drawn = triangles(row.view, row.level, a, b, c, d);
+        uint index = uint(a.index);
+        if ((drawn & 1) != 0) visit_triangle(b, c, d, -1.0, index);
+        if ((drawn & 2) != 0) visit_triangle(a, c, d, -1.0, index);
+        if ((drawn & 4) != 0) visit_triangle(a, b, d, 1.0, index);
+        if ((drawn & 8) != 0) visit_triangle(a, b, c, 1.0, index);
+        if (drawn == 0 && a.there) visit_point(a);
+        a = b;
+        c = d;
+    }
+}

@@ -1,0 +1,258 @@
+"""Pyramidal projection: the picture at several sizes, the holes of one filled from the next.
+
+Farooq 2013, chapters 4 to 6. Samples are scattered into the picture, and that is reduced to targets of half,
+a quarter, ... of its size; what the picture lacks shows through from the finest target that has it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from ...gpu.bindings import Texture
+from ...gpu.pose import GpuPose
+from ...gpu.pyramid import BOX, GAUSSIAN, NEAREST, Filter
+from ...gpu.surface import Surface
+from ...params import param
+from ...scan.pose import Pose
+from ...scan.spacing import sparse_spacing
+from ...view import View
+from .. import FrameView, Limit
+from .sources import PointSource, SampleSource
+from .targets import LEVELS, Targets
+from .views import MODES, ViewSource, view_spacing
+
+TITLE = "Pyramidal projection"
+FILLS = True
+BLENDS = True
+
+_BY_CELLS = "a pixel is filled by whole cells; at their edges the last bit tells which, and what encloses it"
+LIMITS = {
+    "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
+    "coplanar points": Limit(0.02, _BY_CELLS),
+    "collinear points": Limit(0.04, _BY_CELLS),
+    "collinear points end on, perspective": Limit(0.02, _BY_CELLS),
+    "collinear points end on, orthographic": Limit(0.02, _BY_CELLS),
+}
+
+_FILLING = {"fill": (True,)}
+_LEVELS, _HIDDEN, _VIEWS = "Levels", "Hidden points", "Range images"
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of pyramidal projection."""
+
+    fill: bool = param(True, "Fill holes from coarser levels", key="H", group=_LEVELS, sweep=(True, False))
+    level_0: bool = param(True, "Show what was measured", key="0", group=_LEVELS)
+    level_1: bool = param(True, "Fill from half the size", key="1", group=_LEVELS, when=_FILLING)
+    level_2: bool = param(True, "Fill from a quarter of the size", key="2", group=_LEVELS, when=_FILLING)
+    level_3: bool = param(True, "Fill from an eighth of the size", key="3", group=_LEVELS, when=_FILLING)
+    level_4: bool = param(True, "Fill from a sixteenth of the size", key="4", group=_LEVELS, when=_FILLING)
+    upsampling: str = param(
+        "bilinear",
+        "How samples of a coarser level are blended",
+        choices=("nearest", "bilinear", "bicubic"),
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    step: float = param(
+        3.0,
+        "Depth step between neighbours of one surface, in cells of their level",
+        low=0.1,
+        high=100,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    margin: float = param(
+        0.15,
+        "How far outside its samples a surface is filled, in distances between samples",
+        low=0,
+        high=1,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    widest: float = param(
+        1.0,
+        "Widest hole that is filled beyond the gaps between samples, in cells of its level",
+        low=0,
+        high=3,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    hide: bool = param(
+        True,
+        "Leave out samples seen through the holes of a nearer surface",
+        key="Shift+H",
+        group=_HIDDEN,
+        sweep=(True, False),
+    )
+    tolerance: float = param(
+        2.0,
+        "How far behind a nearer surface they lie, in cells of its level",
+        low=0,
+        high=100,
+        group=_HIDDEN,
+        when={"hide": (True,)},
+    )
+
+    first_level: int = param(0, "The finest level of range images that is drawn", low=0, high=5, group=_VIEWS)
+    primitive: str = param(
+        "polygons",
+        "What samples of range images are drawn as",
+        choices=("points", "polygons"),
+        group=_VIEWS,
+        sweep=("points", "polygons"),
+    )
+    lod: bool = param(
+        True, "Draw the level of range images whose samples fit the pixels", group=_VIEWS, affects="draw"
+    )
+    detail: float = param(
+        1.0, "Pixels between samples above which a finer level is drawn", low=0.25, high=16, unit="px",
+        group=_VIEWS, when={"lod": (True,)},
+    )  # fmt: skip
+    filter: str = param(
+        "box",
+        "What coarser levels of range images are made by",
+        choices=("box", "gaussian", "nearest"),
+        group=_VIEWS,
+    )
+    blend: str = param(
+        "linear",
+        "Where several views see one surface: the mean of all, the best of them, or the nearest",
+        choices=MODES,
+        group=_VIEWS,
+        sweep=("linear", "best", "nearest"),
+    )
+    cull_back: bool = param(False, "Leave out surfaces of range images that show their backs", group=_VIEWS)
+    skip: bool = param(
+        True, "Leave out tiles of range images that no pixel shows", group=_VIEWS, affects="speed"
+    )
+
+    @property
+    def reduction(self) -> Filter:
+        """The filter of coarser levels."""
+        return {"box": BOX, "gaussian": GAUSSIAN, "nearest": NEAREST}[self.filter]
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """The levels that may show, ascending."""
+        on = [level for level in range(LEVELS) if getattr(self, f"level_{level}")]
+        return tuple(level for level in on if self.fill or level == 0)
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """Numbers that the shaders read.
+
+    levels: of targets that are shown, a bit each; coarsest: of them. density: the level whose cells samples
+    all fill; sparse: how many levels above that may fill gaps between samples. spacing: of the samples, scan
+    units. first_level, last_level: of range images. least_mask: of a coarser level's samples, what share of
+    their surroundings has to be there.
+    """
+
+    levels: int
+    coarsest: int
+    step: float
+    margin: float
+    widest: float
+    density: int
+    sparse: int
+    tolerance: float
+    spacing: float
+    first_level: int
+    last_level: int
+    detail: float
+    least_mask: float
+
+
+_UPSAMPLING = {"nearest": 0, "bilinear": 1, "bicubic": 2}
+_LEAST_MASK = 0.01  # Farooq 2013, 4.3.2
+
+
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
+    """The samples of range views where there are such, else nothing but positions."""
+    return ("views",) if pose.views else ()
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Scatter, show, hide, fill; complete where all samples shall be drawn."""
+    params: Params = frame.params
+    source = _source(pose, params, surface)
+    refinable = source.scatter(surface, frame.share)
+    fills, hides = params.shown != (0,), params.hide and not source.is_closed
+    if not (fills or hides or source.is_made):
+        surface.stats.skipped["fill"] = "level 0 alone is shown"
+        return refinable
+    gpu, pixels = surface.gpu, surface.size[0] * surface.size[1]
+    channels = source.channels(surface)
+    defines, values = source.defines(channels), source.params
+    targets = surface.keep(Targets)
+
+    def bind() -> None:
+        source.bind()
+        targets.bind()
+        surface.bind_storage()
+        surface.bind_own("level", *channels)
+
+    with gpu.timers.measure("resolve"):
+        program = gpu.compute("pyramidal/resolve.comp", defines, source.parts, values)
+        bind()
+        gpu.dispatch(program, pixels)
+    if hides:
+        targets.reduce(surface, source, channels)
+        with gpu.timers.measure("hide"):
+            program = gpu.compute("pyramidal/hide.comp", params=values)
+            bind()
+            gpu.dispatch(program, pixels)
+    if fills:
+        targets.reduce(surface, source, channels)
+        holes = targets.list_holes(values)
+        with gpu.timers.measure("fill"):
+            upsampling = {"UPSAMPLING": _UPSAMPLING[params.upsampling]}
+            program = gpu.compute("pyramidal/fill.comp", {**upsampling, **defines}, params=values)
+            bind()
+            holes.texels.bind(Texture.LISTED)
+            holes.run(program)
+    return refinable
+
+
+def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
+    values = _Numbers(
+        levels=sum(1 << level for level in params.shown),
+        coarsest=LEVELS - 1,
+        step=params.step,
+        margin=params.margin,
+        widest=params.widest,
+        density=0,
+        sparse=1,
+        tolerance=params.tolerance,
+        spacing=0.0,
+        first_level=0,
+        last_level=0,
+        detail=params.detail,
+        least_mask=_LEAST_MASK,
+    )
+    if not pose.views:
+        spacing = _rounded(sparse_spacing(pose.stored))
+        return PointSource(pose, replace(values, spacing=spacing, **_density(pose, surface.view, spacing)))
+    last = pose.samples.levels - 1
+    levels = {"first_level": min(params.first_level, last), "last_level": last}
+    if not params.lod:
+        levels["last_level"] = levels["first_level"]
+    spacing = view_spacing(pose)
+    if params.primitive == "points":
+        levels |= _density(pose, surface.view, spacing)
+    return ViewSource(pose, surface, params, replace(values, **levels, spacing=spacing))
+
+
+def _rounded(spacing: float) -> float:
+    """The spacing in half octaves, so that pictures do not depend on which points it was judged by."""
+    return 2.0 ** (round(2 * math.log2(spacing)) / 2)
+
+
+def _density(pose: GpuPose, view: View, spacing: float) -> dict[str, int]:
+    """The level whose cells samples fill in the middle of the scan."""
+    depth = max(float(view.depths(pose.bounds.center - pose.overview.origin)), view.near)
+    apart = spacing * view.scale / (depth if view.perspective else 1.0)
+    return {"density": min(math.ceil(math.log2(max(apart, 1.0))), LEVELS - 1), "sparse": 1}

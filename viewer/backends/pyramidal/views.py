@@ -1,0 +1,137 @@
+"""Range views as a source of samples: tiles that a picture needs, of the level that fits its pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...gpu import gl
+from ...gpu.bindings import Storage, Texture
+from ...gpu.compact import IndexList
+from ...gpu.constants import RANGE_TILE
+from ...gpu.context import Gpu, Program
+from ...gpu.pose import GpuPose
+from ...gpu.scatter import Visits, scatter
+from ...gpu.surface import Surface
+from ...look import Look
+from ...scan.range_view import RangeView
+
+_EVERY = 8  # pixels along rows and columns that are looked at
+MODES = ("nearest", "linear", "best")  # as of_views.glsl numbers them
+COUNTS = ("empty", "drawn", "outside", "away")  # what becomes of tiles, as tiles.comp counts them
+
+
+class DrawnTiles:
+    """The list of the tiles that a picture draws, and how many were left out why."""
+
+    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self.counts = gpu.ctx.buffer(reserve=4 * len(COUNTS))
+        self.listed = IndexList(gpu, 1, RANGE_TILE)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.listed.nbytes + self.counts.size
+
+    def reserve(self, tiles: int) -> None:
+        """Make room for a list of so many tiles."""
+        if tiles > self.listed.capacity:
+            self._gpu.discard(self.listed)
+            self.listed = IndexList(self._gpu, tiles, RANGE_TILE)
+
+    def release(self) -> None:
+        """Delete everything."""
+        self._gpu.discard(self.listed, self.counts)
+
+
+class ViewSource:
+    """The samples of a pose's range views."""
+
+    parts: Mapping[str, str] = {"source": "pyramidal/of_views.glsl"}
+    is_made = True
+
+    def __init__(self, pose: GpuPose, surface: Surface, params: Any, values: Any) -> None:
+        """params: of the backend. values: what shaders read in `<params>`."""
+        self.params = values
+        self.is_closed = params.primitive == "polygons"
+        self._pose, self._params, self._view = pose, params, surface.view
+        self._samples = pose.samples
+        self._tiles = surface.keep(DrawnTiles)
+        self._tiles.reserve(self._samples.tile_count)
+        self._texels: dict[str, gl.BufferTexture] = {}
+        self._samples.reduce(params.reduction)
+
+    def defines(self, channels: Sequence[str]) -> dict[str, object]:
+        params = self._params
+        return {
+            **self._samples.defines,
+            "POLYGONS": int(params.primitive == "polygons"),
+            "CULL_BACK": int(params.cull_back),
+            "BLEND": MODES.index(params.blend) if len(self._pose.views) > 1 else 0,
+            "LOD": int(params.lod),
+            "SKIP": int(params.skip),
+            **{name.upper(): int(name in channels) for name in ("color", "normal", "value")},
+        }
+
+    def channels(self, surface: Surface) -> list[str]:
+        found = ["color"] if self._samples.has_color else []
+        if wants_lit(surface.look):
+            found.append("normal")
+            self._texels["normal"] = self._samples.normals(self._tiles.listed)
+        if (values := surface.row_values) is not None:
+            found.append("value")
+            self._texels["value"] = values
+        return found
+
+    def scatter(self, surface: Surface, share: float) -> bool:
+        gpu, tiles = self._pose.gpu, self._tiles
+        program = gpu.compute(
+            "pyramidal/views/tiles.comp", {**self.defines([]), **_causes()}, params=self.params
+        )
+        with gpu.timers.measure("tiles"):
+            gl.clear_words(tiles.counts, 0)
+            tiles.listed.clear()
+            tiles.listed.bind()
+            tiles.counts.bind_to_storage_buffer(Storage.TILE_COUNTS)
+            self.bind()
+            gpu.dispatch(program, self._samples.tile_count)
+
+        def bind(_: Program) -> None:
+            self.bind()
+            tiles.listed.texels.bind(Texture.DRAWN_ROWS)
+
+        cells = f"pyramidal/views/{self._params.primitive}.glsl"
+        visits = Visits(cells, 0, bind, self.defines([]), self.params, tiles.listed)
+        scatter(gpu, visits, surface.depths, surface.rows)
+        surface.show_samples()
+        return False
+
+    def bind(self) -> None:
+        self._samples.bind(self._view)
+        for name, unit in (("normal", Texture.RANGE_NORMALS), ("value", Texture.VALUES)):
+            if name in self._texels:
+                self._texels[name].bind(unit)
+
+
+def view_spacing(pose: GpuPose) -> float:
+    """How far apart the samples of a pose's range views are, where they are far apart; scan units."""
+    return max(_spacing(view) for view in pose.views)
+
+
+def _spacing(view: RangeView) -> float:
+    depth = view.depth[::_EVERY, ::_EVERY][view.valid()[::_EVERY, ::_EVERY]]
+    if view.kind == "height":
+        return 1 / min(view.fx, view.fy)
+    return float(np.quantile(depth, 0.9)) / min(view.fx, view.fy) if len(depth) else 0.0
+
+
+def wants_lit(look: Look) -> bool:
+    """Whether a picture of range views needs normals, which are always to be had."""
+    return look.light != "flat" or look.color_by == "normal"
+
+
+def _causes() -> dict[str, object]:
+    return {f"TILES_{name.upper()}": f"{number}u" for number, name in enumerate(COUNTS)}
