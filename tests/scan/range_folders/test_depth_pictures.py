@@ -126,7 +126,7 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
 @pytest.mark.parametrize(
     ("stored", "told"),
     [
-        ("{", "no calibration"),
+        ("{", "no JSON"),
         ("[1, 2]", "no JSON object"),
         ('{"fx": 5}', "lacks fy, cx, cy"),
         (json.dumps(CAMERA | {"fx": "wide"}), "fx is wide"),

@@ -10,16 +10,15 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ...errors import InputError, explained, shortened, unknown_name
-from ...files import parsed_json, read_text
+from ...errors import InputError, shortened, unknown_name
 from ..range_view import DepthKind
 from ..units import checked_unit
+from ._texts import object_of, text_of
 
 FILES = ("camera.json", "camera.txt")  # beside the pictures
 
 _CENTER = 0.5  # of a pixel: in these files that of the first one is at 0, 0
 _MATRIX = "intrinsic_matrix"  # by columns, as Open3D writes it
-_MOST_BYTES = 1 << 20
 _FORM = "It should have fx, fy, cx and cy in pixels, and for depth pictures depth_scale and unit"
 
 
@@ -75,22 +74,16 @@ def read_calibration(path: Path, default: Calibration | None = None) -> Calibrat
     line: fx fy cx cy and perhaps the coefficients of the distortion.
     """
     try:
-        text = read_text(path, _MOST_BYTES)
-        told = _from_json(parsed_json(text)) if path.suffix.lower() == ".json" else _from_text(text)
-        return _checked(told, default)
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", path, hint) from error
+        is_json = path.suffix.lower() == ".json"
+        return _checked(_from_json(object_of(path)) if is_json else _from_text(text_of(path)), default)
     except InputError as error:
-        raise InputError(error.what, path, error.hint) from error
-    except ValueError as error:  # of the text's encoding as well
+        raise InputError(error.what, path, error.hint or _FORM) from error
+    except ValueError as error:
         raise InputError(f"is no calibration: {shortened(str(error))}", path, _FORM) from error
 
 
-def _from_json(stored: Any) -> dict[str, Any]:
+def _from_json(stored: dict[str, Any]) -> dict[str, Any]:
     """The fields that a file tells, others left aside."""
-    if not isinstance(stored, dict):
-        raise InputError("is no calibration: it is no JSON object", hint=_FORM)
     told = {field.name: stored[field.name] for field in fields(Calibration) if field.name in stored}
     if _MATRIX in stored:
         matrix = np.array(stored[_MATRIX], np.float64)

@@ -10,21 +10,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, explained
-from ...files import read_text
+from ...errors import InputError
 from ..image_poses import from_camera_to_world
 from ..range_view import RangeView
 from ..times import natural_key
 from ._calibration import FILES, Calibration
 from ._pictures import COLOR_SUFFIXES, DEPTH_SUFFIX, depth_view, is_depth
 from ._source import RangeFrames
+from ._texts import text_of
 
 DEPTH_FOLDER = "depth"
 
 _DEPTH, _POSE = "depth", "pose"  # in the names of files, and of folders
 _COLORS = ("color", "colour", "rgb", "image")
 _POSE_SUFFIXES = (".pose.txt", ".txt")
-_MOST_BYTES = 1 << 16  # of one pose
 
 
 @dataclass(frozen=True)
@@ -108,13 +107,10 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
     if picture.pose is None:
         raise InputError("has no pose: no file beside it tells one", picture.depth)
     try:
-        numbers = np.array(read_text(picture.pose, _MOST_BYTES).split(), np.float64)
+        numbers = np.array(text_of(picture.pose).split(), np.float64)
         if numbers.shape != (16,):
             raise InputError(f"holds {numbers.size} numbers, where a pose is a 4 x 4 matrix")
         return from_camera_to_world(numbers.reshape(4, 4))
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", picture.pose, hint) from error
     except InputError as error:
         raise InputError(error.what, picture.pose, error.hint) from error
     except ValueError as error:

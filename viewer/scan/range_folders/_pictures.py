@@ -23,7 +23,7 @@ DEPTH_SUFFIX = ".png"
 
 _SIXTEEN_BITS = "I;16"  # as Pillow calls a grey picture of these
 _NOTHING = 65535  # beside 0: where a sensor tells that it measured none
-_BYTES = 16  # of memory for a pixel, decoded and as a view
+_BYTES = 12  # of memory for a pixel, decoded and as a view
 _SIGNATURE, _SIXTEEN_BIT_GREY = (
     b"\x89PNG\r\n\x1a\n",
     b"\x10\x00",

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError, shortened
-from ...files import parsed_json, read_text
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
 from ._pictures import read_color
 from ._source import RangeFrames
+from ._texts import object_of
 
 TITLE = "a stereo pair of Middlebury's"
 
@@ -27,7 +27,6 @@ _NUMBERS = (
     "baseline_mm",
 )  # fmt: skip
 _CENTER = 0.5  # of a pixel: in the calibration that of the first one is at 0, 0
-_MOST_BYTES = 1 << 20
 
 
 def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
@@ -71,8 +70,8 @@ def _view(file: Path, left: Path | None, numbers: Sequence[float]) -> RangeView:
 
 def _numbers(file: Path) -> list[float]:
     """Numbers of the calibration in their order. Raises InputError."""
+    stored = object_of(file)
     try:
-        stored = parsed_json(read_text(file, _MOST_BYTES))
         return [float(stored[name]) for name in _NUMBERS]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"is no calibration: {shortened(str(error))}", file) from error

@@ -14,19 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...files import read_text
 from ..image_poses import UPRIGHT, from_camera_to_world
 from . import _calibration
 from ._calibration import PRIMESENSE
 from ._partners import DEPTH_FOLDER, DepthPicture, frames_of_pictures, named_pictures
 from ._source import RangeFrames
+from ._texts import text_of
 
 TITLE = "Open3D's RGB-D images"
 
 _PAIRS = "rgbd.match"
 _LOGS = ("trajectory.log", "odometry.log")  # the better one first
 _RECORD = 19  # numbers: three that count, and a matrix
-_MOST_BYTES = 64 << 20
 
 
 def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
@@ -53,17 +52,16 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
 
 def read_log(path: Path) -> NDArray[np.float64]:
     """The matrices of a log, (N, 4, 4), from the camera to the world. Raises InputError."""
+    words = text_of(path).split()
     try:
-        numbers = np.array(read_text(path, _MOST_BYTES).split(), np.float64)
-        return numbers.reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
-    except ValueError as error:  # of the text's encoding as well
+        return np.array(words, np.float64).reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
+    except ValueError as error:
         hint = "A record is three whole numbers and a 4 x 4 matrix"
         raise InputError("is damaged, or no log of poses", path, hint) from error
 
 
 def _pairs(folder: Path) -> list[DepthPicture]:
-    lines = read_text(folder / _PAIRS, _MOST_BYTES).splitlines()
-    pairs = [line.split() for line in lines if line.strip()]
+    pairs = [line.split() for line in text_of(folder / _PAIRS).splitlines() if line.strip()]
     if any(len(pair) != 2 for pair in pairs):
         raise InputError("has a line that is no pair of names", folder / _PAIRS, "First depth, then colour")
     return [DepthPicture(folder / depth, folder / color) for depth, color in pairs]

@@ -9,6 +9,7 @@ row first, x to the right, y up, z towards the scanner.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -16,18 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
-from ...files import read_text
 from ..formats.npz import read_arrays
 from ..formats.ply import read_range_grid
 from ..grids import view_of_grid
 from ..image_poses import from_rotation, rotation_of
 from ..range_view import RangeView
 from ._source import RangeFrames
+from ._texts import text_of
 
 TITLE = "Stanford's laser scans"
 
 _SCAN = "bmesh"
-_MOST_BYTES = 1 << 20
 _UNIT = "m"
 
 
@@ -49,11 +49,9 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
 
 def _lines(conf: Path) -> list[str]:
     """The lines that place scans; none where the file has none."""
-    try:
-        lines = read_text(conf, _MOST_BYTES).splitlines()
-    except (OSError, UnicodeDecodeError):
-        return []
-    return [line for line in lines if line.split()[:1] == [_SCAN]]
+    with suppress(InputError):  # it is of something else
+        return [line for line in text_of(conf).splitlines() if line.split()[:1] == [_SCAN]]
+    return []
 
 
 def _placement(conf: Path, line: str) -> tuple[str, NDArray[np.float64]]:

@@ -13,19 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
-from ...files import parsed_json, read_text
 from ...srgb import bytes_from_linear
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
 from ._source import RangeFrames
+from ._texts import object_of
 
 TITLE = "TrueDepth frames"
 
 _CAMERA, _FRAME = "camera_intrinsics.json", "frame-"
 _MATRIX, _WIDTH = "intrinsic_matrix", "intrinsic_matrix_reference_dimensions_width"
 _CENTER = 0.5  # of a pixel: in the matrix that of the first one is at 0, 0
-_MOST_BYTES = 1 << 20
 _SRGB = bytes_from_linear(np.arange(256) / 255)  # of a stored colour
 
 
@@ -76,10 +75,10 @@ def _times(files: Sequence[Path]) -> NDArray[np.float64] | None:
 
 def _intrinsics(file: Path) -> NDArray[np.float64]:
     """fx, fy, cx and cy in widths of the picture, (4,). Raises InputError."""
+    stored = object_of(file)
     try:
-        stored = parsed_json(read_text(file, _MOST_BYTES))
         camera = np.array(stored[_MATRIX], np.float64).reshape(9)[[0, 4, 6, 7]] / float(stored[_WIDTH])
-    except (OSError, ValueError, KeyError, TypeError, ZeroDivisionError) as error:
+    except (ValueError, KeyError, TypeError, ZeroDivisionError) as error:
         raise InputError(f"is no calibration: {shortened(str(error))}", file) from error
     if not (np.isfinite(camera).all() and (camera > 0).all()):
         raise InputError("is no calibration: a number of its matrix is not above 0", file)

@@ -15,20 +15,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, explained, shortened
-from ...files import read_text
+from ...errors import InputError, shortened
 from ..image_poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
 from . import _calibration
 from ._calibration import PRIMESENSE
 from ._partners import DepthPicture, frames_of_pictures
 from ._source import RangeFrames
+from ._texts import text_of
 
 TITLE = "TUM's RGB-D images"
 
 _DEPTH, _COLOR, _POSES = "depth.txt", "rgb.txt", "groundtruth.txt"
 _KINECT = replace(PRIMESENSE, depth_scale=5000.0)
 _MOST_APART = 0.02  # s
-_MOST_BYTES = 64 << 20
 
 
 def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
@@ -79,11 +78,7 @@ def nearest_once(times: NDArray[np.float64], others: NDArray[np.float64], most: 
 
 def _rows(path: Path) -> tuple[NDArray[np.float64], list[list[str]]]:
     """Times (N,), increasing, and the words behind them. Raises InputError."""
-    try:
-        lines = [line.split() for line in read_text(path, _MOST_BYTES).splitlines()]
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", path, hint) from error
+    lines = [line.split() for line in text_of(path).splitlines()]
     by_time: dict[float, list[str]] = {}
     for number, words in enumerate(lines, start=1):
         if words and not words[0].startswith("#"):
