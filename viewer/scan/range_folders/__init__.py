@@ -4,7 +4,7 @@ A module declares
 
 - `TITLE: str`, as messages name it;
 - `find(folder, names) -> RangeFrames | None`: its frames, where the folder is of this kind. names: those of
-  all that is in the folder, in natural order. No frame is read, small text files may be. It raises where the
+  all that is in the folder, in no order. No frame is read, small text files may be. It raises where the
   folder is of this kind and something is wrong with all of it;
 - `GENERAL = True` where it takes what more special kinds do not.
 
@@ -22,7 +22,6 @@ from types import ModuleType
 
 from ...errors import InputError, explained
 from ..formats import one_message
-from ..times import natural_key
 from ._source import RangeFrames
 
 __all__ = ["RangeFrames", "find_range_frames"]
@@ -34,10 +33,9 @@ def find_range_frames(folder: Path) -> RangeFrames | None:
     Raises InputError where it is of a known kind and cannot be used.
     """
     try:
-        names = sorted(os.listdir(folder), key=natural_key)
+        names = [name for name in os.listdir(folder) if not name.startswith(".")]
     except OSError as error:
         raise InputError(f"cannot be listed ({error.strerror})", folder, explained(error)[1]) from error
-    names = [name for name in names if not name.startswith(".")]
     for kind in _kinds():
         with one_message(folder, f"cannot be read as {kind.TITLE}"):
             if (frames := kind.find(folder, names)) is not None:

@@ -23,7 +23,7 @@ DEPTH_FOLDER = "depth"
 
 _DEPTH, _POSE = "depth", "pose"  # in the names of files, and of folders
 _COLORS = ("color", "colour", "rgb", "image")
-_POSE_SUFFIXES = (".pose.txt", ".txt")
+_POSE_SUFFIX = ".txt"
 
 
 @dataclass(frozen=True)
@@ -84,19 +84,10 @@ def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
 
 
 def depth_names(folder: Path, names: Sequence[str]) -> list[str]:
-    """The names of depth pictures: PNG that say so, or else all PNG where the first is 16-bit grey."""
-    pictures = [name for name in names if name.lower().endswith(DEPTH_SUFFIX)]
+    """The names of depth pictures in natural order: PNG that say so, or all if the first is 16-bit grey."""
+    pictures = sorted((name for name in names if name.lower().endswith(DEPTH_SUFFIX)), key=natural_key)
     told = [name for name in pictures if _DEPTH in name.lower()]
     return told or (pictures if pictures and is_depth(folder / pictures[0]) else [])
-
-
-def names_in(folder: Path) -> list[str]:
-    """The names in a folder, in natural order; none where there is no such folder."""
-    try:
-        names = os.listdir(folder)
-    except OSError:
-        return []
-    return sorted((name for name in names if not name.startswith(".")), key=natural_key)
 
 
 def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
@@ -118,15 +109,21 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
 
 
 def _in_folders(folder: Path, names: Sequence[str]) -> Iterator[DepthPicture]:
-    colors = next((name for name in _COLORS if name in names), None)
-    of_color = {Path(name).stem: name for name in names_in(folder / colors)} if colors else {}
-    poses = {Path(name).stem: name for name in names_in(folder / _POSE)}
-    for name in names_in(folder / DEPTH_FOLDER):
-        if name.lower().endswith(DEPTH_SUFFIX):
-            stem = Path(name).stem
-            color = folder / str(colors) / of_color[stem] if stem in of_color else None
-            pose = folder / _POSE / poses[stem] if stem in poses else None
-            yield DepthPicture(folder / DEPTH_FOLDER / name, color, pose)
+    of_colors = next((name for name in _COLORS if name in names), None)
+    colors = _by_stem(folder / of_colors, COLOR_SUFFIXES) if of_colors else {}
+    poses = _by_stem(folder / _POSE, (_POSE_SUFFIX,))
+    for stem, depth in _by_stem(folder / DEPTH_FOLDER, (DEPTH_SUFFIX,)).items():
+        yield DepthPicture(depth, colors.get(stem), poses.get(stem))
+
+
+def _by_stem(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
+    """The files of a folder by their names without suffix, in natural order; none where it is not there."""
+    try:
+        files = [folder / name for name in os.listdir(folder) if not name.startswith(".")]
+    except OSError:
+        return {}
+    chosen = [file for file in files if file.suffix.lower() in suffixes]
+    return {file.stem: file for file in sorted(chosen, key=lambda file: natural_key(file.name))}
 
 
 def _color_names(depth: str) -> Iterator[str]:
@@ -139,8 +136,8 @@ def _color_names(depth: str) -> Iterator[str]:
 def _pose_names(depth: str) -> Iterator[str]:
     stem = Path(depth).stem
     if _DEPTH in stem.lower():
-        yield _replaced(stem, _POSE) + ".txt"
-    yield from (stem + suffix for suffix in _POSE_SUFFIXES)
+        yield _replaced(stem, _POSE) + _POSE_SUFFIX
+    yield from (f"{stem}.{_POSE}{_POSE_SUFFIX}", stem + _POSE_SUFFIX)
 
 
 def _replaced(stem: str, word: str) -> str:

@@ -17,6 +17,7 @@ from ...srgb import bytes_from_linear
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
+from ..times import natural_key
 from ._source import RangeFrames
 from ._texts import object_of
 
@@ -33,6 +34,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     frames = [name for name in names if name.startswith(_FRAME) and name.endswith(".npz")]
     if not frames or _CAMERA not in names:
         return None
+    frames.sort(key=natural_key)
     camera = _intrinsics(folder / _CAMERA)
     files = [folder / name for name in frames]
     return RangeFrames(
