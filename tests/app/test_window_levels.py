@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 from scenes import sphere_mesh
-from test_window import shown
-from virtual_screen import RunningApp, Screen, running_app
+from test_window import replayed, shown
+from virtual_screen import PANEL, RunningApp, Screen, State, running_app
 
-from viewer.look import HOLE_COLOR, rgba
+from viewer.document.recording import Recording
+from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, rgba
 from viewer.mesh.triangles import Mesh
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -21,6 +23,7 @@ from viewer.scan.range_view import RangeView, merge
 from viewer.simulate.scanner import Faults, capture, rig
 
 FRAMES = 6
+KEYS = (*((str(level), f"level_{level}") for level in range(5)), ("h", "fill"), ("shift+h", "hide"))
 HOLE = np.array([0.1, 0.5, np.sqrt(0.74)])  # on the ball
 
 
@@ -90,3 +93,110 @@ def test_a_key_paints_holes_whatever_draws(app: RunningApp) -> None:
         assert holes(app) > 20
         press(app, "g")
         np.testing.assert_array_equal(shown(app), before)
+
+
+def counted(app: RunningApp) -> dict[int, int]:
+    """How many pixels of the view's upper half are coloured as levels; 0: grey, as measured ones."""
+    view = shown(app)[: app.view()[3] // 2]
+    found = {n: view == rgba(color)[:3] for n, color in enumerate(LEVEL_COLORS, start=1)}
+    background = view == rgba(Look().background)[:3]
+    count = {n: int(same.all(axis=2).sum()) for n, same in found.items()}
+    return {0: int(((np.ptp(view, axis=2) == 0) & ~background.all(axis=2)).sum()), **count}
+
+
+def params(state: State) -> dict[str, object]:
+    return dict(state.document["params"].get("pyramidal", {}))
+
+
+@pytest.fixture
+def levels(app: RunningApp) -> Iterator[RunningApp]:
+    """Pyramidal projection, coloured by level and not lit."""
+    while app.state.backend != "pyramidal":
+        press(app, "b")
+    app.choose(PANEL, "color_by/##value", "level##level")
+    app.choose(PANEL, "light/##value", "flat##flat")
+    app.settle()
+    yield app
+    app.choose(PANEL, "color_by/##value", "auto##auto")
+    app.choose(PANEL, "light/##value", "auto##auto")
+
+
+def test_each_level_has_its_key(levels: RunningApp) -> None:
+    app, before = levels, shown(levels).copy()
+    on = counted(app)
+    assert min(on[n] for n in range(4)) > 50, on
+    for level in range(5):
+        press(app, str(level))
+        assert params(app.state)[f"level_{level}"] is False
+        assert counted(app)[level] == 0
+        assert counted(app) != on or level == 4
+        press(app, str(level))
+        np.testing.assert_array_equal(shown(app), before)
+    press(app, "g")
+    open_with_levels = holes(app)
+    press(app, "h")
+    assert params(app.state)["fill"] is False
+    off = counted(app)
+    assert off[0] > 0
+    assert not any(off[level] for level in range(1, 5))
+    assert holes(app) > 5000 + 10 * open_with_levels
+    press(app, "h")
+    press(app, "g")
+    np.testing.assert_array_equal(shown(app), before)
+
+
+def test_the_key_of_hidden_points_uncovers_what_is_seen_through_a_surface(levels: RunningApp) -> None:
+    app, before = levels, shown(levels).copy()
+    press(app, "shift+h")
+    assert params(app.state)["hide"] is False
+    assert (shown(app) != before).any(axis=2).sum() > 100
+    press(app, "shift+h")
+    np.testing.assert_array_equal(shown(app), before)
+
+
+def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
+    app, view = levels, shown(levels)
+    left, top, *_ = app.view()
+    for level in (1, 2):
+        rows, columns = np.nonzero((view == rgba(LEVEL_COLORS[level - 1])[:3]).all(axis=2))
+        place = len(rows) // 2
+        app.screen.do("mousemove", left + columns[place], top + rows[place], "sleep", 0.2)
+        assert f"filled from level {level}" in app.settle().pointed
+    press(app, "m")
+    app.screen.do("click", 1)
+    app.told("filled")
+    assert not app.settle().measurements
+
+
+@pytest.mark.slow
+def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes(
+    levels: RunningApp,
+) -> None:
+    app = levels
+    press(app, "r")
+    app.see(is_recording=True)
+    app.screen.do("key", "space")
+    app.see(is_playing=True)
+    for key, name in KEYS:
+        for wanted in (False, True):
+            app.screen.do("key", key)
+            state = app.see(lambda state: params(state).get(name) is wanted)  # noqa: B023
+            app.see(lambda later: later.frame != state.frame)  # noqa: B023
+            assert app.state.is_playing
+    app.screen.do("key", "space", "key", "h")
+    app.settle()
+    press(app, "p")
+    picture = Path(app.told(r"Saved (.+\.png)")[1])
+    press(app, "r")
+    recording = Path(app.told(r"Saved (.+\.json)")[1])
+    press(app, "h")
+    entries = Recording.load(recording).entries
+    for _, name in KEYS:
+        assert any(not getattr(entry.params, name) for entry in entries), f"none without {name}"
+    assert {entry.pose for entry in entries} == {*range(FRAMES)}
+    once, again = replayed(recording, "%04d.png"), replayed(recording, "%04d.png")
+    assert len(once) == len(entries)
+    for one, other in zip(once, again, strict=True):
+        np.testing.assert_array_equal(one, other)
+    with Image.open(picture) as file:
+        np.testing.assert_array_equal(np.asarray(file), once[-1])
