@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .bounds import Bounds
 from .errors import InputError, explained, shortened, unknown_name
 from .files import parsed_json, read_text, whole_file
-from .geometry import Vector, front_vector, up_vector
+from .geometry import Vector, front_vector, up_vector, vector
 
 PROJECTIONS = ("perspective", "orthographic")
 _FIT_MARGIN = 1.04
@@ -96,9 +96,9 @@ class Camera:
         # At the poles the view axis is parallel to up: keep the picture's up continuous there.
         screen_up = math.cos(e) * above - math.sin(e) * (math.cos(a) * front + math.sin(a) * right)
         camera = cls(
-            eye=_vector(bounds.center + direction * bounds.radius),
-            target=_vector(bounds.center),
-            up=_vector(screen_up if abs(math.cos(e)) < 1e-6 else above),
+            eye=vector(bounds.center + direction * bounds.radius),
+            target=vector(bounds.center),
+            up=vector(screen_up if abs(math.cos(e)) < 1e-6 else above),
             projection=projection,
             fov_y=fov_y,
         )
@@ -193,8 +193,8 @@ class Camera:
             reach = np.full_like(reach, bounds.radius)
         distance = float((z + reach / tangent).max())
         height = 2 * _FIT_MARGIN * float(reach.max()) if self.projection == "orthographic" else self.height
-        eye = _vector(bounds.center + self.rotation()[2] * distance)
-        return replace(self, eye=eye, target=_vector(bounds.center), height=height)
+        eye = vector(bounds.center + self.rotation()[2] * distance)
+        return replace(self, eye=eye, target=vector(bounds.center), height=height)
 
     def at_distance(self, distance: float) -> Camera:
         """Move to another distance from the target (scan units), in the same direction."""
@@ -202,7 +202,7 @@ class Camera:
             raise InputError(f"a camera's distance is positive, not {distance}")
         eye = np.array(self.target) + self.rotation()[2] * distance
         height = self.height and self.height * distance / self.distance
-        return replace(self, eye=_vector(eye), height=height)
+        return replace(self, eye=vector(eye), height=height)
 
     def orbited(self, azimuth: float, elevation: float, about: Vector | None = None) -> Camera:
         """Turn about the target: azimuth about up, then elevation, in degrees.
@@ -226,18 +226,18 @@ class Camera:
 
         center = np.array(self.target if about is None else about)
         target = center + turn(self.target - center)
-        return replace(self, eye=_vector(target + turn(arm)), target=_vector(target))
+        return replace(self, eye=vector(target + turn(arm)), target=vector(target))
 
     def panned(self, right: float, up: float) -> Camera:
         """Move with its target along the picture's axes, in heights of the picture."""
         axes = self.rotation()
         shift = (axes[0] * right + axes[1] * up) * self.view_height
         eye, target = np.array(self.eye) + shift, np.array(self.target) + shift
-        return replace(self, eye=_vector(eye), target=_vector(target))
+        return replace(self, eye=vector(eye), target=vector(target))
 
     def moved(self, by: NDArray[np.float64]) -> Camera:
         """Move with its target along the world's axes. by: (3,) scan units."""
-        return replace(self, eye=_vector(np.add(self.eye, by)), target=_vector(np.add(self.target, by)))
+        return replace(self, eye=vector(np.add(self.eye, by)), target=vector(np.add(self.target, by)))
 
     def zoomed(self, factor: float) -> Camera:
         """Zoom: nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
@@ -248,7 +248,7 @@ class Camera:
         about = np.array(point)
         eye, target = (about + (np.array(p) - about) / factor for p in (self.eye, self.target))
         return replace(
-            self, eye=_vector(eye), target=_vector(target), height=self.height and self.height / factor
+            self, eye=vector(eye), target=vector(target), height=self.height and self.height / factor
         )
 
     def projected(self, projection: str) -> Camera:
@@ -265,7 +265,7 @@ class Camera:
         """
         back = self.rotation()[2]
         depth = float(np.subtract(self.eye, point) @ back)
-        target = _vector(np.array(self.eye) - back * depth)
+        target = vector(np.array(self.eye) - back * depth)
         if depth <= 0 or target == self.eye:  # the latter far from the origin, by rounding
             return self
         height = self.view_height if self.projection == "orthographic" else self.height
@@ -281,7 +281,7 @@ class Camera:
         shift = np.subtract(point, camera.target)
         if float(np.subtract(self.eye, point) @ back) <= 0:
             return self
-        return replace(camera, eye=_vector(camera.eye + shift), target=point)
+        return replace(camera, eye=vector(camera.eye + shift), target=point)
 
 
 def _with_extent(bounds: Bounds) -> Bounds:
@@ -318,11 +318,6 @@ def _length(name: str, value: Any) -> float:
         what = f"the camera's {name} is {shortened(value)}, expected a positive number"
         raise InputError(f"{what}, {_SMALLEST:g} to {_LARGEST:g}")
     return number
-
-
-def _vector(values: NDArray[np.float64]) -> Vector:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
 
 
 def _rotate(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from .gpu.surface import Surface
 from .look import Look
 from .renderer import Renderer
 from .scan.layers import NO_LAYERS, Layers
+from .scan.pods import first_camera
 from .scan.points import PointCloud
 from .scan.pose import Pose
 from .view import View
@@ -177,10 +178,11 @@ def render(
     renderer, layers = shared_renderer(), layers or NO_LAYERS
     resident = renderer.resident(pose)
     name, chosen = backend_for(pose, backend, params)
+    views = pose.views if layers.place.is_identity else ()
+    bounds = layers.place.bounds(resident.bounds)
     request = Request(
         pose=pose,
-        camera=camera
-        or Camera.orbit(layers.place.bounds(resident.bounds), aspect=size[0] / size[1], up=pose.up or UP),
+        camera=camera or first_camera(views, bounds, size[0] / size[1], pose.up or UP),
         backend=name,
         params=chosen,
         look=look or Look(),

@@ -1,6 +1,8 @@
-"""Names of axes."""
+"""Vectors, and names of axes."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from .errors import unknown_name
 
@@ -19,6 +21,12 @@ AXES: dict[str, Vector] = {
 
 # The front of a subject, at right angles to each up axis; azimuth 0 looks from there.
 _FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """The vector of three numbers, such as an array's."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
 
 
 def up_vector(name: str) -> Vector:

@@ -30,6 +30,8 @@ from ..output.marks import MARKS, Legend, marks_of
 from ..params import parse
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
+from ..scan.pods import first_camera
+from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..timing import draw
 from . import _arguments as arguments
@@ -202,9 +204,10 @@ def _requests(
     A pose without the scalar that the look colours by is reported, and has colours of its own choice.
     """
     chosen = None
-    camera_of = _camera(args, timeline, shots, size, up) if camera is None else lambda shot: camera
+    camera_of = None if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or backend_for(pose, args.backend, values)
+        camera_of = camera_of or _camera(args, timeline, shots, size, up, pose)
         own = drawable(look, pose.overview.scalars)
         if own is not look:
             title = frame_title(timeline, pose.index)
@@ -215,14 +218,17 @@ def _requests(
 
 
 def _camera(
-    args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int], up: str
+    args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int], up: str, first: Pose
 ) -> Callable[[Shot], Camera]:
-    """The camera of each shot, fitted."""
+    """The camera of each shot, fitted. first: the first pose that can be read."""
     aspect = size[0] / size[1]
     bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:
         return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, up)
-    camera = Camera.orbit(bounds, *(args.orbit or ()), aspect=aspect, up=up)
+    if args.orbit:
+        camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=up)
+    else:
+        camera = first_camera(first.views, bounds, aspect, up)
     return lambda shot: camera
 
 

@@ -14,7 +14,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..camera import Camera
 from ..document.recording import Recording, is_recording, place_of
 from ..document.saved_session import SavedSession, is_session
 from ..errors import InputError, NoOpenGLError, explained
@@ -25,6 +24,7 @@ from ..output.export import contact_sheet, film, thumbnail, write_png
 from ..scan.inputs import scan_inputs
 from ..scan.listing import is_there, named_scans
 from ..scan.open import DEMO
+from ..scan.pods import first_camera
 from ..scan.timeline import Timeline
 from ..timing import draw
 from ..unfinished import remove_leftovers
@@ -161,8 +161,9 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
         progress(len(indices)) as tick,
     ):
         bounds = framing(timeline, indices)
-        camera = Camera.orbit(bounds, aspect=_SIZE[0] / _SIZE[1], up=up)
+        camera = None
         for pose in read_poses(timeline, indices):
+            camera = camera or first_camera(pose.views, bounds, _SIZE[0] / _SIZE[1], up)
             draw(renderer, Request(pose, camera, look=Look(up=up)), surface)
             image = surface.image()
             write_png(image, f"{name}_{pose.index:04d}.png")

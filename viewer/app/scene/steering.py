@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from ...bounds import Bounds
 from ...camera import Camera
+from ...scan.pods import first_camera
 from ...scan.pose import Pose
 from ..playing.playback import Playback
 from ..session import Session
@@ -131,7 +132,8 @@ class Steering:
         return not self.moves and now - self._wheeled > _PAUSE
 
     def settle(self, pose: Pose) -> None:
-        """Fit the camera to a pose that is to be drawn where there is none, or one that shows nothing of it.
+        """Fit the camera to a pose that is to be drawn where there is none, or one that shows nothing of it:
+        where its pods look from, or from the front.
 
         The latter is looked at once a scan: its file may have changed since it was left. Where there is none
         at first, the pose tells what is up, unless the user did.
@@ -145,7 +147,9 @@ class Steering:
             if camera is not None and not navigation.shows(camera, bounds, aspect):
                 camera = None
         if camera is None:
-            self._session.amend(camera=Camera.orbit(bounds, aspect=aspect, up=self._up))
+            is_moved = not self._session.laid.layers(pose).place.is_identity
+            views = () if is_moved else pose.views
+            self._session.amend(camera=first_camera(views, bounds, aspect, self._up))
 
     def begin_scan(self) -> None:
         """Take in that another scan is shown from now on."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...camera import Camera
 from ...errors import InputError
-from ...geometry import Vector, up_vector
+from ...geometry import up_vector, vector
 from ...mesh.reference import trace
 from ...mesh.scene import Rays
 from ...mesh.triangles import Mesh
@@ -100,8 +100,8 @@ def _from_pod(view: RangeView, target: Rays, zoom: float, size: tuple[int, int],
         distance = float(np.linalg.norm(target - eye))
     tangent = size[1] / (2 * zoom * density * distance)
     return Camera(
-        eye=_vector(eye),
-        target=_vector(target),
+        eye=vector(eye),
+        target=vector(target),
         up=up_vector(up),
         fov_y=float(np.degrees(2 * np.arctan(tangent))),
     )
@@ -128,7 +128,7 @@ def _look(mesh: Mesh, direction: Rays, wanted: float, size: tuple[int, int], up:
     low, high = np.log(np.array([_NEAREST, _FARTHEST]) * mesh.bounds.radius)
     for _ in range(_HALVINGS):
         distance = np.exp((low + high) / 2)
-        camera = Camera(eye=_vector(target + distance * direction), target=_vector(target), up=up_vector(up))
+        camera = Camera(eye=vector(target + distance * direction), target=vector(target), up=up_vector(up))
         error = covered_share(mesh, camera, size) - wanted
         if abs(error) <= _CLOSE:
             return camera
@@ -143,8 +143,8 @@ def _middle(mesh: Mesh, direction: Rays, size: tuple[int, int], up: str) -> Rays
     """
     center = mesh.bounds.center
     camera = Camera(
-        eye=_vector(center + mesh.bounds.radius * direction),
-        target=_vector(center),
+        eye=vector(center + mesh.bounds.radius * direction),
+        target=vector(center),
         up=up_vector(up),
         projection="orthographic",
     ).fit(mesh.bounds, size[0] / size[1])
@@ -159,8 +159,3 @@ def _middle(mesh: Mesh, direction: Rays, size: tuple[int, int], up: str) -> Rays
 def _small(size: tuple[int, int]) -> tuple[int, int]:
     factor = min(1.0, np.sqrt(_PIXELS / (size[0] * size[1])))
     return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
-
-
-def _vector(values: Rays) -> Vector:
-    x, y, z = (float(v) for v in values)
-    return x, y, z

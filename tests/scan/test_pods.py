@@ -1,0 +1,86 @@
+"""A scan is first shown from where its pods look."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from range_scenes import looking_at, shape_view, sphere_view
+
+from viewer.bounds import Bounds
+from viewer.camera import Camera
+from viewer.geometry import up_vector
+from viewer.scan.pods import first_camera
+from viewer.scan.range_view import RangeView
+from viewer.view import View
+
+BALL = Bounds(np.full(3, -1.0), np.full(3, 1.0))
+
+
+def from_aside(degrees: float) -> RangeView:
+    angle = np.radians(degrees)
+    return sphere_view((4 * np.sin(angle), 0.0, 4 * np.cos(angle)))
+
+
+@pytest.mark.parametrize("aspect", [0.5, 4 / 3, 3.0])
+@pytest.mark.parametrize("center", [(20.0, 30.0), (24.0, 20.0), (40.0, 3.0)])
+def test_one_pod_is_looked_through_and_all_that_it_measured_is_in_the_picture(
+    aspect: float, center: tuple[float, float]
+) -> None:
+    pod = replace(sphere_view((1.0, 2.0, 3.0)), cx=center[0], cy=center[1])
+    camera = first_camera([pod], BALL, aspect)
+    assert camera.eye == pytest.approx(pod.eye)
+    np.testing.assert_allclose(camera.rotation(), pod.world_to_camera[:3, :3], atol=1e-9)
+    size = (round(600 * aspect), 600)
+    pixels, _ = View.of(camera, size, np.zeros(3), BALL).project(pod.positions())
+    assert (pixels > 0).all()
+    assert (pixels < size).all()
+    reached = np.abs(pixels / np.array(size) - 0.5).max()
+    assert reached > 0.2
+
+
+def test_it_turns_about_what_is_in_the_middle() -> None:
+    pod = sphere_view((1.0, 2.0, 3.0))
+    far = pod.depth.copy()
+    far[:13], far[-13:], far[:, :16], far[:, -16:] = 1e4, 1e4, 1e4, 1e4
+    camera = first_camera([replace(pod, depth=far, mask=np.ones_like(pod.mask))], BALL, 1.0)
+    assert np.linalg.norm(camera.target) == pytest.approx(0.95, abs=0.05), "on the ball"
+    empty = pod.depth.copy()
+    empty[10:-10, 10:-10] = np.nan
+    camera = first_camera([replace(pod, depth=empty)], BALL, 1.0)
+    assert camera.distance == np.median(empty[pod.valid() & np.isfinite(empty)])
+
+
+def test_several_are_looked_between_and_the_scan_is_shown_whole() -> None:
+    camera = first_camera([from_aside(-27.5), from_aside(27.5)], BALL, 1.5)
+    expected = Camera.orbit(BALL, aspect=1.5)
+    np.testing.assert_allclose(camera.eye, expected.eye, atol=1e-9)
+    assert camera.target == expected.target
+    aside = first_camera([from_aside(10.0), from_aside(50.0)], BALL, 1.5)
+    np.testing.assert_allclose(aside.eye, Camera.orbit(BALL, 30, aspect=1.5).eye, atol=1e-9)
+
+
+def test_from_all_around_or_nowhere_it_looks_from_the_front() -> None:
+    around = [from_aside(24.0 * number) for number in range(15)]
+    for views in ([], around, [from_aside(0), from_aside(180)], [from_aside(-60), from_aside(60)]):
+        assert first_camera(views, BALL, 1.5, "+z") == Camera.orbit(BALL, aspect=1.5, up="+z")
+
+
+def test_it_is_level_unless_it_looks_up_or_down() -> None:
+    pod = sphere_view((1.0, 2.0, 3.0))
+    for up in ("+y", "-y", "+x"):
+        assert first_camera([pod], BALL, 1.0, up).up == up_vector(up)
+    below = replace(pod, world_to_camera=looking_at((0.5, 0, 4), (0, 0, 0)))
+    camera = first_camera([below], BALL, 1.0, "+z")
+    np.testing.assert_allclose(camera.rotation(), below.world_to_camera[:3, :3], atol=1e-9)
+
+
+def test_heights_are_looked_at_along_their_direction() -> None:
+    view = shape_view("plane", "height")[0]
+    positions = view.positions()
+    bounds = Bounds(positions.min(axis=0), positions.max(axis=0))
+    camera = first_camera([view], bounds, 1.2)
+    np.testing.assert_allclose(camera.rotation()[2], view.world_to_camera[2, :3], atol=1e-9)
+    pixels, _ = View.of(camera, (600, 500), np.zeros(3), bounds).project(positions)
+    assert ((pixels > 0) & (pixels < (600, 500))).all()
