@@ -110,9 +110,11 @@ def params(state: State) -> dict[str, object]:
 
 @pytest.fixture
 def levels(app: RunningApp) -> Iterator[RunningApp]:
-    """Pyramidal projection, coloured by level and not lit."""
+    """Pyramidal projection of points, coloured by level and not lit."""
     while app.state.backend != "pyramidal":
         press(app, "b")
+    if params(app.state).get("primitive") != "points":
+        app.choose(PANEL, "primitive/##value", "points##points")
     app.choose(PANEL, "color_by/##value", "level##level")
     app.choose(PANEL, "light/##value", "flat##flat")
     app.settle()
