@@ -3,6 +3,7 @@
 // 4.4.4). UPSAMPLING 0 nearest, 1 bilinear, 2 bicubic.
 #include "common/item.glsl"
 #include "common/list.glsl"
+#include "common/split.glsl"
 #include <params>
 #define REACH (UPSAMPLING == 2 ? 2 : 1)
 #include "pyramidal/around.glsl"
@@ -87,8 +88,8 @@ void main() {
     uint n = item();
     if (n >= list_count) return;
     int edge = 1 << coarsest, columns = target_size(view_size, coarsest).x;
-    int cell = int(texelFetch(listed_cells, int(n) / (edge * edge)).r), within = int(n) % (edge * edge);
-    ivec2 pixel = edge * ivec2(cell % columns, cell / columns) + ivec2(within % edge, within / edge);
+    int cell = int(texelFetch(listed_cells, int(n) >> 2 * coarsest).r), within = int(n) & edge * edge - 1;
+    ivec2 pixel = edge * split(cell, columns) + ivec2(within & edge - 1, within >> coarsest);
     if (any(greaterThanEqual(pixel, view_size))) return;
     int i = pixel.y * view_size.x + pixel.x;
     if (rows[i] != NOTHING && (levels & 1) != 0) return;

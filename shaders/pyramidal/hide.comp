@@ -1,6 +1,7 @@
 // Samples that are seen through the holes of a nearer surface are taken away: where, in the target whose cells the
 // samples of that surface all fill, it encloses the pixel (Farooq 2013, 6.3.2).
 #include "common/item.glsl"
+#include "common/split.glsl"
 #include <params>
 #define REACH 1
 #include "pyramidal/around.glsl"
@@ -15,7 +16,7 @@ void main() {
     float apart = spacing * scale_at(depth);
     int level = clamp(int(ceil(log2(max(apart, 1.0)))), 0, coarsest);
     if (level == 0) return;
-    Window window = window_of(level, ivec2(i % view_size.x, i / view_size.x));
+    Window window = window_of(level, split(i, view_size.x));
     vec2 around = depths_around(window);
     if (around.x + tolerance * cell_width(level, around.x) >= depth) return;
     vec2 span = surface_beyond(window, around, 0.0, level);

@@ -2,6 +2,7 @@
 // them. Each is listed once for each of its pixels.
 #include "common/item.glsl"
 #include "common/list.glsl"
+#include "common/split.glsl"
 #include <params>
 #define REACH 1
 #include "pyramidal/around.glsl"
@@ -11,7 +12,7 @@ layout(binding = TEXTURE_SHOWN) uniform usamplerBuffer shown;
 
 void main() {
     int i = int(item());
-    ivec2 size = target_size(view_size, coarsest), cell = ivec2(i % size.x, i / size.x);
+    ivec2 size = target_size(view_size, coarsest), cell = split(i, size.x);
     if (i >= size.x * size.y) return;
     int edge = 1 << coarsest;
     ivec2 pixels = min(edge * (cell + 1), view_size) - edge * cell;

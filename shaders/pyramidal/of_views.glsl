@@ -20,16 +20,19 @@ vec3 place_of(uint row) {
 // A unit normal along the pose's axes of one in screen view space.
 vec3 along_pose(vec3 normal) { return normal * mat3(world_to_view); }
 
-// The sample of the first level for (u, v) of a level that is there: the one nearest to a pixel coordinate among those
-// that it was made of.
+// The sample of the first level at a pixel coordinate, or else the one nearest to it among those that (u, v) of a level
+// was made of.
 ivec2 measured_under(RangeView v, int level, ivec2 uv, vec2 pixel) {
+    if (level == 0) return uv;
+    ivec2 there = clamp(ivec2(floor(pixel)), ivec2(0), v.size - 1);
+    if (is_sample(sample_index(v, 0, there))) return there;
+    int reach = v.centered ? 3 : 2;
     for (; level > 0; --level) {
         RangeLevel finer = range_level(v, level - 1);
         float least = 1e30;
         ivec2 chosen = min(2 * uv, finer.size - 1);
-        for (int k = 0; k < 9; ++k) {
-            ivec2 at = 2 * uv + ivec2(k % 3, k / 3) - (v.centered ? 1 : 0);
-            if (!v.centered && (k % 3 == 2 || k / 3 == 2)) continue;
+        for (int k = 0; k < reach * reach; ++k) {
+            ivec2 at = 2 * uv + (reach == 2 ? ivec2(k & 1, k >> 1) : ivec2(k % 3, k / 3) - 1);
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, finer.size))) continue;
             vec2 apart = level_to_pixel(v, level - 1, vec2(at)) - pixel;
             if (dot(apart, apart) >= least || !is_sample(sample_index(finer, at))) continue;
@@ -61,20 +64,26 @@ struct Mixture {
 };
 
 #if POLYGONS
-// Whether a pixel shows this triangle, by its depth. x_at, ...: of the corners from the first of the quad.
-bool shows(Corner x, Corner y, Corner z, ivec2 x_at, ivec2 y_at, ivec2 z_at, vec2 pixel, float depth, inout Mixture shown) {
+Mixture mixed_of(RangeView v, ivec4 at, uint part, vec2 pixel) {
+    RangeLevel found = range_level(v, at.y);
+    // Corners in the order of the quad's, without the one that the triangle lacks.
+    ivec2 x_at = part == 0u ? ivec2(1, 0) : ivec2(0), z_at = part == 3u ? ivec2(0, 1) : ivec2(1);
+    ivec2 y_at = part < 2u ? ivec2(0, 1) : ivec2(1, 0);
+    Corner x = corner_at(v, found, at.y, at.zw + x_at), y = corner_at(v, found, at.y, at.zw + y_at);
+    Corner z = corner_at(v, found, at.y, at.zw + z_at);
     vec3 shares = shares_at(x, y, z, pixel);
-    if (!is_inside(shares) || depth_at(x, y, z, shares) != depth) return false;
     if (view_perspective) shares /= -vec3(x.place.z, y.place.z, z.place.z);
     float sum = shares.x + shares.y + shares.z;
-    shown.shares = sum == 0.0 ? vec3(1.0, 0.0, 0.0) : shares / sum;
-    shown.index = ivec3(x.index, y.index, z.index);
-    bool first = shown.shares.x >= max(shown.shares.y, shown.shares.z);
-    ivec2 most = first ? x_at : shown.shares.y >= shown.shares.z ? y_at : z_at;
-    shown.uv += shown.shares.x * vec2(x_at) + shown.shares.y * vec2(y_at) + shown.shares.z * vec2(z_at);
-    shown.nearest += most;
-    shown.facing = cross(y.place - x.place, z.place - x.place);
-    return true;
+    shares = sum == 0.0 ? vec3(1.0, 0.0, 0.0) : shares / sum;
+    bool first = shares.x >= max(shares.y, shares.z);
+    ivec2 most = first ? x_at : shares.y >= shares.z ? y_at : z_at;
+    return Mixture(
+        shares,
+        ivec3(x.index, y.index, z.index),
+        vec2(at.zw) + shares.x * vec2(x_at) + shares.y * vec2(y_at) + shares.z * vec2(z_at),
+        at.zw + most,
+        cross(y.place - x.place, z.place - x.place)
+    );
 }
 #endif
 
@@ -129,17 +138,18 @@ float other_view(RangeView v, int level, vec3 place, vec3 normal, out float ahea
         int index = sample_index(found, at);
         float share = ((k & 1) != 0 ? part.x : 1.0 - part.x) * ((k >> 1) != 0 ? part.y : 1.0 - part.y);
         float there = sample_depth(index);
-        if (!is_sample(index) || abs(there - projected.z) > (AGREE + 1.0 / cosine) * spacing_there) return 0.0;
+        vec4 look = sample_look(index);
+        if (look.a == 0.0 || abs(there - projected.z) > (AGREE + 1.0 / cosine) * spacing_there) return 0.0;
         depth += share * there;
 #if COLOR
-        seen.color += share * to_linear(sample_look(index).rgb);
-#endif
-#if NORMAL
-        seen.normal += share * normal_of(v, index);
+        seen.color += share * to_linear(look.rgb);
 #endif
     }
     ahead = projected.z - depth;
     if (abs(ahead) > AGREE * spacing_there) return 0.0;
+#if NORMAL
+    seen.normal = normal_of(v, sample_index(found, ivec2(uv + 0.5)));
+#endif
     return weight_of(v, level, projected.xy, cosine);
 }
 
@@ -184,21 +194,14 @@ void blend(int number, RangeView v, int level, vec2 pixel, vec3 place, vec3 norm
 
 // What a pixel shows. row: of the sample that it shows most of.
 void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, out Seen seen) {
-    int index = int(item_index);
+    int index = int(item_index / PARTS);
     ivec4 at = sample_at(index, RANGE_COUNT);
     RangeView v = range_view(at.x);
     Mixture shown = Mixture(vec3(1.0, 0.0, 0.0), ivec3(index), vec2(at.zw), at.zw, vec3(0.0));
     vec2 middle = vec2(pixel) + 0.5;
 #if POLYGONS
-    RangeLevel found = range_level(v, at.y);
-    Corner a = corner_at(v, found, at.y, at.zw), b = corner_at(v, found, at.y, at.zw + ivec2(1, 0));
-    Corner c = corner_at(v, found, at.y, at.zw + ivec2(0, 1)), d = corner_at(v, found, at.y, at.zw + 1);
-    int drawn = triangles(v, at.y, a, b, c, d);
-    const ivec2 A = ivec2(0), B = ivec2(1, 0), C = ivec2(0, 1), D = ivec2(1);
-    bool done = (drawn & 1) != 0 && shows(b, c, d, B, C, D, middle, depth, shown);
-    done = done || (drawn & 2) != 0 && shows(a, c, d, A, C, D, middle, depth, shown);
-    done = done || (drawn & 4) != 0 && shows(a, b, d, A, B, D, middle, depth, shown);
-    done = done || (drawn & 8) != 0 && shows(a, b, c, A, B, C, middle, depth, shown);
+    uint part = item_index % PARTS;
+    if (part != ALONE) shown = mixed_of(v, at, part, middle);
 #endif
     row = sample_id(v, measured_under(v, at.y, shown.nearest, level_to_pixel(v, at.y, shown.uv)));
     seen = UNSEEN;

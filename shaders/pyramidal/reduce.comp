@@ -3,6 +3,7 @@
 // is; COLOR, NORMAL, VALUE: which channels there are; POLYGONS: a pixel's own centre is where its sample is.
 #include "common/view.glsl"
 #include "common/item.glsl"
+#include "common/split.glsl"
 #include "pyramidal/targets.glsl"
 #include <params>
 #include "pyramidal/seen.glsl"
@@ -38,7 +39,7 @@ void main() {
     ivec2 size = target_size(view_size, level), finer = target_size(view_size, level - 1);
     if (i >= size.x * size.y) return;
     int start = FIRST != 0 ? 0 : target_start(view_size, level - 1), from = -1;
-    ivec2 cell = ivec2(i % size.x, i / size.x);
+    ivec2 cell = split(i, size.x);
     uint key = NO_DEPTH, lowest = NOTHING, filled = 0u;
     for (int k = 0; k < 4; ++k) {
         ivec2 at = 2 * cell + ivec2(k & 1, k >> 1);
@@ -71,7 +72,7 @@ void main() {
 #endif
         words = pack_seen(seen);
 #if POLYGONS
-        out_spots[place] = vec2(from % view_size.x, from / view_size.x) + 0.5;
+        out_spots[place] = vec2(split(from, view_size.x)) + 0.5;
 #else
         out_spots[place] = to_pixel(place_of(lowest));
 #endif

@@ -1,5 +1,6 @@
 // What pixels show of the samples that were scattered into them. <source> says what a sample is.
 #include "common/item.glsl"
+#include "common/split.glsl"
 #include "common/view.glsl"
 #include "pyramidal/pixels.glsl"
 #include <source>
@@ -10,6 +11,6 @@ void main() {
     float depth = uintBitsToFloat(depths[i]);
     uint row;
     Seen seen;
-    own_pixel(ivec2(i % view_size.x, i / view_size.x), rows[i], depth, row, seen);
+    own_pixel(split(i, view_size.x), rows[i], depth, row, seen);
     store(i, depth, row, 0, seen);
 }

@@ -65,12 +65,12 @@ vec3 plane_normal(RowOfSamples row, Column columns[2 * REACH + 1], vec3 place) {
 
 void main() {
     uint i = item();
+    if (i >= list_count) return;
+    uint place = texelFetch(listed_tiles, int(i) / RANGE_TILE).r * uint(RANGE_TILE) + i % uint(RANGE_TILE);
     RowOfSamples row;
-    if (i >= list_count || !row_of_samples(i, row)) return;
+    if (made[place] != 0u || !row_of_samples(i, row)) return;
     int first = sample_index(row.range, row.first) - page;
     if (first < 0 || first >= page_size) return;
-    uint place = texelFetch(listed_tiles, int(i) / RANGE_TILE).r * uint(RANGE_TILE) + i % uint(RANGE_TILE);
-    if (made[place] != 0u) return;
     made[place] = 1u;
     Column columns[2 * REACH + 1];
     // Places are summed relative to one of them, so that float32 keeps what they differ by.

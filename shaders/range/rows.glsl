@@ -20,7 +20,7 @@ bool row_of_samples(uint i, out RowOfSamples row) {
     row.view = range_view(at.x);
     row.range = range_level(row.view, at.y);
     int columns = (row.range.size.x + RANGE_TILE - 1) / RANGE_TILE, within = tile - row.range.first_tile;
-    row.first = RANGE_TILE * ivec2(within % columns, within / columns) + ivec2(0, int(i) % RANGE_TILE);
+    row.first = RANGE_TILE * split(within, columns) + ivec2(0, int(i) % RANGE_TILE);
     row.last = ivec2(min(row.first.x + RANGE_TILE, row.range.size.x), row.first.y);
     return row.first.y < row.range.size.y;
 }

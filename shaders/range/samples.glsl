@@ -5,6 +5,8 @@
 // pixel centres at +0.5. Pod space is the camera space of the view's pod (right, up, back), screen view space
 // that of the picture. Results are `precise`: whatever program computes them finds the same bits.
 
+#include "common/split.glsl"
+
 layout(binding = TEXTURE_RANGE_DEPTHS) uniform samplerBuffer range_depths;
 layout(binding = TEXTURE_RANGE_LOOKS) uniform samplerBuffer range_looks;  // sRGB; alpha 0: no sample
 layout(binding = TEXTURE_RANGE_XY) uniform samplerBuffer range_xy;
@@ -85,7 +87,7 @@ ivec4 sample_of_id(uint id, int view_count) {
     }
     uvec4 form = texelFetch(range_views, low * RANGE_ENTRY + 9);
     uint within = id - form.w;
-    return ivec4(low, 0, int(within % form.x), int(within / form.x));
+    return ivec4(low, 0, split(int(within), int(form.x)));
 }
 
 // The view, level, u and v of a place in the buffers.
@@ -102,7 +104,7 @@ ivec4 sample_at(int index, int view_count) {
     ivec4 found = ivec4(low / RANGE_MOST_LEVELS, low % RANGE_MOST_LEVELS, 0, 0);
     uvec4 level = texelFetch(range_views, found.x * RANGE_ENTRY + RANGE_LEVELS_AT + found.y);
     int within = index - int(level.x);
-    found.zw = ivec2(within % int(level.z), within / int(level.z));
+    found.zw = split(within, int(level.z));
     return found;
 }
 

@@ -52,7 +52,6 @@ _KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
 _ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
 _SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
 _SOFTWARE_RUN = 16  # samples of a row that an invocation makes where it is invocations that take long
-_PAGE = 1 << 24  # normals that a shader writes at a time: 64 MiB
 
 
 @dataclass(frozen=True)
@@ -219,8 +218,9 @@ class RangeSamples:
         self._bind_read()
         tiles.texels.bind(Texture.DRAWN_ROWS)
         with gpu.timers.measure("normals"):
-            for first in range(0, self._total, _PAGE):
-                size = min(_PAGE, self._total - first)
+            page = gpu.max_storage_bytes // 4 // _ALIGNED * _ALIGNED  # that a shader writes at a time
+            for first in range(0, self._total, page):
+                size = min(page, self._total - first)
                 words = known.words.buffer
                 words.bind_to_storage_buffer(Storage.RANGE_NORMALS, offset=4 * first, size=4 * size)
                 known.rows.bind_to_storage_buffer(Storage.RANGE_ROWS)

@@ -25,7 +25,10 @@ Corner corner_at(RangeView v, RangeLevel found, int level, ivec2 uv) {
 }
 
 // Corners of a quad: 0 at (u, v), 1 to the right, 2 below, 3 below to the right. A triangle goes by the corner that it
-// lacks.
+// lacks. A pixel shows an item: a triangle of the quad that a sample is the first corner of, or that sample alone.
+const uint ALONE = 4u, PARTS = 8u;
+
+uint item_of(int index, uint part) { return PARTS * uint(index) + part; }
 
 bool joined(RangeView v, int level, Corner a, Corner b) {
     return a.there && b.there && same_surface(v, level, a.depth, b.depth);

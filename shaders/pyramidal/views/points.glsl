@@ -14,6 +14,6 @@ void scatter(uint i) {
         if (dot(sample_normal(row.view, row.level, uv), view_perspective ? a.place : vec3(0.0, 0.0, -1.0)) > 0.0) continue;
 #endif
         ivec2 at = ivec2(a.pixel);
-        visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), uint(a.index));
+        visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), item_of(a.index, ALONE));
     }
 }

@@ -1,5 +1,5 @@
 // Quads of neighbouring samples go to the pixels whose centres their triangles hold; a sample of no triangle to the one
-// that it lies in. What a pixel keeps is the place of the quad's first corner in the buffers. CULL_BACK: triangles that
+// that it lies in. CULL_BACK: triangles that
 // show their backs are left out.
 #include <params>
 #include "pyramidal/views/grid.glsl"
@@ -8,10 +8,10 @@
 void visit_point(Corner a) {
     if (any(lessThan(a.pixel, vec2(0.0))) || any(greaterThanEqual(a.pixel, vec2(view_size)))) return;
     ivec2 at = ivec2(a.pixel);
-    visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), uint(a.index));
+    visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), item_of(a.index, ALONE));
 }
 
-void visit_triangle(Corner x, Corner y, Corner z, float front, uint index) {
+void visit_triangle(Corner x, Corner y, Corner z, float front, uint own) {
     vec2 low = min(x.pixel, min(y.pixel, z.pixel)), high = max(x.pixel, max(y.pixel, z.pixel));
     ivec2 first = max(ivec2(ceil(low - 0.5)), ivec2(0)), last = min(ivec2(floor(high - 0.5)), view_size - 1);
 #if CULL_BACK
@@ -22,7 +22,7 @@ void visit_triangle(Corner x, Corner y, Corner z, float front, uint index) {
             vec3 shares = shares_at(x, y, z, vec2(column, row) + 0.5);
             if (!is_inside(shares)) continue;
             uint key = floatBitsToUint(depth_at(x, y, z, shares));
-            visit(uint(row * view_size.x + column), key, index);
+            visit(uint(row * view_size.x + column), key, own);
         }
 }
 
@@ -35,11 +35,10 @@ void scatter(uint i) {
         Corner b = corner_at(row.view, row.range, row.level, uv + ivec2(1, 0));
         Corner d = corner_at(row.view, row.range, row.level, uv + ivec2(1, 1));
         int drawn = triangles(row.view, row.level, a, b, c, d);
-        uint index = uint(a.index);
-        if ((drawn & 1) != 0) visit_triangle(b, c, d, -1.0, index);
-        if ((drawn & 2) != 0) visit_triangle(a, c, d, -1.0, index);
-        if ((drawn & 4) != 0) visit_triangle(a, b, d, 1.0, index);
-        if ((drawn & 8) != 0) visit_triangle(a, b, c, 1.0, index);
+        if ((drawn & 1) != 0) visit_triangle(b, c, d, -1.0, item_of(a.index, 0u));
+        if ((drawn & 2) != 0) visit_triangle(a, c, d, -1.0, item_of(a.index, 1u));
+        if ((drawn & 4) != 0) visit_triangle(a, b, d, 1.0, item_of(a.index, 2u));
+        if ((drawn & 8) != 0) visit_triangle(a, b, c, 1.0, item_of(a.index, 3u));
         if (drawn == 0 && a.there) visit_point(a);
         a = b;
         c = d;
