@@ -10,8 +10,8 @@ from __future__ import annotations
 import os
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from importlib.util import find_spec
 from itertools import chain, count, product
 from pathlib import Path
@@ -19,6 +19,11 @@ from pathlib import Path
 from ..backends import backend, backends
 from ..bench import numerics
 from ..bench.forecast import forecast
+from ..bench.papers.farooq_2013 import pyramids
+from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
+from ..bench.papers.farooq_2013.farooq import write_farooq
+from ..bench.papers.farooq_2013.large_views import measure_large_views
+from ..bench.papers.farooq_2013.playing import measure_playing
 from ..bench.papers.slomp_2014 import octree_sizes, octrees
 from ..bench.papers.slomp_2014 import surfels as slomp
 from ..bench.papers.slomp_2014.octree_tables import NAME as OCTREE_TABLES
@@ -29,10 +34,12 @@ from ..bench.plan import Group, plan
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
+    LARGE_VIEWS,
     NOTES,
     NUMERICS,
     OCTREE_SIZES,
     OCTREES,
+    PLAYING,
     RESULTS,
     Row,
     compare,
@@ -49,11 +56,51 @@ from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
 
-_SUITES = ("scenes", "numerics", "slomp", "octrees")
-_OF_THE_PAPER = {
-    "slomp": (slomp.groups, write_table_two, TABLE_TWO),
-    "octrees": (octrees.groups, write_octree_tables, OCTREE_TABLES),
+
+@dataclass(frozen=True)
+class _PaperSuite:
+    """A suite of a paper.
+
+    groups: what is drawn of scenes. write_page: makes the page of a folder. page: its name. others: what else
+    is measured, by the files of its rows. usual: settings unless told otherwise.
+    """
+
+    groups: Callable[[], list[Group]]
+    write_page: Callable[[Path], Path]
+    page: str
+    others: Mapping[str, Callable[[Bench], Iterator[Row]]] = field(default_factory=dict)
+    usual: BenchSettings = field(default_factory=BenchSettings)
+
+
+def _octree_scans(bench: Bench) -> Iterator[Row]:
+    """Octrees built and cut, of the scans that are there."""
+    missing = catalog.scene_names(bench.settings.data)
+    scans = [scan for scan in slomp.scans() if not missing[scan.scene]]
+    return octrees.build_and_cut(bench, scans)
+
+
+def _octree_sizes(bench: Bench) -> Iterator[Row]:
+    return map(asdict, octree_sizes.measure(bench.settings.data))
+
+
+_OF_THE_PAPERS = {
+    "slomp": _PaperSuite(slomp.groups, write_table_two, TABLE_TWO),
+    "octrees": _PaperSuite(
+        octrees.groups,
+        write_octree_tables,
+        OCTREE_TABLES,
+        {OCTREES: _octree_scans, OCTREE_SIZES: _octree_sizes},
+        BenchSettings(frames=0),  # how voxels flicker, the scenes tell
+    ),
+    "farooq": _PaperSuite(
+        pyramids.groups,
+        write_farooq,
+        FAROOQ,
+        {LARGE_VIEWS: measure_large_views, PLAYING: measure_playing},
+        BenchSettings(size=(640, 480), views=8, frames=0),
+    ),
 }
+_SUITES = ("scenes", "numerics", *_OF_THE_PAPERS)
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -125,7 +172,7 @@ def run(args: Namespace) -> int:
         return 0
     if args.compare and args.suite == "numerics":
         raise InputError("--compare is for the scenes", "--suite numerics")
-    if args.suite in _OF_THE_PAPER and (args.backend or args.scene):
+    if args.suite in _OF_THE_PAPERS and (args.backend or args.scene):
         raise InputError(
             "has its own scenes and renderer", f"--suite {args.suite}", "Leave out --scene and --backend"
         )
@@ -142,7 +189,7 @@ def run(args: Namespace) -> int:
     for name in missing:
         warn(name)
 
-    _foretell(bench, groups, tested)
+    _foretell(bench, groups, tested, _others(args))
     steps = sum(map(bench.steps, groups))
     measured: list[bool] = []
     try:
@@ -150,8 +197,8 @@ def run(args: Namespace) -> int:
             measured += [_write(args.out / RESULTS, bench, steps, _measured(bench, groups))]
             lines = bench.until_stopped(bench.numerics(tested))
             measured += [_write(args.out / NUMERICS, bench, _lines(tested), lines)]
-            if args.suite == "octrees":
-                measured += _octrees(args.out, bench)
+            for name, measure in _others(args).items():
+                measured += [_write(args.out / name, bench, 0, bench.until_stopped(measure(bench)))]
         if not any(measured):
             if bench.stopped:
                 raise KeyboardInterrupt
@@ -171,25 +218,27 @@ def run(args: Namespace) -> int:
 def _report(args: Namespace) -> None:
     """Make the pages of the rows in the folder, and say what is there."""
     tell(write_report(args.out))
-    if args.suite in _OF_THE_PAPER:
-        _, write_page, _ = _OF_THE_PAPER[args.suite]
-        tell(write_page(args.out))
+    if args.suite in _OF_THE_PAPERS:
+        tell(_OF_THE_PAPERS[args.suite].write_page(args.out))
+
+
+def _others(args: Namespace) -> Mapping[str, Callable[[Bench], Iterator[Row]]]:
+    """Other measurements of a paper's suite than pictures of scenes, by the files of their rows."""
+    return _OF_THE_PAPERS[args.suite].others if args.suite in _OF_THE_PAPERS else {}
 
 
 def _report_files(args: Namespace) -> list[Path]:
     """The files that `_report` writes, and the plots that it replaces by its own."""
     names = [PAGE]
-    if args.suite in _OF_THE_PAPER:
-        *_, name = _OF_THE_PAPER[args.suite]
+    if args.suite in _OF_THE_PAPERS:
+        name = _OF_THE_PAPERS[args.suite].page
         names += [f"{name}.md", f"{name}.json"]
     return [*(args.out / name for name in names), *sorted((args.out / "plots").glob("*.png"))]
 
 
 def _claim(args: Namespace, settings: BenchSettings, groups: Sequence[Group], numerics: bool) -> None:
     """Raise InputError where the folder has results that are not to be replaced."""
-    names = [*([RESULTS] if groups else []), *([NUMERICS] if numerics else []), NOTES]
-    if args.suite == "octrees":
-        names += [OCTREES, OCTREE_SIZES]
+    names = [*([RESULTS] if groups else []), *([NUMERICS] if numerics else []), NOTES, *_others(args)]
     judged = [group for group in groups if group.judged and not group.sweep]
     scenes = dict.fromkeys(settings.subject(group).name for group in judged)
     drawn = dict.fromkeys(contender.backend for group in judged for contender in group.contenders)
@@ -209,19 +258,6 @@ def _measured(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
         except InputError as error:
             bench.note(f"{group.scene} is left out: {error}")
             warn(bench.notes[-1])
-
-
-def _octrees(out: Path, bench: Bench) -> list[bool]:
-    """Build, cut and store octrees; of each whether there were any."""
-    missing = catalog.scene_names(bench.settings.data)
-    scans = [scan for scan in slomp.scans() if not missing[scan.scene]]
-    tell(f"{len(scans) * len(octrees.DELTAS)} rows of octrees, and their sizes: some seconds each")
-    trees = bench.until_stopped(octrees.build_and_cut(bench, scans))
-    sizes = bench.until_stopped(map(asdict, octree_sizes.measure(bench.settings.data)))
-    return [
-        _write(out / OCTREES, bench, len(scans) * len(octrees.DELTAS), trees),
-        _write(out / OCTREE_SIZES, bench, 0, sizes),
-    ]
 
 
 def _write(path: Path, bench: Bench, steps: int, rows: Iterator[Row]) -> bool:
@@ -256,7 +292,7 @@ def _lines(names: Sequence[str]) -> int:
     return len(names) * sum(1 for _ in numerics.rows())
 
 
-def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str]) -> None:
+def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str], others: Iterable[str]) -> None:
     """Say how much there is to do and how long it will take."""
     if groups:
         seconds = forecast(bench, groups)
@@ -264,6 +300,8 @@ def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str]) -> N
         minutes = f"{seconds / 60:.0f} minutes" if seconds >= 100 else f"{seconds:.0f} seconds"
         scenes = len({group.scene for group in groups})
         tell(f"{rows} rows on {scenes} scenes: about {minutes}")
+    if others:
+        tell(f"Then {', '.join(others)}: some minutes")
     if tested:
         tell(f"{_lines(tested)} rows of the stability suite: some seconds a backend")
 
@@ -280,11 +318,10 @@ def _settings(args: Namespace) -> BenchSettings:
             f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
-    if args.suite == "octrees":
-        told["frames"] = 0  # how voxels flicker, the scenes tell
-    return replace(
-        _QUICK if args.quick else BenchSettings(), **{k: v for k, v in told.items() if v is not None}
-    )
+    usual = _OF_THE_PAPERS[args.suite].usual if args.suite in _OF_THE_PAPERS else BenchSettings()
+    if args.quick:
+        usual = replace(_QUICK, frames=min(_QUICK.frames, usual.frames))
+    return replace(usual, **{name: value for name, value in told.items() if value is not None})
 
 
 def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> tuple[list[Group], list[str]]:
@@ -292,9 +329,8 @@ def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> t
     if args.suite == "numerics":
         return [], []
     missing = {name: reason for name, reason in catalog.scene_names(settings.data).items() if reason}
-    if args.suite in _OF_THE_PAPER:
-        make_groups, *_ = _OF_THE_PAPER[args.suite]
-        groups = make_groups()
+    if args.suite in _OF_THE_PAPERS:
+        groups = _OF_THE_PAPERS[args.suite].groups()
         lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
         return [group for group in groups if group.scene not in lacking], _left_out(lacking)
     known = _QUICK_SCENES if args.quick else catalog.scene_names(settings.data)

@@ -8,13 +8,12 @@ goes to docs/data/ under a name of its own, with what its numbers do not tell in
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
 from ...files import whole_file
-from ..papers.slomp_2014 import surfels as slomp
 from .results import Row
 
 Measurement = dict[str, Any]
@@ -73,14 +72,14 @@ def _to_text(measurement: Measurement) -> str:
 # --- of a page ------------------------------------------------------------------------
 
 
-def machines(measurements: Sequence[Measurement], backend: str) -> str:
-    """A Markdown list of where the paper's and ours were measured, and with what parameters of a backend."""
-    return "\n".join(f"* {line}" for line in (_paper(), *(_machine(each, backend) for each in measurements)))
+def machines(measurements: Sequence[Measurement], backend: str, paper: Mapping[str, Any]) -> str:
+    """A Markdown list of where the paper's and ours were measured, and with what parameters of a backend.
 
-
-def _paper() -> str:
-    paper = slomp.paper()
-    return f"**2014**: {paper['gpu']}; {paper['cpu']}; {paper['system']}; {_TIMERS['query']}"
+    paper: its `year` and `gpu`, and of `cpu`, `system` and `timing` what it tells.
+    """
+    told = (paper[part] for part in ("gpu", "cpu", "system", "timing") if part in paper)
+    lines = (f"**{paper['year']}**: {'; '.join(told)}", *(_machine(each, backend) for each in measurements))
+    return "\n".join(f"* {line}" for line in lines)
 
 
 def _machine(measurement: Measurement, backend: str) -> str:

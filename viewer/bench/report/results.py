@@ -18,6 +18,7 @@ Row = dict[str, Any]
 
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
 OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
+LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -30,6 +31,8 @@ _NEEDED: dict[str, dict[str, Any]] = {
     NUMERICS: {"row": str, "backend": str, "held": bool},
     OCTREES: {"scene": str, "n": int, "delta": int, "poses": int, "ms": dict, "sorts": dict},
     OCTREE_SIZES: {"scene": str, "points": int, "stop": str, "bits": dict},
+    LARGE_VIEWS: {"scenario": str, "levels": int, "primitive": str, "samples": int},
+    PLAYING: {"scene": str, "poses": int, "primitive": str, "reading": dict, "playing": dict},
 }  # fmt: skip
 
 # --- what is measured -----------------------------------------------------------------

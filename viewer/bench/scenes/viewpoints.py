@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,21 +75,23 @@ def pod_viewpoints(
     cameras = []
     for pair, place in enumerate(evenly(np.arange((count + 1) // 2), shift)):
         view = views[pair % len(views)]
-        camera = _from_pod(view, _sample_near(view, place), zoom, size, up)
+        camera = pod_camera(view, sample_near(view, place), zoom, size, up)
         cameras += [camera, camera.orbited(_ASIDE, 0)]
     return cameras[:count]
 
 
-def _sample_near(view: RangeView, place: NDArray[np.float64]) -> Rays:
+def sample_near(view: RangeView, place: NDArray[np.float64]) -> Rays:
     """The world position (3,) of the sample nearest to a place in the box around all of them, 0 to 1."""
     pixels = np.argwhere(view.valid())
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     nearest = np.square(pixels - (low + place * (high - low))).sum(axis=1).argmin()
-    return view.positions()[nearest]
+    alone = np.zeros_like(view.mask)
+    alone[tuple(pixels[nearest])] = True
+    return replace(view, mask=alone).positions()[0]
 
 
-def _from_pod(view: RangeView, target: Rays, zoom: float, size: tuple[int, int], up: str) -> Camera:
-    """A camera in the pod's direction from a sample (3,), at a zoom."""
+def pod_camera(view: RangeView, target: Rays, zoom: float, size: tuple[int, int], up: str = "+y") -> Camera:
+    """A camera in the pod's direction from a sample (3,), at a zoom as `pod_viewpoints` has it."""
     rotation, translation = view.world_to_camera[:3, :3], view.world_to_camera[:3, 3]
     focal = float(np.sqrt(view.fx * view.fy))
     if view.kind == "height":

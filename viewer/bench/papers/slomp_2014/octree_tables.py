@@ -109,7 +109,7 @@ def page(measurements: Sequence[Measurement]) -> str:
         ratios=fed.ratios(measurements),
         levels=_levels(measurements),
         sizes=_sizes(sizes) if sizes else "",
-        machines=machines(measurements, BACKEND),
+        machines=machines(measurements, BACKEND, slomp.paper()),
     )
 
 

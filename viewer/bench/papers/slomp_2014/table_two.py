@@ -36,5 +36,5 @@ def page(measurements: Sequence[Measurement]) -> str:
     return text.format(
         milliseconds=_TABLE.milliseconds(measurements),
         ratios=_TABLE.ratios(measurements),
-        machines=machines(measurements, slomp.BACKEND),
+        machines=machines(measurements, slomp.BACKEND, slomp.paper()),
     )

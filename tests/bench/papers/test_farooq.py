@@ -1,0 +1,144 @@
+"""The page of pyramids: what stands in its cells, what is refused, and what is measured for it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from viewer.bench.papers.farooq_2013 import pyramids
+from viewer.bench.papers.farooq_2013.farooq import digest, page, read_measurement, write_farooq
+from viewer.bench.papers.farooq_2013.large_views import scan_head
+from viewer.bench.report.results import LARGE_VIEWS, PLAYING, RESULTS, Row, write_row
+from viewer.errors import InputError
+
+NONE = "\N{EN DASH}"
+PARAMS = {"fill": True, **{f"level_{k}": True for k in range(5)}, "primitive": "points", "hide": True}
+WHERE = {
+    "device": "a card", "driver": "4.6", "timer": "finish", "processors": 4, "version": "0.1.0",
+    "date": "2026-01-31", "size": [640, 480], "seed": 0, "repeat": 3,
+}  # fmt: skip
+
+
+def a_row(scene: str, zoom: float, chosen: dict[str, Any], hole: float = 0.5, **changes: Any) -> Row:
+    same = ("hole_percent", "through_percent", "depth_median_px", "boundary_p95", "spill_p95", "psnr")
+    own = {"hole_scanned_percent": hole, "psnr_scanned": 40 - hole, "wrong_layer_percent": hole}
+    return {
+        "backend": "pyramidal", "scene": scene, "scene_hash": "0", "n": 9, "noise": 0.0, "zoom": zoom,
+        "sweep": "zoom", "params": {**PARAMS, **chosen}, "views": 2, "gpu_ms": {"median": 1.0},
+        "errors": {**dict.fromkeys(same, 1.0), **own},
+        "times_by_view": {name: [1.0, 3.0] for name in ("gpu_ms", "cpu_ms", "busy_ms")}, **WHERE, **changes,
+    }  # fmt: skip
+
+
+ALONE = {"fill": False, "level_3": False}
+DRAWN = [
+    a_row("demo-pair", 1.0, ALONE, 30),
+    a_row("demo-pair", 1.0, {"level_2": False, "level_3": False, "level_4": False}, 12),
+    a_row("demo-pair", 1.0, {}, 8),
+    a_row("demo-pair", 1.0, {}, 7, backend="range-mesh", params={}),
+    a_row("demo-pair", 4.0, ALONE, 90),
+    a_row("armadillo-pair", 4.0, {"hide": False}, 5, sweep="hide"),
+    a_row("armadillo-pair", 4.0, {}, 0.25, sweep="hide"),
+]
+LARGE = [
+    {
+        "scenario": "extreme close-up", "levels": 5, "primitive": "points", "samples": 27_000_000,
+        "measured": 9_000_000, "zoom": 8.0, "ms": 500.0, "unskipped_ms": 2000.0, "covered": 99.6,
+        "open_ms": 2500.0, "read_ms": 1500.0, "bytes_per_sample": 10.67, **WHERE,
+    }
+]  # fmt: skip
+PLAYED = [
+    {
+        "scene": "demo-pair", "poses": 30, "primitive": "points",
+        "reading": {"fps": 8.0, "upload_ms": 9.0, "derive_ms": 0.0},
+        "playing": {"fps": 12.0, "upload_ms": 4.0, "derive_ms": 0.0}, **WHERE, "size": [960, 640],
+    }
+]  # fmt: skip
+MADE = digest(DRAWN, LARGE, PLAYED)
+
+
+def cells(text: str, *start: str) -> list[list[str]]:
+    """The cells of the lines of tables that begin so."""
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if "|" in line]
+    return [line for line in lines if tuple(line[: len(start)]) == start]
+
+
+def test_holes_stand_by_levels_and_zoom() -> None:
+    text = page([MADE])
+    holes, psnr, *_ = cells(text, "`demo-pair`", "level 0 alone")
+    assert holes[2:] == [NONE, "30.0", NONE, "90.0", NONE]
+    assert psnr[3] == "10.0"
+    assert cells(text, "", "2 levels")[0][3] == "12.0"
+    assert cells(text, "", "5 levels")[0][3] == "8.00"
+    assert cells(text, "", "`range-mesh`")[0][3] == "7.00"
+
+
+def test_hidden_points_say_how_many_times_less_shows() -> None:
+    (line,) = cells(page([MADE]), "`armadillo-pair`", "5 levels")
+    assert line[2:] == ["5.00", "0.250", "20.0", "1.00", "1.00"]
+
+
+def test_large_views_stand_under_the_lines_of_the_thesis() -> None:
+    text = page([MADE])
+    assert [line[6:8] for line in cells(text, "full view, all hole filling")] == [["122", "4.50"]]
+    (line,) = cells(text, "", "", "a card", "points")
+    assert line[4:] == ["8.00", "100 %", "54.0", "2.00", "500", "2000", "4.00"]
+    (line,) = cells(text, "Scan4D, its pyramid")
+    assert line[1:3] == ["a card", "10.7"]
+    assert line[5:] == ["1.50", "2.50"]
+    assert [line[2] for line in cells(text, "triangle strip")] == ["23.0"]
+
+
+def test_playing_is_told_while_it_is_read_and_after() -> None:
+    (line,) = cells(page([MADE]), "a card", "points", "30")
+    assert line[3:] == ["960x640", "8.00", "12.0", "4.00", "0"]
+
+
+def test_pages_are_of_several_machines_too() -> None:
+    other = {**MADE, "device": "another card"}
+    text = page([MADE, other])
+    assert len(cells(text, "another card", "points", "30")) == 1
+    assert "**2013**: ATI Radeon HD 5870" in text
+    assert "**another card**" in text
+    assert page([])  # the thesis' figures alone
+
+
+def test_what_was_measured_of_pyramids_survives_its_file(tmp_path: Path) -> None:
+    for name, rows in ((RESULTS, DRAWN), (LARGE_VIEWS, LARGE), (PLAYING, PLAYED)):
+        with open(tmp_path / name, "w", encoding="utf-8") as stream:
+            for row in rows:
+                write_row(stream, row)
+    written = write_farooq(tmp_path)
+    assert read_measurement(tmp_path / "farooq.json") == MADE
+    assert written.read_text(encoding="utf-8") == page([MADE])
+
+
+def test_what_is_no_measurement_of_pyramids_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no zooms"):
+        digest([{**row, "sweep": ""} for row in DRAWN], [], [])
+    path = tmp_path / "farooq.json"
+    for text in ("", "[]", json.dumps({"rows": []})):
+        path.write_text(text)
+        with pytest.raises(InputError, match=r"farooq\.json"):
+            read_measurement(path)
+
+
+def test_levels_are_counted_as_they_are_shown() -> None:
+    assert [pyramids.levels_of(row["params"]) for row in DRAWN[:3]] == [1, 2, 5]
+
+
+def test_the_figures_of_the_thesis_agree_with_each_other() -> None:
+    paper = pyramids.paper()
+    width, height = paper["view_size"]
+    samples = paper["views"] * width * height
+    for line in paper["scenarios"]:
+        assert line["samples_per_second"] == line["frames_per_second"] * samples
+
+
+def test_pods_see_a_head_that_fills_their_views() -> None:
+    views = scan_head((60, 90))
+    assert [view.depth.shape for view in views] == [(90, 60)] * 2
+    assert all(view.valid().mean() > 0.5 for view in views)
