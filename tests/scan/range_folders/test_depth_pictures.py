@@ -20,6 +20,7 @@ from depth_folders import (
     write_matrix,
 )
 
+from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.scan.listing import list_folder
 from viewer.scan.open import find_source, open_scan
@@ -164,6 +165,10 @@ def test_without_a_calibration_it_says_what_is_missing(tmp_path: Path) -> None:
 def test_pictures_beside_a_scan_are_left_alone(tmp_path: Path) -> None:
     put(tmp_path, "a", camera=False)
     np.save(tmp_path / "scan.npy", np.eye(3))
+    assert find_source(tmp_path).label(0) == "scan.npy"
+    (tmp_path / "a.png").unlink()
+    write_color(tmp_path / "depth_shown.png", colors())
+    Camera().save(tmp_path / "camera.json")  # that of a picture of ours
     assert find_source(tmp_path).label(0) == "scan.npy"
 
 

@@ -58,13 +58,15 @@ def of_pinhole(f: float, cx: float, cy: float, **others: Any) -> Calibration:
 PRIMESENSE = of_pinhole(525.0, 319.5, 239.5)
 
 
-def beside(folder: Path, names: Sequence[str], default: Calibration | None = None) -> Calibration | None:
-    """The calibration of the folder's camera.json or camera.txt; what it does not tell is as in the default.
+def calibration_file(names: Sequence[str]) -> str | None:
+    """The name among those of a folder that is of a calibration's file, None where none is."""
+    return next((name for name in FILES if name in names), None)
 
-    Without such a file it is the default. Raises InputError.
-    """
-    found = next((name for name in FILES if name in names), None)
-    return default if found is None else read_calibration(folder / found, default)
+
+def calibration_beside(folder: Path, names: Sequence[str], default: Calibration) -> Calibration:
+    """The calibration in the folder's file, or the default where it has none. Raises InputError."""
+    name = calibration_file(names)
+    return default if name is None else read_calibration(folder / name, default)
 
 
 def read_calibration(path: Path, default: Calibration | None = None) -> Calibration:

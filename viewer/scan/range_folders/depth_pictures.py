@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from .. import formats
 from ..image_poses import UPRIGHT
-from . import _calibration
+from ._calibration import calibration_file, read_calibration
 from ._partners import frames_of_pictures, named_pictures, pose_of_file
 from ._pictures import is_depth
 from ._source import RangeFrames
@@ -24,21 +24,24 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
 
     Raises InputError where depth pictures are all that there is, and their calibration is missing.
     """
-    calibration = _calibration.beside(folder, names)
-    pictures = named_pictures(folder, names)
-    if not pictures or not (calibration or is_depth(pictures[0].depth)):
+    pictures, camera = named_pictures(folder, names), calibration_file(names)
+    if not pictures:
         return None
-    if calibration is None:
-        if _is_another_scan(names):
+    has_scans = _has_scan_files(names)
+    if (camera is None or has_scans) and not is_depth(pictures[0].depth):
+        return None
+    if camera is None:
+        if has_scans:
             return None
         raise InputError("holds depth pictures, but nothing tells their camera", folder, _HINT)
+    calibration = read_calibration(folder / camera)
     have_poses = any(picture.pose for picture in pictures)
     return frames_of_pictures(
         folder, pictures, calibration, lambda index: pose_of_file(pictures[index]) if have_poses else UPRIGHT
     )
 
 
-def _is_another_scan(names: Sequence[str]) -> bool:
+def _has_scan_files(names: Sequence[str]) -> bool:
     """Whether there are scan files beside the pictures; text tables there are notes."""
     suffixes = {Path(name).suffix.lower() for name in names}
     return bool(suffixes & {*formats.known_suffixes()} - formats.NOTES)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..image_poses import UPRIGHT, from_camera_to_world
-from . import _calibration
-from ._calibration import PRIMESENSE
+from ._calibration import PRIMESENSE, calibration_beside
 from ._partners import DEPTH_FOLDER, DepthPicture, frames_of_pictures, named_pictures
 from ._source import RangeFrames
 from ._texts import text_of
@@ -36,7 +35,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     pictures = _pairs(folder) if _PAIRS in known else named_pictures(folder, names)
     if not pictures:
         raise InputError("holds no depth pictures", folder / DEPTH_FOLDER, "They are 16-bit PNG")
-    calibration = _calibration.beside(folder, names, PRIMESENSE) or PRIMESENSE
+    calibration = calibration_beside(folder, names, PRIMESENSE)
     log = next((name for name in _LOGS if name in names), None)
     poses = None if log is None else read_log(folder / log)
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import _calibration
-from ._calibration import of_pinhole, read_calibration
+from ._calibration import calibration_beside, of_pinhole, read_calibration
 from ._partners import frames_of_pictures, named_pictures, pose_of_file
 from ._source import RangeFrames
 
@@ -29,7 +28,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     if _INTRINSICS in names:
         calibration = read_calibration(folder / _INTRINSICS, _KINECT)
     else:
-        calibration = _calibration.beside(folder, names, _KINECT) or _KINECT
+        calibration = calibration_beside(folder, names, _KINECT)
     return frames_of_pictures(
         folder, pictures, calibration, lambda i: pose_of_file(pictures[i]), [_INTRINSICS]
     )

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
 from ..image_poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
-from . import _calibration
-from ._calibration import PRIMESENSE
+from ._calibration import PRIMESENSE, calibration_beside
 from ._partners import DepthPicture, frames_of_pictures
 from ._source import RangeFrames
 from ._texts import text_of
@@ -43,7 +42,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         DepthPicture(folder / words[0], folder / color[0] if color else None)
         for words, color in zip(rows, colors, strict=True)
     ]
-    calibration = _calibration.beside(folder, names, _KINECT) or _KINECT
+    calibration = calibration_beside(folder, names, _KINECT)
 
     def pose(index: int) -> NDArray[np.float64]:
         if poses is None:
