@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from . import formats
 from .points import UNKNOWN_UNIT
-from .range_folders import find_range_frames
+from .range_folders import find_range_frames, pods
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
@@ -68,6 +68,8 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
         from .demo import DemoSource
 
         return DemoSource()
+    if os.path.basename(path) == pods.FILE and os.path.isfile(path):
+        path = os.path.dirname(path) or os.curdir
     if os.path.isdir(path):
         folder = Path(path)
         found = find_range_frames(folder)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from depth_folders import CAMERA, POSE, colors, depth_numbers, write_color, write_depth, write_matrix
+from PIL import Image
 
 from viewer.errors import InputError
 from viewer.scan.listing import list_folder
@@ -72,6 +73,17 @@ def stanford(folder: Path) -> None:
     np.savez(folder / "a.npz", xyz=np.stack([x, y, 0.1 * x], axis=2).astype(np.float32))
 
 
+def scanner(folder: Path) -> None:
+    told = []
+    for name in ("left", "right"):
+        for n in range(2):
+            Image.fromarray(np.ones((4, 5), np.float32)).save(folder / f"{name}_{n}.tif")
+            write_color(folder / f"{name}_{n}.png", np.zeros((4, 5, 3), np.uint8))
+        camera = {"fx": 9, "fy": 9, "cx": 2, "cy": 2, "distortion": [0.1, 0, 0, 0], "pose": POSE.tolist()}
+        told.append({"name": name, "range": f"{name}_*.tif", "texture": f"{name}_*.png"} | camera)
+    (folder / "pods.json").write_text(json.dumps({"unit": "mm", "pods": told}))
+
+
 def damage(folder: Path, chance: random.Random) -> None:
     """Change a byte, cut, empty, insert, exchange or delete: one file of the folder."""
     files = sorted(file for file in folder.rglob("*") if file.is_file())
@@ -93,7 +105,7 @@ def damage(folder: Path, chance: random.Random) -> None:
         file.unlink()
 
 
-@pytest.mark.parametrize("make", [sevenscenes, open3d, tum, truedepth, middlebury, stanford])
+@pytest.mark.parametrize("make", [sevenscenes, open3d, tum, truedepth, middlebury, stanford, scanner])
 def test_whatever_is_wrong_is_one_message(make: object, tmp_path: Path) -> None:
     assert callable(make)
     whole, broken = tmp_path / "whole", tmp_path / "broken"

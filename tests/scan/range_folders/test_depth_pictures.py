@@ -213,7 +213,7 @@ def test_broken_frames_are_left_out(tmp_path: Path) -> None:
     with open_scan(tmp_path) as scan:
         assert [pose.index for pose in scan] == [0]
         told = {index: str(error) for index, error in scan.broken.items()}
-    assert "depth_1.png: is no PNG, or damaged" in told[1]
+    assert "depth_1.png: is no PNG or TIFF, or damaged" in told[1]
     assert "depth_2.png: is a picture of type RGB" in told[2]
     assert "color_3.jpg: is no PNG or JPEG" in told[3]
     assert "color_4.jpg: has 6 x 2 pixels, its depth 6 x 4" in told[4]

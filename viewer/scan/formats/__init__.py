@@ -39,7 +39,7 @@ from ..range_view import RangeView, in_one_unit, merge
 from ..units import usable_unit
 from ._admission import admit
 
-NOTES = {".txt", ".csv"}  # beside frames of another kind these are notes, not frames
+NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
 _LONGEST_MESSAGE = 400  # characters
 
 

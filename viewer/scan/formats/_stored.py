@@ -6,7 +6,7 @@ import math
 import warnings
 from dataclasses import dataclass
 from io import BytesIO
-from threading import Lock
+from threading import RLock
 from typing import IO
 
 import numpy as np
@@ -18,7 +18,7 @@ from ._admission import MOST_FRAMES, check_count
 
 _CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
 _LONGEST_HEADER = 10_000  # bytes, as numpy has it
-_quietly = Lock()
+QUIETLY = RLock()  # around what turns warnings off, which does so for all threads
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class StoredArray:
         if length > _LONGEST_HEADER:
             raise InputError(f"array '{name}' has a header of {length:,} bytes")
         header = BytesIO(head + stream.read(length))
-        # numpy warns of headers written by Python 2. What warnings do is one for all threads.
-        with _quietly, warnings.catch_warnings(action="ignore"):
+        # numpy warns of headers written by Python 2.
+        with QUIETLY, warnings.catch_warnings(action="ignore"):
             shape, column_order, dtype = headers[version](header)
         array = cls(name, stream, shape, dtype, column_order, size - stream.tell())
         if not dtype.hasobject and (min(shape, default=0) < 0 or array.nbytes > array.size):

@@ -84,6 +84,11 @@ def read_calibration(path: Path, default: Calibration | None = None) -> Calibrat
         raise InputError(f"is no calibration: {shortened(str(error))}", path, _FORM) from error
 
 
+def calibration_of(stored: dict[str, Any], default: Calibration | None = None) -> Calibration:
+    """The calibration in a JSON object; what it does not tell is as in the default. Raises InputError."""
+    return _checked(_from_json(stored), default)
+
+
 def _from_json(stored: dict[str, Any]) -> dict[str, Any]:
     """The fields that a file tells, others left aside."""
     told = {field.name: stored[field.name] for field in fields(Calibration) if field.name in stored}

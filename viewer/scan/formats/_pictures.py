@@ -1,0 +1,79 @@
+"""Pictures through Pillow: depth, colours and masks that are stored as PNG, JPEG or TIFF."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, Scan4DError, explained
+from ._admission import admit, opened, size_of
+from ._stored import QUIETLY
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+DEPTH_KINDS = ("PNG", "TIFF")  # as Pillow names them
+COLOR_KINDS = ("PNG", "JPEG", "TIFF")
+
+_BYTES = 24  # of memory for a pixel, decoded and as a view
+_MOST_RATIO = 40  # of memory to the file: flat and masked pictures pack well
+_OF_NUMBERS = ("L", "I", "F", "1")  # modes of Pillow's, and those that begin with I;16
+_COMPRESSED = "libtiff"  # what decodes compressed TIFF, into the machine's order of bytes
+_IN_NATIVE_ORDER = {"F;32BF": "F;32NF", "I;32BS": "I;32NS", "I;32B": "I;32N", "I;16BS": "I;16NS"}
+_HINT = "Check that it is complete; numbers of 64 bit are not read, save them with 32"
+
+
+@contextmanager
+def opened_picture(path: Path, kinds: tuple[str, ...]) -> Iterator[Image]:
+    """A picture of one of these kinds, of which the header is read and the pixels are read when asked for.
+
+    Whatever is wrong with it is one InputError.
+    """
+    from PIL import Image
+
+    title = " or ".join(kinds)
+    try:
+        # Pillow warns of odd tags and large pictures.
+        with opened(path) as stream, QUIETLY, warnings.catch_warnings(action="ignore"):
+            image = Image.open(stream, formats=kinds)
+            admit(size_of(stream), image.width * image.height * _BYTES, _MOST_RATIO)
+            yield image
+    except Scan4DError as error:
+        raise InputError(error.what, error.where or path, error.hint) from error
+    except Image.DecompressionBombError as error:
+        most = 2 * (Image.MAX_IMAGE_PIXELS or 0)
+        raise InputError(f"has more than the {most:,} pixels that are read", path) from error
+    except OSError as error:
+        what, hint = (f"is no {title}, or damaged", _HINT) if error.errno is None else explained(error)
+        raise InputError(what, path, hint) from error
+    except Exception as error:  # Pillow's readers raise what they like
+        raise InputError(f"is no {title}, or damaged ({error})", path) from error
+
+
+def numbers_of_picture(image: Image) -> NDArray:
+    """The numbers of a picture of one channel, (H, W), of the type that they are stored in, or a wider one.
+
+    Raises InputError for pictures in colour.
+    """
+    if image.mode not in _OF_NUMBERS and not image.mode.startswith("I;16"):
+        raise InputError(f"is a picture of type {image.mode}, where one number a pixel should be")
+    tiles = getattr(image, "tile", [])  # that are still to be decoded
+    for place, tile in enumerate(tiles):
+        # Pillow takes what was decoded for numbers in the file's order of bytes.
+        if tile[0] == _COMPRESSED and tile[3][0] in _IN_NATIVE_ORDER:
+            tiles[place] = tile._replace(args=(_IN_NATIVE_ORDER[tile[3][0]], *tile[3][1:]))
+    values = np.array(image)
+    return values.astype(values.dtype.newbyteorder("="), copy=False)
+
+
+def srgb_of_picture(image: Image) -> NDArray[np.uint8]:
+    """The colours of a picture, (H, W, 3), sRGB; grey ones too. Raises InputError beyond 8 bit."""
+    if image.mode in ("I", "F") or image.mode.startswith("I;16"):
+        raise InputError(f"is a picture of type {image.mode}, where colours should be")
+    return np.array(image if image.mode == "RGB" else image.convert("RGB"))

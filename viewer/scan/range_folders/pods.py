@@ -1,0 +1,154 @@
+"""A scanner's range images: pods.json tells the pods, their calibration, and the files of each.
+
+    {"unit": "mm",
+     "pods": [{"name": "left", "kind": "range", "fx": 2600, "fy": 2600, "cx": 1499.5, "cy": 2249.5,
+               "distortion": [-0.1, 0.02, 0, 0],
+               "pose": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+               "range": "left_*_range.tif", "texture": "left_*_texture.png", "mask": "left_*_mask.png"}]}
+
+`range` is a float TIFF or a 16-bit picture; the others, with `confidence`, may be missing. A name may have
+one `*`: a frame is what stands there, and each is looked for with all pods. Calibrations are as in a
+camera.json, but `depth_scale` is 1 where it is missing; `pose` is from the camera to the world in an image's
+axes, 4 x 4.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, shortened
+from ..image_poses import UPRIGHT, from_camera_to_world
+from ..points import UNKNOWN_UNIT
+from ..range_view import RangeView
+from ..times import natural_key
+from ..units import checked_unit
+from ._calibration import Calibration, calibration_of
+from ._pictures import depth_view
+from ._source import RangeFrames
+from ._texts import object_of
+
+TITLE = "a scanner's range images"
+FILE = "pods.json"
+
+_MOST_PODS = 64
+_FORM = 'It holds {"unit": "mm", "pods": [{"name": "left", "range": "left_*.tif", "fx": ...}]}'
+_RANGE, _TEXTURE, _MASK, _CONFIDENCE = _IMAGES = ("range", "texture", "mask", "confidence")
+_ANY = "*"
+
+
+@dataclass(frozen=True)
+class _Pod:
+    name: str
+    calibration: Calibration
+    world_to_camera: NDArray[np.float64]
+    patterns: dict[str, str]  # of the images that it has
+
+
+def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+    """The frames that pods.json names, None without one. Raises InputError where it is unusable."""
+    if FILE not in names:
+        return None
+    try:
+        unit, pods = _rig(object_of(folder / FILE))
+    except InputError as error:
+        raise InputError(error.what, folder / FILE, error.hint or _FORM) from error
+    frames = sorted({key for pod in pods for key in _matches(folder, pod.patterns[_RANGE])}, key=natural_key)
+    if not frames:
+        looked = ", ".join(pod.patterns[_RANGE] for pod in pods)
+        raise InputError(f"there is no range image {looked}", folder / FILE)
+
+    def read(index: int) -> tuple[RangeView, ...]:
+        files = [(pod, _files(folder, pod, frames[index])) for pod in pods]
+        return tuple(
+            depth_view(
+                images[_RANGE],
+                images.get(_TEXTURE),
+                pod.calibration,
+                pod.world_to_camera,
+                pod.name,
+                images.get(_MASK),
+                images.get(_CONFIDENCE),
+            )
+            for pod, images in files
+            if images[_RANGE].is_file()
+        )
+
+    labels = tuple(next(pod.patterns[_RANGE].replace(_ANY, key) for pod in pods) for key in frames)
+    used = [
+        file for key in frames for pod in pods for file in _files(folder, pod, key).values() if file.is_file()
+    ]
+    return RangeFrames(folder.resolve().name, labels, read, (folder / FILE, *used), unit)
+
+
+def _rig(stored: dict[str, Any]) -> tuple[str, list[_Pod]]:
+    """The unit and the pods of a file. Raises InputError."""
+    if not isinstance(stored.get("pods"), list):
+        raise InputError("names no pods")
+    unit = stored.get("unit", UNKNOWN_UNIT)
+    checked_unit(unit if isinstance(unit, str) else "")
+    if not 0 < len(stored["pods"]) <= _MOST_PODS:
+        raise InputError(f"names {len(stored['pods'])} pods, where 1 to {_MOST_PODS} can be read")
+    pods = [_pod(pod, f"pod{number}", unit) for number, pod in enumerate(stored["pods"])]
+    if len({pod.name for pod in pods}) < len(pods):
+        raise InputError("gives several pods one name")
+    return unit, pods
+
+
+def _pod(stored: Any, name: str, unit: str) -> _Pod:
+    if not isinstance(stored, dict):
+        raise InputError(f"{name} is no JSON object")
+    told = stored.get("name", name)
+    if not isinstance(told, str) or not told:
+        raise InputError(f"the name of {name} is {shortened(told)}")
+    try:
+        default = Calibration(fx=1, fy=1, cx=0, cy=0, depth_scale=1, unit=unit)
+        there = [image for image in _IMAGES if image in stored or image == _RANGE]
+        patterns = {image: _pattern(stored, image) for image in there}
+        return _Pod(told, calibration_of(stored, default), _pose(stored), patterns)
+    except InputError as error:
+        raise InputError(f"pod '{shortened(told)}' {error.what}", hint=error.hint) from error
+
+
+def _pose(stored: dict[str, Any]) -> NDArray[np.float64]:
+    if "pose" not in stored:
+        return UPRIGHT
+    try:
+        pose = np.array(stored["pose"], np.float64)
+    except (TypeError, ValueError):
+        pose = np.empty(0)
+    if pose.shape != (4, 4):
+        raise InputError("has a pose that is no 4 x 4 matrix")
+    return from_camera_to_world(pose)
+
+
+def _pattern(stored: dict[str, Any], image: str) -> str:
+    """A file's name within the folder, with one star at most."""
+    told = stored.get(image)
+    if not isinstance(told, str) or not told or told.count(_ANY) > 1 or "\0" in told:
+        raise InputError(f"has the {image} {shortened(told)}, expected a file name with one {_ANY} at most")
+    if os.path.isabs(told) or ".." in Path(told).parts or _ANY in os.path.dirname(told):
+        raise InputError(f"has the {image} {shortened(told)}, which is no file in this folder")
+    return told
+
+
+def _matches(folder: Path, pattern: str) -> list[str]:
+    """Texts for the star in the names of the files of this pattern; without a star, none or an empty one."""
+    place = folder / pattern
+    if _ANY not in pattern:
+        return [""] if place.is_file() else []
+    start, end = place.name.split(_ANY)
+    found = [file.name for file in place.parent.glob(glob.escape(start) + _ANY + glob.escape(end))]
+    return [key for name in found if (key := name[len(start) : len(name) - len(end)])]
+
+
+def _files(folder: Path, pod: _Pod, key: str) -> dict[str, Path]:
+    """The files of a frame of a pod by their images."""
+    return {image: folder / pattern.replace(_ANY, key) for image, pattern in pod.patterns.items()}
