@@ -1,11 +1,14 @@
 // Gives each covered pixel, as its own, what its row has. CHANNEL 0 colour, 1 normal, 2 value. HAS_ROWS: whether rows have
-// any. IS_DEPTH: whether the value is the depth. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
+// any; SAMPLES: which are samples of range views. IS_DEPTH: whether the value is the depth. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
 #include "common/view.glsl"
 #include "common/item.glsl"
 
 layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;
 layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 layout(binding = TEXTURE_VALUES) uniform samplerBuffer values;
+#if SAMPLES
+#include "range/of_rows.glsl"
+#endif
 #if CHANNEL == 0
 layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own[]; };
 uniform vec3 plain;  // sRGB
@@ -23,7 +26,14 @@ void main() {
 #else
     uint row = texelFetch(rows, index).r;
     bool known = HAS_ROWS != 0 && row != NOTHING;
-    vec4 value = known ? texelFetch(values, int(row)) : vec4(0.0);
+    vec4 value = vec4(0.0);
+#if SAMPLES && CHANNEL == 0
+    if (known) value.rgb = sample_color(row);
+#elif SAMPLES && CHANNEL == 1
+    if (known) value.xyz = normal_of_sample(row);
+#else
+    if (known) value = texelFetch(values, int(row));
+#endif
 #if CHANNEL == 0
     own[index] = packUnorm4x8(vec4(known ? value.rgb : plain, 1.0));
 #elif CHANNEL == 1

@@ -3,6 +3,7 @@
 // OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
 // filled have none. TURNED: the pose is, so that its axes are not the world's. With its colour comes how much of the pixel is covered; the rest is background.
 // LEVEL_COLORS: how many colours there are of filled levels, in place of the colour map; 0: pixels are not coloured by level.
+// SAMPLES: rows are samples of range views, whose colours or normals are read.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -25,6 +26,9 @@ layout(binding = TEXTURE_OWN_COLORS) uniform samplerBuffer own_colors;
 #if OWN_LEVEL
 layout(binding = TEXTURE_LEVELS) uniform usamplerBuffer levels;
 #endif
+#if SAMPLES
+#include "range/of_rows.glsl"
+#endif
 layout(std430, binding = STORAGE_PICTURE) writeonly buffer Picture { uint picture[]; };
 
 float depth_at(ivec2 pixel) {
@@ -43,7 +47,9 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
 #if !(COLOR_BY == 1 && OWN_COLOR) && !(COLOR_BY == 3 && (OWN_VALUE || VALUE == 0))
     if (row == NOTHING) return plain.rgb;
 #endif
-#if COLOR_BY == 1
+#if COLOR_BY == 1 && SAMPLES && !OWN_COLOR
+    return sample_color(row);
+#elif COLOR_BY == 1
     return texelFetch(colors, OWN_COLOR != 0 ? index : int(row)).rgb;
 #elif COLOR_BY == 3
 #if OWN_VALUE
@@ -125,7 +131,11 @@ vec3 shade(int index) {
     float depth = uintBitsToFloat(texelFetch(depths, index).r);
     vec3 normal = vec3(0.0);
 #if LIGHT != 0 || COLOR_BY == 2
+#if SAMPLES && !OWN_NORMAL
+    if (row != NOTHING) normal = normal_of_sample(row);
+#else
     if (OWN_NORMAL != 0 || row != NOTHING) normal = texelFetch(normals, OWN_NORMAL != 0 ? index : int(row)).xyz;
+#endif
     float len = length(normal);
     // A missing normal faces the eye.
     normal = len > 0.0 && len < UNKNOWN

@@ -14,6 +14,7 @@ import filling
 import moderngl
 import numpy as np
 import pytest
+import sampling
 from range_scenes import sphere_view
 from scenes import sphere, sphere_mesh
 from test_bins import filled, some_visits
@@ -142,6 +143,20 @@ def draw_all(renderer: Renderer) -> None:
     Presenter(renderer.gpu).release()
 
 
+def draw_samples(renderer: Renderer) -> None:
+    """Pictures whose rows are samples: of views that need little of the shaders, and of such that need all."""
+    view, measured = stepped_view((7, 5)), stepped_view((7, 5), "height", True)
+    bent = replace(stepped_view((7, 5), "range"), distortion=(-0.1, 0.0, 0.0, 0.0))
+    surface = Surface(renderer.gpu, SIZE)
+    for views in ((view,), (view, measured, bent)):
+        pose = Pose.of(0, 0.0, "test", views)
+        camera = Camera.orbit(pose.bounds, **CAMERA)
+        for look in (look for look in LOOKS if look.color_by != "height_of"):
+            render_frame(renderer, Request(pose, camera, sampling.BACKEND, look=look), surface)
+            for channel in ("color", "normal", "value"):
+                surface.resolve(channel)
+
+
 def use_primitives(gpu: Gpu) -> None:
     """What backends may use of each primitive, whether one does or not."""
     gpu.activate()
@@ -170,6 +185,7 @@ def programs() -> list[list[Source]]:
     """The stages of each program that pictures take, and primitives."""
     renderer = Renderer(headless())
     draw_all(renderer)
+    draw_samples(renderer)
     use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader

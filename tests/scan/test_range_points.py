@@ -10,14 +10,16 @@ from threading import Barrier
 
 import numpy as np
 import pytest
-from range_scenes import sphere_view
+from range_scenes import LENSES, shape_view, sphere_view
 
 from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud, strided
 from viewer.scan.pose import Pose
-from viewer.scan.range_view import merge
+from viewer.scan.range_points import RangePoints
+from viewer.scan.range_view import RangeView, merge
+from viewer.scan.spacing import ENOUGH, nearest_row, spacing_at, typical_spacing
 from viewer.scan.timeline import Timeline
 
 FAR = np.array([665187.25, 5648349.5, 241.75])
@@ -67,6 +69,68 @@ def test_points_are_merged_once_whoever_asks() -> None:
         clouds = list(threads.map(ask, [pose, again] * 3))
     assert {id(cloud) for cloud in clouds} == {id(pose.cloud)}
     assert pose.nbytes == again.nbytes == before + pose.cloud.nbytes
+
+
+FORMS = [
+    *((kind, lens, False) for kind in ("z", "range") for lens in LENSES),
+    *((kind, "none", measured) for kind, measured in (("z", True), ("height", False), ("height", True))),
+]
+
+
+def scenes() -> dict[str, tuple[RangeView, ...]]:
+    """Views of all kinds, and of one place from several sides."""
+    around = [np.array([4 * np.sin(turn), 0.3, 4 * np.cos(turn)]) for turn in np.arange(5) * 1.2]
+    forms = {" ".join(map(str, form)): (shape_view("sphere", *form)[0],) for form in FORMS}
+    return {"two": VIEWS, "far": LARGE, "round": tuple(sphere_view(eye) for eye in around), **forms}
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_what_is_found_of_samples_is_what_merged_points_have(name: str) -> None:
+    points = RangePoints.of(scenes()[name])
+    cloud, rng = merge(points.views), np.random.default_rng(0)
+    rows = rng.choice(len(cloud), 25, replace=False)
+    samples = cloud.ids[rows]
+    assert np.array_equal(points.of_samples("positions", samples), cloud.positions[rows])
+    if cloud.colors is not None:
+        assert np.array_equal(points.of_samples("colors", samples), cloud.colors[rows])
+    for scalar, values in cloud.scalars.items():
+        assert np.array_equal(points.of_samples(scalar, samples), values[rows])
+        assert np.array_equal(points.all_samples(scalar)[cloud.ids], values)
+    assert [points.row_of(int(sample)) for sample in samples] == rows.tolist()
+    numbers, places = (np.concatenate(part) for part in zip(*points.parts(), strict=True))
+    assert np.array_equal(numbers, cloud.ids)
+    assert np.array_equal(places, cloud.positions)
+    assert not points.is_merged
+    spread = points.by_sample(cloud.positions[:, 0])
+    assert np.array_equal(spread[cloud.ids], cloud.positions[:, 0])
+    assert np.isnan(spread).sum() == len(spread) - len(cloud)
+    assert [points.row_of(int(sample)) for sample in samples] == rows.tolist()
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_what_lies_around_a_place_is_found_without_merging(name: str) -> None:
+    """The nearest points, and what spacings are found by, are those of all points."""
+    points = RangePoints.of(scenes()[name])
+    cloud, rng = merge(points.views), np.random.default_rng(1)
+    for row in rng.choice(len(cloud), 12, replace=False).tolist():
+        around = points.around(cloud.world()[row], ENOUGH)
+        at = around.row_of(int(cloud.ids[row]))
+        assert np.allclose(around.positions[at], cloud.positions[row], rtol=0, atol=1e-6)
+        assert {name: v[at] for name, v in around.scalars.items()} == {
+            n: v[row] for n, v in cloud.scalars.items()
+        }
+        assert spacing_at(around, at) == pytest.approx(spacing_at(cloud, row), rel=1e-5)
+        beside = cloud.world()[row] + rng.normal(0, 0.1, 3)
+        expected = np.sort(np.linalg.norm(cloud.world() - beside, axis=1))
+        found = np.sort(np.linalg.norm(points.around(beside, 40).world() - beside, axis=1))
+        assert found[:40] == pytest.approx(expected[:40], rel=1e-5)
+        assert nearest_row(points.around(beside), beside)[1] == pytest.approx(expected[0], rel=1e-5)
+    for far in (cloud.origin + 50, cloud.origin - (0, 0, 50), points.views[0].eye):
+        found = np.linalg.norm(points.around(far).world() - far, axis=1)
+        assert found.min() == pytest.approx(np.linalg.norm(cloud.world() - far, axis=1).min(), rel=1e-5)
+    assert points.around(far, 10**9).ids.tolist() == cloud.ids.tolist(), "all that there are"
+    assert points.spacing == pytest.approx(typical_spacing(cloud), rel=0.5)
+    assert not points.is_merged
 
 
 @pytest.mark.parametrize("merged", [False, True])

@@ -355,3 +355,16 @@ def test_what_is_no_range_view(fields: dict[str, object], reason: str) -> None:
     view = flat([[1, 1], [1, 1]])
     with pytest.raises(InputError, match=reason):
         replace(view, **fields)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_a_part_of_a_view_sees_what_its_pixels_see(measured: bool) -> None:
+    view = shape_view("sphere", "z", "kinect", measured)[0]
+    part = view.cropped(slice(20, 60), slice(31, 90))
+    rows, columns = np.nonzero(part.valid())
+    assert len(rows) > 500
+    np.testing.assert_allclose(part.positions(), view.unproject(rows + 20, columns + 31), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(part.depth, view.depth[20:60, 31:90])
+    every = view.cropped(slice(None), slice(None))
+    np.testing.assert_array_equal(every.positions(), view.positions())
+    np.testing.assert_array_equal(view.unproject(*np.nonzero(view.valid())), view.positions())

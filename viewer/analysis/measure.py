@@ -61,7 +61,7 @@ class End:
             end, snapped, spacing = picked.point, "point", picked.spacing
         else:
             unmoved = place.inverse.points(picked.position)
-            end, snapped, spacing = picked.position, "surface", _spacing_near(pose.cloud, unmoved)
+            end, snapped, spacing = picked.position, "surface", _spacing_near(pose.around(unmoved), unmoved)
         x, y, z = (float(v) for v in end)
         return cls(pose.index, float(pose.time), (x, y, z), snapped, picked.id, spacing, picked.level)  # type: ignore[arg-type]
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry import Vector
 from ..gpu.constants import EMPTY, NOTHING
 from ..gpu.surface import Surface
-from ..scan.spacing import spacing_at, typical_spacing
+from ..scan.spacing import ENOUGH, spacing_at
 
 _REACH = 4  # pixels round one that are looked at: gaps that are wider are seen as such
 _BEHIND = 4.0, 4.0 * _REACH  # spacings and pixels that what is seen through a gap is behind it, at least
@@ -59,31 +59,32 @@ class Picked:
 def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | None:
     """Pick what pixel (x, y) shows, row 0 at the top; None where it shows nothing or is none of the picture.
 
-    Reads one pixel from the GPU. spacing: whether to find the spacing too, which looks at
-    every point of the cloud (see `spacing_at`).
+    Reads one pixel from the GPU. spacing: whether to find the spacing too, which looks at every point of the
+    cloud (see `spacing_at`), or of range views at the pixels around.
     """
     if not _has(surface, x, y):
         return None
     depth, row, level = surface.texel(x, y)
     if level == EMPTY:
         return None
-    cloud = surface.scan
     center = np.array([[x + 0.5, y + 0.5]])
     place = surface.layers.place
-    position = place.points(surface.view.unproject(center, np.array([depth]))[0] + cloud.origin)
+    position = place.points(surface.view.unproject(center, np.array([depth]))[0] + surface.pose.origin)
     if row == NOTHING:
         return Picked(position, level)
-    row, scalars = surface.point_of(row), {**cloud.scalars, **surface.layers.scalars}
+    cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
+    row = surface.point_of(row)
+    scalars = {name: values[at].item() for name, values in cloud.scalars.items()}
     return Picked(
         position,
         level,
         row,
-        id=row if cloud.ids is None else int(cloud.ids[row]),
-        point=place.points(cloud.positions[row] + cloud.origin),
-        color=None if cloud.colors is None else cloud.colors[row].copy(),
-        normal=None if cloud.normals is None else place.directions(cloud.normals[row].copy()),
-        scalars={name: values[row].item() for name, values in scalars.items()},
-        spacing=spacing_at(cloud, row) if spacing else None,
+        id=row if cloud.ids is None else int(cloud.ids[at]),
+        point=place.points(cloud.positions[at] + cloud.origin),
+        color=None if cloud.colors is None else cloud.colors[at].copy(),
+        normal=None if cloud.normals is None else place.directions(cloud.normals[at].copy()),
+        scalars=scalars | {name: values[row].item() for name, values in surface.layers.scalars.items()},
+        spacing=spacing_at(cloud, at) if spacing else None,
     )
 
 
@@ -101,7 +102,7 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     limit = texel.depth - pixels * np.linalg.norm(ends[1] - ends[0])
     front = depths < limit
     if front.any():
-        front &= depths < limit - spacings * typical_spacing(surface.scan)
+        front &= depths < limit - spacings * surface.scanned.pose.spacing
     down, across = np.argwhere(front).T - _REACH
     if not _lie_all_round(down, across):
         return x, y

@@ -6,7 +6,8 @@ A backend answers one question: which surface does each pixel see? Its module ha
     TITLE                its name in the panel
     Params               a frozen dataclass of parameters (see viewer/params.py)
     needs(pose, params) -> what the pose must have: "normals" and "radii" of its points are estimated where
-                         they are missing; "views": range views, without which it cannot be drawn
+                         they are missing; "views": range views, without which it cannot be drawn;
+                         where it names these alone, rows are samples of them and no point is read
     draw(gpu_pose, frame, surface) -> bool
                          on the GL thread: write `surface.depths` and `surface.rows`, and what it has of its
                          own (`Surface.own`); True if a later call would refine the picture
@@ -162,7 +163,7 @@ class Backend:
 
     def draws_samples(self, pose: Pose, params: Any) -> bool:
         """Whether it draws this pose from samples of its range views alone: nothing is read of its points."""
-        return self.rows == "samples" and set(self.needs(pose, params)) == {"views"}
+        return set(self.needs(pose, params)) == {"views"}
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw; True if a later call would refine the picture."""

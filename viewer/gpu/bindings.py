@@ -120,6 +120,7 @@ class Storage(IntEnum):
     RANGE_LOOKS = 1
     RANGE_XY = 2
     RANGE_TILES = 0
+    RANGE_VALUES = 0
 
 
 @unique

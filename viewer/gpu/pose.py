@@ -7,7 +7,7 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..bounds import Bounds
 from ..errors import InputError, unknown_name
 from ..scan.points import PointCloud, strided
 from ..scan.pose import Pose
+from ..scan.range_points import RangePoints
 from ..scan.range_view import RangeView
 from . import gl
 from .context import Gpu
@@ -56,7 +57,6 @@ class GpuPose:
         self.uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._layers: dict[int, Layer] = {}
-        self._height_axis: tuple[float, ...] | None = None
 
     @cached_property
     def stored(self) -> PointCloud:
@@ -88,6 +88,13 @@ class GpuPose:
         return self.pose.views
 
     @property
+    def range_points(self) -> RangePoints:
+        """The points of the range views. Raises InputError where there are none."""
+        if isinstance(self.pose.points, PointCloud):
+            raise InputError("the scan has no range views")
+        return self.pose.points
+
+    @property
     def overview(self) -> PointCloud:
         """The pose's cloud that tells origin and attributes."""
         return self.pose.overview
@@ -103,7 +110,8 @@ class GpuPose:
         return self.pose.bounds if len(self.overview) else Bounds(self.origin - 1, self.origin + 1)
 
     def array(self, name: str) -> gl.BufferTexture:
-        """positions, normals, colors, radii, axes, ids, or 'scalar:NAME'; uploaded at the first call."""
+        """positions, normals, colors, radii, axes, ids, or 'scalar:NAME', with a texel for each row; or
+        'sample:NAME', the scalar with a texel for each sample of range views. Uploaded at the first call."""
         self.upload([name])
         return self._arrays[name]
 
@@ -164,9 +172,7 @@ class GpuPose:
 
     def _upload_samples(self, end: float) -> bool:
         if self._samples is None:
-            if not self.views:
-                raise InputError("the scan has no range views")
-            self._samples = RangeSamples(self.gpu, self.views, self.origin)
+            self._samples = RangeSamples(self.gpu, self.range_points.views, self.origin)
         if not self._samples.upload(end):
             return False
         self.uploaded_bytes += self._samples.nbytes
@@ -177,9 +183,11 @@ class GpuPose:
         self.uploaded_bytes += upload.nbytes
 
     def _values(self, name: str) -> NDArray:
-        if name.startswith("scalar:"):
-            scalar = name.removeprefix("scalar:")
-            return as_float32(self.scalar(scalar), self.scalar_range(scalar)[0])
+        kind, _, scalar = name.partition(":")
+        if scalar:
+            zero = self.scalar_range(scalar)[0]
+            stored = self.scalar(scalar) if kind == "scalar" else self.range_points.all_samples(scalar)
+            return as_float32(stored, zero)
         values: NDArray | None = getattr(self.cloud, name)
         if values is None:
             hint = (
@@ -207,33 +215,43 @@ class GpuPose:
         long as somebody holds this array."""
         for key in [key for key, layer in self._layers.items() if layer.values() is None]:
             gone = self._layers.pop(key)
-            if gone.texels is not None:
-                self.uploaded_bytes -= gone.texels.buffer.size
-                self.gpu.discard(gone.texels)
+            self.uploaded_bytes -= sum(texels.buffer.size for texels in gone.texels.values())
+            self.gpu.discard(*gone.texels.values())
         if id(values) not in self._layers:
             self._layers[id(values)] = Layer(weakref.ref(values), robust_range(strided(values)))
         return self._layers[id(values)]
 
-    def layer_texels(self, values: NDArray, zero: float, rows: NDArray[np.uint32] | None) -> gl.BufferTexture:
+    def layer_texels(
+        self, values: NDArray, zero: float, rows: NDArray[np.uint32] | None = None, by_sample: bool = False
+    ) -> gl.BufferTexture:
         """Texels of a layer, relative to zero, uploaded at the first call. rows: those of the layer that this
-        pose's points stand for; None where they are the scan's."""
+        pose's points stand for; None where they are the scan's. by_sample: a texel for each sample of range
+        views rather than for each point."""
         layer = self.layer(values)
-        if layer.texels is None:
+        if by_sample not in layer.texels:
             with self.preparing("upload"):
-                upload = _array_upload(self.gpu, as_float32(values if rows is None else values[rows], zero))
+                made = as_float32(values if rows is None else values[rows], zero)
+                upload = _array_upload(self.gpu, self.range_points.by_sample(made) if by_sample else made)
                 upload.go_on(np.inf)
-                layer.texels = gl.BufferTexture(upload.target, gl.R32F)
+                layer.texels[by_sample] = gl.BufferTexture(upload.target, gl.R32F)
                 self.uploaded_bytes += upload.nbytes
-        return layer.texels
+        return layer.texels[by_sample]
 
-    def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
-        """The height of each point along an axis, relative to the origin; for what cannot go by positions."""
-        if self._height_axis not in (None, axis):  # of the last axis alone: it turns with the pose
-            gone = self._arrays.pop((_heights, self._height_axis))
-            self.uploaded_bytes -= gone.buffer.size
-            self.gpu.discard(gone)
-        self._height_axis = axis
-        return self.packed(_heights, axis)
+    def heights(self, axis: tuple[float, ...], by_sample: bool = False) -> gl.BufferTexture:
+        """The height of each point along an axis, relative to the origin, for what cannot go by positions;
+        by_sample: of each sample of range views. The last axis' alone is kept: it turns with the pose."""
+        key = (_heights, axis, by_sample)
+        for gone in [name for name in self._arrays if isinstance(name, tuple) and name[0] is _heights]:
+            if gone != key:
+                texels = self._arrays.pop(gone)
+                self.uploaded_bytes -= texels.buffer.size
+                self.gpu.discard(texels)
+        if by_sample and key not in self._arrays:
+            samples = self.samples
+            with self.preparing("upload"):
+                self._arrays[key] = samples.heights(np.array(axis))
+                self.uploaded_bytes += self._arrays[key].buffer.size
+        return self._arrays[key] if by_sample else self.packed(_heights, axis, by_sample)
 
     @cached_property
     def sample(self) -> NDArray[np.float64]:
@@ -258,7 +276,7 @@ class GpuPose:
 
     def __del__(self) -> None:
         begun = (upload.target for upload in self._uploads.values())
-        layers = (layer.texels for layer in self._layers.values())
+        layers = (texels for layer in self._layers.values() for texels in layer.texels.values())
         self.gpu.discard(*self._arrays.values(), *layers, *begun, self._samples)
 
 
@@ -266,12 +284,13 @@ class GpuPose:
 class Layer:
     """Numbers that lie over a pose: one object for each array of them.
 
-    range: their 2 % and 98 % quantiles. texels: on the GPU, None before.
+    range: their 2 % and 98 % quantiles. texels: on the GPU, of points (False) and of samples (True), where
+    they are asked for.
     """
 
     values: weakref.ref[NDArray]
     range: tuple[float, float]
-    texels: gl.BufferTexture | None = None
+    texels: dict[bool, gl.BufferTexture] = field(default_factory=dict)
 
 
 @dataclass
@@ -305,7 +324,7 @@ def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:
     return robust_range(strided(cloud.scalars[name]))
 
 
-def _heights(cloud: PointCloud, axis: tuple[float, ...]) -> NDArray[np.float32]:
+def _heights(cloud: PointCloud, axis: tuple[float, ...], _: bool) -> NDArray[np.float32]:
     return cloud.positions @ np.array(axis, np.float32)
 
 

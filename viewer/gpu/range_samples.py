@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
@@ -187,6 +187,22 @@ class RangeSamples:
         for step in self._reductions(tiled_from=1):
             step()
 
+    def heights(self, axis: NDArray[np.float64]) -> gl.BufferTexture:
+        """Make texels of the height along an axis, (3,) in the world, of each sample of level 0 by its id,
+        scan units, relative to the origin; any number where there is no sample. The caller keeps them."""
+        made = self._texels(gl.R32F, 4 * self.count)
+        program = self._gpu.compute("range/heights.comp", self.defines)
+        self._bind_read()
+        made.buffer.bind_to_storage_buffer(Storage.RANGE_VALUES)
+        for number, (pod, levels) in enumerate(zip(self._pods, self.places, strict=True)):
+            to_world = np.linalg.inv(pod.world_to_camera)
+            up = (*(axis @ to_world[:3, :3]), axis @ (to_world[:3, 3] - self._origin))
+            for first in range(0, levels[0].count, _SLICE):
+                self._gpu.set(program, number=number, up=up, first=first)
+                with self._gpu.timers.measure("heights"):
+                    self._gpu.dispatch(program, min(_SLICE, levels[0].count - first))
+        return made
+
     def bind(self, view: View) -> None:
         """Bind all that shaders/range/samples.glsl and tiles.glsl read, for pictures of this view."""
         self._write_table(view)
@@ -262,7 +278,7 @@ class RangeSamples:
 
     def _write(self, view: RangeView, most: float, top: int, bottom: int, first: int) -> None:
         """Upload rows of a view."""
-        part = _rows(view, slice(top, bottom))
+        part = view.cropped(slice(top, bottom), slice(None))
         self.depths.buffer.write(np.ascontiguousarray(part.depth), offset=4 * first)
         self.looks.buffer.write(_looks(part, most), offset=4 * first)
         if part.xy is not None:
@@ -385,13 +401,6 @@ def _places(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]],
             tiles += own[-1].tiles
         places.append(own)
     return places, samples, tiles
-
-
-def _rows(view: RangeView, rows: slice) -> RangeView:
-    """Some rows of a view, to be looked at alone."""
-    images = ("depth", "mask", "color", "confidence", "xy")
-    there = {name: getattr(view, name) for name in images}
-    return replace(view, **{name: image[rows] for name, image in there.items() if image is not None})
 
 
 def _most_confidence(view: RangeView) -> float:

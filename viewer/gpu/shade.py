@@ -50,6 +50,8 @@ def shade(surface: Surface, look: Look) -> None:
     cloud = pose.overview
     source, surface.look = value_source(look, surface.layers.names(cloud.scalars)), look
     value = source if source in (None, "depth", "height") else "scalar"
+    if value == "height" and surface.samples is not None:
+        value = "scalar"  # which have no positions
     by_level = look.color_by == "level"
     color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
@@ -57,6 +59,11 @@ def shade(surface: Surface, look: Look) -> None:
     lit = cloud.normals is not None or surface.is_own("normal")
     light = look.light if look.light != "auto" else "head" if lit else "flat"
     eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
+    lit = light != "flat" or color == "normal"
+    read = [name for name, is_read in (("color", color == "own"), ("normal", lit)) if is_read]
+    from_rows = [name for name in read if not surface.is_own(name)]
+    by_sample = surface.samples is not None and bool(from_rows)
+    has_ids = cloud.ids is not None and surface.samples is None
     surface.color_range = None if source is None else value_range(surface, look)
     program = gpu.compute(
         "shade/shade.comp",
@@ -66,7 +73,8 @@ def shade(surface: Surface, look: Look) -> None:
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
             "TURNED": int(not surface.layers.place.is_identity),
-            "HAS_IDS": int(cloud.ids is not None),
+            "HAS_IDS": int(has_ids),
+            **surface.sample_defines(by_sample),
             "LEVEL_COLORS": len(LEVEL_COLORS) if by_level else 0,
             "OWN_LEVEL": int(by_level and surface.is_own("level")),
             **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
@@ -77,19 +85,22 @@ def shade(surface: Surface, look: Look) -> None:
     covered = surface.list_covered()
     with gpu.timers.measure("shade"):
         surface.bind_textures()
-        if color == "own":
-            _attribute(surface, "color").bind(Texture.COLORS)
-        if light != "flat" or color == "normal":
-            _attribute(surface, "normal").bind(Texture.NORMALS)
+        for name, texture in (("color", Texture.COLORS), ("normal", Texture.NORMALS)):
+            if name in read and surface.is_own(name):
+                surface.own(name).bind(texture)
+            elif name in read and surface.samples is None:
+                pose.array(f"{name}s").bind(texture)
+        if by_sample:
+            surface.bind_samples()
         if surface.is_own("color"):
             surface.own("color").bind(Texture.OWN_COLORS)
         if surface.is_own("value"):
             surface.own("value").bind(Texture.VALUES)
-        elif value == "scalar":
-            surface.scalar_texels(source or "").bind(Texture.VALUES)
+        elif value == "scalar" and (values := surface.row_values) is not None:
+            values.bind(Texture.VALUES)
         elif value == "height":
             pose.array("positions").bind(Texture.POSITIONS)
-        if color == "id" and cloud.ids is not None:
+        if color == "id" and has_ids:
             pose.array("ids").bind(Texture.IDS)
         if value is not None:
             gpu.keep(_color_map, look.color_map).bind(Texture.COLOR_MAP)
@@ -167,11 +178,6 @@ def _fractions(color: str) -> Vec4:
     """A colour of a look, each channel from 0 to 1."""
     red, green, blue, alpha = (c / 255 for c in rgba(color))
     return red, green, blue, alpha
-
-
-def _attribute(surface: Surface, name: str) -> gl.BufferTexture:
-    """Values that the backend wrote for each pixel, else the pose's, for each row."""
-    return surface.own(name) if surface.is_own(name) else surface.pose.array(f"{name}s")
 
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar
+from functools import partial
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import moderngl
 import numpy as np
@@ -15,6 +16,7 @@ from ..geometry import up_vector
 from ..look import Look, rgba, value_source
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.points import PointCloud
+from ..scan.range_points import RangePoints
 from ..srgb import linear_from_bytes
 from ..view import View
 from . import gl
@@ -89,6 +91,7 @@ class Surface:
     look: what it is drawn for, and shaded in last; shaded_by: what did it, None before. layers: over the
     pose.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
+    samples: the points of range views whose samples the rows are; None where these are points.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
@@ -113,8 +116,8 @@ class Surface:
         self.picture = gpu.ctx.buffer(reserve=4 * width * height)
         self._block = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._shown: tuple[GpuPose, View] | None = None
-        self._shows_samples = False
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
+        self.samples: RangePoints | None = None
         self.look = Look()
         self.layers = NO_LAYERS
         self.shaded_by: Callable[[Surface, Look], None] | None = None
@@ -131,12 +134,12 @@ class Surface:
 
     def start(self, pose: GpuPose, view: View, look: Look | None = None, layers: Layers = NO_LAYERS) -> None:
         """Begin a frame: what backends and shading read from now on."""
-        self._shown, self._stood_for, self.look, self.layers = (pose, view), None, look or Look(), layers
+        self._shown, self._stood_for, self.samples = (pose, view), None, None
+        self.look, self.layers = look or Look(), layers
         self._block.write(ViewBlock.of(view))
         self.bind_view()
         self._covered_known = False
         self._written.clear()
-        self._shows_samples = False
         self.stats = Stats()
 
     def take_changes(self, wanted: dict[str, object]) -> frozenset[str]:
@@ -167,8 +170,11 @@ class Surface:
         self._shown, self._stood_for = (pose, self.view), (self.pose, points)
 
     def show_samples(self) -> None:
-        """Say that rows are numbers of samples of the pose's range views, in place of points' rows."""
-        self._shows_samples = True
+        """Say that rows are samples of the pose's range views: pixels, numbered view after view and row after
+        row, whether they see a point or not. These are the ids of the points, none of which is merged for it.
+        Colours are those of the pixels, normals those of the planes through the samples around. Raises
+        InputError where there are no range views."""
+        self.samples = self.pose.range_points
 
     def take_covered(self) -> IndexList:
         """The list of covered pixels, for a backend that can fill it at less than the cost of
@@ -187,11 +193,12 @@ class Surface:
     def take_sample(self, share: float) -> tuple[gl.BufferTexture | None, int]:
         """The rows to draw in place of all, for a backend that is asked for a share of the points:
         (their list, ascending; None where it is all of them, how many there are). Counts the others."""
-        count = len(self._cloud)
+        count = len(self._cloud) if self.samples is None else int(self.samples.firsts[-1])
         if share >= 1 or count < _FEW:
             return None, count
         rows, drawn = sample_of(self.gpu).take(share, count)
-        self.stats.share, self.stats.left_out = share, count - drawn
+        points = count if self.samples is None else self.samples.count
+        self.stats.share, self.stats.left_out = share, points - round(points * drawn / count)
         return rows, drawn
 
     def clear(self) -> None:
@@ -236,9 +243,7 @@ class Surface:
         level: uint32, 0 where measured; n, up to 254, where filled from level n, with a depth and no row
         """
         if name not in self._own:
-            texel_format, size = _CHANNELS[name]
-            buffer = self.gpu.ctx.buffer(reserve=size * self.size[0] * self.size[1])
-            self._own[name] = gl.BufferTexture(buffer, texel_format)
+            self._own[name] = self._texels(name)
         self._written.add(name)
         if name == "value":
             self._blended = self.value_source, self.look.up
@@ -260,19 +265,42 @@ class Surface:
     def resolve(self, name: str) -> gl.BufferTexture:
         """The channel `color`, `normal` or `value` as the backend's `own`, with what the rows have written to
         it: for one that goes on from there, as by filling pixels that have none."""
-        rows = self.row_values if name == "value" else self.pose.find(f"{name}s")
         own = self.own(name)
-        depth = name == "value" and self.value_source == "depth"
-        defines = {"CHANNEL": _RESOLVED[name], "HAS_ROWS": int(rows is not None), "IS_DEPTH": int(depth)}
+        self._resolve(name, own)
+        return own
+
+    def _resolve(self, name: str, target: gl.BufferTexture) -> None:
+        """Write what the rows have of a channel to a texel for each covered pixel."""
+        by_sample = self.samples is not None and name != "value"
+        texels = None if by_sample else self.row_values if name == "value" else self.pose.find(f"{name}s")
+        defines = {
+            "CHANNEL": _RESOLVED[name],
+            "HAS_ROWS": int(texels is not None or (by_sample and not self._lacks(name))),
+            "IS_DEPTH": int(name == "value" and self.value_source == "depth"),
+            **self.sample_defines(by_sample),
+        }
         program = self.gpu.compute("shade/resolve.comp", defines)
         with self.gpu.timers.measure(f"resolve {name}"):
             self.bind_textures()
-            if rows is not None:
-                rows.bind(Texture.VALUES)
-            self.bind_own(name)
+            if by_sample:
+                self.bind_samples()
+            elif texels is not None:
+                texels.bind(Texture.VALUES)
+            target.buffer.bind_to_storage_buffer(Storage[name.upper()])
             self.gpu.set(program, plain=tuple(c / 255 for c in rgba(self.look.plain)[:3]))
             self.gpu.dispatch(program, self.size[0] * self.size[1])
-        return own
+
+    def _lacks(self, name: str) -> bool:
+        """Whether the pixels of range views have no such channel."""
+        return name == "color" and self.pose.overview.colors is None
+
+    def sample_defines(self, used: bool) -> dict[str, object]:
+        """Macros for programs that include range/of_rows.glsl. used: whether it is."""
+        return {"SAMPLES": 1, **self.pose.samples.defines} if used else {"SAMPLES": 0}
+
+    def bind_samples(self) -> None:
+        """Bind all that range/of_rows.glsl reads."""
+        self.pose.samples.bind(self.view)
 
     @property
     def value_source(self) -> str | None:
@@ -305,9 +333,9 @@ class Surface:
         """The numbers of each row, of a layer or the scan, relative to `value_zero`."""
         layer = self.layers.scalars.get(name)
         if layer is None:
-            return self.pose.array(f"scalar:{name}")
-        rows = self._stood_for[1] if self._stood_for else None
-        return self.pose.layer_texels(layer, self.scalar_range(name, self.pose)[0], rows)
+            return self.pose.array(f"{'scalar' if self.samples is None else 'sample'}:{name}")
+        rows, zero = self._stood_for[1] if self._stood_for else None, self.scalar_range(name, self.pose)[0]
+        return self.pose.layer_texels(layer, zero, rows, by_sample=self.samples is not None)
 
     @property
     def height_axis(self) -> tuple[float, float, float]:
@@ -323,7 +351,9 @@ class Surface:
         source = self.value_source
         if source in (None, "depth"):
             return None
-        return self.pose.heights(self.height_axis) if source == "height" else self.scalar_texels(source)
+        if source == "height":
+            return self.pose.heights(self.height_axis, by_sample=self.samples is not None)
+        return self.scalar_texels(source)
 
     @property
     def nbytes(self) -> int:
@@ -344,12 +374,25 @@ class Surface:
 
     @property
     def scan(self) -> PointCloud:
-        """The points of `scanned`; see `point_of`."""
+        """The points of `scanned`, which this merges; see `point_of`."""
         return self.scanned.stored
 
     def point_of(self, row: int) -> int:
         """The row in `scan` of the point that a row of the surface stands for."""
+        if self.samples is not None:
+            return self.samples.row_of(row)
         return int(self._stood_for[1][row]) if self._stood_for else row
+
+    def point_at(self, row: int, least: int = 1) -> tuple[PointCloud, int]:
+        """A cloud that has the point which a row stands for, and the row of the point there. It has at least
+        so many of the nearest points: it is `scan`, or of range views what pixels around see."""
+        if self.samples is None:
+            return self.scan, self.point_of(row)
+        offset = self.samples.of_samples("positions", np.array([row]))[0]
+        cloud = self.samples.around(offset + self.pose.origin, least)
+        found = cloud.row_of(row)
+        assert found is not None
+        return cloud, found
 
     @property
     def view(self) -> View:
@@ -365,36 +408,35 @@ class Surface:
 
     @property
     def row(self) -> NDArray[np.uint32]:
-        """(H, W) uint32, the point's row in the cloud's arrays; 0xFFFFFFFF where none."""
+        """(H, W) uint32, the point's row in the cloud's arrays, or the sample's number; 0xFFFFFFFF where
+        none."""
         return self._read(self.rows.buffer, np.uint32)
 
     @property
     def id(self) -> NDArray[np.uint32]:
-        """(H, W) uint32, the index of the point or the sample in the file; 0xFFFFFFFF where none."""
-        if self._shows_samples:
+        """(H, W) uint32, the point's index in the file; 0xFFFFFFFF where none."""
+        if self.samples is not None:
             return self.row
-        ids = self._cloud.ids
+        ids = self._of_rows("ids")
         return self.row if ids is None else self._fetch(ids, np.uint32(NOTHING))
 
     @property
     def color(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, linear; the look's plain colour where the scan has none; 0 where nothing is."""
-        colors = self._cloud.colors
         if self.is_own("color"):
             rgb = self._read_texels("color", np.uint8)[..., :3]
         else:
-            plain = np.array(rgba(self.look.plain)[:3], np.uint8)
-            rgb = self._fetch(None if colors is None else colors[:, :3], plain)
+            rgb = self._fetch(self._of_rows("colors"), np.array(rgba(self.look.plain), np.uint8))[..., :3]
         return _LINEAR[np.where(self._covered[..., None], rgb, np.uint8(0))]
 
     @property
     def normal(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, world space, unit length; 0 where unknown."""
-        if self.is_own("normal"):
+        if self.is_own("normal") or self.samples is not None:
             written = self._read_texels("normal", np.float32)
             fetched = np.where(self._covered[..., None], written, np.float32(0))
         else:
-            fetched = self._fetch(self._cloud.normals, np.zeros(3, np.float32))
+            fetched = self._fetch(self._of_rows("normals"), np.zeros(3, np.float32))
         length = np.linalg.norm(fetched, axis=2, keepdims=True)
         usable = np.isfinite(length) & (length > 0)
         along_pose = np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
@@ -440,7 +482,7 @@ class Surface:
     @property
     def value(self) -> NDArray[np.float32]:
         """(H, W) float32, the number that the look colours by; NaN where there is none."""
-        source, cloud, unknown = self.value_source, self._cloud, np.float32(np.nan)
+        source, unknown = self.value_source, np.float32(np.nan)
         if source is not None and self.is_own("value"):
             written = np.where(self._covered, self._read(self._own["value"].buffer, np.float32), unknown)
             return as_float32(written.astype(np.float64), -self.value_zero)
@@ -448,15 +490,7 @@ class Surface:
             return np.where(self._covered, self.depth, unknown)
         if source is None:
             return self._fetch(None, unknown)
-        values: NDArray
-        if source == "height":
-            values = self.layers.place.points(cloud.world()) @ up_vector(self.look.up)
-        elif source in self.layers.scalars:
-            layer = self.layers.scalars[source]
-            values = layer[self._stood_for[1]] if self._stood_for else layer
-        else:
-            values = cloud.scalars[source]
-        return self._fetch(as_float32(values), unknown)
+        return self._fetch(lambda rows: as_float32(self._values_of(source, rows)), unknown)
 
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
@@ -474,7 +508,12 @@ class Surface:
 
     def point_counts(self) -> dict[str, int]:
         """Counts of what became of the points of the file; see `count_points`."""
-        return count_points(self._cloud, self.view, self.row, self.stats.share, self.stats.faces_away)
+        return self.counting()()
+
+    def counting(self) -> Callable[[], dict[str, int]]:
+        """A function that gives `point_counts` of what is drawn now, on any thread."""
+        points, stats = self._cloud if self.samples is None else self.samples, self.stats
+        return partial(count_points, points, self.view, self.row, stats.share, stats.faces_away)
 
     def release(self) -> None:
         """Give up what it holds on the GPU now; otherwise that goes with the object."""
@@ -502,21 +541,62 @@ class Surface:
         return out.view(dtype).reshape(self.size[1], -1)
 
     def _read_texels(self, name: str, dtype: type) -> NDArray:
-        """Read what the backend wrote for each pixel, (H, W, channels)."""
-        return self._read(self._own[name].buffer, dtype).reshape(*self.size[::-1], -1)
+        """Read what the backend wrote for each pixel, or else what the rows have, (H, W, channels)."""
+        if self.is_own(name):
+            texels = self._own[name]
+        else:
+            texels = self._texels(name)
+            self._resolve(name, texels)
+        read = self._read(texels.buffer, dtype).reshape(*self.size[::-1], -1)
+        if not self.is_own(name):
+            self.gpu.discard(texels)
+        return read
+
+    def _texels(self, name: str) -> gl.BufferTexture:
+        """A channel of a texel for each pixel."""
+        texel_format, size = _CHANNELS[name]
+        buffer = self.gpu.ctx.buffer(reserve=size * self.size[0] * self.size[1])
+        return gl.BufferTexture(buffer, texel_format)
 
     @property
     def _covered(self) -> NDArray[np.bool_]:
         """(H, W), where something is seen."""
         return np.isfinite(self.depth)
 
-    def _fetch(self, values: NDArray | None, unknown: NDArray | np.generic) -> NDArray:
-        """Values (N, ...) of each pixel's row; `unknown` where there is no row, or None have any."""
+    def _of_rows(self, name: str) -> Callable[[NDArray], NDArray] | None:
+        """Function that gives values (n, ...) of rows (n,): positions, normals, colors, ids or 'scalar:NAME';
+        None where none have any."""
+        scalar = name.removeprefix("scalar:") if name.startswith("scalar:") else None
+        if self.samples is not None:
+            is_there = scalar is not None or getattr(self.pose.overview, name) is not None
+            return partial(self.samples.of_samples, scalar or name) if is_there else None
+        values = getattr(self._cloud, name) if scalar is None else self._cloud.scalars[scalar]
+        return None if values is None else values.__getitem__
+
+    def _values_of(self, source: str, rows: NDArray) -> NDArray:
+        """Numbers of rows (n,): heights along the look's up, of a layer, or a scalar of the scan."""
+        if source in self.layers.scalars:
+            return self.layers.scalars[source][self._points_of(rows)]
+        find = self._of_rows("positions" if source == "height" else f"scalar:{source}")
+        assert find is not None
+        if source != "height":
+            return find(rows)
+        return self.layers.place.points(find(rows) + self.pose.origin) @ up_vector(self.look.up)
+
+    def _points_of(self, rows: NDArray) -> NDArray:
+        """Rows in `scan` of the points that rows (n,) stand for; see `point_of`."""
+        if self.samples is not None:
+            return np.searchsorted(cast(NDArray, self.scan.ids), rows)
+        return self._stood_for[1][rows] if self._stood_for else rows
+
+    def _fetch(self, find: Callable[[NDArray], NDArray] | None, unknown: NDArray | np.generic) -> NDArray:
+        """Values of each pixel's row, as `find` gives them of some rows; `unknown` where there is no row, or
+        where there are none to find."""
         rows = self.row
         out = np.full((*rows.shape, *unknown.shape), unknown)
-        if values is not None:
+        if find is not None:
             found = rows != NOTHING
-            out[found] = values[rows[found]]
+            out[found] = find(rows[found])
         return out
 
 

@@ -11,6 +11,7 @@ from ..bounds import Bounds
 from .points import PointCloud, strided
 from .range_points import RangePoints
 from .range_view import RangeView, up_axis
+from .spacing import ENOUGH, typical_spacing
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 
@@ -88,6 +89,16 @@ class Pose:
     def sample(self) -> NDArray[np.float64]:
         """Some of the positions, (M, 3), relative to the origin: for ranges."""
         return strided(self.overview.positions).astype(np.float64)
+
+    @property
+    def spacing(self) -> float:
+        """The typical distance between neighbouring points, scan units, see `typical_spacing`."""
+        return typical_spacing(self.points) if isinstance(self.points, PointCloud) else self.points.spacing
+
+    def around(self, place: NDArray[np.float64], least: int = ENOUGH) -> PointCloud:
+        """A cloud that has at least so many of the points nearest to a place, (3,) scan units: all, or those
+        that range views see in pixels round it."""
+        return self.points if isinstance(self.points, PointCloud) else self.points.around(place, least)
 
     @property
     def nbytes(self) -> int:

@@ -127,6 +127,18 @@ class RangeView:
         from_eye += self.eye
         return from_eye
 
+    def unproject(self, row: NDArray[np.integer], column: NDArray[np.integer]) -> NDArray[np.float64]:
+        """World positions (N, 3) of valid pixels (N,), which `project` takes back to them."""
+        return self._in_camera(row, column) @ self._camera_to_world().T + self.eye
+
+    def cropped(self, rows: slice, columns: slice) -> RangeView:
+        """Take the pixels of some rows and columns, slices without a step, as a view of their own."""
+        images = ("depth", "mask", "color", "confidence", "xy")
+        parts = {name: getattr(self, name) for name in images if getattr(self, name) is not None}
+        top, left = rows.indices(len(self.depth))[0], columns.indices(self.depth.shape[1])[0]
+        parts = {name: image[rows, columns] for name, image in parts.items()}
+        return replace(self, **parts, cx=self.cx - left, cy=self.cy - top)
+
     def project(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Pixels (N, 2) in which the pod sees world points (N, 3), by its calibration: column and row with
         centres at +0.5; and depths (N,) of the view's kind. NaN where a point is not before the pod or its
@@ -228,18 +240,22 @@ class RangeView:
         done, height = 0, max(1, _AT_ONCE // valid.shape[1])
         for top in range(0, len(valid), height):
             row, column = np.nonzero(valid[top : top + height])
-            depth = self.depth[top : top + height][row, column].astype(np.float64)
-            if self.xy is not None:
-                x, y = self.xy[top : top + height][row, column].astype(np.float64).T
-            else:
-                x, y = self._rays(row + top, column)
-                if self.kind == "range":
-                    depth /= np.sqrt(x * x + y * y + 1)
-                if self.kind != "height":
-                    x, y = x * depth, y * depth
-            from_eye[done : done + len(row)] = np.stack([x, y, -depth], axis=1) @ turn
+            from_eye[done : done + len(row)] = self._in_camera(row + top, column) @ turn
             done += len(row)
         return from_eye
+
+    def _in_camera(self, row: NDArray[np.integer], column: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Places of valid pixels (N,) in camera space, (N, 3)."""
+        depth = self.depth[row, column].astype(np.float64)
+        if self.xy is not None:
+            x, y = self.xy[row, column].astype(np.float64).T
+        else:
+            x, y = self._rays(row, column)
+            if self.kind == "range":
+                depth /= np.sqrt(x * x + y * y + 1)
+            if self.kind != "height":
+                x, y = x * depth, y * depth
+        return np.stack([x, y, -depth], axis=1)
 
 
 def assumed_pinhole(width: int, height: int) -> dict[str, Any]:

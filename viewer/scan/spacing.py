@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..task import checkpoint
 from .points import PointCloud
 
+ENOUGH = 24  # nearest points, of which some may be copies of others, that tell a spacing
 _DISTANCES = 2_000_000  # point-to-point distances looked at
 _NEAREST = (128, 8192)  # of these: six neighbours, each with twenty copies or with a thousand
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
-from ...gpu.counts import count_points
 from ...task import Task, in_background
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ _REST = 0.3  # seconds after the last picture
 
 
 class Counting:
-    """counts: those of `count_points` for the picture that is shown; None until they are there."""
+    """counts: `Surface.point_counts` of the picture that is shown; None until they are there."""
 
     def __init__(self) -> None:
         self.counts: dict[str, int] | None = None
@@ -40,11 +39,8 @@ class Counting:
     def _begin(self, viewport: Viewport) -> None:
         surface = viewport.surface
         assert surface is not None
-        cloud, view, rows, stats = surface.pose.stored, surface.view, surface.row, surface.stats
         self._picture, self._task = viewport.number, Task("Counting points")
-        self._future = in_background(
-            self._task, lambda: count_points(cloud, view, rows, stats.share, stats.faces_away)
-        )
+        self._future = in_background(self._task, surface.counting())
 
     def cancel(self) -> None:
         """Stop counting."""
@@ -61,7 +57,7 @@ def words(viewport: Viewport, counts: Mapping[str, int] | None) -> list[tuple[st
     surface = viewport.surface
     if surface is not None and surface.stats.left_out:
         left_out = surface.stats.left_out
-        drawn = len(surface.scan) - left_out
+        drawn = surface.scanned.pose.count - left_out
         pixels = math.prod(surface.size) / math.prod(viewport.size)
         return [
             ("Drawn", f"{drawn:,} at most"),
