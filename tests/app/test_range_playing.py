@@ -17,6 +17,7 @@ from viewer.app.playing.player import Pace
 from viewer.app.scene.counting import Counting, words
 from viewer.app.scene.viewport import Viewport
 from viewer.app.session import Session
+from viewer.backends import Backend
 from viewer.camera import Camera
 from viewer.frame import Request, shared_renderer
 from viewer.look import Look
@@ -49,7 +50,7 @@ def viewport() -> Iterator[Viewport]:
     viewport.release()
 
 
-def play(timeline: Timeline, viewport: Viewport, backend: object) -> list[Pose]:
+def play(timeline: Timeline, viewport: Viewport, backend: Backend | str) -> list[Pose]:
     """Play all frames as a window does; the poses in the order in which they were shown."""
     playback = Playback(timeline, Session("scan", pace=Pace(every_frame=True)))
     shown: list[Pose] = []
@@ -71,9 +72,12 @@ def play(timeline: Timeline, viewport: Viewport, backend: object) -> list[Pose]:
     return shown
 
 
-def test_a_sequence_plays_without_merging(timeline: Timeline, viewport: Viewport) -> None:
+@pytest.mark.parametrize("backend", [sampling.BACKEND, "pyramidal"], ids=str)
+def test_a_sequence_plays_without_merging(
+    timeline: Timeline, viewport: Viewport, backend: Backend | str
+) -> None:
     timeline.finish = find_facts
-    shown = play(timeline, viewport, sampling.BACKEND)
+    shown = play(timeline, viewport, backend)
     assert sorted(pose.index for pose in shown) == [*range(FRAMES)]
     while not viewport.is_complete:
         viewport.draw(viewport.request)

@@ -144,7 +144,7 @@ def draw_all(renderer: Renderer) -> None:
 
 
 def draw_samples(renderer: Renderer) -> None:
-    """Pictures whose rows are samples: of views that need little of the shaders, and of such that need all."""
+    """Pictures whose rows are samples, of views that need little of the shaders and of some that need all."""
     view, measured = stepped_view((7, 5)), stepped_view((7, 5), "height", True)
     bent = replace(stepped_view((7, 5), "range"), distortion=(-0.1, 0.0, 0.0, 0.0))
     surface = Surface(renderer.gpu, SIZE)

@@ -285,7 +285,8 @@ def test_anonymous_pictures_are_drawn_of_samples_too(renderer: Renderer) -> None
     np.testing.assert_array_equal(anonymous.pose.cloud.positions, pose.cloud.positions)
 
 
-def test_a_sequence_is_drawn_without_merging_anything(renderer: Renderer) -> None:
+@pytest.mark.parametrize("backend", [sampling.BACKEND, "pyramidal"], ids=str)
+def test_a_sequence_is_drawn_without_merging_anything(renderer: Renderer, backend: Backend | str) -> None:
     own, surface = Renderer(renderer.gpu), Surface(renderer.gpu, SIZE)
     poses = [
         Pose.of(index, index / 25, "", tuple(sphere_view(eye + 0.02 * index, size=(96, 80)) for eye in EYES))
@@ -295,13 +296,13 @@ def test_a_sequence_is_drawn_without_merging_anything(renderer: Renderer) -> Non
     sizes = [pose.nbytes for pose in poses]
     for pose in poses:
         for look in (FLAT, Look(), Look(light="head"), replace(FLAT, color_by="height")):
-            request = Request(pose, camera, sampling.BACKEND, look=look)
+            request = Request(pose, camera, backend, look=look)
             while not bring(own, request, budget_ms=5):
                 pass
             while render_frame(own, request, surface, wait=False, moving=True):
                 time.sleep(0.001)
             assert is_prepared(own, request, SIZE)
-            assert surface.stats.backend == "sampling"
+            assert surface.stats.backend == str(backend)
             assert (surface.row != NOTHING).sum() > 500
     assert not any(pose.is_merged for pose in poses)
     assert [pose.nbytes for pose in poses] == sizes
