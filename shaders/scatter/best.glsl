@@ -1,7 +1,9 @@
 // The best visit of each cell, by an order-preserving uint key. PASS 0 keeps the least key, PASS 1 the lowest
 // item among those that have it, PASS 2 lists the cells that were hit. Two 32-bit passes: 64-bit
 // atomics are not everywhere.
+#if PASS == 2 || LISTED
 #include "common/list.glsl"
+#endif
 
 #if PASS == 0
 layout(std430, binding = STORAGE_KEYS) buffer Keys { uint keys[]; };

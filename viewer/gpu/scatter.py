@@ -41,8 +41,8 @@ class Visits:
         """Send the items to their cells. target: the shader file that says what becomes of a visit; bind:
         sets what that one reads and writes."""
         parts = {"target": target, "cells": self.cells}
-        items = "item_count" if self.listed is None else "list_count"
-        given = {"ITEMS": items, **defines, **self.defines}
+        listed = int(self.listed is not None)
+        given = {"ITEMS": ("item_count", "list_count")[listed], "LISTED": listed, **defines, **self.defines}
         program = gpu.compute("scatter/scatter.comp", given, parts, self.params)
         bind(program)
         self.bind(program)
