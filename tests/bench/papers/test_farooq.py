@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from viewer.bench.papers.farooq_2013 import pyramids
 from viewer.bench.papers.farooq_2013.farooq import digest, page, read_measurement, write_farooq
-from viewer.bench.papers.farooq_2013.large_views import scan_head
+from viewer.bench.papers.farooq_2013.large_views import measure_large_views, scan_head
+from viewer.bench.papers.farooq_2013.playing import measure_playing
 from viewer.bench.report.results import LARGE_VIEWS, PLAYING, RESULTS, Row, write_row
+from viewer.bench.run import Bench, BenchSettings
+from viewer.bench.scenes import catalog
 from viewer.errors import InputError
+
+if TYPE_CHECKING:
+    from viewer.renderer import Renderer
 
 NONE = "\N{EN DASH}"
 PARAMS = {"fill": True, **{f"level_{k}": True for k in range(5)}, "primitive": "points", "hide": True}
@@ -138,7 +145,64 @@ def test_the_figures_of_the_thesis_agree_with_each_other() -> None:
         assert line["samples_per_second"] == line["frames_per_second"] * samples
 
 
+@pytest.mark.slow
 def test_pods_see_a_head_that_fills_their_views() -> None:
     views = scan_head((60, 90))
     assert [view.depth.shape for view in views] == [(90, 60)] * 2
     assert all(view.valid().mean() > 0.5 for view in views)
+
+
+# --- what is measured ----------------------------------------------------------------------
+
+
+def test_every_number_of_levels_is_drawn_at_every_zoom() -> None:
+    groups = pyramids.groups()
+    by_zoom = [group for group in groups if "hide" not in {each.sweep for each in group.contenders}]
+    for scene in {group.scene for group in by_zoom}:
+        assert [group.zoom for group in by_zoom if group.scene == scene] == list(pyramids.ZOOMS)
+    for group in groups:
+        assert group.scene in catalog.scene_names(None)
+        assert (group.noise == 0) == group.scene.endswith("-pair")
+    params = [asdict(each.params) for each in by_zoom[0].contenders if each.params]
+    drawn = [(each["primitive"], pyramids.levels_of(each)) for each in params]
+    assert drawn == [*(("points", count) for count in range(1, 6)), ("polygons", 1), ("polygons", 5)]
+    assert by_zoom[0].contenders[-1].backend == "range-mesh"
+
+
+def test_more_levels_leave_fewer_holes_and_polygons_are_as_good_as_the_mesh(renderer: Renderer) -> None:
+    bench = Bench(renderer, BenchSettings(size=(160, 120), views=2, repeat=1, frames=0))
+    (like, *_) = pyramids.groups()
+    rows = bench.measure(replace(like, scene="torus-pair", zoom=4.0))
+    assert not bench.notes
+    found = {row["primitive"] + str(row["levels"]): row["errors"] for row in digest(rows, [], [])["rows"]}
+    holes = [found[f"points{count}"]["hole_scanned_percent"] for count in range(1, 6)]
+    assert holes == sorted(holes, reverse=True)
+    assert holes[0] > 80 > 10 > holes[-1]
+    assert found["points5"]["psnr_scanned"] > found["points1"]["psnr_scanned"] + 3
+    assert found["polygons5"]["psnr_scanned"] > min(found["range-mesh0"]["psnr_scanned"], 50) - 1
+
+
+@pytest.mark.slow
+def test_large_views_are_opened_and_drawn_with_and_without_skipping(renderer: Renderer) -> None:
+    bench = Bench(renderer, BenchSettings(repeat=1))
+    rows = list(measure_large_views(bench, view_size=(60, 90)))
+    assert [row["scenario"] for row in rows[::2]] == [
+        line["scenario"] for line in pyramids.paper()["scenarios"]
+    ]
+    assert {row["samples"] for row in rows} == {2 * 60 * 90}
+    for row in rows:
+        assert min(row["ms"], row["unskipped_ms"], row["covered"]) > 0
+        assert row["open_ms"] > row["read_ms"] > 0
+        assert row["bytes_per_sample"] > 8
+    covered = [row["covered"] for row in rows[1::2]]  # of polygons
+    assert covered[0] == pytest.approx(covered[-1], rel=0.02)
+    assert covered[-1] < covered[1] <= covered[4]
+
+
+def test_sequences_are_played(renderer: Renderer) -> None:
+    rows = list(measure_playing(Bench(renderer, BenchSettings()), poses=2))
+    assert [row["primitive"] for row in rows] == list(pyramids.PRIMITIVES)
+    for row in rows:
+        assert row["reading"]["fps"] > 0
+        assert row["playing"]["fps"] > 0
+    assert digest(DRAWN, LARGE, rows)["playing"][0]["poses"] == 2
