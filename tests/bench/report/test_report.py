@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from test_results import a_row, times, written
 
-from viewer.bench.report.page import overall, stability, summary_rows, three_digits, write_report
+from viewer.bench.report.page import fronts, overall, stability, summary_rows, three_digits, write_report
 from viewer.bench.report.pictures import _HOLE, _SPILL, picture_path, side_by_side
 from viewer.bench.report.plots import distinct, pareto, slope, sweeps, swept, time_against_error
 from viewer.bench.report.results import METRICS, Row, error_metrics
@@ -137,13 +137,13 @@ def test_numbers_have_three_digits(value: float, text: str) -> None:
     assert three_digits(value) == text
 
 
-def best(rows: list[Row], column: str) -> set[str]:
-    """The backends whose value in a column is marked as best."""
+def marked(rows: list[Row], column: str, kind: str = "best") -> set[str]:
+    """The backends whose value in a column is marked so."""
     return {
         backend
         for backend, _, cells in summary_rows(rows)
         for cell in cells
-        if cell.kind == "best" and cell.note.startswith(f"{column} of")
+        if cell.kind == kind and cell.note.startswith(f"{column} of")
     }
 
 
@@ -154,11 +154,26 @@ def test_the_best_of_a_column_is_marked_among_the_backends_only() -> None:
         a_row({"hole_percent": 1.0, "psnr": 20.0}, 7.0, backend="surfels"),
         a_row({"hole_percent": 3.0, "psnr": math.nan}, 9.0, backend="voxels"),
     ]
-    assert best(rows, "gpu_ms") == {"points"}
-    assert best(rows, "hole_percent") == {"surfels"}
-    assert best(rows, "psnr") == {"points"}
-    assert best(rows, "cpu_ms") == set()  # all alike
-    assert best(rows, "flip") == set()  # all undefined
+    assert marked(rows, "gpu_ms") == {"points"}
+    assert marked(rows, "hole_percent") == {"surfels"}
+    assert marked(rows, "psnr") == {"points"}
+    assert marked(rows, "cpu_ms") == set()  # all alike
+    assert marked(rows, "flip") == set()  # all undefined
+
+
+def test_errors_that_nothing_faster_beats_are_marked() -> None:
+    rows = [
+        a_row({"hole_percent": 9.0, "psnr": 1.0}, 1.0, backend="gl-points"),
+        a_row({"hole_percent": 2.0, "psnr": 30.0}, 5.0, backend="points"),
+        a_row({"hole_percent": 1.0, "psnr": 20.0}, 7.0, backend="surfels"),
+        a_row({"hole_percent": 3.0, "psnr": 40.0}, 9.0, backend="voxels"),
+    ]
+    assert fronts(rows)["hole_percent"] == ["points", "surfels"]
+    assert fronts(rows)["psnr"] == ["points", "voxels"]
+    assert fronts(rows)["flip"] == []
+    assert marked(rows, "hole_percent", "front") == {"points"}  # the best is marked as such
+    assert marked(rows, "psnr", "front") == {"points"}
+    assert marked(rows, "gpu_ms", "front") == set()
 
 
 def test_over_all_scenes_fronts_are_counted_and_times_are_ratios() -> None:
@@ -170,11 +185,11 @@ def test_over_all_scenes_fronts_are_counted_and_times_are_ratios() -> None:
         ]
 
     table = overall([scene("torus", 1.0, 2.0, 4.0, 1.0), scene("bunny", 10.0, 80.0, 160.0, 3.0)])
-    assert [(name, time, fronts[0]) for name, time, fronts in table] == [
+    assert [(name, time, won[0]) for name, time, won in table] == [
         ("points", "4.00", "2 of 2"),  # the geometric mean of 2 and 8
         ("surfels", "8.00", "1 of 2"),  # slower, and in the second scene worse
     ]
-    assert {text for _, _, fronts in table for text in fronts[1:]} == {"\N{EN DASH}"}
+    assert {text for _, _, won in table for text in won[1:]} == {"\N{EN DASH}"}
 
 
 def test_numerics_are_held_failed_or_limited() -> None:

@@ -151,9 +151,10 @@ def about(rows: Sequence[Row]) -> list[tuple[str, str]]:
 def summary_rows(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
     """The default rows of a scene: backend, kind ("floor", "ceiling" or empty), a cell for each column.
 
-    The best of each column, floor and ceiling aside, has the kind "best".
+    The best of each column, floor and ceiling aside, has the kind "best"; other errors that nothing faster
+    beats have the kind "front".
     """
-    contest = [row for row in rows if row["backend"] not in (FLOOR, CEILING)]
+    contest, on_front = _contest(rows), fronts(rows)
     best = {}
     for name in _SUMMARY:
         losses = {METRICS[name].loss(METRICS[name].of(row)) for row in contest}
@@ -163,8 +164,11 @@ def summary_rows(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
 
     def cell(row: Row, metric: Metric) -> Cell:
         value = metric.of(row)
-        won = len(contest) > 1 and row in contest and metric.loss(value) == best[metric.name]
-        return Cell(_shown(metric, row), "best" if won else "", f"{metric.name} of {row['backend']}")
+        named = f"{metric.name} of {row['backend']}"
+        if len(contest) > 1 and row in contest and metric.loss(value) == best[metric.name]:
+            return Cell(_shown(metric, row), "best", named)
+        stands = len(contest) > 1 and row["backend"] in on_front.get(metric.name, ())
+        return Cell(_shown(metric, row), "front" if stands else "", named)
 
     return [
         (row["backend"], kinds.get(row["backend"], ""), [cell(row, METRICS[name]) for name in _SUMMARY])
@@ -172,6 +176,21 @@ def summary_rows(rows: Sequence[Row]) -> list[tuple[str, str, list[Cell]]]:
         for row in rows
         if row["backend"] == backend
     ]
+
+
+def fronts(rows: Sequence[Row]) -> dict[str, list[str]]:
+    """Pareto fronts of the default rows of a scene: for each judged error the backends that none beats in
+    both time and error, by time. Floor and ceiling have no part."""
+    time, contest = METRICS["gpu_ms"], _contest(rows)
+    times = [time.of(row) for row in contest]
+    losses = {name: [METRICS[name].loss(METRICS[name].of(row)) for row in contest] for name in _JUDGED}
+    return {
+        name: [contest[i]["backend"] for i in plots.pareto(times, values)] for name, values in losses.items()
+    }
+
+
+def _contest(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["backend"] not in (FLOOR, CEILING)]
 
 
 def overall(scenes: Sequence[Sequence[Row]]) -> list[tuple[str, str, list[str]]]:
@@ -186,20 +205,18 @@ def overall(scenes: Sequence[Sequence[Row]]) -> list[tuple[str, str, list[str]]]
     won: Counter[tuple[str, str]] = Counter()
     for rows in scenes:
         floor = [time.of(row) for row in rows if row["backend"] == FLOOR]
-        contest = [row for row in rows if row["backend"] not in (FLOOR, CEILING)]
+        contest, on_front = _contest(rows), fronts(rows)
         for row in contest:
             ratios.setdefault(row["backend"], []).extend(time.of(row) / other for other in floor if other > 0)
         for name in _JUDGED:
-            losses = [METRICS[name].loss(METRICS[name].of(row)) for row in contest]
-            front = plots.pareto([time.of(row) for row in contest], losses)
             known.update((row["backend"], name) for row in contest if _known([row], METRICS[name]))
-            won.update((contest[i]["backend"], name) for i in front)
+            won.update((backend, name) for backend in on_front[name])
 
-    def fronts(backend: str) -> list[str]:
+    def won_of(backend: str) -> list[str]:
         of = [(won[backend, name], known[backend, name]) for name in _JUDGED]
         return [f"{some} of {all_}" if all_ else _DASH for some, all_ in of]
 
-    return [(name, three_digits(_geometric_mean(ratios[name])), fronts(name)) for name in sorted(ratios)]
+    return [(name, three_digits(_geometric_mean(ratios[name])), won_of(name)) for name in sorted(ratios)]
 
 
 def stability(lines: Sequence[Row]) -> dict[str, Any]:
