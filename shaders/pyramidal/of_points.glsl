@@ -13,6 +13,9 @@ layout(binding = TEXTURE_VALUES) uniform samplerBuffer values;
 
 vec3 place_of(uint row) { return to_view(texelFetch(positions, int(row)).xyz); }
 
+// Points have no neighbours that are known.
+bool are_neighbors(uint row, uint other) { return false; }
+
 void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, out Seen seen) {
     row = item_index;
     seen = UNSEEN;

@@ -17,6 +17,16 @@ vec3 place_of(uint row) {
     return to_screen_view(v, sample_place(v, 0, vec2(at.zw), sample_depth(sample_index(v, 0, at.zw))));
 }
 
+// Whether samples are near to each other in one range image, and of one surface there (Farooq 2013, algorithm 6.5).
+bool are_neighbors(uint row, uint other) {
+    ivec4 here = sample_of_id(row, RANGE_COUNT), there = sample_of_id(other, RANGE_COUNT);
+    int apart = max(abs(here.z - there.z), abs(here.w - there.w));
+    if (here.x != there.x || apart > neighbors) return false;
+    RangeView v = range_view(here.x);
+    float depth = sample_depth(sample_index(v, 0, here.zw)), beside = sample_depth(sample_index(v, 0, there.zw));
+    return abs(depth - beside) <= STEEPEST * float(max(apart, 1)) * sample_spacing(v, 0, min(depth, beside));
+}
+
 // A unit normal along the pose's axes of one in screen view space.
 vec3 along_pose(vec3 normal) { return normal * mat3(world_to_view); }
 
@@ -55,12 +65,14 @@ vec3 normal_of(RangeView v, int index) {
 
 // What a pixel shows: a mix of up to three samples of a level of a view. shares: sum 1. uv: the place between them.
 // nearest: the sample with the largest share. facing: the normal of the triangle, 0 where it is a sample alone.
+// apart: pixels between neighbouring samples.
 struct Mixture {
     vec3 shares;
     ivec3 index;
     vec2 uv;
     ivec2 nearest;
     vec3 facing;
+    float apart;
 };
 
 #if POLYGONS
@@ -72,6 +84,7 @@ Mixture mixed_of(RangeView v, ivec4 at, uint part, vec2 pixel) {
     Corner x = corner_at(v, found, at.y, at.zw + x_at), y = corner_at(v, found, at.y, at.zw + y_at);
     Corner z = corner_at(v, found, at.y, at.zw + z_at);
     vec3 shares = shares_at(x, y, z, pixel);
+    float apart = sqrt(abs(shares.x + shares.y + shares.z));  // a triangle is half a square
     if (view_perspective) shares /= -vec3(x.place.z, y.place.z, z.place.z);
     float sum = shares.x + shares.y + shares.z;
     shares = sum == 0.0 ? vec3(1.0, 0.0, 0.0) : shares / sum;
@@ -82,8 +95,29 @@ Mixture mixed_of(RangeView v, ivec4 at, uint part, vec2 pixel) {
         ivec3(x.index, y.index, z.index),
         vec2(at.zw) + shares.x * vec2(x_at) + shares.y * vec2(y_at) + shares.z * vec2(z_at),
         at.zw + most,
-        cross(y.place - x.place, z.place - x.place)
+        cross(y.place - x.place, z.place - x.place),
+        apart
     );
+}
+#endif
+
+#if FADE && COLOR
+const float FOG = 4.0;  // of a level whose samples are half a pixel apart, 2 % are left
+
+// Linear colour of a level at a pixel coordinate, between its samples; alpha: 0 where there are none.
+vec4 color_at(RangeView v, int level, vec2 pixel) {
+    RangeLevel found = range_level(v, level);
+    vec2 uv = clamp(pixel_to_level(v, level, pixel), vec2(0.0), vec2(found.size - 1));
+    ivec2 first = ivec2(uv);
+    vec2 part = uv - vec2(first);
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < 4; ++k) {
+        ivec2 at = min(first + ivec2(k & 1, k >> 1), found.size - 1);
+        vec4 look = sample_look(sample_index(found, at));
+        float share = ((k & 1) != 0 ? part.x : 1.0 - part.x) * ((k >> 1) != 0 ? part.y : 1.0 - part.y) * look.a;
+        sum += share * vec4(to_linear(look.rgb), 1.0);
+    }
+    return sum.a > 0.0 ? vec4(sum.rgb / sum.a, 1.0) : vec4(0.0);
 }
 #endif
 
@@ -197,7 +231,7 @@ void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, ou
     int index = int(item_index / PARTS);
     ivec4 at = sample_at(index, RANGE_COUNT);
     RangeView v = range_view(at.x);
-    Mixture shown = Mixture(vec3(1.0, 0.0, 0.0), ivec3(index), vec2(at.zw), at.zw, vec3(0.0));
+    Mixture shown = Mixture(vec3(1.0, 0.0, 0.0), ivec3(index), vec2(at.zw), at.zw, vec3(0.0), 1.0);
     vec2 middle = vec2(pixel) + 0.5;
 #if POLYGONS
     uint part = item_index % PARTS;
@@ -213,6 +247,15 @@ void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, ou
         seen.normal += shown.shares[k] * normal_of(v, shown.index[k]);
 #endif
     }
+#if FADE && COLOR
+    // The fog equation: the closer together samples are, the less is seen of them (7.3.2).
+    float closer = max(1.0 / shown.apart - 1.0, 0.0);
+    float fine = exp(-closer * closer * FOG);
+    if (fine < 0.999 && at.y < last_level) {
+        vec4 coarse = color_at(v, at.y + 1, level_to_pixel(v, at.y, shown.uv));
+        seen.color = mix(seen.color, coarse.rgb, (1.0 - fine) * coarse.a);
+    }
+#endif
     vec3 place = from_pixel(middle, depth), normal = triangle_normal(v, shown.facing, place);
 #if NORMAL
     if (dot(seen.normal, seen.normal) > 1e-6) normal = normalize(seen.normal);

@@ -5,6 +5,12 @@
 #include "pyramidal/pixels.glsl"
 #include <source>
 
+#if SUMS
+layout(binding = TEXTURE_SUMS) uniform usamplerBuffer sums;  // of point spread functions: weight, and times linear colour
+
+const float steps[] = STEPS;
+#endif
+
 void main() {
     int i = int(item());
     if (i >= view_size.x * view_size.y || rows[i] == NOTHING) return;
@@ -12,5 +18,10 @@ void main() {
     uint row;
     Seen seen;
     own_pixel(split(i, view_size.x), rows[i], depth, row, seen);
+#if SUMS && COLOR
+    float weight = float(int(texelFetch(sums, 4 * i).r)) * steps[0];
+    for (int k = 0; k < 3; ++k)
+        if (weight > 0.0) seen.color[k] = float(int(texelFetch(sums, 4 * i + k + 1).r)) * steps[k + 1] / weight;
+#endif
     store(i, depth, row, 0, seen);
 }

@@ -20,7 +20,8 @@ struct Column {
     float depth;  // of the view's kind; +inf: none
 };
 
-float weight_at(int apart) { return float(REACH + 1 - abs(apart)); }
+// Of a coarser level, which has less noise, only the nearest count: they reach as far.
+float weight_at(int level, int apart) { return max(float((level == 0 ? REACH : 1) + 1 - abs(apart)), 0.0); }
 
 Column column_at(RowOfSamples row, ivec2 uv, vec3 zero) {
     vec4 middle = placed_sample(row.view, row.range, row.level, uv);
@@ -29,7 +30,7 @@ Column column_at(RowOfSamples row, ivec2 uv, vec3 zero) {
     for (int y = -REACH; y <= REACH; ++y) {
         vec4 other = y == 0 ? middle : placed_sample(row.view, row.range, row.level, uv + ivec2(0, y));
         if (!same_surface(row.view, row.level, middle.w, other.w)) continue;
-        float weight = weight_at(y), v = float(y);
+        float weight = weight_at(row.level, y), v = float(y);
         column.count += weight * vec3(1.0, v, v * v);
         column.places += weight * (other.xyz - zero);
         column.places_v += weight * v * (other.xyz - zero);
@@ -44,7 +45,7 @@ vec3 plane_normal(RowOfSamples row, Column columns[2 * REACH + 1], vec3 place) {
     vec3 count = vec3(0.0), squares = vec3(0.0), places = vec3(0.0), places_u = vec3(0.0), places_v = vec3(0.0);
     for (int k = 0; k < 2 * REACH + 1; ++k) {
         if (!same_surface(row.view, row.level, columns[REACH].depth, columns[k].depth)) continue;
-        float weight = weight_at(k - REACH), u = float(k - REACH);
+        float weight = weight_at(row.level, k - REACH), u = float(k - REACH);
         vec3 sums = weight * columns[k].count;
         count += vec3(sums.x, u * sums.x, sums.y);
         squares += vec3(u * u * sums.x, u * sums.y, sums.z);

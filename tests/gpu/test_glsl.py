@@ -137,6 +137,8 @@ def draw_all(renderer: Renderer) -> None:
                 draw(pose, name, **setting)
         draw(pose, "pyramidal", Look(light="flat"), primitive="points", fill=False, hide=False)
         draw(pose, "pyramidal", projection="orthographic", primitive="points", cull_back=True)
+        for mode, kernel in product(("table", "analytic"), ("3x3", "5x5")):
+            draw(pose, "pyramidal", primitive="points", antialias=mode, kernel=kernel)
     draw(sphere(1500), "surfels", radius_scale=0.01)
     mesh = sphere_mesh(16)
     draw(mesh.points, baselines.mesh(mesh))

@@ -46,6 +46,8 @@ class Texture(IntEnum):
     # Targets of pyramidal projection, with keys and best.
     SPOTS = auto()
     SHOWN = auto()
+    KERNELS = auto()  # point spread functions
+    SUMS = auto()  # of such
     RANGE_NORMALS = auto()  # of samples of range views
     # A level of a pyramid that is read, and one that is added to it.
     SAMPLES = auto()

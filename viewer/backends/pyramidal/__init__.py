@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from ...gpu.bindings import Texture
 from ...gpu.pose import GpuPose
 from ...gpu.pyramid import BOX, GAUSSIAN, NEAREST, Filter
+from ...gpu.scatter import scatter
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
@@ -19,6 +20,7 @@ from ...scan.spacing import sparse_spacing
 from ...view import View
 from .. import FrameView, Limit
 from .sources import PointSource, SampleSource
+from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
 from .views import MODES, ViewSource, view_spacing
 
@@ -36,7 +38,7 @@ LIMITS = {
 }
 
 _FILLING = {"fill": (True,)}
-_LEVELS, _HIDDEN, _VIEWS = "Levels", "Hidden points", "Range images"
+_LEVELS, _HIDDEN, _VIEWS, _SMOOTHING = "Levels", "Hidden points", "Range images", "Anti-aliasing"
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,15 @@ class Params:
         when={"hide": (True,)},
     )
 
+    neighbors: int = param(
+        4,
+        "Samples of a range image so near to one of the nearer surface are not hidden by it",
+        low=0,
+        high=100,
+        unit="samples",
+        group=_HIDDEN,
+        when={"hide": (True,)},
+    )
     first_level: int = param(0, "The finest level of range images that is drawn", low=0, high=5, group=_VIEWS)
     primitive: str = param(
         "polygons",
@@ -111,6 +122,25 @@ class Params:
         1.0, "Pixels between samples above which a finer level is drawn", low=0.25, high=16, unit="px",
         group=_VIEWS, when={"lod": (True,)},
     )  # fmt: skip
+    antialias: str = param(
+        "off",
+        "Colours as sums of point spread functions, of samples that are drawn as points",
+        choices=FUNCTIONS,
+        group=_SMOOTHING,
+        sweep=("off", "table", "analytic"),
+    )
+    kernel: str = param(
+        "3x3",
+        "Pixels that a point spread function reaches",
+        choices=KERNELS,
+        group=_SMOOTHING,
+        unless={"antialias": ("off",)},
+    )
+    fade: bool = param(
+        False,
+        "Fade colours into the next coarser level as samples come to lie closer than pixels",
+        group=_SMOOTHING,
+    )
     filter: str = param(
         "box",
         "What coarser levels of range images are made by",
@@ -159,6 +189,7 @@ class _Numbers:
     density: int
     sparse: int
     tolerance: float
+    neighbors: int
     spacing: float
     first_level: int
     last_level: int
@@ -179,14 +210,18 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter, show, hide, fill; complete where all samples shall be drawn."""
     params: Params = frame.params
     source = _source(pose, params, surface)
-    refinable = source.scatter(surface, frame.share)
+    visits = source.visits(surface, frame.share)
+    scatter(surface.gpu, visits, surface.depths, surface.rows)
     fills, hides = params.shown != (0,), params.hide and not source.is_closed
-    if not (fills or hides or source.is_made):
+    channels = source.channels(surface)
+    spreads = params.antialias != "off" and not source.is_closed and "color" in channels
+    refinable = surface.stats.share < 1
+    if not (fills or hides or spreads or source.is_made):
         surface.stats.skipped["fill"] = "level 0 alone is shown"
         return refinable
     gpu, pixels = surface.gpu, surface.size[0] * surface.size[1]
-    channels = source.channels(surface)
     defines, values = source.defines(channels), source.params
+    spreading = spread_macros(params.antialias if spreads else "off", params.kernel, source.count)
     targets = surface.keep(Targets)
 
     def bind() -> None:
@@ -195,14 +230,17 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.bind_storage()
         surface.bind_own("level", *channels)
 
+    if spreads:
+        given = replace(visits, defines={**visits.defines, **spreading})
+        add_spread(surface, given, params.kernel, source.count).texels.bind(Texture.SUMS)
     with gpu.timers.measure("resolve"):
-        program = gpu.compute("pyramidal/resolve.comp", defines, source.parts, values)
+        program = gpu.compute("pyramidal/resolve.comp", {**defines, **spreading}, source.parts, values)
         bind()
         gpu.dispatch(program, pixels)
     if hides:
         targets.reduce(surface, source, channels)
         with gpu.timers.measure("hide"):
-            program = gpu.compute("pyramidal/hide.comp", params=values)
+            program = gpu.compute("pyramidal/hide.comp", source.defines([]), source.parts, values)
             bind()
             gpu.dispatch(program, pixels)
     if fills:
@@ -227,6 +265,7 @@ def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
         density=0,
         sparse=1,
         tolerance=params.tolerance,
+        neighbors=params.neighbors,
         spacing=0.0,
         first_level=0,
         last_level=0,

@@ -9,7 +9,7 @@ from ...gpu import gl
 from ...gpu.bindings import Texture
 from ...gpu.context import Program
 from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits, scatter
+from ...gpu.scatter import Visits
 from ...gpu.surface import Surface
 
 CHANNELS = {"color": Texture.COLORS, "normal": Texture.NORMALS, "value": Texture.VALUES}
@@ -20,11 +20,12 @@ class SampleSource(Protocol):
 
     parts: the shader file that says what a sample is, as programs include it. params: the numbers that it
     reads. is_closed: whether what it scatters has no holes that something behind is seen through. is_made:
-    whether what it scatters are no rows yet, but what `resolve.comp` makes rows of.
+    whether what it scatters are no rows yet, but what `resolve.comp` makes rows of. count: of the samples.
     """
 
     parts: Mapping[str, str]
     params: Any
+    count: int
     is_closed: bool
     is_made: bool
 
@@ -34,8 +35,8 @@ class SampleSource(Protocol):
     def channels(self, surface: Surface) -> list[str]:
         """The names of what its samples have to show, of `CHANNELS`."""
 
-    def scatter(self, surface: Surface, share: float) -> bool:
-        """Scatter samples into a Surface; whether some were left out."""
+    def visits(self, surface: Surface, share: float) -> Visits:
+        """The visits of the samples to pixels."""
 
     def bind(self) -> None:
         """Bind what the shader file reads."""
@@ -49,6 +50,7 @@ class PointSource:
 
     def __init__(self, pose: GpuPose, params: Any) -> None:
         self.params = params
+        self.count = len(pose.cloud)
         self._pose = pose
         self._texels: dict[str, gl.BufferTexture] = {}
 
@@ -64,7 +66,7 @@ class PointSource:
         self._texels = {name: texels for name, texels in found.items() if texels is not None}
         return list(self._texels)
 
-    def scatter(self, surface: Surface, share: float) -> bool:
+    def visits(self, surface: Surface, share: float) -> Visits:
         rows, count = surface.take_sample(share)
 
         def bind(_: Program) -> None:
@@ -72,9 +74,8 @@ class PointSource:
             if rows is not None:
                 rows.bind(Texture.DRAWN_ROWS)
 
-        visits = Visits("pyramidal/points.glsl", count, bind, {"SAMPLED": int(rows is not None)})
-        scatter(self._pose.gpu, visits, surface.depths, surface.rows)
-        return rows is not None
+        defines = {"SAMPLED": int(rows is not None), "SUMS": 0}
+        return Visits("pyramidal/points.glsl", count, bind, defines, self.params)
 
     def bind(self) -> None:
         self._pose.array("positions").bind(Texture.POSITIONS)

@@ -13,7 +13,7 @@ from ...gpu.compact import IndexList
 from ...gpu.constants import RANGE_TILE
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits, scatter
+from ...gpu.scatter import Visits
 from ...gpu.surface import Surface
 from ...look import Look
 from ...scan.range_view import RangeView
@@ -59,6 +59,7 @@ class ViewSource:
         self.is_closed = params.primitive == "polygons"
         self._pose, self._params, self._view = pose, params, surface.view
         self._samples = pose.samples
+        self.count = self._samples.count
         self._tiles = surface.keep(DrawnTiles)
         self._tiles.reserve(self._samples.tile_count)
         self._texels: dict[str, gl.BufferTexture] = {}
@@ -72,6 +73,7 @@ class ViewSource:
             "CULL_BACK": int(params.cull_back),
             "BLEND": MODES.index(params.blend) if len(self._pose.views) > 1 else 0,
             "LOD": int(params.lod),
+            "FADE": int(params.lod and params.fade),
             "SKIP": int(params.skip),
             **{name.upper(): int(name in channels) for name in ("color", "normal", "value")},
         }
@@ -86,11 +88,10 @@ class ViewSource:
             self._texels["value"] = values
         return found
 
-    def scatter(self, surface: Surface, share: float) -> bool:
-        gpu, tiles = self._pose.gpu, self._tiles
-        program = gpu.compute(
-            "pyramidal/views/tiles.comp", {**self.defines([]), **_causes()}, params=self.params
-        )
+    def visits(self, surface: Surface, share: float) -> Visits:
+        """List the tiles that the picture needs: the visits of their samples."""
+        gpu, tiles, defines = self._pose.gpu, self._tiles, self.defines([])
+        program = gpu.compute("pyramidal/views/tiles.comp", {**defines, **_causes()}, params=self.params)
         with gpu.timers.measure("tiles"):
             gl.clear_words(tiles.counts, 0)
             tiles.listed.clear()
@@ -98,16 +99,14 @@ class ViewSource:
             tiles.counts.bind_to_storage_buffer(Storage.TILE_COUNTS)
             self.bind()
             gpu.dispatch(program, self._samples.tile_count)
+        surface.show_samples()
 
         def bind(_: Program) -> None:
             self.bind()
             tiles.listed.texels.bind(Texture.DRAWN_ROWS)
 
         cells = f"pyramidal/views/{self._params.primitive}.glsl"
-        visits = Visits(cells, 0, bind, self.defines([]), self.params, tiles.listed)
-        scatter(gpu, visits, surface.depths, surface.rows)
-        surface.show_samples()
-        return False
+        return Visits(cells, 0, bind, {**defines, "SUMS": 0}, self.params, tiles.listed)
 
     def bind(self) -> None:
         self._samples.bind(self._view)
