@@ -18,8 +18,7 @@ from viewer import cli
 from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.look import Look
-from viewer.scan.points import PointCloud
-from viewer.scan.pose import Pose
+from viewer.scan.pose import Pose, Scanned
 
 if TYPE_CHECKING:
     from viewer.backends import Backend
@@ -91,7 +90,8 @@ def renderer() -> Renderer:
 
 @pytest.fixture
 def draw(renderer: Renderer) -> Callable[..., Surface]:
-    """draw(cloud, camera, size, backend or its name or a variant, look, params): one finished Surface."""
+    """draw(cloud or range views, camera, size, backend or its name or a variant, look, params): one finished
+    Surface."""
     from scenes import of_variant
 
     from viewer.backends import backend
@@ -99,7 +99,7 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
     from viewer.gpu.surface import Surface
 
     def draw(
-        cloud: PointCloud,
+        scanned: Scanned,
         camera: Camera,
         size: tuple[int, int] = (64, 48),
         which: str | Backend = "points",
@@ -111,7 +111,7 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
             name, setting = of_variant(which)
             which = backend(name)
         values = which.params({**setting, **(params or {})})
-        request = Request(Pose(0, 0.0, "test", cloud), camera, which, values, look or Look(light="flat"))
+        request = Request(Pose.of(0, 0.0, "test", scanned), camera, which, values, look or Look(light="flat"))
         surface = Surface(renderer.gpu, size)
         while render_frame(renderer, request, surface):
             pass

@@ -110,3 +110,19 @@ def shape_view(
         unit="mm",
     )
     return view, (points[seen] - matrix[:3, 3]) @ matrix[:3, :3], normals[seen] @ matrix[:3, :3]
+
+
+def heights(depth: ArrayLike, mask: NDArray[np.bool_] | None = None, **fields: object) -> RangeView:
+    """A pod at the origin that looks down -z in parallel: a scan unit apart, the middle one on the axis."""
+    depth = np.asarray(depth, np.float32)
+    height, width = depth.shape
+    known = {"mask": np.ones(depth.shape, bool) if mask is None else mask, "world_to_camera": np.eye(4)}
+    pinhole = {"fx": 1.0, "fy": 1.0, "cx": width / 2, "cy": height / 2}
+    return RangeView(depth=depth, kind="height", **{**known, **pinhole, **fields})
+
+
+def straight_above(shape: tuple[int, int], zoom: float = 1.0) -> tuple[Camera, tuple[int, int]]:
+    """A camera that sees all of `heights` of a shape, each in the middle of a pixel where zoom is 1, and the
+    picture's size."""
+    size = round(shape[1] * zoom), round(shape[0] * zoom)
+    return Camera((0, 0, 1000), (0, 0, 0), projection="orthographic", height=size[1] / zoom), size

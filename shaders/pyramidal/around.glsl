@@ -1,12 +1,11 @@
-// What is around a pixel in a target, and which of it is one surface.
-// REACH: how many cells to each side are looked at. step is the largest depth step of a surface, in cells.
+// What is around a pixel in a target, and which of it is one surface. step is the largest depth step of a surface, in
+// cells.
 #include "common/view.glsl"
 #include "pyramidal/targets.glsl"
 
 layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;   // of the targets' cells: float bits of depths
 layout(binding = TEXTURE_SPOTS) uniform samplerBuffer spots;  // where their samples lie, in pixels
 
-#define EDGE (2 * REACH + 1)
 const int SURFACES = 3;  // sheets behind one another that are told apart
 const int CHAIN = 3;     // times that a surface is followed from one sample to the next
 
@@ -18,12 +17,13 @@ struct Window {
     float scale;
 };
 
-Window window_of(int level, ivec2 pixel) {
+// reach: how many cells to each side.
+Window window_of(int level, ivec2 pixel, int reach) {
     ivec2 size = target_size(view_size, level), cell = pixel >> level;
     float scale = 1.0 / float(1 << level);
     int start = target_start(view_size, level);
     vec2 place = (vec2(pixel) + 0.5) * scale;
-    return Window(max(cell - REACH, 0), min(cell + REACH, size - 1), start, size.x, place, scale);
+    return Window(max(cell - reach, 0), min(cell + reach, size - 1), start, size.x, place, scale);
 }
 
 // Width of a cell of a level, scan units.

@@ -5,7 +5,6 @@
 #include "common/list.glsl"
 #include "common/split.glsl"
 #include <params>
-#define REACH (UPSAMPLING == 2 ? 2 : 1)
 #include "pyramidal/around.glsl"
 #include "pyramidal/pixels.glsl"
 
@@ -32,17 +31,20 @@ float weight_of(vec2 offset) {
 #endif
 }
 
-// Whether what is empty around a pixel is no larger than `widest` cells are wide: a hole, and no gap between outlines.
+// Whether what is empty around a pixel is no larger than `widest` cells are wide: a hole, and no gap between outlines. At
+// the picture's edges, of which less is known, a hole is smaller by as much.
 bool is_hole(Window window, int level) {
     int below = level - density, filled = 0;
     EACH_CELL(window, cell) filled += int(count_filled(texelFetch(shown, cell)));
-    ivec2 cells = window.high - window.low + 1;
-    return float((cells.x * cells.y << 2 * below) - filled) <= widest * widest * float(1 << 2 * below);
+    ivec2 end = min(window.high + 1 << below, target_size(view_size, density));
+    ivec2 cells = end - (window.low << below);
+    int known = cells.x * cells.y;
+    return float(known - filled) <= widest * widest * float(known) / 9.0;
 }
 
 // Fills a pixel from a target; whether it could.
 bool fill(int i, ivec2 pixel, int level) {
-    Window window = window_of(level, pixel);
+    Window window = window_of(level, pixel, 1);  // what encloses the pixel, however wide the kernel is
     if (level > density + sparse && !is_hole(window, level)) return false;
     vec2 around = depths_around(window), span = vec2(0.0);
     if (isinf(around.x)) return false;
@@ -50,14 +52,18 @@ bool fill(int i, ivec2 pixel, int level) {
         span = surface_beyond(window, around, span.y, level);
         if (isinf(span.x)) return false;
         Sides sides = NO_SIDES;
-        float total = 0.0, depth = 0.0;
-        Seen sum = UNSEEN;
         EACH_CELL(window, cell) {
             float here = depth_of(cell);
+            if (here >= span.x && here <= span.y) extend(sides, offset_to(window, cell));
+        }
+        if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
+        Window blended = UPSAMPLING == 2 ? window_of(level, pixel, 2) : window;
+        float total = 0.0, depth = 0.0;
+        Seen sum = UNSEEN;
+        EACH_CELL(blended, cell) {
+            float here = depth_of(cell);
             if (here < span.x || here > span.y) continue;
-            vec2 offset = offset_to(window, cell);
-            extend(sides, offset);
-            float weight = weight_of(offset);
+            float weight = weight_of(offset_to(window, cell));
             Seen one = unpack_seen(texelFetch(shown, cell));
 #if UPSAMPLING == 0
             if (weight <= total) continue;
@@ -72,7 +78,6 @@ bool fill(int i, ivec2 pixel, int level) {
             sum.value += weight * one.value;
 #endif
         }
-        if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
 #if UPSAMPLING != 0
         depth /= total;
         sum.color /= total;

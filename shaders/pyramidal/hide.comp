@@ -4,7 +4,6 @@
 #include "common/item.glsl"
 #include "common/split.glsl"
 #include <params>
-#define REACH 1
 #include "pyramidal/around.glsl"
 
 #include "common/color.glsl"
@@ -22,7 +21,7 @@ void main() {
     float apart = spacing * scale_at(depth);
     int level = clamp(int(ceil(log2(max(apart, 1.0)))), 0, coarsest);
     if (level == 0) return;
-    Window window = window_of(level, split(i, view_size.x));
+    Window window = window_of(level, split(i, view_size.x), 1);
     vec2 around = depths_around(window);
     if (around.x + tolerance * cell_width(level, around.x) >= depth) return;
     vec2 span = surface_beyond(window, around, 0.0, level);

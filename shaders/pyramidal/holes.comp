@@ -4,7 +4,6 @@
 #include "common/list.glsl"
 #include "common/split.glsl"
 #include <params>
-#define REACH 1
 #include "pyramidal/around.glsl"
 #include "pyramidal/seen.glsl"
 
@@ -18,7 +17,7 @@ void main() {
     ivec2 pixels = min(edge * (cell + 1), view_size) - edge * cell;
     uint filled = count_filled(texelFetch(shown, target_start(view_size, coarsest) + i));
     bool full = density == 0 && int(filled) == pixels.x * pixels.y && (levels & 1) != 0;
-    bool nothing = isinf(depths_around(window_of(coarsest, edge * cell)).x);
+    bool nothing = isinf(depths_around(window_of(coarsest, edge * cell, 1)).x);
     if (full || nothing) return;
     uint each = uint(edge * edge);
     list[reserve(each) / each] = uint(i);
