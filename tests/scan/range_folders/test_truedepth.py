@@ -47,6 +47,34 @@ def test_frames_with_their_times(tmp_path: Path) -> None:
     assert [(one.kind, one.frames) for one in list_folder(tmp_path)] == [("whole", 3), ("file", 1)]
 
 
+@pytest.mark.parametrize(("gravity", "turns"), [((0, -1), 1), ((1, 0.1), 0), ((-1, 0), 2), ((0.1, 1), 3)])
+def test_pictures_stand_upright(tmp_path: Path, gravity: tuple[float, float], turns: int) -> None:
+    put(tmp_path, 42.0)
+    x, y = gravity
+    motion = [{"gravity_x": x, "gravity_y": y, "gravity_z": 0.0, "timestamp": 42.0}] * 2
+    (tmp_path / "motion-data.json").write_text(json.dumps(motion))
+    with open_scan(tmp_path) as scan:
+        (view,) = scan.pose(0).views
+        assert len(scan.files) == 3
+    flat = seen_points([[1, 2, 0], [3, 4, 5]], CAMERA)
+    for _ in range(turns):  # what was up goes to the right, what was left goes up
+        flat = flat[:, [1, 0, 2]] * (1, -1, 1)
+    assert view.depth.shape == ((2, 3), (3, 2))[turns % 2]
+    found = view.positions()
+    np.testing.assert_allclose(found[found[:, 2].argsort()], flat[flat[:, 2].argsort()], rtol=1e-5)
+    assert view.color is not None
+    middle = {0: (0, 0), 1: (0, 1), 2: (1, 2), 3: (2, 0)}[turns]  # where the first pixel went
+    assert view.color[middle].tolist() == [0, 56, 79]
+
+
+@pytest.mark.parametrize("text", ["{", "{}", "[]", "[1]", '[{"gravity_x": "a"}]', '[{"gravity_x": 1}]'])
+def test_motion_that_tells_no_gravity_is_told(tmp_path: Path, text: str) -> None:
+    put(tmp_path, 1)
+    (tmp_path / "motion-data.json").write_text(text)
+    with pytest.raises(InputError, match=r"motion-data\.json: tells no gravity"):
+        find_source(tmp_path)
+
+
 def test_times_that_do_not_increase_need_a_frame_rate(tmp_path: Path) -> None:
     put(tmp_path, 42.0, 41.0)
     with pytest.raises(InputError, match="times do not increase"):
@@ -93,9 +121,10 @@ def test_real_frames(data_dir: Path) -> None:
         assert len(scan) == 30
         assert scan.times[-1] == pytest.approx(2.894784)
         (view,) = scan.pose(9).views
-    assert view.depth.shape == (240, 320)
-    assert (view.fx, view.cx, view.cy) == pytest.approx((298.565, 159.732, 119.601), abs=1e-3)
+    assert view.depth.shape == (320, 240)  # the phone was upright, its sensor on its side
+    assert (view.fx, view.cx, view.cy) == pytest.approx((298.565, 240 - 119.601, 159.732), abs=1e-3)
     head = view.positions()[view.depth[view.valid()] < 0.75]
     size = np.ptp(head, axis=0)
     assert 0.2 < size[0] < 0.4  # metres
     assert 0.2 < size[1] < 0.5
+    assert scan.unit == "m"

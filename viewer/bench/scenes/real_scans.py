@@ -24,11 +24,13 @@ from .subjects import Moment
 
 # The head is nearer than this, the room behind it begins at a metre.
 _ROOM = 0.75  # m
-# The frame that looks as the reference does: with the middles of both together it finds its place.
+# The frame that looks as the reference does, turned: with the middles of both together it finds its place.
 _FIRST = 9
 _REACHES = (0.05, 0.02, 0.005)  # m, how far partners may be
 _EVERY = 8  # pixels that are registered
 _DOWN = np.diag([1.0, -1.0, -1.0, 1.0])  # from an image's axes to a camera's, that looks down -z
+# From an upright picture's axes to those of the phone's sensor, which the reference has.
+_ON_ITS_SIDE = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 _MOST_RMS, _LEAST_SHARE = 1e-3, 0.9  # m to the planes of partners, and of points that have some
 
 _CELL = 1.5e-3  # m, of the reference's mesh
@@ -71,8 +73,8 @@ class DepthFrames:
         """The motion of each frame to the reference, (4, 4), found from one frame to the next."""
         assert self._surfels.normals is not None
         target = OrientedPoints(self._surfels.world(), self._surfels.normals.astype(np.float64))
-        first = np.eye(4)
-        first[:3, 3] = target.positions.mean(axis=0) - self._points(_FIRST).mean(axis=0)
+        first = _ON_ITS_SIDE.copy()
+        first[:3, 3] = target.positions.mean(axis=0) - first[:3, :3] @ self._points(_FIRST).mean(axis=0)
         motions = {_FIRST: self._registered(_FIRST, target, first)}
         for index in range(_FIRST + 1, len(self)):
             motions[index] = self._registered(index, target, motions[index - 1])

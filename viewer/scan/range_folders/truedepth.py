@@ -1,7 +1,9 @@
 """A phone's TrueDepth frames: frame-*.npz with `depth`, `color` and `timestamp`, and camera_intrinsics.json.
 
 Depth is in metres; the colours are stored linear. The calibration is Apple's: a matrix by columns, for
-pictures of a width that stands beside it. No poses are known: each frame is in its camera's own space.
+pictures of a width that stands beside it. No poses are known: each frame is in its camera's own space. The
+sensor lies on its side in the phone, so pictures are turned by quarters until gravity, as `motion-data.json`
+tells it, goes down in them.
 """
 
 from __future__ import annotations
@@ -13,17 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
+from ...files import parsed_json
 from ...srgb import bytes_from_linear
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
 from ..times import natural_key
 from ._source import RangeFrames
-from ._texts import object_of
+from ._texts import object_of, text_of
 
 TITLE = "TrueDepth frames"
 
-_CAMERA, _FRAME = "camera_intrinsics.json", "frame-"
+_CAMERA, _MOTION, _FRAME = "camera_intrinsics.json", "motion-data.json", "frame-"
 _MATRIX, _WIDTH = "intrinsic_matrix", "intrinsic_matrix_reference_dimensions_width"
 _CENTER = 0.5  # of a pixel: in the matrix that of the first one is at 0, 0
 _SRGB = bytes_from_linear(np.arange(256) / 255)  # of a stored colour
@@ -36,30 +39,37 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         return None
     frames.sort(key=natural_key)
     camera = _intrinsics(folder / _CAMERA)
+    turns = _quarter_turns(folder / _MOTION) if _MOTION in names else 0
     files = [folder / name for name in frames]
     return RangeFrames(
         name=folder.resolve().name,
         labels=tuple(frames),
-        read=lambda index: (_view(files[index], camera),),
-        files=(*files, folder / _CAMERA),
+        read=lambda index: (_view(files[index], camera, turns),),
+        files=(*files, *(folder / name for name in (_CAMERA, _MOTION) if name in names)),
         unit="m",
         recorded=lambda: _times(files),
     )
 
 
-def _view(file: Path, camera: NDArray[np.float64]) -> RangeView:
+def _view(file: Path, camera: NDArray[np.float64], turns: int) -> RangeView:
+    """The view of a frame, turned clockwise by so many quarters."""
     depth, color = read_arrays(file, "depth", "color")
     if color.dtype != np.uint8:
         raise InputError(f"array 'color' is of type {color.dtype}, expected uint8", file)
-    fx, fy, cx, cy = camera * depth.shape[-1]
+    if depth.ndim != 2:
+        raise InputError(f"array 'depth' has shape {depth.shape}, expected (H, W)", file)
+    fx, fy, cx, cy = camera * depth.shape[1] + (0, 0, _CENTER, _CENTER)
+    for _ in range(turns):
+        fx, fy, cx, cy = fy, fx, depth.shape[0] - cy, cx
+        depth, color = np.rot90(depth, -1), np.rot90(color, -1)
     return RangeView(
-        depth=depth,
+        depth=np.ascontiguousarray(depth),
         mask=np.isfinite(depth),
         color=_SRGB[color],
         fx=fx,
         fy=fy,
-        cx=cx + _CENTER,
-        cy=cy + _CENTER,
+        cx=cx,
+        cy=cy,
         world_to_camera=UPRIGHT,
         name="truedepth",
         unit="m",
@@ -73,6 +83,23 @@ def _times(files: Sequence[Path]) -> NDArray[np.float64] | None:
     except Exception:  # whatever is wrong with a frame, reading it tells
         return None
     return np.array(stored) - stored[0]
+
+
+def _quarter_turns(file: Path) -> int:
+    """How often pictures are to be turned clockwise by a quarter, from gravity in the phone's axes.
+
+    These are right, up and out of the screen, where its camera looks; the picture's right is the phone's
+    bottom. Raises InputError.
+    """
+    try:
+        records = parsed_json(text_of(file))
+        gravity = np.array([(record["gravity_x"], record["gravity_y"]) for record in records], np.float64)
+        right, up = gravity.sum(axis=0)  # none of an empty list
+    except (ValueError, KeyError, TypeError) as error:
+        hint = "Without this file, pictures are shown as the sensor lies"
+        raise InputError(f"tells no gravity: {shortened(repr(error))}", file, hint) from error
+    sides = (right, -up, -right, up)  # how far up the picture's top is, its left, its bottom, its right
+    return sides.index(max(sides))
 
 
 def _intrinsics(file: Path) -> NDArray[np.float64]:
