@@ -14,6 +14,9 @@ from typing import Any
 
 import lzf
 import numpy as np
+import OpenEXR
+from PIL import Image
+from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from viewer.analysis.measure import End, Measurement
 from viewer.app import keys, settings
@@ -111,6 +114,36 @@ def _write_scans(folder: Path) -> None:
         for name in ("left", "right")
     ]  # fmt: skip
     formats.write(folder / "views.exr", merge(views), views)
+    _write_grids(folder)
+
+
+def _write_grids(folder: Path) -> None:
+    """Range views as other programs write them."""
+    row, column = np.mgrid[:7, :9].astype(np.float32)
+    depth = 2 + 0.1 * column
+    grid = np.stack([(column - 4) * depth / 9, (row - 3) * depth / 9, depth], axis=2)
+    head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 9\nHEIGHT 7\nVIEWPOINT 1 2 3 0 1 0 0\nDATA binary\n"
+    (folder / "organised.pcd").write_bytes(head.encode() + grid.tobytes())
+    np.savez(
+        folder / "depth.npz", depth=depth, kind="range", unit="m", intrinsics=np.diag([9.0, 9, 1]),
+        distortion=np.array([0.1, 0, 0, 0]), pose=np.eye(4), mask=depth > 2, color=depth / 9,
+    )  # fmt: skip
+    np.savez(folder / "grid.npz", xyz=grid)
+    np.savez(folder / "scanner.npz", xyz=np.stack([column, row, np.sin(column)], axis=2), unit="mm")
+    np.savez(folder / "terrain.npz", elevation=row.astype(np.int16), xmin=0, xmax=9, ymin=7, ymax=0)
+    ground = ImageFileDirectory_v2()
+    for tag, numbers in {33550: (2.0, 2.0, 0.0), 33922: (0.0, 0.0, 0.0, 5e5, 4e6, 0.0)}.items():
+        ground.tagtype[tag], ground[tag] = 12, numbers
+    ground.tagtype[34735], ground[34735] = 3, (1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 9001)
+    ground.tagtype[42113], ground[42113] = 2, "3"
+    Image.fromarray(row).save(folder / "terrain.tif", tiffinfo=ground)
+    Image.fromarray(row.astype(np.uint16)).save(folder / "depth.tif", compression="tiff_lzw")
+    layers = {f"L.Depth.{name}": np.ascontiguousarray(depth) for name in "ZA"} | {
+        f"L.Combined.{name}": depth.astype(np.float16) for name in "RGBA"
+    }
+    header = {"type": OpenEXR.scanlineimage, "worldToCamera": np.eye(4, dtype=np.float32)}
+    with open(folder / "render.exr", "wb") as stream:
+        OpenEXR.File(header, layers).write(stream)
 
 
 def _write_choices(folder: Path) -> None:

@@ -211,7 +211,10 @@ def test_a_fault_in_the_rocks(data_dir: Path) -> None:
     file = data_dir / "range/terrain/jacksboro_fault_dem.npz"
     with np.load(file) as stored_arrays:
         heights, dx = stored_arrays["elevation"], float(stored_arrays["dx"])
-    (view,) = formats.read(file)
+    with open_scan(file) as scan:
+        assert scan.unit == "m"
+        (view,) = scan.pose(0).views
+        assert scan.messages == []
     assert (view.kind, view.unit, view.depth.shape) == ("height", "m", (344, 403))
     assert np.array_equal(-view.depth, heights)  # ymin, of the first row, is the northern edge
     assert 1 / view.fx == pytest.approx(111_320 * np.cos(np.radians(36.59)) * dx, rel=2e-3)

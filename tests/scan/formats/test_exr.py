@@ -223,6 +223,16 @@ def test_pictures_of_other_programs_stand_where_their_matrices_say(tmp_path: Pat
         assert view.positions() == pytest.approx(shape.positions(), abs=1e-5)
 
 
+def test_a_left_handed_world_is_turned(tmp_path: Path) -> None:
+    """Its z points the other way, so that what is seen is not mirrored."""
+    shape, points, _ = shape_view("sphere", "z")
+    camera = cameras_of(tmp_path / "ours.exr", shape)
+    turn = np.diag([1, 1, -1, 1]).astype(np.float32)  # for row vectors, from a left-handed world to ours
+    camera = {name: turn @ matrix for name, matrix in camera.items()}
+    (view,) = formats.read(parts(tmp_path / "f.exr", ("beauty", camera, {"Z": shape.depth})))
+    assert view.positions() == pytest.approx(points, abs=1e-5)
+
+
 def test_a_camera_that_nothing_tells_is_assumed(tmp_path: Path) -> None:
     shape, header, channels = rendered()
     path = parts(tmp_path / "f.exr", ("beauty", header, channels))

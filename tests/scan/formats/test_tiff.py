@@ -78,8 +78,7 @@ def test_units_of_ground_and_heights(path: Path) -> None:
         pytest.approx(9.144),
         pytest.approx(376_060 * 0.3048),
     )
-    assert terrain(path, HEIGHTS, GROUND).unit == "units"
-    assert formats.read_unit(path) is None
+    assert terrain(path, HEIGHTS, GROUND).unit == formats.read_unit(path) == "units"
 
 
 def test_degrees(path: Path) -> None:
@@ -89,6 +88,7 @@ def test_degrees(path: Path) -> None:
     assert 1 / told.fy == pytest.approx(111.2, abs=0.1)
     assert told.eye[:2] == pytest.approx([0, 0], abs=1e-9)
     assert np.array_equal(terrain(path, HEIGHTS, ground).positions(), told.positions())  # cliffs, or degrees
+    assert formats.read_unit(path) == "m"
     lengths = terrain(path, HEIGHTS, ground | {KEYS: keys(model=1)})
     assert 1 / lengths.fy == pytest.approx(0.001)
 

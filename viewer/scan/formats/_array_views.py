@@ -87,8 +87,17 @@ def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
     return replace(view, **changes)
 
 
-def unit_of_arrays(arrays: _Arrays) -> str | None:
-    """The name of the unit of length that the arrays tell."""
+def unit_of_arrays(arrays: _Arrays, held: int) -> str | None:
+    """The name of the unit of length of the view of a file of `held` bytes, or None. Raises InputError.
+
+    The heights of a terrain are read where they tell whether its ground is in degrees.
+    """
+    if "unit" in arrays or _source(arrays) != "elevation":
+        return _unit(arrays)
+    return usable_unit(view_of_arrays(arrays, held).unit)
+
+
+def _unit(arrays: _Arrays) -> str | None:
     return usable_unit(_word(arrays, "unit", "")) if "unit" in arrays else None
 
 
@@ -108,7 +117,7 @@ def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
         distortion=tuple(_vector(arrays, "distortion").tolist()) if "distortion" in arrays else (),
         world_to_camera=UPRIGHT if (told := _world_to_camera(arrays)) is None else told,
         name="camera",
-        unit=unit_of_arrays(arrays) or UNKNOWN_UNIT,
+        unit=_unit(arrays) or UNKNOWN_UNIT,
     )
     return view, _AS_THEY_ARE
 
@@ -116,7 +125,7 @@ def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
 def _of_grid(grid: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     if grid.dtype.kind != "f":
         raise InputError(f"array 'xyz' is of type {grid.dtype}, expected floats")
-    unit, told = unit_of_arrays(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
+    unit, told = _unit(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
     view = view_of_camera(grid, UPRIGHT if told is None else told, "camera", unit)
     if view is not None:
         return view, _AS_THEY_ARE
@@ -139,7 +148,7 @@ def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     there = np.isfinite(heights)
     span = float(np.ptp(heights[there])) if there.any() else 0.0
     degrees = are_degrees(left, first, right * columns, down * rows, span)
-    unit = unit_of_arrays(arrays) or (METRE if degrees else UNKNOWN_UNIT)
+    unit = _unit(arrays) or (METRE if degrees else UNKNOWN_UNIT)
     ground = Ground(left=left, first=first, right=right, down=down, degrees=degrees, unit=unit)
     return terrain_view(heights, there, ground, "terrain"), ground.turned
 

@@ -22,6 +22,8 @@ _FARTHEST = 1e10  # what programs write where nothing is, and more
 _UNSKEWED = 1e-3  # what else there may be in a projection, as a part of its focal length
 _DEFAULT_SCREEN = (0.0, 0.0, 1.0)  # its centre and width, where nobody has set them
 
+_TURNED = np.diag([1.0, 1.0, -1.0, 1.0])  # OpenEXR's cameras look along +z
+
 _Channel = tuple[int, str]  # the number of a part, and the name
 _Layer = dict[str, _Channel]  # by the last word of their names
 
@@ -105,8 +107,9 @@ def _camera(header: dict[str, Any]) -> dict[str, Any]:
     low, high = header["displayWindow"]
     width, height = (high - low + 1).tolist()
     placed = "worldToCamera" in header
-    to_camera = _matrix(header, "worldToCamera") if placed else np.diag([1.0, 1, -1, 1])
-    pose = {"world_to_camera": np.diag([1.0, 1, -1, 1]) @ to_camera}  # in OpenEXR, a camera looks along +z
+    to_camera = _matrix(header, "worldToCamera") if placed else _TURNED
+    left_handed = np.linalg.det(to_camera) > 0  # as the camera's space is: then z of the world is turned
+    pose = {"world_to_camera": _TURNED @ to_camera @ (_TURNED if left_handed else np.eye(4))}
     if placed and "worldToNDC" in header:
         return pose | _projection(_matrix(header, "worldToNDC") @ np.linalg.inv(to_camera), width, height)
     screen = (*header["screenWindowCenter"], header["screenWindowWidth"])

@@ -67,9 +67,9 @@ def frame_count(path: Path) -> int:
 
 
 def read_unit(path: Path) -> str | None:
-    """The array `unit` of a range view, or None."""
+    """The unit of a range view, or None."""
     with opened(path) as stream, _arrays(stream) as arrays:
-        return unit_of_arrays(arrays) if _is_range_scan(arrays) else None
+        return unit_of_arrays(arrays, size_of(stream)) if _is_range_scan(arrays) else None
 
 
 def read_times(path: Path) -> NDArray[np.float64] | None:

@@ -35,7 +35,9 @@ def read_unit(path: Path) -> str | None:
     """The unit of the heights of a terrain, or None."""
     with opened_picture(path, ("TIFF",)) as image:
         tags = dict(image.tag_v2)  # type: ignore[attr-defined]
+    if not _has_ground(tags) or _MODEL_TYPE in _geo_keys(tags):
         return _units(tags)[1] if _has_ground(tags) else None
+    return read(path)[0].unit  # heights tell whether the ground is in degrees
 
 
 def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
