@@ -1,5 +1,6 @@
 // What pixels show of the samples that were scattered into them. <source> says what a sample is.
 #include "common/item.glsl"
+#include "common/list.glsl"
 #include "common/split.glsl"
 #include "common/view.glsl"
 #include "pyramidal/pixels.glsl"
@@ -11,9 +12,12 @@ layout(binding = TEXTURE_SUMS) uniform usamplerBuffer sums;  // of point spread 
 const float steps[] = STEPS;
 #endif
 
+layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // pixels
+
 void main() {
-    int i = int(item());
-    if (i >= view_size.x * view_size.y || rows[i] == NOTHING) return;
+    uint n = item();
+    if (n >= list_count) return;
+    int i = int(texelFetch(listed, int(n)).r);
     float depth = uintBitsToFloat(depths[i]);
     uint row;
     Seen seen;

@@ -18,7 +18,7 @@ from ...params import param
 from ...scan.pose import Pose
 from ...scan.spacing import sparse_spacing
 from ...view import View
-from .. import FrameView, Limit
+from .. import FrameView, Limit, Suited
 from .sources import PointSource, SampleSource
 from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
@@ -206,6 +206,11 @@ def needs(pose: Pose, params: Params) -> tuple[str, ...]:
     return ("views",) if pose.views else ()
 
 
+def suits(pose: Pose) -> Suited | None:
+    """Range views: nothing has to be estimated or merged, and nothing lies nearer to what was measured."""
+    return Suited(2) if pose.views else None
+
+
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter, show, hide, fill; complete where all samples shall be drawn."""
     params: Params = frame.params
@@ -233,10 +238,12 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if spreads:
         given = replace(visits, defines={**visits.defines, **spreading})
         add_spread(surface, given, params.kernel, source.count).texels.bind(Texture.SUMS)
+    covered = surface.list_covered()
     with gpu.timers.measure("resolve"):
         program = gpu.compute("pyramidal/resolve.comp", {**defines, **spreading}, source.parts, values)
         bind()
-        gpu.dispatch(program, pixels)
+        covered.texels.bind(Texture.LISTED)
+        covered.run(program)
     if hides:
         targets.reduce(surface, source, channels)
         with gpu.timers.measure("hide"):
