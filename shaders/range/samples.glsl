@@ -15,11 +15,10 @@ layout(binding = TEXTURE_RANGE_VIEWS) uniform usamplerBuffer range_views;
 // What the views of a pose have, so that nothing is computed for what none has: RangeSamples.defines.
 #ifndef RANGE_KINDS
 #define RANGE_KINDS (RANGE_Z | RANGE_ALONG_RAY | RANGE_HEIGHT)
-#define RANGE_DISTORTED 1
+#define RANGE_LENS_STEPS 9
 #define RANGE_HAS_XY 1
 #endif
 
-const int LENS_STEPS = 6;  // of Newton, each of which doubles the digits
 const int GRID_STEPS = 2;
 #define NO_PLACE uintBitsToFloat(NO_DEPTH | 1u)  // NaN
 
@@ -142,7 +141,7 @@ bool same_surface(RangeView v, int level, float depth, float other) {  // not wh
     return abs(depth - other) <= STEEPEST * sample_spacing(v, level, min(depth, other));
 }
 
-#if RANGE_DISTORTED
+#if RANGE_LENS_STEPS
 // Where a lens shows an ideal direction (right / forwards, down / forwards): OpenCV's model. And its derivatives by
 // right; right or down (they are the same); down.
 vec2 distorted(RangeView v, vec2 ideal, out vec3 jacobian) {
@@ -161,9 +160,10 @@ vec2 distorted(RangeView v, vec2 ideal, out vec3 jacobian) {
     return bent;
 }
 
+// The other way, by as many of Newton's steps as the lenses take.
 vec2 undistorted(RangeView v, vec2 seen) {
     precise vec2 ideal = seen;
-    for (int i = 0; i < LENS_STEPS; ++i) {
+    for (int i = 0; i < RANGE_LENS_STEPS; ++i) {
         vec3 j;
         precise vec2 missed = seen - distorted(v, ideal, j);
         precise vec2 moved = vec2(j.z * missed.x - j.y * missed.y, j.x * missed.y - j.y * missed.x);
@@ -176,7 +176,7 @@ vec2 undistorted(RangeView v, vec2 seen) {
 // Right and up per unit of depth of a pixel coordinate; for heights, in scan units.
 vec2 pixel_ray(RangeView v, vec2 pixel) {
     precise vec2 seen = (pixel - v.center) / v.focal;
-#if RANGE_DISTORTED
+#if RANGE_LENS_STEPS
     if (v.distorted) seen = undistorted(v, seen);
 #endif
     return vec2(seen.x, -seen.y);
@@ -285,7 +285,7 @@ vec3 project_to(RangeView v, vec3 screen_view_place) {
     if (v.kind != RANGE_HEIGHT) {
         if (!(depth > 0.0)) return vec3(NO_PLACE);
         seen = seen / depth;
-#if RANGE_DISTORTED
+#if RANGE_LENS_STEPS
         if (v.distorted) {
             vec3 j;
             seen = distorted(v, seen, j);

@@ -347,6 +347,32 @@ def test_places_are_those_of_the_view(
     samples.release()
 
 
+@pytest.mark.parametrize(
+    ("lens", "half", "steps"), [("kinect", 0.2, 2), ("kinect", 0.8, 5), ("rational", 0.65, 5)]
+)
+def test_a_lens_is_undone_to_float32_however_wide(
+    renderer: Renderer, lens: str, half: float, steps: int
+) -> None:
+    """By as many steps as it takes."""
+    depth = np.full((81, 81), 2.0, np.float32)
+    focal = 40.5 / half
+    lens_view = replace(
+        stepped_view((81, 81)),
+        depth=depth,
+        mask=depth > 0,
+        fx=focal,
+        fy=focal,
+        cx=40.5,
+        cy=40.5,
+        distortion=LENSES[lens],
+    )
+    samples = held(renderer.gpu, (lens_view,))
+    assert samples.defines["RANGE_LENS_STEPS"] == steps
+    found = probe(samples, seen_by(lens_view), 0, 0)[..., 0, :3].reshape(-1, 3)
+    np.testing.assert_allclose(found, lens_view.positions(), atol=1e-6)
+    samples.release()
+
+
 @pytest.mark.parametrize("level", range(6))
 @pytest.mark.parametrize("how", [BOX, GAUSSIAN])
 def test_coarse_samples_lie_where_stated(renderer: Renderer, level: int, how: Filter) -> None:

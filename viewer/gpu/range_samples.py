@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..scan.colors import srgb8
+from ..scan.lens import steps_to_undo
 from ..scan.range_view import RangeView
 from ..view import View
 from . import gl
@@ -51,6 +52,9 @@ LEVELS = 6
 _KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
 _ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
 _SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
+_LOOKED_AT = 17  # pixels along either edge that tell how a lens is undone
+_LAST_STEP = 1e-4  # at depth 1: what is missing after it is below float32's rounding
+_MOST_STEPS = 9
 _SOFTWARE_RUN = 16  # samples of a row that an invocation makes where it is invocations that take long
 
 
@@ -78,12 +82,16 @@ class SampleLevel:
 
 @dataclass(frozen=True, eq=False)
 class _Pod:
-    """Pod of a range view: what stays of that when its samples are on the GPU."""
+    """Pod of a range view: what stays of that when its samples are on the GPU.
+
+    lens_steps: of Newton's method, that undo its distortion to float32.
+    """
 
     kind: int
     size: tuple[int, int]
     pinhole: tuple[float, float, float, float]
     distortion: tuple[float, ...]
+    lens_steps: int
     has_xy: bool
     world_to_camera: NDArray[np.float64]
 
@@ -140,7 +148,7 @@ class RangeSamples:
         self._tabled: tuple[object, ...] | None = None  # what the table holds
         self.defines: dict[str, object] = {
             "RANGE_KINDS": int(np.bitwise_or.reduce([pod.kind for pod in self._pods])),
-            "RANGE_DISTORTED": int(any(pod.distortion for pod in self._pods)),
+            "RANGE_LENS_STEPS": max(pod.lens_steps for pod in self._pods),
             "RANGE_HAS_XY": int(has_xy),
             "RANGE_COUNT": len(views),
         }
@@ -387,7 +395,16 @@ def _pod(view: RangeView) -> _Pod:
     height, width = view.depth.shape
     pinhole = (view.fx, view.fy, view.cx, view.cy)
     has_xy, matrix = view.xy is not None, view.world_to_camera
-    return _Pod(_KINDS[view.kind], (width, height), pinhole, view.distortion, has_xy, matrix)
+    steps = _lens_steps(view) if view.distortion else 0
+    return _Pod(_KINDS[view.kind], (width, height), pinhole, view.distortion, steps, has_xy, matrix)
+
+
+def _lens_steps(view: RangeView) -> int:
+    """The number of steps by which shaders undo a lens, of what some pixels need, those at the edges too."""
+    height, width = view.depth.shape
+    row, column = np.linspace(0, height - 1, _LOOKED_AT)[:, None], np.linspace(0, width - 1, _LOOKED_AT)
+    x, y = np.broadcast_arrays((column + 0.5 - view.cx) / view.fx, (row + 0.5 - view.cy) / view.fy)
+    return min(steps_to_undo(x, y, view.distortion, _LAST_STEP), _MOST_STEPS)
 
 
 def _places(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:

@@ -10,7 +10,7 @@ k1 k2 p1 p2 [k3 [k4 k5 k6]], the rest of which are 0:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,20 +34,38 @@ def distorted(x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequ
 
 def undistorted(x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float]) -> _Places:
     """The places that the lens shows at x and y, any shape; NaN where it shows none there."""
-    place_x, place_y = np.array(x, np.float64), np.array(y, np.float64)
     with np.errstate(all="ignore"):
-        for _ in range(_MOST_STEPS):  # Newton's
-            seen_x, seen_y, xx, xy, yy = _seen(place_x, place_y, coefficients)
-            off_x, off_y, area = x - seen_x, y - seen_y, xx * yy - xy * xy
-            step_x, step_y = (yy * off_x - xy * off_y) / area, (xx * off_y - xy * off_x) / area
-            place_x += step_x
-            place_y += step_y
-            if not max(np.abs(step_x).max(initial=0), np.abs(step_y).max(initial=0)) > _EXACT:
-                break
+        *_, (place_x, place_y, _) = _approached(x, y, coefficients, _EXACT)
         seen_x, seen_y, *slopes = _seen(place_x, place_y, coefficients)
         lost = ~((np.abs(seen_x - x) < _ROUNDED) & (np.abs(seen_y - y) < _ROUNDED) & _upright(*slopes))
     place_x[lost] = place_y[lost] = np.nan
     return place_x, place_y
+
+
+def steps_to_undo(
+    x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float], last: float
+) -> int:
+    """The number of steps of Newton's method, from what is seen, of which none at these places, any shape, is
+    longer than `last` at the end: what is missing then is about the square of that."""
+    with np.errstate(all="ignore"):
+        return sum(1 for _ in _approached(x, y, coefficients, last))
+
+
+def _approached(
+    x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float], last: float
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
+    """The places that the lens shows at x and y, after each of Newton's steps, and the longest; until that is
+    below `last`."""
+    place_x, place_y = np.array(x, np.float64), np.array(y, np.float64)
+    for _ in range(_MOST_STEPS):
+        seen_x, seen_y, xx, xy, yy = _seen(place_x, place_y, coefficients)
+        off_x, off_y, area = x - seen_x, y - seen_y, xx * yy - xy * xy
+        step_x, step_y = (yy * off_x - xy * off_y) / area, (xx * off_y - xy * off_x) / area
+        place_x, place_y = place_x + step_x, place_y + step_y
+        longest = float(max(np.abs(step_x).max(initial=0), np.abs(step_y).max(initial=0)))
+        yield place_x, place_y, longest
+        if not longest > last:
+            return
 
 
 def can_be_undone(x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float]) -> bool:
