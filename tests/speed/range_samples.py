@@ -2,8 +2,8 @@
 
     python tests/speed/range_samples.py [--size 3000x4500] [--rounds 5] [--distorted] [--measured]
 
-One view of a ball that fills three quarters of its pixels. Wall time, and processor time of all threads, which
-other work on the machine changes less.
+One view of a ball that fills three quarters of its pixels. Wall time, and processor time of all threads,
+which other work on the machine changes less.
 """
 
 from __future__ import annotations
