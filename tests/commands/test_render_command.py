@@ -283,7 +283,8 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
     assert [f["pose"] for f in stats["frames"]] == [1, 2]
     for f in stats["frames"]:
         assert list(f) == [
-            "pose", "gpu_ms", "cpu_ms", "upload_ms", "derive_ms", "passes", "points", "skipped", "chosen",
+            "pose", "gpu_ms", "cpu_ms", "upload_ms", "derive_ms", "passes", "points", "skipped", "counted",
+            "chosen",
         ]  # fmt: skip
         assert f["upload_ms"] > 0
         assert f["cpu_ms"] > 0

@@ -45,6 +45,7 @@ def draw_measured(
         "passes": [{"name": name, "gpu_ms": median(run[name] for run in runs)} for name in runs[0]],
         "points": _points(surface),
         "skipped": surface.stats.skipped,
+        "counted": {name: read() for name, read in surface.stats.counted.items()},
         "chosen": surface.stats.chosen,
     }
 

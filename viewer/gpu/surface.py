@@ -42,10 +42,11 @@ class Stats:
 
     backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose,
     estimates included. passes: (name, gpu_ms), empty while timers are off.
-    skipped: what was not computed -> why. chosen: parameter -> what "auto" stood for. faces_away:
-    whether points that face away from the eye were left out. share: of the points that needed to be
-    drawn, by the order of gpu/sample.py, less than 1 in a preview. left_out: the points that are not in
-    that share.
+    skipped: what was not computed -> why. counted: what was looked at, as tiles -> a function that reads how
+    many of it became what; it waits for the GPU, and tells of the last picture of its surface. chosen:
+    parameter -> what "auto" stood for. faces_away: whether points that face away from the eye were left
+    out. share: of the points that needed to be drawn, by the order of gpu/sample.py, less than 1 in a
+    preview. left_out: the points that are not in that share.
     """
 
     backend: str = ""
@@ -55,6 +56,7 @@ class Stats:
     derive_ms: float = 0.0
     passes: list[tuple[str, float]] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    counted: dict[str, Callable[[], dict[str, int]]] = field(default_factory=dict)
     chosen: dict[str, str] = field(default_factory=dict)
     faces_away: bool = False
     share: float = 1.0

@@ -253,6 +253,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if fills:
         targets.reduce(surface, source, channels)
         holes = targets.list_holes(values)
+        surface.stats.counted["cells"] = targets.read_holes
         with gpu.timers.measure("fill"):
             upsampling = {"UPSAMPLING": _UPSAMPLING[params.upsampling]}
             program = gpu.compute("pyramidal/fill.comp", {**upsampling, **defines}, params=values)

@@ -86,6 +86,11 @@ class Targets:
             self._gpu.dispatch(program, width * height)
         return self.holes
 
+    def read_holes(self) -> dict[str, int]:
+        """Numbers of cells of the coarsest level: in which pixels may be filled, and of the others."""
+        cells, filled = self.holes.capacity, len(self.holes) // (1 << 2 * (LEVELS - 1))
+        return {"filled": filled, "left": cells - filled}
+
     def release(self) -> None:
         """Delete them."""
         self._gpu.discard(self.keys, self.best, self._spots, self._shown, self.holes)

@@ -36,6 +36,10 @@ class DrawnTiles:
         """Bytes held on the GPU."""
         return self.listed.nbytes + self.counts.size
 
+    def read(self) -> dict[str, int]:
+        """Numbers of tiles of the levels that were looked at, by what became of them."""
+        return dict(zip(COUNTS, np.frombuffer(self.counts.read(), np.uint32).tolist(), strict=True))
+
     def reserve(self, tiles: int) -> None:
         """Make room for a list of so many tiles."""
         if tiles > self.listed.capacity:
@@ -100,6 +104,7 @@ class ViewSource:
             self.bind()
             gpu.dispatch(program, self._samples.tile_count)
         surface.show_samples()
+        surface.stats.counted["tiles"] = tiles.read
 
         def bind(_: Program) -> None:
             self.bind()
