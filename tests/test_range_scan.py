@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from range_scenes import looking_at, sphere_view
 import viewer
 from viewer import cli
 from viewer.camera import Camera
+from viewer.commands import render as render_command
+from viewer.commands._scans import read_poses
 from viewer.errors import InputError
 from viewer.frame import Request, bring, is_prepared, render_frame
 from viewer.gpu.surface import Surface
@@ -21,6 +24,7 @@ from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import merge
+from viewer.scan.timeline import Timeline
 
 EYES = {"left": (-1.0, 0.0, 4.0), "right": (1.5, 0.5, 4.0)}
 
@@ -136,3 +140,24 @@ def test_more_points_than_the_driver_takes_are_not_even_merged(
             renderer, Request(pose, Camera.orbit(pose.bounds), "points"), Surface(renderer.gpu, (64, 48))
         )
     assert not pose.is_merged
+
+
+@pytest.mark.parametrize("out", ["p%d.png", "p%d.npz", "p.mp4"])
+def test_a_command_that_draws_range_views_merges_nothing(
+    scan: Path, tmp_path: Path, out: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    poses = []
+
+    def noted(timeline: Timeline, indices: list[int]) -> Iterator[Pose]:
+        for pose in read_poses(timeline, indices):
+            poses.append(pose)
+            yield pose
+
+    monkeypatch.setattr(render_command, "read_poses", noted)
+    arguments = ["--all", "--fps", "25", "--backend", "pyramidal", "--size", "90x70"]
+    assert (
+        cli.main(["render", str(scan), "-o", str(tmp_path / out), *arguments, "--look", "color_by=view"]) == 0
+    )
+    assert len(poses) == 3
+    assert not any(pose.is_merged for pose in poses)
+    assert any(tmp_path.iterdir())

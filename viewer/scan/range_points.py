@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .colors import srgb8
 from .points import PointCloud, stride
-from .range_view import RangeView, merge
+from .range_view import RangeView, merge, merge_some
 from .spacing import ENOUGH, spacing_at
 
 _WINDOW = 8  # pixels round a place that are looked at first
@@ -232,15 +232,13 @@ def _overview(views: Sequence[RangeView]) -> tuple[PointCloud, int]:
 
     It is the stride at which clouds are looked at, so that what is found by either is the same.
     """
-    seen = [view.valid().ravel() for view in views]
-    counts = [int(np.count_nonzero(pixels)) for pixels in seen]
-    step, first, thinned = stride(sum(counts)), 0, []
-    for view, pixels, count in zip(views, seen, counts, strict=True):
-        mask = np.zeros(len(pixels), bool)
-        mask[np.flatnonzero(pixels)[first::step]] = True
-        thinned.append(replace(view, mask=mask.reshape(view.depth.shape)))
-        first = (first - count) % step
-    return merge(thinned), sum(counts)
+    seen = [np.flatnonzero(view.valid()) for view in views]
+    count = sum(map(len, seen))
+    step, first, some = stride(count), 0, []
+    for pixels in seen:
+        some.append(pixels[first::step])
+        first = (first - len(pixels)) % step
+    return merge_some(views, some), count
 
 
 def _merged_and_moved(points: RangePoints, by: NDArray[np.float64]) -> PointCloud:

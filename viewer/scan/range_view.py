@@ -288,18 +288,45 @@ def merge(views: Sequence[RangeView], normals: bool = False, origin: ArrayLike |
     ):
         points[start:end] = view.positions()
         ids[start:end] = np.flatnonzero(pixels) + before
+    of_points = np.concatenate([view.normals() for view in views]) if normals else None
+    return _cloud(views, valid, counts, points, ids, of_points, origin)
+
+
+def merge_some(views: Sequence[RangeView], pixels: Sequence[NDArray[np.integer]]) -> PointCloud:
+    """Merge what some of the valid pixels see, as `merge` does.
+
+    pixels: of each view, their numbers in row order, ascending. Raises InputError where there is none.
+    """
+    places = [np.divmod(some, view.depth.shape[1]) for view, some in zip(views, pixels, strict=True)]
+    before = np.cumsum([0, *(view.depth.size for view in views)])[:-1]
+    ids = np.concatenate([some + first for some, first in zip(pixels, before, strict=True)])
+    points = np.concatenate([view.unproject(*place) for view, place in zip(views, places, strict=True)])
+    return _cloud(views, places, [len(some) for some in pixels], points, ids.astype(np.uint32))
+
+
+def _cloud(
+    views: Sequence[RangeView],
+    pixels: Sequence[Any],
+    counts: Sequence[int],
+    points: NDArray[np.float64],
+    ids: NDArray[np.uint32],
+    normals: NDArray[np.float32] | None = None,
+    origin: ArrayLike | None = None,
+) -> PointCloud:
+    """The points (N, 3) of these ids with what the views have of them. pixels: of each view, to index its
+    images with; counts: how many."""
 
     def of_points(name: str, made: Callable[[NDArray], NDArray] = np.asarray) -> NDArray | None:
         images = [getattr(view, name) for view in views]
         if any(image is None for image in images):
             return None
-        return np.concatenate([made(image[pixels]) for image, pixels in zip(images, valid, strict=True)])
+        return np.concatenate([made(image[some]) for image, some in zip(images, pixels, strict=True)])
 
     scalars = {"view": np.repeat(np.arange(len(views), dtype=np.uint16), counts)}
     confidence = of_points("confidence")
     cloud = PointCloud.from_arrays(
         points,
-        normals=np.concatenate([view.normals() for view in views]) if normals else None,
+        normals=normals,
         colors=of_points("color", srgb8),
         scalars=scalars if confidence is None else scalars | {"confidence": confidence},
         origin=origin,
