@@ -11,6 +11,10 @@ from contextlib import contextmanager
 from threading import Lock
 
 OPENEXR = re.compile(rb".*\(EXR_ERR_\w+\)|\s*$")  # the lines of OpenEXR, and empty ones
+# Those of libtiff, which begin with the name of a function or of a file of Pillow's, and no exception's.
+LIBTIFF = re.compile(
+    rb"(?!\w+(?:Error|Exception|Exit|Interrupt|Warning):)(?:[A-Z_]\w*|tempfile\.tif): |More samples per|\s*$"
+)
 _STDERR = 2
 _turn = Lock()  # there is one standard error
 

@@ -24,6 +24,7 @@ DepthKind = Literal["z", "range", "height"]
 _LEAST_UPRIGHT = 0.5  # the cosine of how far from an axis the pictures' common up may be
 _RIGID = 1e-3  # how far a rotation may be from orthonormal: real trackers drift to 1e-4
 _MASKED_IN = 0.01  # above which a number in a mask says that the depth is used (Farooq 2013, 4.3)
+_LARGEST = 1e30  # number of a calibration; one over it is the least: the GPU counts in float32
 _FIELD_OF_VIEW = 45.0  # degrees, where nothing tells it
 _AT_ONCE = 1 << 17  # pixels worked on together
 _MERGED_BYTES, _MERGING_BYTES = 52, 20 << 20  # that `merge` takes for a point, and beside all points
@@ -94,7 +95,8 @@ class RangeView:
             raise unknown_name("kind of depth", self.kind, kinds)
         if self.kind == "range" and self.xy is not None:
             raise InputError("a range view has measured x and y beside a range", hint="Give z instead")
-        if not (np.isfinite([self.fx, self.fy, self.cx, self.cy]).all() and self.fx > 0 and self.fy > 0):
+        numbers = np.array([self.fx, self.fy, self.cx, self.cy])
+        if not ((np.abs(numbers) < _LARGEST).all() and (numbers[:2] > 1 / _LARGEST).all()):
             given = f"fx {self.fx:g}, fy {self.fy:g}, cx {self.cx:g}, cy {self.cy:g}"
             raise InputError(f"a range view's calibration is unusable: {given}")
         self._check_distortion()
@@ -332,7 +334,8 @@ def _cloud(
         origin=origin,
     )
     if not len(cloud):
-        raise InputError("holds no points: no pixel inside the masks has a depth")
+        what = "holds no points: no pixel inside the masks has a depth"
+        raise InputError(what, hint="Check its masks, and what its depths mean")
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
 
 

@@ -176,3 +176,14 @@ def test_images_of_other_pixels_are_refused(tmp_path: Path) -> None:
         pytest.raises(InputError, match="has 121 x 96 pixels, its depth 121 x 97"),
     ):
         scan.pose(0)
+
+
+def test_a_large_mask_of_one_colour_is_no_bomb(tmp_path: Path) -> None:
+    """It packs to a thousandth of what it takes; textures and depths of that size do not."""
+    shape = 2000, 3000
+    save(tmp_path / "range.tif", np.ones(shape, np.float32))
+    save(tmp_path / "mask.png", np.full(shape, 255, np.uint8))
+    assert (tmp_path / "mask.png").stat().st_size < 20_000
+    given = {"fx": 3000, "fy": 3000, "cx": 1500, "cy": 1000, "range": "range.tif", "mask": "mask.png"}
+    with open_scan(write(tmp_path, given)) as scan:
+        assert scan.pose(0).views[0].mask.all()

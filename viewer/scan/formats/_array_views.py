@@ -41,7 +41,8 @@ _IMAGES = ("depth", "xyz", "elevation")  # of which one makes a view
 _PINHOLE = ("fx", "fy", "cx", "cy")
 _EDGES = ("xmin", "xmax", "ymin", "ymax")
 _MOST_RATIO = 40  # of memory to the file: what is masked packs well
-_BYTES = 80  # of memory for a pixel as it becomes a view, beside what is stored
+_BYTES = {"depth": 16, "elevation": 24, "xyz": 140}  # of memory for a pixel of a view, beside what is stored
+_ROWS = 64  # of colours worked on together
 _LONGEST = 1024  # numbers, or bytes of a word, where few are expected
 _CENTER = 0.5  # of a pixel: in these arrays that of the first one is at 0, 0
 _AS_THEY_ARE = (slice(None), slice(None))
@@ -74,7 +75,7 @@ def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
         if image[:2] != shape[:2] or (name != source and image[2:] and name != "color"):
             raise InputError(f"array '{name}' has shape {image}, '{source}' {shape}")
     stored = sum(arrays[name].memory() for name in images)
-    admit(held, stored + shape[0] * shape[1] * _BYTES, _MOST_RATIO)
+    admit(held, stored + shape[0] * shape[1] * _BYTES[source], _MOST_RATIO)
     make = {"depth": _of_depth, "xyz": _of_grid, "elevation": _of_terrain}[source]
     view, turned = make(_numbers(arrays[source]), arrays)
     changes: dict[str, Any] = {}
@@ -179,7 +180,10 @@ def _colors(stored: NDArray) -> NDArray[np.uint8]:
     if stored.ndim > 3 or stored.shape[2:] not in ((), (1,), (3,), (4,)):
         raise InputError(f"array 'color' has shape {stored.shape}, expected (H, W), (H, W, 3) or (H, W, 4)")
     if stored.dtype.kind == "f":
-        stored = np.rint(np.clip(np.nan_to_num(stored), 0, 1) * 255).astype(np.uint8)
+        units, stored = stored, np.empty(stored.shape, np.uint8)
+        for top in range(0, len(units), _ROWS):
+            rows = np.nan_to_num(units[top : top + _ROWS])
+            stored[top : top + _ROWS] = np.rint(np.clip(rows, 0, 1) * 255)
     if stored.dtype != np.uint8:
         raise InputError(f"array 'color' is of type {stored.dtype}, expected uint8 or floats in 0..1")
     colors = stored if stored.ndim == 3 else stored[..., None]

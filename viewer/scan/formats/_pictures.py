@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError, explained
+from ...native import LIBTIFF, unsaid
 from ._admission import admit, opened, size_of
 from ._stored import QUIETLY
 
@@ -21,7 +22,13 @@ if TYPE_CHECKING:
 DEPTH_KINDS = ("PNG", "TIFF")  # as Pillow names them
 COLOR_KINDS = ("PNG", "JPEG", "TIFF")
 
-_BYTES = 24  # of memory for a pixel, decoded and as a view
+_BYTES = {
+    "1": 4,
+    "L": 4,
+    "I;16": 10,
+    "RGB": 13,
+}  # of memory for a pixel of a mode of Pillow's, with its copies
+_MOST_BYTES = 16  # the same of all other modes
 _MOST_RATIO = 40  # of memory to the file: flat and masked pictures pack well
 _OF_NUMBERS = ("L", "I", "F", "1")  # modes of Pillow's, and those that begin with I;16
 _COMPRESSED = "libtiff"  # what decodes compressed TIFF, into the machine's order of bytes
@@ -40,9 +47,11 @@ def opened_picture(path: Path, kinds: tuple[str, ...]) -> Iterator[Image]:
     title = " or ".join(kinds)
     try:
         # Pillow warns of odd tags and large pictures.
-        with opened(path) as stream, QUIETLY, warnings.catch_warnings(action="ignore"):
+        with opened(path) as stream, QUIETLY, warnings.catch_warnings(action="ignore"), unsaid(LIBTIFF):
             image = Image.open(stream, formats=kinds)
-            admit(size_of(stream), image.width * image.height * _BYTES, _MOST_RATIO)
+            admit(
+                size_of(stream), image.width * image.height * _BYTES.get(image.mode, _MOST_BYTES), _MOST_RATIO
+            )
             yield image
     except Scan4DError as error:
         raise InputError(error.what, error.where or path, error.hint) from error
