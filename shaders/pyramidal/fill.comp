@@ -45,7 +45,7 @@ bool is_hole(Window window, int level) {
 // Fills a pixel from a target; whether it could.
 bool fill(int i, ivec2 pixel, int level) {
     Window window = window_of(level, pixel, 1);  // what encloses the pixel, however wide the kernel is
-    if (level > density + sparse && !is_hole(window, level)) return false;
+    if (level > density + 1 && !is_hole(window, level)) return false;
     vec2 around = depths_around(window), span = vec2(0.0);
     if (isinf(around.x)) return false;
     for (int n = 0; n < SURFACES; ++n) {

@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ...gpu.bindings import Texture
 from ...gpu.pose import GpuPose
 from ...gpu.pyramid import BOX, GAUSSIAN, NEAREST, Filter
 from ...gpu.scatter import scatter
 from ...gpu.surface import Surface
 from ...params import param
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import sparse_spacing
 from ...view import View
@@ -29,12 +32,14 @@ FILLS = True
 BLENDS = True
 
 _BY_CELLS = "a pixel is filled by whole cells; at their edges the last bit tells which, and what encloses it"
+_NO_SURFACE = "how far apart points of a surface are is not to be told from a line of them"
 LIMITS = {
+    "eye inside the cloud": Limit(0.02, _BY_CELLS),
     "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
     "coplanar points": Limit(0.02, _BY_CELLS),
     "collinear points": Limit(0.04, _BY_CELLS),
-    "collinear points end on, perspective": Limit(0.02, _BY_CELLS),
-    "collinear points end on, orthographic": Limit(0.02, _BY_CELLS),
+    "collinear points end on, perspective": Limit(0.1, _NO_SURFACE),
+    "collinear points end on, orthographic": Limit(0.1, _NO_SURFACE),
 }
 
 _FILLING = {"fill": (True,)}
@@ -59,16 +64,18 @@ class Params:
         when=_FILLING,
     )
     step: float = param(
-        3.0,
+        6.0,
         "Depth step between neighbours of one surface, in cells of their level",
         low=0.1,
         high=100,
         group=_LEVELS,
         when=_FILLING,
     )
-    margin: float = param(
-        0.15,
-        "How far outside its samples a surface is filled, in distances between samples",
+    margin: float | None = param(
+        None,
+        "How far outside its samples a surface is filled, in distances between samples; auto: 0.15 of those "
+        "that polygons join, 0.4 of others",
+        type=float,
         low=0,
         high=1,
         group=_LEVELS,
@@ -176,9 +183,8 @@ class _Numbers:
     """Numbers that the shaders read.
 
     levels: of targets that are shown, a bit each; coarsest: of them. density: the level whose cells samples
-    all fill; sparse: how many levels above that may fill gaps between samples. spacing: of the samples, scan
-    units. first_level, last_level: of range images. least_mask: of a coarser level's samples, what share of
-    their surroundings has to be there.
+    all fill. spacing: of the samples, scan units. first_level, last_level: of range images. least_mask: of a
+    coarser level's samples, what share of their surroundings has to be there.
     """
 
     levels: int
@@ -187,7 +193,6 @@ class _Numbers:
     margin: float
     widest: float
     density: int
-    sparse: int
     tolerance: float
     neighbors: int
     spacing: float
@@ -198,6 +203,7 @@ class _Numbers:
 
 
 _UPSAMPLING = {"nearest": 0, "bilinear": 1, "bicubic": 2}
+_MARGIN, _MARGIN_OF_JOINED = 0.4, 0.15
 _LEAST_MASK = 0.01  # Farooq 2013, 4.3.2
 
 
@@ -264,42 +270,41 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 
 
 def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
+    joined = bool(pose.views) and params.primitive == "polygons"
+    spacing = view_spacing(pose) if pose.views else pose.stored.remember(_spacing)
+    margin = _MARGIN_OF_JOINED if joined else _MARGIN
+    last = pose.samples.levels - 1 if pose.views else 0
+    first = min(params.first_level, last)
     values = _Numbers(
         levels=sum(1 << level for level in params.shown),
         coarsest=LEVELS - 1,
         step=params.step,
-        margin=params.margin,
+        margin=margin if params.margin is None else params.margin,
         widest=params.widest,
-        density=0,
-        sparse=1,
+        density=0 if joined else _density(pose, surface.view, spacing),
         tolerance=params.tolerance,
         neighbors=params.neighbors,
-        spacing=0.0,
-        first_level=0,
-        last_level=0,
+        spacing=spacing,
+        first_level=first,
+        last_level=last if params.lod else first,
         detail=params.detail,
         least_mask=_LEAST_MASK,
     )
     if not pose.views:
-        spacing = _rounded(sparse_spacing(pose.stored))
-        return PointSource(pose, replace(values, spacing=spacing, **_density(pose, surface.view, spacing)))
-    last = pose.samples.levels - 1
-    levels = {"first_level": min(params.first_level, last), "last_level": last}
-    if not params.lod:
-        levels["last_level"] = levels["first_level"]
-    spacing = view_spacing(pose)
-    if params.primitive == "points":
-        levels |= _density(pose, surface.view, spacing)
-    return ViewSource(pose, surface, params, replace(values, **levels, spacing=spacing))
+        return PointSource(pose, values)
+    return ViewSource(pose, surface, params, values)
 
 
-def _rounded(spacing: float) -> float:
-    """The spacing in half octaves, so that pictures do not depend on which points it was judged by."""
-    return 2.0 ** (round(2 * math.log2(spacing)) / 2)
+def _spacing(cloud: PointCloud) -> float:
+    """The spacing of points, in half octaves of the scan's size: pictures depend neither on which points it was
+    judged by nor on the unit."""
+    size = float(np.ptp(cloud.positions, axis=0).max())
+    ratio = sparse_spacing(cloud) / size if size > 0 else 1.0
+    return (size or 1.0) * 2.0 ** (round(2 * math.log2(ratio)) / 2)
 
 
-def _density(pose: GpuPose, view: View, spacing: float) -> dict[str, int]:
+def _density(pose: GpuPose, view: View, spacing: float) -> int:
     """The level whose cells samples fill in the middle of the scan."""
     depth = max(float(view.depths(pose.bounds.center - pose.overview.origin)), view.near)
     apart = spacing * view.scale / (depth if view.perspective else 1.0)
-    return {"density": min(math.ceil(math.log2(max(apart, 1.0))), LEVELS - 1), "sparse": 1}
+    return min(math.ceil(math.log2(max(apart, 1.0))), LEVELS - 1)
