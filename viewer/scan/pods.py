@@ -13,6 +13,7 @@ from ..geometry import UP, Vector, up_vector, vector
 from .range_view import RangeView
 
 _AGREE = 0.75  # length of the mean of directions that agree: they lie within 41 degrees of it, or so
+_UPRIGHT = 0.5  # cosine of how far a pod that stands upright is tilted
 _LEAST_SINE = 0.3  # of the angle between what is up and where a camera that is level looks
 _WIDEST = 120.0  # field of view, degrees
 
@@ -22,16 +23,19 @@ def first_camera(views: Sequence[RangeView], bounds: Bounds, aspect: float, up: 
     direction of several, or above heights, as near as shows the bounds whole. Where there is no pod, or they
     look from all around, it looks from the front.
 
-    aspect: width / height of the picture. up: the scan's, also the camera's unless that looks along it.
+    aspect: width / height of the picture. up: the scan's, kept to unless it is along the view axis, or nearly
+    what is up in the picture of one pod alone.
     """
     axes = np.mean([view.world_to_camera[:3, :3] for view in views] or np.zeros((1, 3, 3)), axis=0)
     if np.linalg.norm(axes, axis=1).min() < _AGREE:
         return Camera.orbit(bounds, aspect=aspect, up=up)
     _, pods_up, back = axes
-    is_level = np.linalg.norm(np.cross(up_vector(up), back)) > _LEAST_SINE
-    above = up_vector(up) if is_level else vector(pods_up)
+    upright = np.array(up_vector(up))
     if len(views) == 1 and views[0].kind != "height":
-        return _camera_of_pod(views[0], aspect, above)
+        keeps_up = pods_up @ upright > _UPRIGHT
+        return _camera_of_pod(views[0], aspect, vector(pods_up if keeps_up else upright))
+    is_level = np.linalg.norm(np.cross(upright, back)) > _LEAST_SINE
+    above = vector(upright if is_level else pods_up)
     return Camera(eye=vector(back), target=(0.0, 0.0, 0.0), up=above).fit(bounds, aspect)
 
 
