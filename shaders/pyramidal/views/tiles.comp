@@ -8,6 +8,20 @@
 
 layout(std430, binding = STORAGE_TILE_COUNTS) buffer Counts { uint counts[]; };  // as viewer/backends/pyramidal/views.py names them
 
+#if LOD
+// Pixels between neighbouring samples of a tile, where these face the pod: the most, since a tile may hold a silhouette
+// before what is far behind.
+float pixels_apart(RangeView v, int level, RangeTile tile) {
+    float most = 0.0;
+    for (int i = 0; i < 8; ++i) {
+        vec3 pod = tile_corner(v, tile, i);
+        float depth = max(-to_screen_view(v, pod).z, view_near);
+        most = max(most, sample_spacing(v, level, -pod.z) * scale_at(depth));
+    }
+    return most;
+}
+#endif
+
 // Whether samples of a tile lie farther apart than the picture shows, so that a finer level is drawn in its stead.
 bool is_coarse(RangeView v, int level, ivec2 tile) {
     if (level <= first_level) return false;
@@ -15,7 +29,7 @@ bool is_coarse(RangeView v, int level, ivec2 tile) {
     RangeLevel found = range_level(v, level);
     int columns = (found.size.x + RANGE_TILE - 1) / RANGE_TILE;
     RangeTile bounds = range_tile(found.first_tile + tile.y * columns + tile.x);
-    return is_empty(bounds) || footprint(v, bounds).x > detail;
+    return is_empty(bounds) || pixels_apart(v, level, bounds) > detail;
 #else
     return true;
 #endif
