@@ -296,8 +296,8 @@ def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
 
 
 def _spacing(cloud: PointCloud) -> float:
-    """The spacing of points, in half octaves of the scan's size: pictures depend neither on which points it was
-    judged by nor on the unit."""
+    """The spacing of points, in half octaves of the scan's size: pictures depend neither on which points it
+    was judged by nor on the unit."""
     size = float(np.ptp(cloud.positions, axis=0).max())
     ratio = sparse_spacing(cloud) / size if size > 0 else 1.0
     return (size or 1.0) * 2.0 ** (round(2 * math.log2(ratio)) / 2)
