@@ -66,9 +66,11 @@ def running(screen: Screen, scan: Path, tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.fixture
-def app(running: RunningApp) -> RunningApp:
+def app(running: RunningApp) -> Iterator[RunningApp]:
     running.reset()
-    return running
+    yield running
+    running.see(lambda state: state.counted)
+    assert "Traceback" not in running.log()
 
 
 def press(app: RunningApp, key: str) -> None:
@@ -108,13 +110,17 @@ def params(state: State) -> dict[str, object]:
     return dict(state.document["params"].get("pyramidal", {}))
 
 
+def draw_pyramids(app: RunningApp, primitive: str) -> None:
+    """Have pyramidal projection draw, which is the default, of points or polygons."""
+    assert app.settle().backend == "pyramidal"
+    app.choose(PANEL, "primitive/##value", f"{primitive}##{primitive}")
+    app.settle()
+
+
 @pytest.fixture
 def levels(app: RunningApp) -> Iterator[RunningApp]:
     """Pyramidal projection of points, coloured by level and not lit."""
-    while app.state.backend != "pyramidal":
-        press(app, "b")
-    if params(app.state).get("primitive") != "points":
-        app.choose(PANEL, "primitive/##value", "points##points")
+    draw_pyramids(app, "points")
     app.choose(PANEL, "color_by/##value", "level##level")
     app.choose(PANEL, "light/##value", "flat##flat")
     app.settle()
@@ -172,9 +178,9 @@ def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
 
 @pytest.mark.slow
 def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes(
-    levels: RunningApp,
+    app: RunningApp,
 ) -> None:
-    app = levels
+    draw_pyramids(app, "polygons")
     press(app, "r")
     app.see(is_recording=True)
     app.screen.do("key", "space")
