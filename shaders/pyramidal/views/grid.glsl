@@ -24,6 +24,11 @@ Corner corner_at(RangeView v, RangeLevel found, int level, ivec2 uv) {
     return corner;
 }
 
+// Whether the surface around a sample faces away from the eye.
+bool shows_back(RangeView v, int level, ivec2 uv, Corner a) {
+    return dot(sample_normal(v, level, uv), view_perspective ? a.place : vec3(0.0, 0.0, -1.0)) > 0.0;
+}
+
 // Corners of a quad: 0 at (u, v), 1 to the right, 2 below, 3 below to the right. A triangle goes by the corner that it
 // lacks. A pixel shows an item: a triangle of the quad that a sample is the first corner of, or that sample alone.
 const uint ALONE = 4u, PARTS = 8u;

@@ -16,7 +16,7 @@ void scatter(uint i) {
         Corner a = corner_at(row.view, row.range, row.level, uv);
         if (!a.there) continue;
 #if CULL_BACK
-        if (dot(sample_normal(row.view, row.level, uv), view_perspective ? a.place : vec3(0.0, 0.0, -1.0)) > 0.0) continue;
+        if (shows_back(row.view, row.level, uv, a)) continue;
 #endif
         place_sample(a.pixel, -a.place.z, item_of(a.index, ALONE));
     }

@@ -1,12 +1,15 @@
-// Quads of neighbouring samples go to the pixels whose centres their triangles hold; a sample of no triangle to the one
-// that it lies in. CULL_BACK: triangles that
-// show their backs are left out.
+// Quads of neighbouring samples go to the pixels whose centres their triangles hold; a sample that is in no triangle of its
+// own quad to the pixel that it lies in: those that are alone, and those along outlines to the right and below.
+// CULL_BACK: what shows its back is left out.
 #include <params>
 #include "pyramidal/views/grid.glsl"
 #include "range/rows.glsl"
 
-void visit_point(Corner a) {
+void visit_point(RowOfSamples row, ivec2 uv, Corner a) {
     if (any(lessThan(a.pixel, vec2(0.0))) || any(greaterThanEqual(a.pixel, vec2(view_size)))) return;
+#if CULL_BACK
+    if (shows_back(row.view, row.level, uv, a)) return;
+#endif
     ivec2 at = ivec2(a.pixel);
     visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), item_of(a.index, ALONE));
 }
@@ -39,7 +42,7 @@ void scatter(uint i) {
         if ((drawn & 2) != 0) visit_triangle(a, c, d, -1.0, item_of(a.index, 1u));
         if ((drawn & 4) != 0) visit_triangle(a, b, d, 1.0, item_of(a.index, 2u));
         if ((drawn & 8) != 0) visit_triangle(a, b, c, 1.0, item_of(a.index, 3u));
-        if (drawn == 0 && a.there) visit_point(a);
+        if ((drawn & ~1) == 0 && a.there) visit_point(row, uv, a);
         a = b;
         c = d;
     }
