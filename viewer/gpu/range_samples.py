@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 
@@ -50,6 +50,7 @@ from .pyramid import BOX, Filter, sizes
 
 LEVELS = 6
 _KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
+_EVERY = 8  # pixels along rows and columns that are looked at
 _ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
 _SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
 _LOOKED_AT = 17  # pixels along either edge that tell how a lens is undone
@@ -152,6 +153,7 @@ class RangeSamples:
             "RANGE_HAS_XY": int(has_xy),
             "RANGE_COUNT": len(views),
         }
+        self.spacing = max(_spacing(view) for view in views)
         self.has_color = any(view.color is not None for view in views)
         self._normals: _Normals | None = None
         self._steps: Iterator[Callable[[], object]] = chain(self._uploads(views), self._reductions())
@@ -389,6 +391,17 @@ class RangeSamples:
         to_view[:3, :3] = view.rotation
         to_view[:3, 3] = view.translation - view.rotation @ self._origin
         return to_view @ np.linalg.inv(pod.world_to_camera)
+
+
+def _spacing(view: RangeView) -> float:
+    """How far apart samples are across the line of sight, where they are far apart, scan units."""
+    if view.kind == "height":
+        return 1 / min(view.fx, view.fy)
+    some = slice(None, None, _EVERY)
+    depth, mask = view.depth[some, some], view.mask[some, some]
+    few = replace(view, depth=depth, mask=mask, color=None, confidence=None, xy=None)
+    depth = few.depth[few.valid()]
+    return float(np.quantile(depth, 0.9)) / min(view.fx, view.fy) if len(depth) else 0.0
 
 
 def _pod(view: RangeView) -> _Pod:

@@ -7,6 +7,7 @@ a quarter, ... of its size; what the picture lacks shows through from the finest
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from ...gpu.bindings import Texture
 from ...gpu.pose import GpuPose
 from ...gpu.pyramid import BOX, GAUSSIAN, NEAREST, Filter
-from ...gpu.scatter import scatter
+from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.points import PointCloud
@@ -25,7 +26,7 @@ from .. import FrameView, Limit, Suited
 from .sources import PointSource, SampleSource
 from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
-from .views import MODES, ViewSource, view_spacing
+from .views import MODES, ViewSource
 
 TITLE = "Pyramidal projection"
 FILLS = True
@@ -219,59 +220,86 @@ def suits(pose: Pose) -> Suited | None:
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter, show, hide, fill; complete where all samples shall be drawn."""
-    params: Params = frame.params
+    params = _coarser(frame.params, frame.share) if pose.views else frame.params
     source = _source(pose, params, surface)
     visits = source.visits(surface, frame.share)
     scatter(surface.gpu, visits, surface.depths, surface.rows)
     fills, hides = params.shown != (0,), params.hide and not source.is_closed
     channels = source.channels(surface)
     spreads = params.antialias != "off" and not source.is_closed and "color" in channels
-    refinable = surface.stats.share < 1
-    if not (fills or hides or spreads or source.is_made):
+    if fills or hides or spreads or source.is_made:
+        _resolve(
+            surface, source, channels, _spread(surface, source, visits, params) if spreads else {"SUMS": 0}
+        )
+    else:
         surface.stats.skipped["fill"] = "level 0 alone is shown"
-        return refinable
-    gpu, pixels = surface.gpu, surface.size[0] * surface.size[1]
-    defines, values = source.defines(channels), source.params
-    spreading = spread_macros(params.antialias if spreads else "off", params.kernel, source.count)
     targets = surface.keep(Targets)
-
-    def bind() -> None:
-        source.bind()
-        targets.bind()
-        surface.bind_storage()
-        surface.bind_own("level", *channels)
-
-    if spreads:
-        given = replace(visits, defines={**visits.defines, **spreading})
-        add_spread(surface, given, params.kernel, source.count).texels.bind(Texture.SUMS)
-    covered = surface.list_covered()
-    with gpu.timers.measure("resolve"):
-        program = gpu.compute("pyramidal/resolve.comp", {**defines, **spreading}, source.parts, values)
-        bind()
-        covered.texels.bind(Texture.LISTED)
-        covered.run(program)
     if hides:
         targets.reduce(surface, source, channels)
-        with gpu.timers.measure("hide"):
-            program = gpu.compute("pyramidal/hide.comp", source.defines([]), source.parts, values)
-            bind()
-            gpu.dispatch(program, pixels)
+        with surface.gpu.timers.measure("hide"):
+            defines = source.defines([])
+            program = surface.gpu.compute("pyramidal/hide.comp", defines, source.parts, source.params)
+            _bind(surface, source, channels)
+            targets.bind()
+            surface.gpu.dispatch(program, surface.size[0] * surface.size[1])
     if fills:
         targets.reduce(surface, source, channels)
-        holes = targets.list_holes(values)
-        surface.stats.counted["cells"] = targets.read_holes
-        with gpu.timers.measure("fill"):
-            upsampling = {"UPSAMPLING": _UPSAMPLING[params.upsampling]}
-            program = gpu.compute("pyramidal/fill.comp", {**upsampling, **defines}, params=values)
-            bind()
-            holes.texels.bind(Texture.LISTED)
-            holes.run(program)
-    return refinable
+        _fill(surface, source, channels, targets, params.upsampling)
+    return frame.share < 1
+
+
+def _coarser(params: Params, share: float) -> Params:
+    """The parameters for a share of the samples: those of coarser levels, of one view."""
+    if share >= 1:
+        return params
+    return replace(params, detail=params.detail / math.sqrt(share), blend="nearest")
+
+
+def _spread(surface: Surface, source: SampleSource, visits: Visits, params: Params) -> Mapping[str, object]:
+    """Add up point spread functions; gives the macros of what reads their sums."""
+    macros = spread_macros(params.antialias, params.kernel, source.count)
+    given = replace(visits, defines={**visits.defines, **macros})
+    add_spread(surface, given, params.kernel, source.count).texels.bind(Texture.SUMS)
+    return macros
+
+
+def _bind(surface: Surface, source: SampleSource, channels: Sequence[str]) -> None:
+    source.bind()
+    surface.bind_storage()
+    surface.bind_own("level", *channels)
+
+
+def _resolve(
+    surface: Surface, source: SampleSource, channels: Sequence[str], macros: Mapping[str, object]
+) -> None:
+    """Make what was scattered into pixels what these show."""
+    gpu, covered = surface.gpu, surface.list_covered()
+    with gpu.timers.measure("resolve"):
+        defines = {**source.defines(channels), **macros}
+        program = gpu.compute("pyramidal/resolve.comp", defines, source.parts, source.params)
+        _bind(surface, source, channels)
+        covered.texels.bind(Texture.LISTED)
+        covered.run(program)
+
+
+def _fill(
+    surface: Surface, source: SampleSource, channels: Sequence[str], targets: Targets, upsampling: str
+) -> None:
+    """Fill pixels from what is around them in the targets."""
+    gpu, holes = surface.gpu, targets.list_holes(source.params)
+    surface.stats.counted["cells"] = targets.read_holes
+    with gpu.timers.measure("fill"):
+        defines = {"UPSAMPLING": _UPSAMPLING[upsampling], **source.defines(channels)}
+        program = gpu.compute("pyramidal/fill.comp", defines, params=source.params)
+        _bind(surface, source, channels)
+        targets.bind()
+        holes.texels.bind(Texture.LISTED)
+        holes.run(program)
 
 
 def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
     joined = bool(pose.views) and params.primitive == "polygons"
-    spacing = view_spacing(pose) if pose.views else pose.stored.remember(_spacing)
+    spacing = pose.samples.spacing if pose.views else pose.stored.remember(_spacing)
     margin = _MARGIN_OF_JOINED if joined else _MARGIN
     last = pose.samples.levels - 1 if pose.views else 0
     first = min(params.first_level, last)

@@ -16,9 +16,7 @@ from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits
 from ...gpu.surface import Surface
 from ...look import Look
-from ...scan.range_view import RangeView
 
-_EVERY = 8  # pixels along rows and columns that are looked at
 MODES = ("nearest", "linear", "best")  # as of_views.glsl numbers them
 COUNTS = ("empty", "drawn", "outside", "away")  # what becomes of tiles, as tiles.comp counts them
 
@@ -118,18 +116,6 @@ class ViewSource:
         for name, unit in (("normal", Texture.RANGE_NORMALS), ("value", Texture.VALUES)):
             if name in self._texels:
                 self._texels[name].bind(unit)
-
-
-def view_spacing(pose: GpuPose) -> float:
-    """How far apart the samples of a pose's range views are, where they are far apart; scan units."""
-    return max(_spacing(view) for view in pose.views)
-
-
-def _spacing(view: RangeView) -> float:
-    depth = view.depth[::_EVERY, ::_EVERY][view.valid()[::_EVERY, ::_EVERY]]
-    if view.kind == "height":
-        return 1 / min(view.fx, view.fy)
-    return float(np.quantile(depth, 0.9)) / min(view.fx, view.fy) if len(depth) else 0.0
 
 
 def wants_lit(look: Look) -> bool:
