@@ -130,6 +130,23 @@ class Params:
         1.0, "Pixels between samples above which a finer level is drawn", low=0.25, high=16, unit="px",
         group=_VIEWS, when={"lod": (True,)},
     )  # fmt: skip
+    filter: str = param(
+        "box",
+        "What coarser levels of range images are made by",
+        choices=("box", "gaussian", "nearest"),
+        group=_VIEWS,
+    )
+    blend: str = param(
+        "linear",
+        "Where several views see one surface: the mean of all, the best of them, or the nearest",
+        choices=MODES,
+        group=_VIEWS,
+        sweep=("linear", "best", "nearest"),
+    )
+    cull_back: bool = param(False, "Leave out surfaces of range images that show their backs", group=_VIEWS)
+    skip: bool = param(
+        True, "Leave out tiles of range images that no pixel shows", group=_VIEWS, affects="speed"
+    )
     antialias: str = param(
         "off",
         "Colours as sums of point spread functions, of samples that are drawn as points",
@@ -148,23 +165,6 @@ class Params:
         False,
         "Fade colours into the next coarser level as samples come to lie closer than pixels",
         group=_SMOOTHING,
-    )
-    filter: str = param(
-        "box",
-        "What coarser levels of range images are made by",
-        choices=("box", "gaussian", "nearest"),
-        group=_VIEWS,
-    )
-    blend: str = param(
-        "linear",
-        "Where several views see one surface: the mean of all, the best of them, or the nearest",
-        choices=MODES,
-        group=_VIEWS,
-        sweep=("linear", "best", "nearest"),
-    )
-    cull_back: bool = param(False, "Leave out surfaces of range images that show their backs", group=_VIEWS)
-    skip: bool = param(
-        True, "Leave out tiles of range images that no pixel shows", group=_VIEWS, affects="speed"
     )
 
     @property
