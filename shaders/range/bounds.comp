@@ -12,6 +12,15 @@ uniform uint first;  // tile of the level that is made by this call
 const float ROUNDING = 1e-6;  // of numbers in float32, and some
 const float CONE_ROUNDING = 1e-4;
 
+// The cosine between an axis and the normal of a quad's triangle that lacks a corner; 1 where that is no surface.
+float triangle_cosine(RangeView view, vec4 quad[4], int lacks, vec3 axis) {
+    vec4 x = quad[lacks == 0 ? 1 : 0], y = quad[lacks < 2 ? 2 : 1], z = quad[lacks == 3 ? 2 : 3];
+    if (!same_surface(view, level, x.w, y.w) || !same_surface(view, level, x.w, z.w)) return 1.0;
+    vec3 normal = (lacks < 2 ? 1.0 : -1.0) * cross(y.xyz - x.xyz, z.xyz - x.xyz);
+    float size = length(normal);
+    return size > 0.0 ? dot(axis, normal) / size : 1.0;
+}
+
 void main() {
     uint i = first + item();
     if (item() >= item_count) return;
@@ -59,6 +68,8 @@ void main() {
                 }
                 if (isinf(around[4].w)) continue;
                 cosine = min(cosine, dot(axis, fitted_normal(view, level, around)));  // 0 where unknown
+                vec4 quad[4] = vec4[](around[4], around[5], around[7], around[8]);
+                for (int i = 0; i < 4; ++i) cosine = min(cosine, triangle_cosine(view, quad, i, axis));
             }
         }
         cosine = max(cosine - CONE_ROUNDING, -1.0);

@@ -166,6 +166,8 @@ def test_skipping_changes_no_picture(draw: Draw, primitive: str, lod: bool, cull
     shown = 0
     for kind in ("z", "range", "height"):
         first, second = (shape_view(name, kind)[0] for name in ("sphere", "plane"))
+        rough = 0.02 * rng.standard_normal(first.depth.shape, np.float32)
+        first = replace(first, depth=first.depth + rough)
         views = (first, replace(second, world_to_camera=looking_at((2.0, 1.5, 3.0), (0.5, 0.0, 0.0))))
         center = middle(first)
         for distance in (0.5, 2.0, 4.0, 15.0):
