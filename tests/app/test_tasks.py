@@ -14,7 +14,7 @@ from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 
 from viewer.analysis.pick import pick
 from viewer.app.scene import navigation
-from viewer.gpu.surface import Surface
+from viewer.gpu.surface import EMPTY, Surface
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 
@@ -104,7 +104,7 @@ def person(tmp_path: Path) -> Iterator[Person]:
 
 def holes(surface: Surface) -> float:
     """The share of the face that shows nothing: of what has something left, right, above and below it."""
-    seen = surface.level == 0
+    seen = surface.level != EMPTY
     inside = np.ones_like(seen)
     for turns in range(4):
         turned = np.rot90(seen, turns)
@@ -121,8 +121,8 @@ def told(tasks: str) -> dict[str, int]:
 
 
 def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
-    person.press("shift", "b")  # points, which break apart
-    person.app.see(backend="points")
+    while person.app.state.backend != "points":  # which break apart
+        person.press("shift", "b")
     for _ in FACES:
         before = person.look()
         person.task = "A1"

@@ -77,7 +77,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         press(app, "r")
         app.see(is_recording=True)
         for key, wanted in (
-            ("Right", {"frame": 1}), ("b", {"backend": "surfels"}), ("o", {}), ("End", {"frame": 3}),
+            ("Right", {"frame": 1}), ("b", {"backend": "pyramidal"}), ("o", {}), ("End", {"frame": 3}),
         ):  # fmt: skip
             press(app, key)
             app.see(**wanted)

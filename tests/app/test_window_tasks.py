@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PATIENCE, RunningApp, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, RunningApp, running_app, virtual_screen
 
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -82,7 +82,7 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     left, top, width, height = app.view()
     part = np.s_[top + 200 : top + height - 100, left : left + width]  # without marks
     before, pictures = app.screen.picture()[part], app.state.pictures
-    app.screen.do("key", "b")
+    app.choose(PANEL, "##backend", "Surfels##surfels")
     drawn = app.see(lambda state: state.pictures > pictures, backend="points").pictures  # meanwhile
     press_until(app, "Escape", "Cancelled: Estimating normals")
     app.screen.do("key", "Escape")  # away with the note
@@ -90,7 +90,7 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     assert (after.frame, after.backend) == (0, "points")
     assert after.pictures <= drawn + 3, "the same picture is not drawn again and again"
     assert (app.screen.picture()[part] == before).all()
-    app.screen.do("key", "b")
+    app.choose(PANEL, "##backend", "Surfels##surfels")
     app.see(frame=0, backend="surfels")
     app.settle()
     assert (app.screen.picture()[part] != before).any()
