@@ -24,7 +24,7 @@ ZOOMS = (0.25, 1.0, 2.0, 4.0, 8.0)
 HIDDEN_ZOOM = 4.0
 
 _NOISE = 0.0  # of the virtual scanner: the real scans have their own
-_SCENES = ("demo-pair", "armadillo-pair", "dragon-pair", "dragon-scans", "bunny-scans", "truedepth-head")
+_SCENES = ("demo-pair", "armadillo-pair", "dragon-scans", "bunny-scans", "truedepth-head")
 _COVERED_SCENES = ("armadillo-pair", "hand-before-face-pair")  # which cover themselves
 
 
@@ -47,8 +47,8 @@ def levels_of(params: dict[str, Any]) -> int:
 
 def groups() -> list[Group]:
     """A group for each scene and zoom; then those of hidden points."""
-    levels = [(count, "points") for count in range(1, MOST_LEVELS + 1)]
-    drawn = [with_levels(*each) for each in (*levels, (1, "polygons"), (MOST_LEVELS, "polygons"))]
+    drawn = [with_levels(count, "points") for count in range(1, MOST_LEVELS + 1)]
+    drawn.append(with_levels(MOST_LEVELS, "polygons"))
     contenders = (*(Contender(BACKEND, params) for params in drawn), Contender(RANGE_MESH))
     return [
         *(_group(scene, zoom, contenders) for scene in _SCENES for zoom in ZOOMS),
