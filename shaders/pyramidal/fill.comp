@@ -1,6 +1,7 @@
 // Pixels without a sample show what those of the finest target around them give (Farooq 2013, 4.3.3). Depth-aware: only
 // samples of one surface are blended, of the nearest that encloses the pixel, so that outlines do not grow (the limit of
-// 4.4.4). UPSAMPLING 0 nearest, 1 bilinear, 2 bicubic.
+// 4.4.4). UPSAMPLING 0 nearest, 1 bilinear, 2 bicubic. FRAMED: samples are on a grid, so that what the picture's frame
+// cuts off is known to be surface.
 #include "common/item.glsl"
 #include "common/list.glsl"
 #include "common/split.glsl"
@@ -42,50 +43,84 @@ bool is_hole(Window window, int level) {
     return float(known - filled) <= widest * widest * float(known) / 9.0;
 }
 
+#if FRAMED
+// What the picture's frame cuts off goes on beyond it, as far as the next sample. apart: samples, in cells.
+void extend_to_frame(inout Sides sides, Window window, float apart) {
+    vec2 before = window.pixel, after = vec2(view_size) * window.scale - window.pixel;
+    if (before.x < apart) extend(sides, vec2(-before.x, 0.0));
+    if (before.y < apart) extend(sides, vec2(0.0, -before.y));
+    if (after.x < apart) extend(sides, vec2(after.x, 0.0));
+    if (after.y < apart) extend(sides, vec2(0.0, after.y));
+}
+#endif
+
+// Blends what a surface shows around a pixel into it.
+void blend(int i, ivec2 pixel, int level, vec2 span) {
+    Window window = window_of(level, pixel, UPSAMPLING == 2 ? 2 : 1);
+    float total = 0.0, depth = 0.0;
+    Seen sum = UNSEEN;
+    EACH_CELL(window, cell) {
+        float here = depth_of(cell);
+        if (here < span.x || here > span.y) continue;
+        float weight = weight_of(offset_to(window, cell));
+        Seen one = unpack_seen(texelFetch(shown, cell));
+#if UPSAMPLING == 0
+        if (weight <= total) continue;
+        total = weight;
+        depth = here;
+        sum = one;
+#else
+        total += weight;
+        depth += weight * here;
+        sum.color += weight * one.color;
+        sum.normal += weight * one.normal;
+        sum.value += weight * one.value;
+#endif
+    }
+#if UPSAMPLING != 0
+    depth /= total;
+    sum.color /= total;
+    sum.value /= total;
+#endif
+    store(i, depth, NOTHING, level, sum);
+}
+
 // Fills a pixel from a target; whether it could.
 bool fill(int i, ivec2 pixel, int level) {
     Window window = window_of(level, pixel, 1);  // what encloses the pixel, however wide the kernel is
-    if (level > density + 1 && !is_hole(window, level)) return false;
-    vec2 around = depths_around(window), span = vec2(0.0);
+    bool gap = level <= density + 1;             // between samples, rather than a hole in what was measured
+    if (!gap && !is_hole(window, level)) return false;
+    vec2 around = depths_around(window), span = vec2(0.0), nearest = span;
     if (isinf(around.x)) return false;
+    float apart = spacing / cell_width(level, around.x), least = 1e9;  // samples, in cells
+    Sides all_around = NO_SIDES;
     for (int n = 0; n < SURFACES; ++n) {
         span = surface_beyond(window, around, span.y, level);
-        if (isinf(span.x)) return false;
+        if (isinf(span.x)) break;
         Sides sides = NO_SIDES;
         EACH_CELL(window, cell) {
             float here = depth_of(cell);
-            if (here >= span.x && here <= span.y) extend(sides, offset_to(window, cell));
-        }
-        if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
-        Window blended = UPSAMPLING == 2 ? window_of(level, pixel, 2) : window;
-        float total = 0.0, depth = 0.0;
-        Seen sum = UNSEEN;
-        EACH_CELL(blended, cell) {
-            float here = depth_of(cell);
             if (here < span.x || here > span.y) continue;
-            float weight = weight_of(offset_to(window, cell));
-            Seen one = unpack_seen(texelFetch(shown, cell));
-#if UPSAMPLING == 0
-            if (weight <= total) continue;
-            total = weight;
-            depth = here;
-            sum = one;
-#else
-            total += weight;
-            depth += weight * here;
-            sum.color += weight * one.color;
-            sum.normal += weight * one.normal;
-            sum.value += weight * one.value;
-#endif
+            vec2 offset = offset_to(window, cell);
+            extend(sides, offset);
+            extend(all_around, offset);
+            if (dot(offset, offset) < least) nearest = span;
+            least = min(least, dot(offset, offset));
         }
-#if UPSAMPLING != 0
-        depth /= total;
-        sum.color /= total;
-        sum.value /= total;
+#if FRAMED
+        if (level <= density) extend_to_frame(sides, window, apart);
 #endif
-        store(i, depth, NOTHING, level, sum);
+        if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
+        blend(i, pixel, level, span);
         return true;
     }
+#if POLYGONS
+    // Between the outline of one surface and what was measured beside it behind: the one that is nearer in the picture.
+    if (gap && encloses(all_around, margin * apart)) {
+        blend(i, pixel, level, nearest);
+        return true;
+    }
+#endif
     return false;
 }
 

@@ -4,7 +4,7 @@
 #include <params>
 #include "pyramidal/views/grid.glsl"
 
-#if NORMAL
+#if NORMAL || BLEND
 layout(binding = TEXTURE_RANGE_NORMALS) uniform usamplerBuffer range_normals;
 #endif
 #if VALUE
@@ -55,7 +55,7 @@ ivec2 measured_under(RangeView v, int level, ivec2 uv, vec2 pixel) {
 }
 
 vec3 normal_of(RangeView v, int index) {
-#if NORMAL
+#if NORMAL || BLEND
     uint word = texelFetch(range_normals, index).r;
     return word == 0u ? vec3(0.0) : turned(v.screen, unpack_normal(word));
 #else
@@ -136,7 +136,7 @@ const float LEAST_WEIGHT = 1e-3;
 // Weight of a place of a view: of its mask and confidence, falling towards the mask's edges, and how it faces the pod
 // (Farooq 2013, GRAPP 2009, eq. 1: S C V). cosine: of the normal and the direction to the pod.
 float weight_of(RangeView v, int level, vec2 pixel, float cosine) {
-    int coarse = min(level + AROUND, last_level);
+    int coarse = min(level + AROUND, top_level);
     RangeLevel found = range_level(v, coarse);
     vec2 uv = clamp(pixel_to_level(v, coarse, pixel), vec2(0.0), vec2(found.size - 1));
     ivec2 first = ivec2(uv), last = min(first + 1, found.size - 1);
@@ -171,6 +171,7 @@ float other_view(RangeView v, int level, vec3 place, vec3 normal, out float ahea
         ivec2 at = first + ivec2(k & 1, k >> 1);
         int index = sample_index(found, at);
         float share = ((k & 1) != 0 ? part.x : 1.0 - part.x) * ((k >> 1) != 0 ? part.y : 1.0 - part.y);
+        if (share == 0.0) continue;
         float there = sample_depth(index);
         vec4 look = sample_look(index);
         if (look.a == 0.0 || abs(there - projected.z) > (AGREE + 1.0 / cosine) * spacing_there) return 0.0;
@@ -243,7 +244,7 @@ void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, ou
 #if COLOR
         seen.color += shown.shares[k] * to_linear(sample_look(shown.index[k]).rgb);
 #endif
-#if NORMAL
+#if NORMAL || BLEND
         seen.normal += shown.shares[k] * normal_of(v, shown.index[k]);
 #endif
     }
@@ -257,7 +258,7 @@ void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, ou
     }
 #endif
     vec3 place = from_pixel(middle, depth), normal = triangle_normal(v, shown.facing, place);
-#if NORMAL
+#if NORMAL || BLEND
     if (dot(seen.normal, seen.normal) > 1e-6) normal = normalize(seen.normal);
     seen.normal = normal;
 #endif

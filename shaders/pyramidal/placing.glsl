@@ -3,6 +3,8 @@
 // (Farooq 2013, chapter 5): by a table of kernels, or by the integral of each.
 // What includes it says `vec3 color_of_item(item)`, linear.
 #if SUMS
+const float FRONT = 3.0;  // how far behind what a pixel shows a sample of the same surface may lie, in pixels
+
 layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer front;  // of the samples that pixels show
 
 #if SUMS == 1
@@ -38,7 +40,7 @@ void place_sample(vec2 place, float depth, uint item_id) {
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, view_size))) continue;
             int pixel = at.y * view_size.x + at.x;
             float before = uintBitsToFloat(texelFetch(front, pixel).r);
-            if (isinf(before) || abs(depth - before) > step / scale_at(before)) continue;
+            if (isinf(before) || abs(depth - before) > FRONT / scale_at(before)) continue;
 #if SUMS == 1
             float weight = texelFetch(kernels, first + (y + reach) * KERNEL + x + reach).r;
 #else

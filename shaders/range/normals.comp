@@ -67,12 +67,13 @@ vec3 plane_normal(RowOfSamples row, Column columns[2 * REACH + 1], vec3 place) {
 void main() {
     uint i = item();
     if (i >= list_count) return;
-    uint place = texelFetch(listed_tiles, int(i) / RANGE_TILE).r * uint(RANGE_TILE) + i % uint(RANGE_TILE);
+    uint word = texelFetch(listed_tiles, int(i) / RANGE_TILE).r;
+    uint place = (word & 0xFFFFFFu) * uint(RANGE_TILE) + i % uint(RANGE_TILE);
     RowOfSamples row;
-    if (made[place] != 0u || !row_of_samples(i, row)) return;
-    int first = sample_index(row.range, row.first) - page;
-    if (first < 0 || first >= page_size) return;
-    made[place] = 1u;
+    if (word >> 24 > 1u || made[place] != 0u || !row_of_samples(i, row)) return;
+    int first = sample_index(row.range, row.first) - page, end = first + row.last.x - row.first.x;
+    if (end <= 0 || first >= page_size) return;
+    if (first >= 0 && end <= page_size) made[place] = 1u;  // else the next page has the rest
     Column columns[2 * REACH + 1];
     // Places are summed relative to one of them, so that float32 keeps what they differ by.
     vec3 zero = sample_place(row.view, row.level, vec2(row.first), 0.0);
@@ -89,6 +90,7 @@ void main() {
         columns[2 * REACH] = column_at(row, uv + ivec2(REACH, 0), zero);
         if (isinf(columns[REACH].depth)) continue;
         int index = sample_index(row.range, uv);
+        if (index < page || index >= page + page_size) continue;
         vec3 here = sample_place(row.view, row.level, vec2(uv), columns[REACH].depth);
         range_normals[index - page] = pack_normal(plane_normal(row, columns, here));
     }

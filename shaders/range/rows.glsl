@@ -1,4 +1,5 @@
-// Listed tiles, of which each row of samples is an invocation's.
+// Listed tiles, of which each row of samples is an invocation's. Eight bits before a tile's number say which part of it
+// the invocation is asked for, from 1 on; 0: for all.
 #include "common/list.glsl"
 #include "range/tiles.glsl"
 
@@ -7,13 +8,15 @@ layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer listed_tiles;
 struct RowOfSamples {
     RangeView view;
     RangeLevel range;
-    int number, level;
+    int number, level, part;
     ivec2 first, last;  // (u, v), and how many there are: last.x - first.x
 };
 
 // The i-th listed row; false where the tile has fewer rows.
 bool row_of_samples(uint i, out RowOfSamples row) {
-    int tile = int(texelFetch(listed_tiles, int(i) / RANGE_TILE).r);
+    uint word = texelFetch(listed_tiles, int(i) / RANGE_TILE).r;
+    int tile = int(word & 0xFFFFFFu);
+    row.part = int(word >> 24);
     ivec2 at = level_of_tile(tile, RANGE_COUNT);
     row.number = at.x;
     row.level = at.y;

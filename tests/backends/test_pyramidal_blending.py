@@ -61,7 +61,7 @@ def test_nothing_behind_shows_through_a_sparse_surface(draw: Draw, zoom: int) ->
 def test_sheets_that_are_near_are_left_alone(draw: Draw, gap: float, hides: bool) -> None:
     """Two cells, of four pixels here, are tolerated."""
     camera, size = straight_above((96, 96))
-    params = {"primitive": "points", "lod": False, "fill": False}
+    params = {"primitive": "points", "lod": False, "fill": False, "blend": "nearest"}
     surface = draw(sheets(gap), camera, size, "pyramidal", params=params)
     behind = (surface.depth == 500 + gap)[8:-8, 8:-8].mean()
     assert behind == pytest.approx(0 if hides else 15 / 16)

@@ -6,6 +6,8 @@ import struct
 from collections.abc import Callable, Mapping
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from . import gl
 from .bindings import Storage
@@ -27,7 +29,7 @@ class IndexList:
     """
 
     def __init__(self, gpu: Gpu, capacity: int, each: int = 1) -> None:
-        self._gpu = gpu
+        self._gpu, self._each = gpu, each
         self.capacity = capacity
         self.nbytes = 4 * capacity + 16
         self.texels = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * capacity), gl.R32UI)
@@ -38,6 +40,12 @@ class IndexList:
     def clear(self) -> None:
         """Make it empty."""
         self._dispatch.write(struct.pack("4I", 0, self._rows, 1, 0))
+
+    def write(self, indices: NDArray[np.uint32]) -> None:
+        """Make it these indices, (N,)."""
+        count = len(indices) * self._each
+        self.texels.buffer.write(indices)
+        self._dispatch.write(struct.pack("4I", -(-count // (GROUP * self._rows)), self._rows, 1, count))
 
     def bind(self) -> None:
         """Bind where shaders that include common/list.glsl find it."""

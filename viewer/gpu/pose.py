@@ -54,7 +54,7 @@ class GpuPose:
         self._samples: RangeSamples | None = None
         self._uploads: dict[str, _Upload] = {}  # that have begun
         self._estimated: PointCloud | None = None
-        self.uploaded_bytes = 0
+        self._uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._layers: dict[int, Layer] = {}
 
@@ -103,6 +103,12 @@ class GpuPose:
     def origin(self) -> NDArray[np.float64]:
         """The origin that positions are relative to, (3,) scan units."""
         return self.pose.origin
+
+    @property
+    def uploaded_bytes(self) -> int:
+        """Bytes that it holds on the GPU."""
+        samples = self._samples
+        return self._uploaded_bytes + (samples.nbytes if samples is not None and samples.complete else 0)
 
     @property
     def bounds(self) -> Bounds:
@@ -173,14 +179,11 @@ class GpuPose:
     def _upload_samples(self, end: float) -> bool:
         if self._samples is None:
             self._samples = RangeSamples(self.gpu, self.range_points.views, self.origin)
-        if not self._samples.upload(end):
-            return False
-        self.uploaded_bytes += self._samples.nbytes
-        return True
+        return self._samples.upload(end)
 
     def _keep_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
         self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
-        self.uploaded_bytes += upload.nbytes
+        self._uploaded_bytes += upload.nbytes
 
     def _values(self, name: str) -> NDArray:
         kind, _, scalar = name.partition(":")
@@ -215,7 +218,7 @@ class GpuPose:
         long as somebody holds this array."""
         for key in [key for key, layer in self._layers.items() if layer.values() is None]:
             gone = self._layers.pop(key)
-            self.uploaded_bytes -= sum(texels.buffer.size for texels in gone.texels.values())
+            self._uploaded_bytes -= sum(texels.buffer.size for texels in gone.texels.values())
             self.gpu.discard(*gone.texels.values())
         if id(values) not in self._layers:
             self._layers[id(values)] = Layer(weakref.ref(values), robust_range(strided(values)))
@@ -234,7 +237,7 @@ class GpuPose:
                 upload = _array_upload(self.gpu, self.range_points.by_sample(made) if by_sample else made)
                 upload.go_on(np.inf)
                 layer.texels[by_sample] = gl.BufferTexture(upload.target, gl.R32F)
-                self.uploaded_bytes += upload.nbytes
+                self._uploaded_bytes += upload.nbytes
         return layer.texels[by_sample]
 
     def heights(self, axis: tuple[float, ...], by_sample: bool = False) -> gl.BufferTexture:
@@ -244,13 +247,13 @@ class GpuPose:
         for gone in [name for name in self._arrays if isinstance(name, tuple) and name[0] is _heights]:
             if gone != key:
                 texels = self._arrays.pop(gone)
-                self.uploaded_bytes -= texels.buffer.size
+                self._uploaded_bytes -= texels.buffer.size
                 self.gpu.discard(texels)
         if by_sample and key not in self._arrays:
             samples = self.samples
             with self.preparing("upload"):
                 self._arrays[key] = samples.heights(np.array(axis))
-                self.uploaded_bytes += self._arrays[key].buffer.size
+                self._uploaded_bytes += self._arrays[key].buffer.size
         return self._arrays[key] if by_sample else self.packed(_heights, axis, by_sample)
 
     @cached_property

@@ -50,6 +50,7 @@ from .pyramid import BOX, Filter, sizes
 
 LEVELS = 6
 _KINDS = {"z": RANGE_Z, "range": RANGE_ALONG_RAY, "height": RANGE_HEIGHT}
+_AT_ONCE = 1 << 22  # samples of which all normals are found together
 _EVERY = 8  # pixels along rows and columns that are looked at
 _ALIGNED = 64  # samples: a level begins where any driver can bind a buffer (OpenGL 4.3, table 23.64)
 _SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time: a few milliseconds
@@ -104,6 +105,7 @@ class _Normals:
     words: gl.BufferTexture
     rows: moderngl.Buffer
     filter: Filter | None = None
+    complete: bool = False
 
     @property
     def nbytes(self) -> int:
@@ -227,7 +229,8 @@ class RangeSamples:
         """Normals of the samples in these tiles, which have `RANGE_TILE` invocations each, and of others that
         were asked for before: R32UI, in the pod's space, as shaders/common/octahedron.glsl has them.
 
-        Each is found once, when it is first asked for: 4 bytes a sample where anything asks for any.
+        Each is found once: 4 bytes a sample where anything asks for any. Of up to four million samples all
+        are found at once; of more, what is seen at the rim of tiles may turn on what was drawn before.
         """
         gpu = self._gpu
         if self._normals is None:
@@ -239,7 +242,14 @@ class RangeSamples:
         if known.filter != self.filter:
             gl.clear_words(known.words.buffer, 0)
             gl.clear_words(known.rows, 0)
-            known.filter = self.filter
+            known.filter, known.complete = self.filter, False
+        if known.complete:
+            return known.words
+        if self._total <= _AT_ONCE:
+            tiles = IndexList(gpu, self.tile_count, RANGE_TILE)
+            tiles.write(np.arange(self.tile_count, dtype=np.uint32))
+            known.complete = True
+            gpu.discard(tiles)
         program = gpu.compute("range/normals.comp", self.defines)
         self._bind_read()
         tiles.texels.bind(Texture.DRAWN_ROWS)

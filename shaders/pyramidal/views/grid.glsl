@@ -15,7 +15,7 @@ Corner corner_at(RangeView v, RangeLevel found, int level, ivec2 uv) {
     Corner corner;
     corner.there = all(greaterThanEqual(uv, ivec2(0))) && all(lessThan(uv, found.size));
     corner.index = sample_index(found, corner.there ? uv : ivec2(0));
-    corner.there = corner.there && is_sample(corner.index, level > 0 ? least_mask : 0.0);
+    corner.there = corner.there && is_sample(corner.index);
     corner.depth = sample_depth(corner.index);
     corner.place = to_screen_view(v, sample_place(v, level, vec2(uv), corner.depth));
     corner.there = corner.there && in_depth_range(-corner.place.z);

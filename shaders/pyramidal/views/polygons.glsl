@@ -14,13 +14,16 @@ void visit_point(RowOfSamples row, ivec2 uv, Corner a) {
     visit(uint(at.y * view_size.x + at.x), floatBitsToUint(-a.place.z), item_of(a.index, ALONE));
 }
 
-void visit_triangle(Corner x, Corner y, Corner z, float front, uint own) {
+// part: of the picture's rows that is drawn, from 1 on; 0: all.
+void visit_triangle(Corner x, Corner y, Corner z, float front, uint own, int part) {
     vec2 low = min(x.pixel, min(y.pixel, z.pixel)), high = max(x.pixel, max(y.pixel, z.pixel));
     ivec2 first = max(ivec2(ceil(low - 0.5)), ivec2(0)), last = min(ivec2(floor(high - 0.5)), view_size - 1);
 #if CULL_BACK
     if (beside(x, y, z.pixel) * front < 0.0) return;
 #endif
-    for (int row = first.y; row <= last.y; ++row)
+    int every = part == 0 ? 1 : parts;
+    if (part > 0) first.y += (part - 1 + parts - first.y % parts) % parts;
+    for (int row = first.y; row <= last.y; row += every)
         for (int column = first.x; column <= last.x; ++column) {
             vec3 shares = shares_at(x, y, z, vec2(column, row) + 0.5);
             if (!is_inside(shares)) continue;
@@ -38,10 +41,10 @@ void scatter(uint i) {
         Corner b = corner_at(row.view, row.range, row.level, uv + ivec2(1, 0));
         Corner d = corner_at(row.view, row.range, row.level, uv + ivec2(1, 1));
         int drawn = triangles(row.view, row.level, a, b, c, d);
-        if ((drawn & 1) != 0) visit_triangle(b, c, d, -1.0, item_of(a.index, 0u));
-        if ((drawn & 2) != 0) visit_triangle(a, c, d, -1.0, item_of(a.index, 1u));
-        if ((drawn & 4) != 0) visit_triangle(a, b, d, 1.0, item_of(a.index, 2u));
-        if ((drawn & 8) != 0) visit_triangle(a, b, c, 1.0, item_of(a.index, 3u));
+        if ((drawn & 1) != 0) visit_triangle(b, c, d, -1.0, item_of(a.index, 0u), row.part);
+        if ((drawn & 2) != 0) visit_triangle(a, c, d, -1.0, item_of(a.index, 1u), row.part);
+        if ((drawn & 4) != 0) visit_triangle(a, b, d, 1.0, item_of(a.index, 2u), row.part);
+        if ((drawn & 8) != 0) visit_triangle(a, b, c, 1.0, item_of(a.index, 3u), row.part);
         if ((drawn & ~1) == 0 && a.there) visit_point(row, uv, a);
         a = b;
         c = d;

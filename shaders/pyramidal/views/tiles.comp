@@ -1,6 +1,7 @@
 // Lists the tiles of range views that a picture needs: of the level whose samples fit its pixels, in the picture, and
-// not facing away. Each is listed once for every 16 of its samples.
-// CULL_BACK: tiles that face away are left out. SKIP: tiles are looked at; else all of the first level are listed.
+// not facing away. Each is listed once, and an invocation draws a row of its samples; those whose quads are larger than
+// LARGE pixels are listed for each of `parts` of the picture's rows, so that no invocation has much to draw.
+// CULL_BACK: tiles that face away are left out. SKIP: what the picture does not show is left out.
 #include "common/item.glsl"
 #include "common/list.glsl"
 #include <params>
@@ -8,7 +9,10 @@
 
 layout(std430, binding = STORAGE_TILE_COUNTS) buffer Counts { uint counts[]; };  // as viewer/backends/pyramidal/views.py names them
 
-#if LOD
+uniform int capacity;  // of the list
+
+const float LARGE = 16.0;
+
 // Pixels between neighbouring samples of a tile, where these face the pod: the most, since a tile may hold a silhouette
 // before what is far behind.
 float pixels_apart(RangeView v, int level, RangeTile tile) {
@@ -20,7 +24,6 @@ float pixels_apart(RangeView v, int level, RangeTile tile) {
     }
     return most;
 }
-#endif
 
 // Whether samples of a tile lie farther apart than the picture shows, so that a finer level is drawn in its stead.
 bool is_coarse(RangeView v, int level, ivec2 tile) {
@@ -57,5 +60,10 @@ void main() {
 #endif
 #endif
     atomicAdd(counts[cause], 1u);
-    if (cause == TILES_DRAWN) list[reserve(uint(RANGE_TILE)) / uint(RANGE_TILE)] = i;
+    if (cause != TILES_DRAWN) return;
+    int count = POLYGONS != 0 && pixels_apart(v, at.y, bounds) > LARGE ? parts : 1;
+    for (int part = 0; part < count; ++part) {
+        uint place = reserve(uint(RANGE_TILE)) / uint(RANGE_TILE);
+        if (place < uint(capacity)) list[place] = i | uint(count > 1 ? part + 1 : 0) << 24;
+    }
 }

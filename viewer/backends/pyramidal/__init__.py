@@ -184,8 +184,8 @@ class _Numbers:
     """Numbers that the shaders read.
 
     levels: of targets that are shown, a bit each; coarsest: of them. density: the level whose cells samples
-    all fill. spacing: of the samples, scan units. first_level, last_level: of range images. least_mask: of a
-    coarser level's samples, what share of their surroundings has to be there.
+    all fill. spacing: of the samples, scan units. first_level, last_level: of range images, that are drawn;
+    top_level: the last that there is. parts: of the picture's rows, that large triangles are drawn in.
     """
 
     levels: int
@@ -200,12 +200,15 @@ class _Numbers:
     first_level: int
     last_level: int
     detail: float
-    least_mask: float
+    top_level: int
+    parts: int
 
 
 _UPSAMPLING = {"nearest": 0, "bilinear": 1, "bicubic": 2}
 _MARGIN, _MARGIN_OF_JOINED = 0.4, 0.15
-_LEAST_MASK = 0.01  # Farooq 2013, 4.3.2
+_ROWS_OF = 1 << 14  # pixels that an invocation may have to look at, of triangles that fill the picture
+_MOST_PARTS = 128
+_CROWD, _CROWDED = 1 << 13, 64  # point spread functions a pixel, at least; times what is to be expected
 
 
 def needs(pose: Pose, params: Params) -> tuple[str, ...]:
@@ -233,6 +236,10 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         )
     else:
         surface.stats.skipped["fill"] = "level 0 alone is shown"
+    if source.is_closed:
+        surface.stats.skipped["hide"] = "polygons hide what is behind them"
+    if not (fills or hides):
+        return frame.share < 1
     targets = surface.keep(Targets)
     if hides:
         targets.reduce(surface, source, channels)
@@ -257,10 +264,20 @@ def _coarser(params: Params, share: float) -> Params:
 
 def _spread(surface: Surface, source: SampleSource, visits: Visits, params: Params) -> Mapping[str, object]:
     """Add up point spread functions; gives the macros of what reads their sums."""
-    macros = spread_macros(params.antialias, params.kernel, source.count)
+    most = _most_at_once(surface, source.count)
+    macros = spread_macros(params.antialias, params.kernel, most)
     given = replace(visits, defines={**visits.defines, **macros})
-    add_spread(surface, given, params.kernel, source.count).texels.bind(Texture.SUMS)
+    add_spread(surface, given, params.kernel, most).texels.bind(Texture.SUMS)
     return macros
+
+
+def _most_at_once(surface: Surface, count: int) -> int:
+    """Number of point spread functions that a pixel may be given: far more than if samples were spread over
+    what the scan covers of the picture."""
+    pose, view = surface.pose, surface.view
+    depth = max(float(view.depths(pose.bounds.center - pose.origin)), view.near)
+    radius = pose.bounds.radius * view.scale / (depth if view.perspective else 1.0)
+    return min(count, _CROWD + _CROWDED * math.ceil(count / max(math.pi * radius**2, 1.0)))
 
 
 def _bind(surface: Surface, source: SampleSource, channels: Sequence[str]) -> None:
@@ -316,7 +333,8 @@ def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
         first_level=first,
         last_level=last if params.lod else first,
         detail=params.detail,
-        least_mask=_LEAST_MASK,
+        top_level=last,
+        parts=_parts(surface.size),
     )
     if not pose.views:
         return PointSource(pose, values)
@@ -329,6 +347,11 @@ def _spacing(cloud: PointCloud) -> float:
     size = float(np.ptp(cloud.positions, axis=0).max())
     ratio = sparse_spacing(cloud) / size if size > 0 else 1.0
     return (size or 1.0) * 2.0 ** (round(2 * math.log2(ratio)) / 2)
+
+
+def _parts(size: tuple[int, int]) -> int:
+    """The parts that the rows of a picture are drawn in, where triangles may fill it."""
+    return min(2 ** math.ceil(math.log2(max(size[0] * size[1] / _ROWS_OF, 1))), _MOST_PARTS)
 
 
 def _density(pose: GpuPose, view: View, spacing: float) -> int:

@@ -55,7 +55,7 @@ class PointSource:
         self._texels: dict[str, gl.BufferTexture] = {}
 
     def defines(self, channels: Sequence[str]) -> dict[str, object]:
-        return {"POLYGONS": 0, **{name.upper(): int(name in channels) for name in CHANNELS}}
+        return {"POLYGONS": 0, "FRAMED": 0, **{name.upper(): int(name in channels) for name in CHANNELS}}
 
     def channels(self, surface: Surface) -> list[str]:
         found = {

@@ -18,6 +18,7 @@ from ...gpu.surface import Surface
 from ...look import Look
 
 MODES = ("nearest", "linear", "best")  # as of_views.glsl numbers them
+_SPARE = 1 << 16  # entries of a list for the parts of large tiles
 COUNTS = ("empty", "drawn", "outside", "away")  # what becomes of tiles, as tiles.comp counts them
 
 
@@ -59,11 +60,12 @@ class ViewSource:
         """params: of the backend. values: what shaders read in `<params>`."""
         self.params = values
         self.is_closed = params.primitive == "polygons"
+        self._blend = MODES.index(params.blend) if len(pose.views) > 1 else 0
         self._pose, self._params, self._view = pose, params, surface.view
         self._samples = pose.samples
         self.count = self._samples.count
         self._tiles = surface.keep(DrawnTiles)
-        self._tiles.reserve(self._samples.tile_count)
+        self._tiles.reserve(self._samples.tile_count + _SPARE)
         self._texels: dict[str, gl.BufferTexture] = {}
         self._samples.reduce(params.reduction)
 
@@ -72,8 +74,9 @@ class ViewSource:
         return {
             **self._samples.defines,
             "POLYGONS": int(params.primitive == "polygons"),
+            "FRAMED": int(params.primitive == "points"),
             "CULL_BACK": int(params.cull_back),
-            "BLEND": MODES.index(params.blend) if len(self._pose.views) > 1 else 0,
+            "BLEND": self._blend,
             "LOD": int(params.lod),
             "FADE": int(params.lod and params.fade),
             "SKIP": int(params.skip),
@@ -82,8 +85,9 @@ class ViewSource:
 
     def channels(self, surface: Surface) -> list[str]:
         found = ["color"] if self._samples.has_color else []
-        if wants_lit(surface.look):
+        if lit := wants_lit(surface.look):
             found.append("normal")
+        if lit or self._blend:
             self._texels["normal"] = self._samples.normals(self._tiles.listed)
         if (values := surface.row_values) is not None:
             found.append("value")
@@ -100,6 +104,7 @@ class ViewSource:
             tiles.listed.bind()
             tiles.counts.bind_to_storage_buffer(Storage.TILE_COUNTS)
             self.bind()
+            gpu.set(program, capacity=tiles.listed.capacity)
             gpu.dispatch(program, self._samples.tile_count)
         surface.show_samples()
         surface.stats.counted["tiles"] = tiles.read
