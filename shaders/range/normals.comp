@@ -70,7 +70,8 @@ void main() {
     uint word = texelFetch(listed_tiles, int(i) / RANGE_TILE).r;
     uint place = (word & 0xFFFFFFu) * uint(RANGE_TILE) + i % uint(RANGE_TILE);
     RowOfSamples row;
-    if (word >> 24 > 1u || made[place] != 0u || !row_of_samples(i, row)) return;
+    if (word >> 24 > 1u || made[place] != 0u || is_empty(range_tile(int(word & 0xFFFFFFu)))) return;
+    if (!row_of_samples(i, row)) return;
     int first = sample_index(row.range, row.first) - page, end = first + row.last.x - row.first.x;
     if (end <= 0 || first >= page_size) return;
     if (first >= 0 && end <= page_size) made[place] = 1u;  // else the next page has the rest

@@ -252,6 +252,7 @@ class RangeSamples:
             gpu.discard(tiles)
         program = gpu.compute("range/normals.comp", self.defines)
         self._bind_read()
+        self.tiles.bind(Texture.RANGE_TILES)
         tiles.texels.bind(Texture.DRAWN_ROWS)
         with gpu.timers.measure("normals"):
             page = gpu.max_storage_bytes // 4 // _ALIGNED * _ALIGNED  # that a shader writes at a time
