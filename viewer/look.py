@@ -33,8 +33,9 @@ class Look:
     """Lighting, colouring and background.
 
     `color_by` and `light` are "auto" by default: own colours where the scan has them, a
-    head light where it has normals, else eye-dome lighting, which needs depth alone. "level"
-    shows measured pixels in grey, filled ones in a colour for each level that fills.
+    head light where it has normals, else eye-dome lighting, which needs depth alone; the photographs
+    of range images are shown as they are. "level" shows measured pixels in grey, filled ones in a
+    colour for each level that fills.
     """
 
     color_by: str = param(

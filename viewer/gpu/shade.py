@@ -56,9 +56,12 @@ def shade(surface: Surface, look: Look) -> None:
     color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
         color = "plain"
-    lit = cloud.normals is not None or surface.is_own("normal")
+    # Photographs have the light that they were taken in, and what depth cameras measure is rougher than that.
+    photographed = surface.samples is not None and color == "own" and not by_level
+    lit = not photographed and (cloud.normals is not None or surface.is_own("normal"))
     light = look.light if look.light != "auto" else "head" if lit else "flat"
-    eye_dome = look.eye_dome if look.eye_dome is not None else look.light == "auto" and light == "flat"
+    unlit = look.light == "auto" and light == "flat" and not photographed
+    eye_dome = unlit if look.eye_dome is None else look.eye_dome
     lit = light != "flat" or color == "normal"
     read = [name for name, is_read in (("color", color == "own"), ("normal", lit)) if is_read]
     from_rows = [name for name in read if not surface.is_own(name)]
