@@ -227,6 +227,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     source = _source(pose, params, surface)
     visits = source.visits(surface, frame.share)
     scatter(surface.gpu, visits, surface.depths, surface.rows)
+    refinable = frame.share < 1 if pose.views else surface.stats.share < 1
     fills, hides = params.shown != (0,), params.hide and not source.is_closed
     channels = source.channels(surface)
     spreads = params.antialias != "off" and not source.is_closed and "color" in channels
@@ -239,7 +240,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if source.is_closed:
         surface.stats.skipped["hide"] = "polygons hide what is behind them"
     if not (fills or hides):
-        return frame.share < 1
+        return refinable
     targets = surface.keep(Targets)
     if hides:
         targets.reduce(surface, source, channels)
@@ -252,7 +253,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if fills:
         targets.reduce(surface, source, channels)
         _fill(surface, source, channels, targets, params.upsampling)
-    return frame.share < 1
+    return refinable
 
 
 def _coarser(params: Params, share: float) -> Params:
@@ -344,7 +345,7 @@ def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
 def _spacing(cloud: PointCloud) -> float:
     """The spacing of points, in half octaves of the scan's size: pictures depend neither on which points it
     was judged by nor on the unit."""
-    size = float(np.ptp(cloud.positions, axis=0).max())
+    size = float(np.ptp(cloud.positions, axis=0).max()) if len(cloud) else 0.0
     ratio = sparse_spacing(cloud) / size if size > 0 else 1.0
     return (size or 1.0) * 2.0 ** (round(2 * math.log2(ratio)) / 2)
 
