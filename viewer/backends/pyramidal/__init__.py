@@ -165,6 +165,7 @@ class Params:
         False,
         "Fade colours into the next coarser level as samples come to lie closer than pixels",
         group=_SMOOTHING,
+        when={"lod": (True,)},
     )
 
     @property
