@@ -38,10 +38,11 @@ def call_ms(
 ) -> list[float]:
     """Wall time of each of `repeat` draws with the picture read back, ms; `tick` is called after each.
 
-    Timers should be off: on software drivers they wait between passes.
+    Each is drawn as if it were the first. Timers should be off: on software drivers they wait between passes.
     """
     times = []
     for _ in range(repeat):
+        surface.drawn = {}
         start = time.perf_counter()
         draw(renderer, request, surface)
         surface.image()
@@ -51,13 +52,17 @@ def call_ms(
 
 
 def pass_ms(renderer: Renderer, request: Request, surface: Surface, repeat: int) -> list[Counter[str]]:
-    """Milliseconds on the GPU of each pass, in each of `repeat` draws."""
+    """Milliseconds on the GPU of each pass, in each of `repeat` draws as if it were the first."""
     timers = renderer.gpu.timers
     timers.enabled = True
+    found = []
     try:
-        return [draw(renderer, request, surface) for _ in range(repeat)]
+        for _ in range(repeat):
+            surface.drawn = {}
+            found.append(draw(renderer, request, surface))
     finally:
         timers.enabled = False
+    return found
 
 
 def peak_rss() -> int | None:

@@ -11,7 +11,7 @@ from viewer.bench.scenes.subjects import Moment, Subject, smooth
 from viewer.bench.truth.shapes import AnalyticScene
 from viewer.camera import Camera
 from viewer.errors import InputError
-from viewer.mesh.reference import trace
+from viewer.mesh.reference import pixel_rays, trace
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import merge
@@ -20,6 +20,7 @@ ANALYTIC = ["sphere", "plane", "box", "torus"]
 OWN = ["demo", "hand-before-face"]
 STILL = ["bunny", "armadillo", "horse", "dragon-100k", "igea", "dragon"]
 MOVING = ["crane", "horse-gallop", "owlii"]
+ARRANGED = ["two-bunnies", "horses"]
 
 # The median distance of the points to the truth, and what it may be at most, scan units.
 REAL = {"dragon-scans": 2e-4, "bunny-scans": 1.5e-4, "truedepth-head": 6e-4}
@@ -50,7 +51,7 @@ def test_all_scenes_are_listed_and_say_what_they_lack(tmp_path: Path) -> None:
     assert [name for name, reason in listed.items() if not reason] == [*ANALYTIC, *OWN, *scanned]
     for pods in ("simulated", "pair"):
         assert {f"{name}-{pods}" for name in ["torus", *OWN, *STILL, *MOVING]} <= set(listed)
-    assert set(REAL) <= set(listed)
+    assert {*REAL, *ARRANGED} <= set(listed)
     assert "models/stanford_bunny_35947.ply" in catalog.scene_names(tmp_path)["bunny"]
     assert str(tmp_path) in catalog.scene_names(tmp_path)["bunny"]
 
@@ -142,6 +143,34 @@ def test_a_model_comes_in_any_number_of_points(data_dir: Path) -> None:
     assert distances(moment).max() < 1e-6
     other = catalog.subject("bunny", data_dir, count=20_000, seed=1).moment(0)
     assert not np.array_equal(moment.pose.cloud.positions, other.pose.cloud.positions)
+
+
+def test_horses_hide_each_other(data_dir: Path) -> None:
+    import open3d
+
+    moment = catalog.subject("horses", data_dir).moment(0)
+    assert len(moment.pose.cloud) == 120 * 8431
+    picture = trace(moment.truth, Camera.orbit(moment.mesh.bounds, 30, 20), (60, 60))
+    rays = np.concatenate(pixel_rays(picture.view, np.flatnonzero(picture.covered)), axis=1, dtype=np.float32)
+    scene = open3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        *(open3d.core.Tensor(array) for array in (moment.mesh.points.positions, moment.mesh.faces))
+    )
+    surfaces = scene.count_intersections(open3d.core.Tensor(rays)).numpy()
+    assert surfaces.mean() > 4
+
+
+def test_a_bunny_sits_on_the_head_of_a_larger_one(data_dir: Path) -> None:
+    mesh = catalog.subject("two-bunnies", data_dir).moment(0).mesh
+    large, small = np.split(mesh.points.world(), 2)
+    assert np.ptp(small, axis=0) == pytest.approx(np.ptp(large, axis=0) / 8, rel=1e-4)
+    on_top = large[large[:, 1].argmax()]
+    assert (small.min(axis=0) < on_top).all()
+    assert (on_top < small.max(axis=0)).all()
+    assert (small[:, 1] > on_top[1]).mean() > 0.9
+    np.testing.assert_array_equal(
+        mesh.faces[len(mesh.faces) // 2 :], mesh.faces[: len(mesh.faces) // 2] + len(large)
+    )
 
 
 def test_loose_vertices_are_left_out() -> None:

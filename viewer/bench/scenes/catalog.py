@@ -20,6 +20,7 @@ from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
 from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from . import samples
+from .arrangements import in_lattice, on_its_head
 from .real_scans import DepthFrames
 from .samples import Sampler
 from .simulated import simulated
@@ -200,6 +201,39 @@ def _simulated(name: str, scene: _Scene, pods: int) -> _Scene:
     return replace(scene, make=make, counts=False, noise=_NOISE)
 
 
+def _lattice(folder: str, counts: tuple[int, int, int], credit: str) -> _Scene:
+    """The moments of a sequence of meshes side by side, at one moment."""
+
+    def make(request: _Request) -> Subject:
+        source = find_source(request.paths[0])
+
+        def frame(index: int) -> Mesh:
+            points = source.load(index)
+            assert isinstance(points, PointCloud), "the formats with faces hold points"
+            return smooth(Mesh(points, source.faces(index).triangles()))
+
+        def load(_: int) -> Moment:
+            mesh = in_lattice([frame(index) for index in range(len(source))], counts)
+            return _of_mesh(mesh, request, 0, 0.0, request.name)
+
+        return Subject(name=request.name, load=load, credit=credit)
+
+    return _Scene(make, (f"sequences/{folder}",), counts=True)
+
+
+def _two_scales(file: str, credit: str) -> _Scene:
+    """A model with itself on its head."""
+
+    def make(request: _Request) -> Subject:
+        def load(_: int) -> Moment:
+            mesh = on_its_head(smooth(read_mesh(request.paths[0])))
+            return _of_mesh(mesh, request, 0, 0.0, request.name)
+
+        return Subject(name=request.name, load=load, credit=credit)
+
+    return _Scene(make, (f"models/{file}",), counts=True)
+
+
 _ANALYTIC = {
     "sphere": _analytic(Sphere(), samples.on_sphere, tessellation.sphere_mesh),
     "plane": _analytic(Plane(), samples.on_square, tessellation.square_mesh),
@@ -219,6 +253,10 @@ _MESHES = {
     "horse-gallop": _sequence("horse_gallop_48", "Sumner and Popovic"),
     "owlii": _sequence("owlii_basketball_player_10", "Owlii"),
 }
+_ARRANGED = {
+    "two-bunnies": _two_scales("stanford_bunny_35947.ply", _STANFORD),
+    "horses": _lattice("horse_gallop_48", (10, 4, 3), "Sumner and Popovic"),
+}
 _SCANNED = {name: _ANALYTIC[name] for name in ("torus", "demo", "hand-before-face")} | _MESHES
 _SIMULATED = {
     f"{name}-{suffix}": _simulated(name, scene, pods)
@@ -230,7 +268,7 @@ _REAL = {
     "bunny-scans": _laser("stanford_bunny_scans", "stanford_bunny_35947.ply", 2e-3),
     "truedepth-head": _Scene(_phone, (_PHONE, f"{_PHONE}/fused_reference_45428.ply")),
 }
-_SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _SIMULATED | _REAL
+_SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _ARRANGED | _SIMULATED | _REAL
 
 
 _FILE = _Scene(_file, counts=True)  # of a user's own mesh

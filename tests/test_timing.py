@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from scenes import looking_down_z, plane
+
+from viewer.backends import CHANGES, Backend, FrameView, points
+from viewer.frame import Request
+from viewer.gpu.pose import GpuPose
+from viewer.gpu.surface import Surface
+from viewer.scan.pose import Pose
+from viewer.timing import call_ms, draw, pass_ms
+
+if TYPE_CHECKING:
+    from viewer.renderer import Renderer
+
+
+class Watched:
+    """The points, and what each call was told has changed."""
+
+    TITLE, Params = points.TITLE, points.Params
+
+    def __init__(self) -> None:
+        self.told: list[frozenset[str]] = []
+
+    def needs(self, pose: Pose, params: points.Params) -> tuple[str, ...]:
+        return points.needs(pose, params)
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        self.told.append(frame.changed)
+        return points.draw(pose, frame, surface)
+
+
+def test_timed_pictures_are_drawn_as_if_they_were_the_first(renderer: Renderer) -> None:
+    watched = Watched()
+    request = Request(Pose(0, 0.0, "plane", plane(20, 2.0)), looking_down_z(), Backend("watched", watched))
+    surface = Surface(renderer.gpu, (40, 30))
+    for _ in range(2):
+        draw(renderer, request, surface)
+    assert watched.told == [frozenset(CHANGES), frozenset()]
+    assert len(call_ms(renderer, request, surface, 2)) == 2
+    assert len(pass_ms(renderer, request, surface, 2)) == 2
+    assert watched.told[2:] == 4 * [frozenset(CHANGES)]
