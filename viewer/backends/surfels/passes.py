@@ -44,10 +44,15 @@ def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> N
             _draw_fill(splats.larger(points), feed, splats)
     with gpu.timers.measure("copy"):
         surface.take_raster()
-    _add(points, splats.larger(points), surface, feed, splats)
-    _resolve(points, surface, over=False)
+    blend(points, surface, feed, splats)
     if splats.enlarge > 1:
         _close(points, surface, splats)
+
+
+def blend(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
+    """The second pass: what each splat gives, added up over what `surface` holds, by the rasteriser."""
+    _add(points, splats.larger(points), surface, feed, splats)
+    _resolve(points, surface, over=False)
 
 
 def _draw_fill(larger: Points, feed: str, splats: Splats) -> None:
@@ -130,14 +135,21 @@ def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
     large = lists.large_points(splats.larger(points)) if lists.large else None
     if splats.enlarge > 1:
         _fill_by_tiles(surface, lists, large, splats)
+    blend_by_tiles(points, surface, lists, large, splats)
+    if splats.enlarge > 1:
+        _close(points, surface, splats)
+
+
+def blend_by_tiles(
+    points: Points, surface: Surface, lists: TileLists, large: Points | None, splats: Splats
+) -> None:
+    """The second pass, as `blend`, of the splats that are listed and of the large ones."""
     if large is not None:
         sums = _add(points, large, surface, FALLBACK, splats)
         sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)
-    defines = {"FOUND": 1, "FILL": 0, "LARGE": int(lists.large > 0), **points.defines}
+    defines = {"FOUND": 1, "FILL": 0, "LARGE": int(large is not None), **points.defines}
     defines |= bind_looks(points, surface)
     run("blend", surface, lists, defines, points, splats)
-    if splats.enlarge > 1:
-        _close(points, surface, splats)
 
 
 def _first_by_tiles(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
