@@ -1,11 +1,14 @@
-// Points from buffer textures. SAMPLED: only the listed rows are drawn.
+// Points from buffer textures. SAMPLED: only the listed rows are drawn. PACKED: normal, radius and half-axes are words.
+#include "amplify/packed.glsl"
 #include "amplify/point.glsl"
+#include "amplify/radii.glsl"
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+#if !PACKED
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
-#include "amplify/radii.glsl"
 #if HAS_AXES
 layout(binding = TEXTURE_AXES) uniform samplerBuffer axes;
+#endif
 #endif
 #if SAMPLED
 layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
@@ -21,15 +24,19 @@ int drawn_row(int i) {
 }
 
 Point texel_point(int at) {
-#if HAS_RADIUS
-    float radius = texelFetch(radii, at).r;
+    vec3 position = texelFetch(positions, at).xyz;
+#if PACKED
+    uvec3 words = texelFetch(splats, at).xyz;
+    vec3 normal = packed_normal(words);
 #else
-    const float radius = 0.0;
+    vec3 normal = texelFetch(normals, at).xyz;
 #endif
-#if HAS_AXES
+#if HAS_AXES && PACKED
+    vec4 half_axes = packed_axes(words);
+#elif HAS_AXES
     vec4 half_axes = texelFetch(axes, at);
 #else
     const vec4 half_axes = vec4(0.0);
 #endif
-    return Point(texelFetch(positions, at).xyz, texelFetch(normals, at).xyz, radius, half_axes, uint(at));
+    return Point(position, normal, stored_radius(at), half_axes, uint(at));
 }

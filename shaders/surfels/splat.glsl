@@ -1,5 +1,6 @@
 // What a point's splat is, for quads and for discs alike.
 #include "common/view.glsl"
+#include "common/tangent.glsl"
 #include "amplify/point.glsl"
 // backends/surfels/splats.py.
 #include <params>
@@ -34,18 +35,16 @@ float splat_reach(Point point, float depth) {
 // their lengths, scan units. A tangent that is missing, or parallel to the normal, makes it round.
 vec2 splat_axes(Point point, vec3 n, float depth, out vec3 u, out vec3 v) {
     vec2 lengths = vec2(splat_radius(point.radius, depth));
-    u = cross(vec3(0.0, 1.0, 0.0), n);
-    if (dot(u, u) < 1e-8) u = cross(vec3(0.0, 0.0, -1.0), n);  // n is parallel to (0, 1, 0)
+    u = tangent_of(n);
 #if HAS_AXES
     float first = length(point.axes.xyz);
     vec3 tangent = first > 0.0 ? point.axes.xyz / first : n;
     tangent -= dot(tangent, n) * n;
     if (dot(tangent, tangent) > 1e-6) {
-        u = tangent;
+        u = normalize(tangent);
         lengths = vec2(splat_radius(first, depth), splat_radius(point.axes.w, depth));
     }
 #endif
-    u = normalize(u);
     v = cross(n, u);  // the paper prints n x a, which is -u
     return lengths;
 }

@@ -7,12 +7,14 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 
 import filling
 import moderngl
 import numpy as np
+import packed
 import pytest
 import sampling
 from range_scenes import sphere_view
@@ -23,6 +25,7 @@ from test_pyramid import FILTERS, chain, picture
 from test_range_samples import held, probe, seen_by, stepped_view
 
 from viewer.backends import Backend, backend, backends
+from viewer.backends._auto_splatting import WAYS, draw_splats
 from viewer.bench import baselines
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
@@ -159,6 +162,21 @@ def draw_samples(renderer: Renderer) -> None:
                 surface.resolve(channel)
 
 
+def draw_packed(renderer: Renderer) -> None:
+    """Pictures of splats that a compute pass packed."""
+    surface = Surface(renderer.gpu, SIZE)
+    for cloud, listed in product(list(clouds())[:2], (True, False)):
+        splats = packed.Packed.of(cloud)
+        few = replace(splats, rows=np.arange(len(cloud), dtype=np.uint32)) if listed else splats
+        for colors, ellipses in product((cloud.colors, None), (True, False)):
+            bare = PointCloud.from_arrays(cloud.positions, colors=colors)
+            pose = Pose(0, 0.0, "test", bare)
+            camera = Camera.orbit(pose.bounds, **CAMERA)
+            for way, two in product(WAYS, (True, False)):
+                drawing = partial(draw_splats, instancing=way, two=two)
+                render_frame(renderer, Request(pose, camera, packed.backend(few, drawing, ellipses)), surface)
+
+
 def use_primitives(gpu: Gpu) -> None:
     """What backends may use of each primitive, whether one does or not."""
     gpu.activate()
@@ -188,6 +206,7 @@ def programs() -> list[list[Source]]:
     renderer = Renderer(headless())
     draw_all(renderer)
     draw_samples(renderer)
+    draw_packed(renderer)
     use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader

@@ -29,6 +29,7 @@ _FEEDS: dict[str, tuple[tuple[str, ...], dict[str, str]]] = {
 }
 FEEDS = tuple(_FEEDS)
 _WHOLE = ("ubo", "vbo")  # feeds that bring a pose's points one after the other, without choice
+_ATTRIBUTE_FEEDS = ("gs", *_WHOLE)  # those that bring each array as an attribute
 _BLOCK_BYTES = 1 << 16  # of a uniform block; some drivers allow less or more
 _BLOCK_POINTS = 64  # ranges begin at multiples of 256 bytes, whatever a point takes
 Attributes = tuple[tuple[str, str, int], ...]
@@ -56,7 +57,10 @@ class Points:
 
     use_radii: whether they bring their own radius, or half-axes. count: how many. rows: which,
     ascending; None: all. enlarged: the factor on their size with which they together cover what all do.
-    buffers: in place of the pose's arrays of these names, such as normals that a compute pass found.
+    buffers: in place of the pose's arrays of these names, such as normals that a compute pass found;
+    "splats", normal, radius and half-axes of each row in three words, as amplify/packed.glsl reads them,
+    in place of all three; "looks", colour and normal as surfels/passes/look.glsl reads them. elliptical:
+    whether the half-axes of "splats" count; else they are round, of the shorter one.
     """
 
     pose: GpuPose
@@ -65,6 +69,7 @@ class Points:
     rows: gl.BufferTexture | None = None
     enlarged: float = 1.0
     buffers: Mapping[str, gl.BufferTexture] = field(default_factory=dict)
+    elliptical: bool = True
 
     @classmethod
     def of(cls, pose: GpuPose, surface: Surface, share: float, use_radii: bool) -> Points:
@@ -73,13 +78,20 @@ class Points:
         return cls(pose, use_radii, count, rows, math.sqrt(len(pose.cloud) / count) if count else 1.0)
 
     @property
+    def packed(self) -> bool:
+        """Whether normals, radii and half-axes are those of "splats"."""
+        return "splats" in self.buffers
+
+    @property
     def use_axes(self) -> bool:
         """Whether there are ellipses among them."""
+        if self.packed:
+            return self.use_radii and self.elliptical
         given = "axes" in self.buffers if "radii" in self.buffers else self.pose.cloud.axes is not None
         return self.use_radii and given
 
     def array(self, name: str) -> gl.BufferTexture:
-        """positions, normals, radii or axes, indexed by row."""
+        """positions, normals, radii, axes or splats, indexed by row."""
         return self.buffers.get(name) or self.pose.array(name)
 
     @property
@@ -98,16 +110,27 @@ class Points:
         return {
             "HAS_RADIUS": int(self.use_radii),
             "HAS_AXES": int(self.use_axes),
+            "PACKED": int(self.packed),
             "SAMPLED": int(self.rows is not None),
         }
 
     def bind(self, program: Program) -> None:
         """Bind what amplify/texels.glsl reads."""
         self.pose.gpu.set(program, enlarged=self.enlarged)
-        for name, _, _ in self.attributes:
-            self.array(name).bind(Texture[name.upper()])
+        self._bind(*(("positions", "splats") if self.packed else (name for name, _, _ in self.attributes)))
         if self.rows is not None:
             self.rows.bind(Texture.DRAWN_ROWS)
+
+    def bind_radii(self) -> None:
+        """Bind what amplify/radii.glsl reads."""
+        if self.packed:
+            self._bind("splats")
+        elif self.use_radii:
+            self._bind("radii")
+
+    def _bind(self, *names: str) -> None:
+        for name in names:
+            self.array(name).bind(Texture[name.upper()])
 
 
 def amplify(
@@ -148,10 +171,12 @@ def _restore(surface: Surface) -> None:
 def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: Values | None = None) -> None:
     """Draw points as shapes into the bound framebuffer, with the depth test and blending that are set.
 
-    Where only some are drawn, `ubo` and `vbo` are replaced by `tbo`, which gives the same picture.
+    Where a feed cannot bring them, `tbo` does in its place, which gives the same picture: `ubo` and `vbo`
+    where only some are drawn, all that bring attributes where these are packed.
     """
     gpu = points.pose.gpu
-    if (points.rows is not None and feed in _WHOLE) or (points.buffers and feed == "ubo"):
+    replaced = _ATTRIBUTE_FEEDS if points.packed else _WHOLE if points.rows is not None else ()
+    if feed in replaced or (points.buffers and feed == "ubo"):
         feed = "tbo"
     stages, parts = _FEEDS[feed]
     defines = {**points.defines, "CORNERS": shape.corners}

@@ -31,6 +31,7 @@ class Texture(IntEnum):
     COLORS = auto()  # of a Surface where the backend wrote them
     RADII = auto()
     AXES = auto()
+    SPLATS = auto()  # normal, radius and half-axes in three words
     IDS = auto()
     VALUES = auto()  # of a scalar
     LOOKS = auto()  # colour and normal in two words

@@ -1,16 +1,10 @@
 // How far behind the visible splat others still count (Slomp 2014, V-B): visibility, pushed away from the eye.
 #include "surfels/splat.glsl"
-
 #include "amplify/radii.glsl"
 
 // Of the splat that a pixel shows at this depth, scan units.
 float visible_radius(float depth, uint row) {
-#if HAS_RADIUS
-    float radius = texelFetch(radii, int(row)).r;
-#else
-    const float radius = 0.0;
-#endif
-    return splat_radius(radius, depth);
+    return splat_radius(stored_radius(int(row)), depth);
 }
 
 // The reversed depth-buffer value that splats must reach to count there.

@@ -252,7 +252,8 @@ def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:
 def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     """Bind what surfels/passes/look.glsl reads and store.glsl writes; the defines that say so."""
     cloud = points.pose.cloud
-    points.pose.packed(_pack_looks, texel_format=gl.RG32UI).bind(Texture.LOOKS)
+    looks = points.buffers.get("looks") or points.pose.packed(_pack_looks, texel_format=gl.RG32UI)
+    looks.bind(Texture.LOOKS)
     if cloud.colors is not None:
         surface.bind_own("color")
     surface.bind_own("normal")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ...gpu.amplify import Points, Shape
-from ...gpu.bindings import Texture
 from ...gpu.context import Program
 
 SURFEL = Shape("surfels/surfel.glsl", corners=4)
@@ -44,5 +43,4 @@ class Splats:
 def bind_visible(points: Points, program: Program) -> None:
     """Bind what surfels/passes/limit.glsl reads of the points that were drawn first."""
     points.pose.gpu.set(program, enlarged=points.enlarged)
-    if points.use_radii:
-        points.array("radii").bind(Texture.RADII)
+    points.bind_radii()
