@@ -7,7 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -16,7 +16,7 @@ import pytest
 from viewer.backends import backends
 from viewer.bench.papers.farooq_2013 import farooq
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
-from viewer.look import Look
+from viewer.look import Look, ValueKind
 from viewer.params import Parameter, describe
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -40,6 +40,12 @@ def table(parameters: Sequence[Parameter]) -> str:
     return "\n".join(rows)
 
 
+def values_table(values: Mapping[str, ValueKind]) -> str:
+    """A Markdown table of the numbers that a backend finds."""
+    rows = ["| number | what it is |", "|---|---|"]
+    return "\n".join([*rows, *(f"| `{name}` | {kind.help} |" for name, kind in values.items())])
+
+
 def backends_page() -> str:
     """docs/backends.md as the declarations have it."""
     parts = [
@@ -49,6 +55,8 @@ def backends_page() -> str:
     for backend in backends().values():
         about = " ".join((backend.module.__doc__ or "").split())
         parts += [f"## {backend.title} (`--backend {backend.name}`)", about, table(backend.parameters)]
+        if backend.values:
+            parts += ["Numbers that it finds, for `--look color_by=`:", values_table(backend.values)]
     parts += [
         "## Look (`--look key=value`)",
         " ".join((Look.__doc__ or "").split()),

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
-from .backends import Backend, FrameView, backends
+from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
 from .geometry import UP
 from .gpu.pose import GpuPose
 from .gpu.shade import shade
 from .gpu.surface import Surface
-from .look import Look
+from .look import Look, drawable
 from .renderer import Renderer
 from .scan.layers import NO_LAYERS, Layers
 from .scan.pods import first_camera
@@ -66,7 +66,7 @@ def render_frame(
 
     pose = renderer.resident(request.pose)
     request.layers.check(request.pose)
-    backend, params = _chosen(request)
+    backend, params = chosen = _chosen(request)
     view = _view(request, pose, surface.size)
     prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
     look = request.look
@@ -74,9 +74,12 @@ def render_frame(
         plain = fallback(request)
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
-    surface.start(pose, view, look, request.layers)
+    surface.start(pose, view, look, request.layers, backend.values)
     stats = surface.stats
     stats.backend = backend.name
+    if colorable(request) is not request:
+        names = request.layers.names(pose.overview.scalars)
+        raise missing_source(request.look.color_by, chosen[0], names)
     if prepared is None:
         stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
     budget_ms = None if wait else _BUDGET_MS
@@ -123,9 +126,16 @@ def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int]) -> 
 
 def fallback(request: Request) -> Request:
     """Request for plain points, of which nothing is prepared: drawn while the other picture is."""
-    return replace(
-        request, backend=FALLBACK, params=find_backend(FALLBACK).params(), look=_unlit(request.look)
-    )
+    plain = colorable(replace(request, backend=FALLBACK, params=find_backend(FALLBACK).params()))
+    return replace(plain, look=_unlit(plain.look))
+
+
+def colorable(request: Request) -> Request:
+    """The request with other colours where neither its pose nor its backend has the number that gives
+    them."""
+    names = request.layers.names(request.pose.overview.scalars)
+    look = drawable(request.look, names, _chosen(request)[0].values)
+    return request if look is request.look else replace(request, look=look)
 
 
 def _view(request: Request, pose: GpuPose, size: tuple[int, int]) -> View:

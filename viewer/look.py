@@ -40,12 +40,13 @@ class Look:
 
     color_by: str = param(
         "auto",
-        f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, or #N for scalar N",
+        f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, #N for scalar N, or a number "
+        "that the backend finds",
         group="Colour",
     )
     color_map: str = param(
         "batlow",
-        "Colour map of depth, height and scalars",
+        "Colour map of numbers",
         choices=COLOR_MAPS,
         group="Colour",
         unless=_UNMAPPED,
@@ -94,8 +95,28 @@ class Look:
         rgba(self.background, "background")
 
 
-def value_source(look: Look, scalars: Collection[str]) -> str | None:
-    """Source of the number that the look colours by: "depth", "height" or a scalar's name.
+@dataclass(frozen=True)
+class ValueKind:
+    """Kind of a number that a backend finds for each row that it draws, for looks to colour by.
+
+    help: a line on what it is. is_length: in the scan's unit; else a pure number. is_log: of a wide range, so
+    that its logarithm is coloured. range: where the colour map begins and ends, unless the look says so;
+    None: found from what is seen.
+    """
+
+    help: str
+    is_length: bool = False
+    is_log: bool = False
+    range: tuple[float, float] | None = None
+
+    def goes_by_log(self, low: float, high: float) -> bool:
+        """Whether colours go by the logarithm in this range: where all of it has one."""
+        return self.is_log and low > 0 and high > 0
+
+
+def value_source(look: Look, scalars: Collection[str], found: Collection[str] = ()) -> str | None:
+    """Source of the number that the look colours by: "depth", "height", a scalar's name, or one of what the
+    backend has found, unless a scalar is called so.
 
     None where colours do not come from a number. Raises InputError for an unknown name.
     """
@@ -103,15 +124,15 @@ def value_source(look: Look, scalars: Collection[str]) -> str | None:
         return look.color_by
     if look.color_by in COLOR_BY:
         return None
-    if (scalar := _scalar(look, scalars)) is None:
-        raise unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars])
-    return scalar
+    if (source := _number(look, scalars, found)) is None:
+        raise unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars, *found])
+    return source
 
 
-def drawable(look: Look, scalars: Collection[str]) -> Look:
-    """The look where the cloud has what it colours by, else with colours of its own choice: frames of one
-    scan may differ in their scalars."""
-    has_source = look.color_by in COLOR_BY or _scalar(look, scalars) is not None
+def drawable(look: Look, scalars: Collection[str], found: Collection[str] = ()) -> Look:
+    """The look where there is what it colours by, else with colours of its own choice: frames of one
+    scan may differ in their scalars, and backends in what they find."""
+    has_source = look.color_by in COLOR_BY or _number(look, scalars, found) is not None
     return look if has_source else replace(look, color_by="auto")
 
 
@@ -120,6 +141,12 @@ def unnamed(look: Look, scalars: Collection[str]) -> Look:
     if look.color_by in COLOR_BY or (scalar := _scalar(look, scalars)) is None:
         return look
     return replace(look, color_by=f"#{[*scalars].index(scalar) + 1}")
+
+
+def _number(look: Look, scalars: Collection[str], found: Collection[str]) -> str | None:
+    """The scalar, or else what the backend found, that `color_by` names; None where there is neither."""
+    scalar = _scalar(look, scalars)
+    return look.color_by if scalar is None and look.color_by in found else scalar
 
 
 def _scalar(look: Look, scalars: Collection[str]) -> str | None:

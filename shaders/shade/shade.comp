@@ -3,7 +3,7 @@
 // OWN_COLOR, OWN_NORMAL, OWN_VALUE: the backend wrote it for each pixel; else each row has it, and pixels that were
 // filled have none. TURNED: the pose is, so that its axes are not the world's. With its colour comes how much of the pixel is covered; the rest is background.
 // LEVEL_COLORS: how many colours there are of filled levels, in place of the colour map; 0: pixels are not coloured by level.
-// SAMPLES: rows are samples of range views, whose colours or normals are read.
+// BY_LOG: the colour map goes by the logarithm of the value. SAMPLES: rows are samples of range views, whose colours or normals are read.
 // One invocation for each listed pixel; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
@@ -62,6 +62,9 @@ vec3 base_color(int index, uint row, float depth, vec3 normal) {
     float value = texelFetch(values, int(row)).r;
 #endif
     if (isnan(value)) return plain.rgb;
+#if BY_LOG
+    value = value > 0.0 ? log2(value) : value_range.x;
+#endif
     float t = (value - value_range.x) / max(value_range.y - value_range.x, 1e-30);
     return texelFetch(color_map, int(clamp(t, 0.0, 1.0) * 255.0 + 0.5)).rgb;
 #else

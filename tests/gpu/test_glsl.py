@@ -12,6 +12,7 @@ from itertools import product
 from pathlib import Path
 
 import filling
+import finding
 import moderngl
 import numpy as np
 import packed
@@ -134,6 +135,8 @@ def draw_all(renderer: Renderer) -> None:
         draw(cloud, baselines.gl_points())
         for look in LOOKS:
             draw(cloud, filling.BACKEND, look)
+        for name in finding.VALUES:
+            draw(cloud, finding.BACKEND, Look(color_by=name))
     for pose in range_poses():
         for name, setting in settings():
             if name == "pyramidal":

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from viewer.camera import Camera
-from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, rgba
+from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from viewer.output.marks import (
     INK,
     PLATE,
@@ -25,6 +25,7 @@ from viewer.output.marks import (
     scale_bar,
     stamp,
     swatches,
+    ticks,
 )
 from viewer.scan.points import PointCloud
 
@@ -111,6 +112,14 @@ def test_numbers_have_the_digits_that_matter(value: float, span: float, text: st
 def test_lengths_have_the_unit_and_scalars_their_name() -> None:
     assert quantity(Look(color_by="depth"), "mm") == "Depth (mm)"
     assert quantity(Look(color_by="temperature"), "mm") == "temperature"
+    found = Look(color_by="splat_radius")
+    assert quantity(found, "mm", ValueKind("", is_length=True)) == "Splat radius (mm)"
+    assert quantity(found, "mm", ValueKind("")) == "Splat radius"
+
+
+def test_the_bar_of_a_logarithm_has_its_geometric_mean_in_the_middle() -> None:
+    assert ticks(0.0, 10.0) == ticks(0.0, 10.0, ValueKind("", is_log=True))
+    assert ticks(1e-4, 1.0, ValueKind("", is_log=True)) == [(0.0, "0.000100"), (0.5, "0.0100"), (1.0, "1.00")]
     assert stamp(LEGEND) == "Frame 3 of 64, 0.080 s"
 
 

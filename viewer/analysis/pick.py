@@ -29,7 +29,7 @@ class Picked:
     in the file.
     point: (3,) float64, scan units: the point itself. color: (4,) uint8, sRGB and alpha.
     normal: (3,) float32. These two are the scan's own, None where it has none.
-    scalars: name -> number, of the scan and of layers.
+    scalars: name -> number, of the scan, of layers, and the one that the backend found for the picture.
     spacing: distance between the points around it, scan units: how uncertain `point` is as a
     place on the body. None where it was not asked for or all points coincide.
     """
@@ -73,8 +73,10 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
     if row == NOTHING:
         return Picked(position, level)
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
+    found = surface.found_at(row)
     row = surface.point_of(row)
     scalars = {name: values[at].item() for name, values in cloud.scalars.items()}
+    scalars |= {name: values[row].item() for name, values in surface.layers.scalars.items()}
     return Picked(
         position,
         level,
@@ -83,7 +85,7 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
         point=place.points(cloud.positions[at] + cloud.origin),
         color=None if cloud.colors is None else cloud.colors[at].copy(),
         normal=None if cloud.normals is None else place.directions(cloud.normals[at].copy()),
-        scalars=scalars | {name: values[row].item() for name, values in surface.layers.scalars.items()},
+        scalars=scalars | found,
         spacing=spacing_at(cloud, at) if spacing else None,
     )
 

@@ -48,7 +48,8 @@ def draw(app: App) -> None:
             _draw_renderer(app.session, app.rendering, pose)
         if _section("Look"):
             look = app.document.look
-            colors = _colors(look, app.session.laid.layers(pose).names(pose.overview.scalars))
+            names = app.session.laid.layers(pose).names(pose.overview.scalars)
+            colors = _colors(look, names, backend(app.document.chosen(pose)[0]).values)
             app.rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": colors}))
             _draw_projection(app.steering, app.document.camera)
         if _section("Bookmarks", is_open=bool(app.document.bookmarks)):
@@ -102,12 +103,12 @@ def _draw_renderer(session: Session, rendering: Rendering, pose: Pose) -> None:
     rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))
 
 
-def _colors(look: Look, scalars: Collection[str]) -> dict[str, str]:
-    """Sources of colours, and the title of each: also the one chosen where the frame lacks it.
+def _colors(look: Look, scalars: Collection[str], found: Collection[str]) -> dict[str, str]:
+    """Sources of colours, and the title of each: also the one chosen where it is not there.
 
-    scalars: that the frame has.
+    scalars: that the frame has. found: what the backend finds.
     """
-    there = [*COLOR_BY, *scalars]
+    there = [*COLOR_BY, *scalars, *found]
     titles = {name: printable(name) for name in there}
     if look.color_by in there:
         return titles

@@ -26,6 +26,8 @@ It may declare
     ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" where it says nothing
     BLENDS               True: what a pixel shows may be of several points
     FILLS                True: pixels may be filled that no point gave
+    VALUES               numbers that it finds for the rows that it draws, for looks to colour by:
+                         name -> `ValueKind`; see `Surface.wanted`
     suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
     LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`
 
@@ -36,15 +38,16 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple, Protocol
 
-from ..errors import unknown_name
+from ..errors import InputError, unknown_name
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
+from ..look import COLOR_BY, ValueKind
 from ..params import Parameter, describe, parse
 from ..scan.pose import Pose
 from ..view import View
@@ -144,6 +147,11 @@ class Backend:
         """Whether pixels may be filled that no point gave."""
         return getattr(self.module, "FILLS", False)
 
+    @property
+    def values(self) -> Mapping[str, ValueKind]:
+        """Numbers that it finds for the rows that it draws, by name."""
+        return getattr(self.module, "VALUES", {})
+
     def suits(self, pose: Pose) -> Suited | None:
         """How well it does as the default for a scan, None where it does not."""
         return self.module.suits(pose) if hasattr(self.module, "suits") else None
@@ -205,3 +213,16 @@ def backend(name: str) -> Backend:
     if name not in backends():
         raise unknown_name("backend", name, list(backends()))
     return backends()[name]
+
+
+def missing_source(
+    name: str, drawn_by: Backend, scalars: Collection[str], where: object = None
+) -> InputError:
+    """The error for a number to colour by that neither a scan with these scalars nor the backend has; it
+    tells which backend does, or lists what there is."""
+    finders = [one.name for one in backends().values() if name in one.values]
+    if finders:
+        what = f"'{name}' is not found by the backend {drawn_by}, but by {' and '.join(finders)}"
+        return InputError(what, where, f"Use --backend {finders[0]}")
+    error = unknown_name("colour source", name, [*COLOR_BY, *scalars, *drawn_by.values])
+    return InputError(error.what, where, error.hint)

@@ -8,17 +8,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import frame
+from ..backends import backend as find_backend
+from ..backends import missing_source
 from ..bounds import Bounds
 from ..camera import Camera
 from ..document.recording import Entry
-from ..frame import Request
+from ..errors import InputError
+from ..frame import Request, backend_for
 from ..gpu.context import headless
 from ..gpu.surface import Surface
+from ..look import COLOR_BY, Look, drawable
 from ..output.export import numbered
 from ..output.marks import Legend
 from ..renderer import Renderer
 from ..scan.timeline import Timeline
 from ..scan.times import typical_rate
+from ._scans import frame_title
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,31 @@ def turntable_camera(
     """A camera for each shot, at the one distance that shows the whole bounds from all azimuths."""
     distance = max(Camera.orbit(bounds, azimuth, aspect=aspect, up=up).distance for azimuth in azimuths)
     return lambda shot: Camera.orbit(bounds, shot.azimuth, distance=distance, up=up)
+
+
+def check_color_source(
+    look: Look, timeline: Timeline, indices: Sequence[int], backend: str | None = None
+) -> None:
+    """Raise InputError where neither one of these poses nor the backend has what the look colours by; it
+    lists what there is.
+
+    Broken ones are passed over; it reads until one has it. backend: None for the default of the first.
+    """
+    if look.color_by in COLOR_BY:
+        return
+    drawn_by, scalars = None, dict[str, None]()
+    for index in indices:
+        try:
+            pose = timeline.pose(index)
+        except InputError:
+            continue
+        drawn_by = drawn_by or find_backend(backend_for(pose, backend)[0])
+        if drawable(look, pose.overview.scalars, drawn_by.values) is look:
+            return
+        scalars |= dict.fromkeys(pose.overview.scalars)
+    if drawn_by is not None:
+        where = timeline.name if len(indices) > 1 else frame_title(timeline, indices[0])
+        raise missing_source(look.color_by, drawn_by, scalars, where)
 
 
 def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> float:

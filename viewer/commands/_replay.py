@@ -31,7 +31,6 @@ from . import _drawing as drawing
 from ._console import warn
 from ._drawing import Plan
 from ._outputs import claim
-from ._scans import check_color_source
 
 # What the recording tells, by the names of arguments.
 _TOLD = (
@@ -130,7 +129,7 @@ def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     if entry.anonymous:
         return entry.request(anonymous_pose(pose, start))
     request = entry.request(pose)
-    check_color_source(entry.look, timeline, [entry.pose])
+    drawing.check_color_source(entry.look, timeline, [entry.pose], entry.backend)
     return anonymous_request(request, start) if args.anonymous else request
 
 

@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from ..bounds import Bounds
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 from ..files import absolute, printable, whole_file
 from ..geometry import UP
-from ..look import COLOR_BY, Look, drawable
 from ..output.export import is_pattern, numbered
 from ..scan import formats
 from ..scan.open import entries, open_scan
@@ -123,28 +122,6 @@ def told_up(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> str:
         with suppress(InputError):
             return timeline.pose(index).up or UP
     return UP
-
-
-def check_color_source(look: Look, timeline: Timeline, indices: Sequence[int]) -> None:
-    """Raise InputError where none of these poses has what the look colours by; it lists what there is.
-
-    Broken ones are passed over; it reads until one has it.
-    """
-    if look.color_by in COLOR_BY:
-        return
-    readable, scalars = False, dict[str, None]()
-    for index in indices:
-        try:
-            named = timeline.pose(index).overview.scalars
-        except InputError:
-            continue
-        if drawable(look, named) is look:
-            return
-        readable, scalars = True, scalars | dict.fromkeys(named)
-    if readable:
-        error = unknown_name("colour source", look.color_by, [*COLOR_BY, *scalars])
-        where = timeline.name if len(indices) > 1 else frame_title(timeline, indices[0])
-        raise InputError(error.what, where, error.hint)
 
 
 def frame_title(timeline: Timeline, index: int) -> str:

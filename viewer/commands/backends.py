@@ -48,6 +48,7 @@ def declaration(backend: Backend, obstacle: str | None) -> dict[str, Any]:
         "fills": backend.fills,
         "available": obstacle is None,
         "why_not": obstacle,
+        "values": {name: kind.help for name, kind in backend.values.items()},
         "parameters": [_parameter(p) for p in backend.parameters],
     }
 
@@ -77,6 +78,10 @@ def _as_text(backend: Backend) -> str:
             lines.append(f"  {group}:")
         columns = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=False))
         lines.append("  " + "  ".join([*columns, row[3]]))
+    if backend.values:
+        width = max(map(len, backend.values))
+        lines.append("  Numbers to colour by (--look color_by=...):")
+        lines += [f"  {name:{width}}  {kind.help}" for name, kind in backend.values.items()]
     return "\n".join(lines)
 
 

@@ -44,7 +44,6 @@ from ._outputs import add_force_argument, claim
 from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
-    check_color_source,
     chosen_poses,
     frame_title,
     framing,
@@ -144,7 +143,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         if "up" not in dict(args.look):
             look = replace(look, up=up)
         claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
-        check_color_source(look, timeline, indices)
+        drawing.check_color_source(look, timeline, indices, args.backend)
         fps = drawing.film_rate(timeline, indices, args.fps)
         salt = new_salt() if args.anonymous else None
         hash = fingerprint(timeline.files, salt) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
@@ -201,14 +200,14 @@ def _requests(
 ) -> Iterator[tuple[Shot, Request]]:
     """Requests for each shot. The first pose settles the backend, several the camera if there is none.
 
-    A pose without the scalar that the look colours by is reported, and has colours of its own choice.
+    A pose without the number that the look colours by is reported, and has colours of its own choice.
     """
     chosen = None
     camera_of = None if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or backend_for(pose, args.backend, values)
         camera_of = camera_of or _camera(args, timeline, shots, size, up, pose)
-        own = drawable(look, pose.overview.scalars)
+        own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
         if own is not look:
             title = frame_title(timeline, pose.index)
             warn(f"{timeline.name}: {title} has no '{look.color_by}', and is drawn in other colours")

@@ -11,9 +11,9 @@ import numpy as np
 from ..backends import backends
 from ..camera import Camera
 from ..errors import InputError, shortened
-from ..frame import Request, backend_for
+from ..frame import Request, backend_for, colorable
 from ..geometry import UP, Vector, up_vector
-from ..look import Look, drawable
+from ..look import Look
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Pose
 from .part import Part
@@ -185,11 +185,10 @@ class Document:
         return name, params if isinstance(params, type(defaults)) else usable(defaults, params)
 
     def request(self, pose: Pose, layers: Layers = NO_LAYERS) -> Request:
-        """The picture to draw of a pose, in other colours where it lacks the scalar that gives them.
+        """The picture to draw of a pose, in other colours where nothing has the number that gives them.
 
         The camera must be set. layers: over the pose.
         """
         assert self.camera is not None
         name, params = self.chosen(pose)
-        look = drawable(self.look, layers.names(pose.overview.scalars))
-        return Request(pose, self.camera, name, params, look, layers)
+        return colorable(Request(pose, self.camera, name, params, self.look, layers))

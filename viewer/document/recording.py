@@ -36,7 +36,7 @@ from ..camera import Camera
 from ..errors import InputError, shortened
 from ..files import open_plain, whole_file
 from ..frame import Request
-from ..look import Look, value_source
+from ..look import Look, drawable, value_source
 from ..output.export import read_description
 from ..output.marks import Legend, Marks
 from ..rigid import STILL, Rigid, is_rigid
@@ -120,7 +120,8 @@ class Entry:
         Raises InputError where its colours come from a layer: these numbers are in no file.
         """
         layers = request.layers
-        source = value_source(request.look, layers.names(request.pose.overview.scalars))
+        names = layers.names(request.pose.overview.scalars)
+        source = value_source(drawable(request.look, names), names)
         if source in layers.scalars:
             what = f"the colours come from '{source}', which is computed and not in the scan's files"
             raise InputError(what, hint="It can be drawn again in other colours")

@@ -30,7 +30,7 @@ class _Shading:
 
     plain, background: sRGB and alpha. height_axis: up, along the pose's axes. to_world: turns these. light:
     towards it, view space. phong: ambient, diffuse, specular, shininess. value_range: of the colour map,
-    relative to the zero that values are stored from.
+    relative to the zero that values are stored from, or their binary logarithms.
     """
 
     plain: Vec4
@@ -48,7 +48,7 @@ def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
     pose, gpu = surface.pose, surface.gpu
     cloud = pose.overview
-    source, surface.look = value_source(look, surface.layers.names(cloud.scalars)), look
+    source, surface.look = value_source(look, surface.layers.names(cloud.scalars), surface.finds), look
     value = source if source in (None, "depth", "height") else "scalar"
     if value == "height" and surface.samples is not None:
         value = "scalar"  # which have no positions
@@ -68,11 +68,14 @@ def shade(surface: Surface, look: Look) -> None:
     by_sample = surface.samples is not None and bool(from_rows)
     has_ids = cloud.ids is not None and surface.samples is None
     surface.color_range = None if source is None else value_range(surface, look)
+    kind = surface.value_kind
+    by_log = surface.color_range is not None and kind is not None and kind.goes_by_log(*surface.color_range)
     program = gpu.compute(
         "shade/shade.comp",
         {
             "COLOR_BY": _COLOR_CODES[color],
             "VALUE": _VALUE_CODES[value or "scalar"],
+            "BY_LOG": int(by_log),
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
             "TURNED": int(not surface.layers.place.is_identity),
@@ -82,7 +85,7 @@ def shade(surface: Surface, look: Look) -> None:
             "OWN_LEVEL": int(by_level and surface.is_own("level")),
             **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
         },
-        params=_shading(surface, look),
+        params=_shading(surface, look, by_log),
     )
     surface.bind_view()
     covered = surface.list_covered()
@@ -149,9 +152,10 @@ def _word(color: str) -> int:
     return int.from_bytes(bytes(rgba(color)), "little")
 
 
-def _shading(surface: Surface, look: Look) -> _Shading:
+def _shading(surface: Surface, look: Look, by_log: bool) -> _Shading:
     low, high = surface.color_range or (0.0, 1.0)
     zero = surface.value_zero
+    ends = (math.log2(low), math.log2(high)) if by_log else (_finite(low - zero), _finite(high - zero))
     return _Shading(
         plain=_fractions(look.plain),
         background=_fractions(look.background),
@@ -159,7 +163,7 @@ def _shading(surface: Surface, look: Look) -> _Shading:
         to_world=_columns(surface.layers.place.rotation),
         light=(*_direction(look.azimuth, look.elevation), 0.0),
         phong=(look.ambient, look.diffuse, look.specular, look.shininess),
-        value_range=(_finite(low - zero), _finite(high - zero)),
+        value_range=ends,
         eye_dome_strength=look.eye_dome_strength,
         eye_dome_radius=look.eye_dome_radius,
     )
@@ -184,9 +188,14 @@ def _fractions(color: str) -> Vec4:
 
 
 def value_range(surface: Surface, look: Look) -> tuple[float, float]:
-    """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles of the scan's points."""
+    """(low, high) of the colour map: the look's own, else the 2 % and 98 % quantiles of the scan's points; of
+    what the backend finds, the usual ones of its kind, else the quantiles of what is seen."""
     pose, source = surface.scanned, surface.value_source
-    if source == "depth":
+    if look.low is not None and look.high is not None:
+        return look.low, look.high
+    if kind := surface.value_kind:
+        low, high = kind.range or surface.found_range()
+    elif source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample))
     elif source == "height":
         world = surface.layers.place.points(pose.sample + pose.origin)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeVar, cast
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry import up_vector
-from ..look import Look, rgba, value_source
+from ..look import Look, ValueKind, rgba, value_source
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
@@ -26,10 +26,11 @@ from .compact import IndexList, list_covered
 from .constants import EMPTY, NO_DEPTH, NOTHING
 from .context import Gpu, Resource
 from .counts import count_points
-from .pose import GpuPose, as_float32
+from .pose import GpuPose, as_float32, robust_range
 from .sample import sample_of
 from .view import ViewBlock
 
+_SAMPLED = 256  # pixels along the longer edge whose numbers tell a range
 _FEW = 1000  # points of which none is left out: it would gain nothing, and they would be missed
 # What a backend may write for each pixel: the format of a texel, and its bytes.
 _CHANNELS = {"color": (gl.RGBA8, 4), "normal": (gl.RGB32F, 12), "value": (gl.R32F, 4), "level": (gl.R32UI, 4)}
@@ -91,7 +92,8 @@ class Surface:
     filled, and what the backend did not write of it is unknown. Reading a property copies it to the CPU.
     drawn: what the picture was made of, by name; empty before, and where drawing failed.
     look: what it is drawn for, and shaded in last; shaded_by: what did it, None before. layers: over the
-    pose.
+    pose. finds: the numbers that the backend finds for rows, by name, unless the scan or a layer has one of
+    that name.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
     samples: the points of range views whose samples the rows are; None where these are points.
     """
@@ -122,6 +124,8 @@ class Surface:
         self.samples: RangePoints | None = None
         self.look = Look()
         self.layers = NO_LAYERS
+        self.finds: Mapping[str, ValueKind] = {}
+        self._given: tuple[str, gl.BufferTexture] | None = None  # which of these the backend gave
         self.shaded_by: Callable[[Surface, Look], None] | None = None
         self.color_range: tuple[float, float] | None = None
         self.stats = Stats()
@@ -134,10 +138,20 @@ class Surface:
 
     # --- for backends -----------------------------------------------------------------
 
-    def start(self, pose: GpuPose, view: View, look: Look | None = None, layers: Layers = NO_LAYERS) -> None:
+    def start(
+        self,
+        pose: GpuPose,
+        view: View,
+        look: Look | None = None,
+        layers: Layers = NO_LAYERS,
+        finds: Mapping[str, ValueKind] | None = None,
+    ) -> None:
         """Begin a frame: what backends and shading read from now on."""
         self._shown, self._stood_for, self.samples = (pose, view), None, None
         self.look, self.layers = look or Look(), layers
+        scalars = layers.names(pose.overview.scalars)
+        self.finds = {name: kind for name, kind in (finds or {}).items() if name not in scalars}
+        self._given = None
         self._block.write(ViewBlock.of(view))
         self.bind_view()
         self._covered_known = False
@@ -264,6 +278,25 @@ class Surface:
         fits = name != "value" or self._blended == (self.value_source, self.look.up)
         return name in self._written and fits
 
+    @property
+    def wanted(self) -> str | None:
+        """The name of the number that the look colours by where the backend finds it: `give` takes it. None
+        where none of these is asked for."""
+        source = self.value_source
+        return source if source in self.finds else None
+
+    def give(self, texels: gl.BufferTexture) -> None:
+        """Take the number that is `wanted`, for a backend that finds it: a float for each row of the pose,
+        NaN: unknown. Those of rows that no pixel has are unread. It stays the backend's, and as it is until
+        the next picture."""
+        assert self.wanted is not None
+        self._given = self.wanted, texels
+
+    @property
+    def value_kind(self) -> ValueKind | None:
+        """The kind of the number that the look colours by, where the backend finds it."""
+        return self.finds.get(self.value_source or "")
+
     def resolve(self, name: str) -> gl.BufferTexture:
         """The channel `color`, `normal` or `value` as the backend's `own`, with what the rows have written to
         it: for one that goes on from there, as by filling pixels that have none."""
@@ -271,14 +304,16 @@ class Surface:
         self._resolve(name, own)
         return own
 
-    def _resolve(self, name: str, target: gl.BufferTexture) -> None:
-        """Write what the rows have of a channel to a texel for each covered pixel."""
+    def _resolve(self, name: str, target: gl.BufferTexture, stride: int | None = None) -> None:
+        """Write what the rows have of a channel to a texel for each covered pixel. stride: to one for each
+        of some pixels, covered or not: one in so many of each line, and of the lines."""
         by_sample = self.samples is not None and name != "value"
         texels = None if by_sample else self.row_values if name == "value" else self.pose.find(f"{name}s")
         defines = {
             "CHANNEL": _RESOLVED[name],
             "HAS_ROWS": int(texels is not None or (by_sample and not self._lacks(name))),
             "IS_DEPTH": int(name == "value" and self.value_source == "depth"),
+            "SAMPLED": int(stride is not None),
             **self.sample_defines(by_sample),
         }
         program = self.gpu.compute("shade/resolve.comp", defines)
@@ -290,7 +325,13 @@ class Surface:
                 texels.bind(Texture.VALUES)
             target.buffer.bind_to_storage_buffer(Storage[name.upper()])
             self.gpu.set(program, plain=tuple(c / 255 for c in rgba(self.look.plain)[:3]))
-            self.gpu.dispatch(program, self.size[0] * self.size[1])
+            if stride is not None:
+                self.gpu.set(program, stride=stride)
+            self.gpu.dispatch(program, self._count(stride or 1))
+
+    def _count(self, stride: int) -> int:
+        """The number of pixels that one in so many of each line, and of the lines, are."""
+        return -(-self.size[0] // stride) * -(-self.size[1] // stride)
 
     def _lacks(self, name: str) -> bool:
         """Whether the pixels of range views have no such channel."""
@@ -306,8 +347,9 @@ class Surface:
 
     @property
     def value_source(self) -> str | None:
-        """Source of the number that the look colours by ("depth", "height", a scalar's name), else None."""
-        return value_source(self.look, self.layers.names(self.pose.overview.scalars))
+        """Source of the number that the look colours by ("depth", "height", a scalar's name, one of `finds`),
+        else None."""
+        return value_source(self.look, self.layers.names(self.pose.overview.scalars), self.finds)
 
     @property
     def values_key(self) -> tuple[object, ...]:
@@ -324,7 +366,18 @@ class Surface:
         source = self.value_source
         if source == "height":
             return float(self.layers.place.points(self.pose.origin) @ up_vector(self.look.up))
-        return 0.0 if source in (None, "depth") else self.scalar_range(source, self.pose)[0]
+        if source is None or source == "depth" or source in self.finds:
+            return 0.0
+        return self.scalar_range(source, self.pose)[0]
+
+    def found_range(self) -> tuple[float, float]:
+        """The 2 % and 98 % quantiles of the number that the backend gave, among some of the pixels."""
+        stride = -(-max(self.size) // _SAMPLED)
+        texels = gl.BufferTexture(self.gpu.ctx.buffer(reserve=4 * self._count(stride)), gl.R32F)
+        self._resolve("value", texels, stride)
+        values = np.frombuffer(texels.buffer.read(), np.float32)
+        self.gpu.discard(texels)
+        return robust_range(values)
 
     def scalar_range(self, name: str, pose: GpuPose) -> tuple[float, float]:
         """The 2 % and 98 % quantiles of a layer's or else a pose's finite numbers."""
@@ -355,7 +408,20 @@ class Surface:
             return None
         if source == "height":
             return self.pose.heights(self.height_axis, by_sample=self.samples is not None)
-        return self.scalar_texels(source)
+        return self._found_texels(source) if source in self.finds else self.scalar_texels(source)
+
+    def _found_texels(self, name: str) -> gl.BufferTexture:
+        if self._given is None or self._given[0] != name:
+            raise InputError(f"'{name}' was not found for this picture", hint="Draw it anew in this look")
+        return self._given[1]
+
+    def found_at(self, row: int) -> dict[str, float]:
+        """The number of a row, by name, that the backend gave; empty where it gave none."""
+        if self._given is None:
+            return {}
+        self.gpu.activate()
+        name, texels = self._given
+        return {name: float(np.frombuffer(texels.buffer.read(4, offset=4 * row), np.float32)[0])}
 
     @property
     def nbytes(self) -> int:
@@ -492,6 +558,8 @@ class Surface:
             return np.where(self._covered, self.depth, unknown)
         if source is None:
             return self._fetch(None, unknown)
+        if source in self.finds:
+            return np.where(self._covered, self._read_texels("value", np.float32)[..., 0], unknown)
         return self._fetch(lambda rows: as_float32(self._values_of(source, rows)), unknown)
 
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:

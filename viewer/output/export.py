@@ -130,7 +130,7 @@ def write_png(image: NDArray[np.uint8], path: Path | str, description: str | Non
 
 def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
     image = surface.image()
-    return image if legend is None else marked(image, legend, surface.color_range)
+    return image if legend is None else marked(image, legend, surface.color_range, surface.value_kind)
 
 
 def read_description(path: Path) -> str:

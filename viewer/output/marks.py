@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
-from ..look import HOLE_COLOR, LEVEL_COLORS, Look, color_table, rgba
+from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
 
@@ -115,10 +115,12 @@ def scale_bar(camera: Camera, size: tuple[float, float]) -> tuple[float, float]:
     return length, length * height / camera.view_height
 
 
-def quantity(look: Look, unit: str) -> str:
-    """The number that the look colours by, with its unit where it is a length."""
-    if look.color_by in ("depth", "height"):
-        return f"{look.color_by.capitalize()} ({unit})"
+def quantity(look: Look, unit: str, kind: ValueKind | None = None) -> str:
+    """The number that the look colours by, with its unit where it is a length. kind: of what a backend
+    finds."""
+    if kind is not None or look.color_by in ("depth", "height"):
+        is_length = kind is None or kind.is_length
+        return look.color_by.replace("_", " ").capitalize() + (f" ({unit})" if is_length else "")
     return "Value" if look.color_by.startswith("#") else look.color_by
 
 
@@ -161,18 +163,23 @@ def text_height(size: tuple[int, int]) -> int:
 
 
 def draw(
-    painter: MarkPainter, size: tuple[float, float], legend: Legend, values: tuple[float, float] | None
+    painter: MarkPainter,
+    size: tuple[float, float],
+    legend: Legend,
+    values: tuple[float, float] | None,
+    kind: ValueKind | None = None,
 ) -> None:
     """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp upper left.
 
-    size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar.
+    size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar. kind: of
+    its numbers, where the backend found them.
     """
     if legend.marks.scale_bar:
         _draw_scale_bar(painter, size, legend)
     if legend.marks.color_bar:
         foot = size[1] - _MARGIN * painter.em
         if values is not None:
-            foot = _draw_color_bar(painter, size, legend, values) - _GAP * painter.em
+            foot = _draw_color_bar(painter, size, legend, values, kind) - _GAP * painter.em
         if told := swatches(legend.look):
             _draw_swatches(painter, size, told, foot)
     if legend.marks.stamp:
@@ -206,15 +213,27 @@ def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Leg
     painter.box((start + line, foot - line, start + pixels - line, foot), INK)
 
 
+def ticks(low: float, high: float, kind: ValueKind | None = None) -> list[tuple[float, str]]:
+    """Shares of the colour bar at which numbers stand, from its foot, and these. kind: as for `draw`."""
+    shares = (0.0, 0.5, 1.0) if high != low else (0.0,)
+    if kind is not None and kind.goes_by_log(low, high):
+        values = [math.exp((1 - share) * math.log(low) + share * math.log(high)) for share in shares]
+        return [(share, number(value, value)) for share, value in zip(shares, values, strict=True)]
+    return [(share, number(low + share * (high - low), abs(high - low))) for share in shares]
+
+
 def _draw_color_bar(
-    painter: MarkPainter, size: tuple[float, float], legend: Legend, values: tuple[float, float]
+    painter: MarkPainter,
+    size: tuple[float, float],
+    legend: Legend,
+    values: tuple[float, float],
+    kind: ValueKind | None,
 ) -> float:
     """Draw it lower right; returns where it begins at the top, pixels."""
-    em, (low, high) = painter.em, values
-    title = _shortened(painter, quantity(legend.look, legend.unit), _TEXT_SHARE * size[0])
-    shares = (0.0, 0.5, 1.0) if high != low else (0.0,)
-    texts = [number(low + share * (high - low), abs(high - low)) for share in shares]
-    widest = (_MAP_WIDTH + _GAP) * em + max(map(painter.width, texts))
+    em = painter.em
+    title = _shortened(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
+    told = ticks(*values, kind)
+    widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in told)
     height = min(_MAP_HEIGHT * em, 0.6 * size[1])
     right, bottom = round(size[0] - _MARGIN * em), round(size[1] - _MARGIN * em)
     left = round(right - max(widest, painter.width(title)) - 2 * _PAD * em)
@@ -225,7 +244,7 @@ def _draw_color_bar(
     foot = bottom - round((_PAD + 0.5) * em)
     colors = color_table(legend.look.color_map)
     painter.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
-    for share, text in zip(shares, texts, strict=True):
+    for share, text in told:
         painter.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
     return top
 
@@ -264,10 +283,15 @@ def _shortened(painter: MarkPainter, text: str, room: float) -> str:
 # --- in images ------------------------------------------------------------------------------
 
 
-def marked(image: NDArray[np.uint8], legend: Legend, values: tuple[float, float] | None) -> NDArray[np.uint8]:
+def marked(
+    image: NDArray[np.uint8],
+    legend: Legend,
+    values: tuple[float, float] | None,
+    kind: ValueKind | None = None,
+) -> NDArray[np.uint8]:
     """The image, (H, W, 4) uint8 sRGB and alpha, with the legend's marks; outside them as it was.
 
-    values: where the colour map begins and ends (see `draw`).
+    values, kind: as for `draw`.
     """
     from PIL import Image
 
@@ -275,7 +299,7 @@ def marked(image: NDArray[np.uint8], legend: Legend, values: tuple[float, float]
         return image
     below = Image.fromarray(image)
     painter = _Overlay(below.size)
-    draw(painter, below.size, legend, values)
+    draw(painter, below.size, legend, values, kind)
     return np.asarray(Image.alpha_composite(below, painter.image))
 
 

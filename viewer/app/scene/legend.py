@@ -43,7 +43,7 @@ class ViewMarks:
         told = Legend(self.shown, camera, surface.look, unit, pose.index, count, float(pose.time))
         corner = imgui.get_window_pos()
         canvas = _View(corner)
-        marks.draw(canvas, (size.x, size.y), told, surface.color_range)
+        marks.draw(canvas, (size.x, size.y), told, surface.color_range, surface.value_kind)
         if self.shown.scale_bar and self._steering.gesture is None and imgui.is_window_hovered():
             left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
             if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):

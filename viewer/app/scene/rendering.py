@@ -22,8 +22,8 @@ class Rendering:
         self._missed: set[tuple[str, str]] = set()  # scan, and scalar or backend, which were told
 
     def tell_missing(self, pose: Pose) -> None:
-        """Tell, once a scan, that the chosen backend is not there, and that a frame has not the scalar that
-        the user chose to colour by."""
+        """Tell, once a scan, that the chosen backend is not there, and that neither the frame nor the backend
+        has the number that the user chose to colour by."""
         look, chosen_backend = self._session.document.look, self._session.document.backend
         absent = self._session.scan, f"backend {chosen_backend}"
         if chosen_backend is not None and chosen_backend not in backends() and absent not in self._missed:
@@ -32,12 +32,17 @@ class Rendering:
             self._note(f"This Scan4D has no renderer '{chosen_backend}': {stand_in} draws in its place.")
         missed = self._session.scan, look.color_by
         names = self._session.laid.layers(pose).names(pose.overview.scalars)
-        if missed not in self._missed and drawable(look, names) != look:
+        drawn_by = backends()[self._session.document.chosen(pose)[0]]
+        if missed not in self._missed and drawable(look, names, drawn_by.values) != look:
             self._missed.add(missed)
             chosen = missed[1]
             name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"
+            finders = [one.title for one in backends().values() if chosen in one.values]
             self._note(
-                f"Frame {pose.index + 1} has no {name} to colour by: "
+                f"{name} is not found by {drawn_by.title}, but by {' and '.join(finders)}: "
+                "other colours are shown."
+                if finders
+                else f"Frame {pose.index + 1} has no {name} to colour by: "
                 "other colours are shown until a frame has it."
             )
 

@@ -12,10 +12,9 @@ from typing import Any
 from ...analysis.pick import Picked, before_gap, pick
 from ...bounds import Bounds
 from ...errors import Scan4DError
-from ...frame import Request, bring, fallback, is_prepared, render_frame
+from ...frame import Request, bring, colorable, fallback, is_prepared, render_frame
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
-from ...look import drawable
 from ...renderer import Renderer
 from ...scan.pose import Pose
 from ..failures import failure_in_words
@@ -122,10 +121,9 @@ class Viewport:
     def without_preparing(self, request: Request) -> Request:
         """A request to show instead, for which nothing has to be prepared: as before, or plain points."""
         if self._asked_for is not None:
-            before = replace(
-                self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers,
-                look=drawable(self._asked_for.look, request.layers.names(request.pose.overview.scalars)),
-            )  # fmt: skip
+            before = colorable(
+                replace(self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers)
+            )
             if is_prepared(self.renderer, before, self.size):
                 return before
         return fallback(request)

@@ -1,0 +1,81 @@
+"""Points, and numbers found of those that are seen: a backend for tests of looks that colour by such.
+
+Rows that no pixel has get numbers that would be noticed.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.backends import Backend, FrameView
+from viewer.backends import points as plain
+from viewer.gpu import gl
+from viewer.gpu.context import Gpu
+from viewer.gpu.pose import GpuPose
+from viewer.gpu.surface import NOTHING, Surface
+from viewer.look import ValueKind
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+TITLE = "Finding"
+VALUES = {
+    "gap": ValueKind("Distance to the point before, scan units", is_length=True, is_log=True),
+    "slope": ValueKind("How steep the line to the origin is, unknown on the left"),
+    "odd": ValueKind("1 where the row is odd, 0 elsewhere", range=(0.0, 1.0)),
+}
+UNSEEN = np.float32(1e20)
+BACKEND = Backend("finding", sys.modules[__name__])
+Params = plain.Params
+
+
+def needs(pose: Pose, params: plain.Params) -> tuple[str, ...]:
+    """Nothing but positions."""
+    return ()
+
+
+def numbers(cloud: PointCloud) -> Mapping[str, NDArray[np.float32]]:
+    """All that is found of a cloud, (N,) each: the plain twin too."""
+    positions = cloud.positions.astype(float)
+    gap = np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1)
+    steep = np.abs(positions[:, 1]) / np.maximum(np.linalg.norm(positions, axis=1), 1e-9)
+    found = {
+        "gap": gap,
+        "slope": np.where(positions[:, 0] < -0.5, np.nan, steep),
+        "odd": np.arange(len(cloud)) % 2,
+    }
+    return {name: values.astype(np.float32) for name, values in found.items()}
+
+
+class _Found:
+    """A number of each row on the GPU."""
+
+    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+        self._gpu, self.nbytes = gpu, 0
+        self.texels: gl.BufferTexture | None = None
+
+    def write(self, values: NDArray[np.float32]) -> gl.BufferTexture:
+        self.release()
+        data = values if values.size else np.zeros(1, np.float32)
+        self.texels, self.nbytes = gl.BufferTexture(self._gpu.ctx.buffer(data), gl.R32F), data.nbytes
+        return self.texels
+
+    def release(self) -> None:
+        if self.texels is not None:
+            self.texels.release()
+            self.texels = None
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Scatter the points, and give the number that is wanted of those that some pixel shows."""
+    refinable = plain.draw(pose, frame, surface)
+    if (name := surface.wanted) is not None:
+        values = np.full(len(pose.cloud), UNSEEN)
+        rows = surface.row
+        seen = rows[rows != NOTHING]
+        values[seen] = numbers(pose.cloud)[name][seen]
+        surface.give(surface.keep(_Found).write(values))
+    return refinable
