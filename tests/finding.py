@@ -1,4 +1,4 @@
-"""Points, and numbers found of those that are seen: a backend for tests of looks that colour by such.
+"""Points, numbers and normals found of those that are seen: a backend for tests of looks that show them.
 
 Rows that no pixel has get numbers that would be noticed.
 """
@@ -22,6 +22,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 TITLE = "Finding"
+FINDS_NORMALS = True
 VALUES = {
     "gap": ValueKind("Distance to the point before, scan units", is_length=True, is_log=True),
     "slope": ValueKind("How steep the line to the origin is, unknown on the left"),
@@ -35,6 +36,11 @@ Params = plain.Params
 def needs(pose: Pose, params: plain.Params) -> tuple[str, ...]:
     """Nothing but positions."""
     return ()
+
+
+def normals(cloud: PointCloud) -> NDArray[np.float32]:
+    """What is found as normals, (N, 3): away from the origin, of no certain length."""
+    return cloud.positions
 
 
 def numbers(cloud: PointCloud) -> Mapping[str, NDArray[np.float32]]:
@@ -70,12 +76,15 @@ class _Found:
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Scatter the points, and give the number that is wanted of those that some pixel shows."""
+    """Scatter the points, and give the normals, and the number that is wanted, of those that are seen."""
     refinable = plain.draw(pose, frame, surface)
+    rows = surface.row
+    is_seen = rows != NOTHING
+    own = np.zeros((*rows.shape, 3), np.float32)
+    own[is_seen] = normals(pose.cloud)[rows[is_seen]]
+    surface.own("normal").buffer.write(own)
     if (name := surface.wanted) is not None:
         values = np.full(len(pose.cloud), UNSEEN)
-        rows = surface.row
-        seen = rows[rows != NOTHING]
-        values[seen] = numbers(pose.cloud)[name][seen]
+        values[rows[is_seen]] = numbers(pose.cloud)[name][rows[is_seen]]
         surface.give(surface.keep(_Found).write(values))
     return refinable

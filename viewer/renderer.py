@@ -269,7 +269,8 @@ def _missing(pose: GpuPose, backend: Backend, params: Any, look: Look) -> tuple[
     wanted = set(backend.needs(pose.pose, params))
     if "views" in wanted and not pose.views:
         raise InputError(f"{backend.title} draws range views, and this scan has none", hint="Choose another")
-    if wants_normals(look) and not backend.draws_samples(pose.pose, params):
+    has_own = backend.finds_normals or backend.draws_samples(pose.pose, params)
+    if wants_normals(look) and not has_own:
         wanted.add("normals")
     wanted.discard("views")
     return tuple(sorted(name for name in wanted if getattr(pose.cloud, name) is None and len(pose.cloud)))

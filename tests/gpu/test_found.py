@@ -143,6 +143,21 @@ def test_it_is_picked_and_exported(draw: Draw, tmp_path: Path) -> None:
         assert arrays["value"][y, x] == number
 
 
+@pytest.mark.parametrize("look", [Look(light="head"), Look(light="flat", color_by="normal")])
+def test_normals_that_are_found_are_not_estimated(renderer: Renderer, look: Look) -> None:
+    bare = Pose(0, 0.0, "x", PointCloud.from_arrays(CLOUD.world()))
+    surface, own = Surface(renderer.gpu, SIZE), Renderer(renderer.gpu)
+    render_frame(own, Request(bare, CAMERA, finding.BACKEND, look=look), surface)
+    assert own.resident(bare).cloud.normals is None
+    seen = surface.row != NOTHING
+    np.testing.assert_allclose(surface.normal[seen], CLOUD.normals[surface.row[seen]], atol=1e-5)
+    with_normals = Surface(renderer.gpu, SIZE)
+    render_frame(own, Request(Pose(0, 0.0, "x", CLOUD), CAMERA, "points", look=look), with_normals)
+    colors = surface.image(replace(look, color_by="normal")).astype(int)
+    assert np.abs(colors - with_normals.image(replace(look, color_by="normal"))).max() <= 1
+    own.release()
+
+
 def test_what_is_asked_for_tells_the_backend(renderer: Renderer) -> None:
     """That it has to find numbers anew, or others."""
     changes: list[frozenset[str]] = []

@@ -26,6 +26,7 @@ It may declare
     ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" where it says nothing
     BLENDS               True: what a pixel shows may be of several points
     FILLS                True: pixels may be filled that no point gave
+    FINDS_NORMALS        True: it writes normals of its own, so that looks need none of the pose
     VALUES               numbers that it finds for the rows that it draws, for looks to colour by:
                          name -> `ValueKind`; see `Surface.wanted`
     suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
@@ -146,6 +147,11 @@ class Backend:
     def fills(self) -> bool:
         """Whether pixels may be filled that no point gave."""
         return getattr(self.module, "FILLS", False)
+
+    @property
+    def finds_normals(self) -> bool:
+        """Whether its pictures have normals of their own, whatever the pose has."""
+        return getattr(self.module, "FINDS_NORMALS", False)
 
     @property
     def values(self) -> Mapping[str, ValueKind]:
