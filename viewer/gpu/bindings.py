@@ -61,6 +61,11 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
+    # Neighborhoods, beside splats.
+    SLOTS = auto()  # participants in the order of their cells
+    ACTIVE = auto()
+    USUAL = auto()
+    COUNTS = auto()
     # Samples of range views.
     RANGE_DEPTHS = auto()
     RANGE_LOOKS = auto()
@@ -118,6 +123,17 @@ class Storage(IntEnum):
     REACH = 4
     LARGE = 5
     FARTHEST = 7
+    # Neighborhoods and their splats, beside a list.
+    SPLATS = 0
+    FOUND = 1
+    SLOTS = 0
+    DRAWN_ROWS = 1
+    ACTIVE = 0
+    USUAL = 0
+    LOOKS = 6
+    TOTALS = 4
+    COUNTS = 5
+    NEXT = 5
     # Samples of range views: a level that is made.
     RANGE_DEPTHS = 0
     RANGE_LOOKS = 1
