@@ -1,5 +1,4 @@
 // Points from buffer textures. SAMPLED: only the listed rows are drawn. PACKED: normal, radius and half-axes are words.
-#include "amplify/packed.glsl"
 #include "amplify/point.glsl"
 #include "amplify/radii.glsl"
 
@@ -25,6 +24,7 @@ int drawn_row(int i) {
 
 Point texel_point(int at) {
     vec3 position = texelFetch(positions, at).xyz;
+    float radius = stored_radius(at);
 #if PACKED
     uvec3 words = texelFetch(splats, at).xyz;
     vec3 normal = packed_normal(words);
@@ -32,11 +32,11 @@ Point texel_point(int at) {
     vec3 normal = texelFetch(normals, at).xyz;
 #endif
 #if HAS_AXES && PACKED
-    vec4 half_axes = packed_axes(words);
+    vec4 half_axes = packed_axes(words, radius);
 #elif HAS_AXES
     vec4 half_axes = texelFetch(axes, at);
 #else
     const vec4 half_axes = vec4(0.0);
 #endif
-    return Point(position, normal, stored_radius(at), half_axes, uint(at));
+    return Point(position, normal, radius, half_axes, uint(at));
 }

@@ -168,15 +168,16 @@ def draw_samples(renderer: Renderer) -> None:
 def draw_packed(renderer: Renderer) -> None:
     """Pictures of splats that a compute pass packed."""
     surface = Surface(renderer.gpu, SIZE)
-    for cloud, listed in product(list(clouds())[:2], (True, False)):
+    large = list(clouds())[1]
+    for cloud, listed in product((sphere(1500), large), (True, False)):
         splats = packed.Packed.of(cloud)
         few = replace(splats, rows=np.arange(len(cloud), dtype=np.uint32)) if listed else splats
         for colors, ellipses in product((cloud.colors, None), (True, False)):
             bare = PointCloud.from_arrays(cloud.positions, colors=colors)
             pose = Pose(0, 0.0, "test", bare)
             camera = Camera.orbit(pose.bounds, **CAMERA)
-            for way, two in product(WAYS, (True, False)):
-                drawing = partial(draw_splats, instancing=way, two=two)
+            for way, two, refine in product(WAYS, (True, False), (True, False)):
+                drawing = partial(draw_splats, instancing=way, two=two, refine=refine)
                 render_frame(renderer, Request(pose, camera, packed.backend(few, drawing, ellipses)), surface)
 
 

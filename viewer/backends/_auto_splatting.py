@@ -6,19 +6,24 @@ The ways of the surfels backend, in one pass or in two; normals are those of the
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
+from ..gpu import gl
 from ..gpu.amplify import Points, amplify
-from ..gpu.bindings import Texture
+from ..gpu.bindings import Storage, Texture
 from ..gpu.constants import LEAST_RADIUS
+from ..gpu.context import Gpu
 from ..gpu.fastest import instancing_for
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from .surfels.passes import blend, blend_by_tiles
 from .surfels.splats import FRAGMENT, SURFEL, Splats
-from .surfels.tiles import FALLBACK, show_all, tile_lists
+from .surfels.tiles import FALLBACK, TileLists, show_all, show_smaller, show_with, tile_lists
 
 WAYS = ("tiles", "tbo", "pull")  # how packed points become splats
+_SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it
+_SPARE = 4  # times the rows that there is room for, beyond which room is given up
 _FALLOFF = 4.0  # of the Gaussian mask, which ends where the splat does
 
 
@@ -29,16 +34,17 @@ def draw_splats(
     instancing: str = "auto",
     radius_scale: float = 1.0,
     two: bool = False,
+    refine: bool = True,
     epsilon: float = 1.0,
 ) -> None:
     """Draw points whose `buffers` have "splats" and "looks".
 
     instancing: one of `WAYS`, or "auto", what is fastest on this device. radius_scale: factor on radii. two:
     whether splats that overlap are blended, those at most epsilon radii behind the nearest; else the nearest
-    alone is seen.
+    alone is seen. refine: whether splats of points that others hide are made as small as those.
     """
     splats = _splats(radius_scale, epsilon)
-    _draw(points, surface, splats, _instancing(surface, instancing, two), two)
+    _draw(points, surface, splats, _instancing(surface, instancing, two), two, refine)
     if not two:
         _take_normals(points, surface)
 
@@ -56,18 +62,82 @@ def _splats(radius_scale: float, epsilon: float) -> Splats:
     )
 
 
-def _draw(points: Points, surface: Surface, splats: Splats, way: str, two: bool) -> None:
+def _draw(points: Points, surface: Surface, splats: Splats, way: str, two: bool, refine: bool) -> None:
     lists = tile_lists(points, surface, splats) if way == "tiles" else None
     if lists is not None:
-        show_all(points, surface, lists, splats)
-        if two:
-            large = lists.large_points(points) if lists.large else None
-            blend_by_tiles(points, surface, lists, large, splats)
+        _draw_by_tiles(points, surface, lists, splats, two, refine)
         return
     feed = FALLBACK if way == "tiles" else way
     amplify(points, surface, feed, SURFEL, FRAGMENT, splats)
+    if refine:
+        points = _shrunk(points, surface, splats)
+        amplify(points, surface, feed, SURFEL, FRAGMENT, splats)
     if two:
         blend(points, surface, feed, splats)
+
+
+def _draw_by_tiles(
+    points: Points, surface: Surface, lists: TileLists, splats: Splats, two: bool, refine: bool
+) -> None:
+    large = show_all(points, surface, lists, splats)
+    if refine:
+        points = _shrunk(points, surface, splats, lists)
+        if large is None:
+            show_smaller(surface, lists)
+            surface.stats.counted["refined tiles"] = lists.shown_again
+        else:
+            large = replace(large, buffers=points.buffers)
+            show_with(large, surface, lists, splats)
+    if two:
+        blend_by_tiles(points, surface, lists, large, splats)
+
+
+def _shrunk(points: Points, surface: Surface, splats: Splats, lists: TileLists | None = None) -> Points:
+    """The points, with splats of those that are hidden no larger than what hides them, and so in `lists`.
+
+    Where the nearest surface is sparse, points behind it are the nearest of their pixels, and find neighbors
+    only far away: their splats reach beyond outlines. The paper culls them, draws the others, culls anew by
+    what these show, and draws once more. That opens holes where splats of the nearest surface leave gaps:
+    made small, those behind it still close them, and one depth map more is enough.
+    """
+    gpu = surface.gpu
+    radii = surface.keep(_Radii).reserve(len(points.pose.cloud))
+    defines = {"TILES": int(lists is not None), **points.defines}
+    program = gpu.compute("auto_splats/shrink.comp", defines, params=splats)
+    with gpu.timers.measure("shrink"):
+        gpu.set(program, slack=_SLACK)
+        points.bind(program)
+        surface.bind_textures()
+        radii.buffer.bind_to_storage_buffer(Storage.RADII)
+        if lists is not None:
+            lists.bind_forms()
+        gpu.dispatch(program, points.count)
+    return replace(points, buffers={**points.buffers, "radii": radii})
+
+
+class _Radii:
+    """The radii of a pose's splats as they are drawn, kept with a surface."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self._texels: gl.BufferTexture | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self._texels.buffer.size if self._texels else 0
+
+    def reserve(self, count: int) -> gl.BufferTexture:
+        """Texels for so many rows."""
+        if not 4 * count <= self.nbytes <= 4 * _SPARE * max(count, 1):
+            self.release()
+            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * max(count, 1)), gl.R32F)
+        assert self._texels is not None
+        return self._texels
+
+    def release(self) -> None:
+        """Delete them."""
+        self._gpu.discard(self._texels)
 
 
 def _take_normals(points: Points, surface: Surface) -> None:
@@ -85,6 +155,6 @@ def _instancing(surface: Surface, setting: str, two: bool) -> str:
 
     def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
         points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {name: partial(_draw, points, surface, _splats(1.0, 1.0), name, two) for name in WAYS}
+        return {name: partial(_draw, points, surface, _splats(1.0, 1.0), name, two, False) for name in WAYS}
 
     return instancing_for(surface, setting, "tiles", f"packed splats, {1 + two} passes", WAYS, ways)

@@ -59,8 +59,9 @@ class Points:
     ascending; None: all. enlarged: the factor on their size with which they together cover what all do.
     buffers: in place of the pose's arrays of these names, such as normals that a compute pass found;
     "splats", normal, radius and half-axes of each row in three words, as amplify/packed.glsl reads them,
-    in place of all three; "looks", colour and normal as surfels/passes/look.glsl reads them. elliptical:
-    whether the half-axes of "splats" count; else they are round, of the shorter one.
+    in place of all three, but for the radii where these are given as well; "looks", colour and normal as
+    surfels/passes/look.glsl reads them. elliptical: whether the half-axes of "splats" count; else they
+    are round, of the shorter one.
     """
 
     pose: GpuPose
@@ -111,13 +112,18 @@ class Points:
             "HAS_RADIUS": int(self.use_radii),
             "HAS_AXES": int(self.use_axes),
             "PACKED": int(self.packed),
+            "RADII_APART": int(self.use_radii and (not self.packed or "radii" in self.buffers)),
             "SAMPLED": int(self.rows is not None),
         }
 
     def bind(self, program: Program) -> None:
         """Bind what amplify/texels.glsl reads."""
         self.pose.gpu.set(program, enlarged=self.enlarged)
-        self._bind(*(("positions", "splats") if self.packed else (name for name, _, _ in self.attributes)))
+        if self.packed:
+            self._bind("positions")
+            self.bind_radii()
+        else:
+            self._bind(*(name for name, _, _ in self.attributes))
         if self.rows is not None:
             self.rows.bind(Texture.DRAWN_ROWS)
 
@@ -125,7 +131,7 @@ class Points:
         """Bind what amplify/radii.glsl reads."""
         if self.packed:
             self._bind("splats")
-        elif self.use_radii:
+        if self.defines["RADII_APART"]:
             self._bind("radii")
 
     def _bind(self, *names: str) -> None:

@@ -61,11 +61,6 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
-    # Neighborhoods, beside splats.
-    SLOTS = auto()  # participants in the order of their cells
-    ACTIVE = auto()
-    USUAL = auto()
-    COUNTS = auto()
     # Samples of range views.
     RANGE_DEPTHS = auto()
     RANGE_LOOKS = auto()
@@ -122,18 +117,10 @@ class Storage(IntEnum):
     FORMS = 3
     REACH = 4
     LARGE = 5
+    AGAIN = 6
     FARTHEST = 7
-    # Neighborhoods and their splats, beside a list.
-    SPLATS = 0
-    FOUND = 1
-    SLOTS = 0
-    DRAWN_ROWS = 1
-    ACTIVE = 0
-    USUAL = 0
-    LOOKS = 6
-    TOTALS = 4
-    COUNTS = 5
-    NEXT = 5
+    # Splats that become smaller, beside the forms of tiles.
+    RADII = 4
     # Samples of range views: a level that is made.
     RANGE_DEPTHS = 0
     RANGE_LOOKS = 1

@@ -64,6 +64,8 @@ float form_at(Column c, float y) {
     return form;
 }
 
+bool is_inside(float form, float key) { return form <= (PERSPECTIVE != 0 ? key * key : 1.0); }
+
 // No `continue` in a loop over pixels: Mesa would not unroll it, arrays would go to memory, and each loop be slower.
 void take_nearest(ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
@@ -71,8 +73,7 @@ void take_nearest(ivec2 part) {
         Column c = column_of(row);
         for (int k = 0; k < ROWS; ++k) {
             float y = down_at(c, k), here = key_at(c, y);
-            bool inside = form_at(c, y) <= (PERSPECTIVE != 0 ? here * here : 1.0);
-            bool better = inside && (here > best[k] || (here == best[k] && row < shown[k]));
+            bool better = is_inside(form_at(c, y), here) && (here > best[k] || (here == best[k] && row < shown[k]));
             best[k] = better ? here : best[k];
             shown[k] = better ? row : shown[k];
         }

@@ -39,7 +39,7 @@ _ROOM = 4  # entries of the list for each point, to begin with
 _LONGEST = 30_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
 _LARGE_HEAD = 16  # bytes before the rows of large discs
-_WORK_HEAD = 16  # bytes before the tiles that discs reach
+_WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
 FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 
@@ -60,7 +60,8 @@ class TileLists:
         words = self.tiles[0] * self.tiles[1]
         self._bins = Bins(gpu, words)
         self._textures = {"farthest": self._texture(4 * words, gl.R32UI)}
-        self._textures["work"] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
+        for name in ("work", "again"):
+            self._textures[name] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
         self._large_rows: gl.BufferTexture | None = None
 
     @property
@@ -116,14 +117,34 @@ class TileLists:
         self._large_rows = gl.BufferTexture(self._gpu.ctx.buffer(np.sort(rows)), gl.R32UI)
         return replace(points, rows=self._large_rows, count=self.large)
 
-    def run(self, program: moderngl.ComputeShader) -> None:
-        """Run a program that includes surfels/tiles/nearest.glsl on the tiles that discs reach."""
-        for name in ("places", "forms", "work"):
+    def run(self, program: moderngl.ComputeShader, again: bool = False) -> None:
+        """Run a program that includes surfels/tiles/nearest.glsl on the tiles that discs reach. again: on
+        those of them that are to be shown again."""
+        work = "again" if again else "work"
+        for name in ("places", "forms"):
             self._textures[name].bind(Texture[name.upper()])
+        self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
         self._bins.items.bind(Texture.LISTED)
         self._bind_storage("farthest")
-        self._gpu.dispatch_indirect(program, self._buffer("work"))
+        self._gpu.dispatch_indirect(program, self._buffer(work))
+
+    def bind_forms(self) -> None:
+        """Bind the forms of discs for shaders to change them."""
+        self._bind_storage("forms")
+
+    def start_again(self) -> None:
+        """Empty, and bind, the list of tiles that are to be shown again."""
+        self._buffer("again").write(struct.pack("4I", 0, 0, 1, 0))
+        gl.clear_words(self.farthest, 0)
+        self._bind_storage("again")
+
+    def shown_again(self) -> dict[str, int]:
+        """How many tiles of those that discs reach were shown again; waits for the GPU."""
+        worked, again = (
+            int.from_bytes(self._buffer(name).read(4, offset=12), "little") for name in ("work", "again")
+        )
+        return {"in": worked, "again": again}
 
     def release(self) -> None:
         """Delete everything."""
@@ -206,11 +227,24 @@ def show_all(
     lists: TileLists,
     splats: Splats,
     farthest: bool = False,
+) -> Points | None:
+    """The nearest disc at each pixel of those listed and of the large ones, which it returns; None where
+    there are none. farthest: as in `show`."""
+    large = lists.large_points(points) if lists.large else None
+    if large is None:
+        show(surface, lists, farthest=farthest)
+    else:
+        show_with(large, surface, lists, splats, farthest)
+    return large
+
+
+def show_with(
+    large: Points, surface: Surface, lists: TileLists, splats: Splats, farthest: bool = False
 ) -> None:
-    """The nearest disc at each pixel of those listed and of the large ones. farthest: as in `show`."""
-    if lists.large:
-        amplify(lists.large_points(points), surface, FALLBACK, SURFEL, FRAGMENT, splats)
-    show(surface, lists, found=lists.large > 0, farthest=farthest)
+    """The nearest disc at each pixel of those listed and of others, which are rasterised. farthest: as in
+    `show`."""
+    amplify(large, surface, FALLBACK, SURFEL, FRAGMENT, splats)
+    show(surface, lists, found=True, farthest=farthest)
 
 
 def show(surface: Surface, lists: TileLists, found: bool = False, farthest: bool = False) -> None:
@@ -231,9 +265,10 @@ def run(
     defines: Mapping[str, object],
     first: Points | None = None,
     splats: Splats | None = None,
+    again: bool = False,
 ) -> None:
     """Run surfels/tiles/NAME.comp on the tiles that have lists. first: the points of the first pass, where it
-    reads their radii, and splats: how they were drawn."""
+    reads their radii, and splats: how they were drawn. again: only on tiles that are to be shown again."""
     gpu = surface.gpu
     rows, tiles = _mapping(gpu)
     perspective = int(surface.view.perspective)
@@ -243,7 +278,15 @@ def run(
         if first is not None:
             bind_visible(first, program)
         surface.bind_storage()
-        lists.run(program)
+        lists.run(program, again)
+
+
+def show_smaller(surface: Surface, lists: TileLists) -> None:
+    """Show the tiles again in which a pixel shows a disc that does not reach it any more, now that some have
+    become smaller."""
+    lists.start_again()
+    run("again", surface, lists, {})
+    run("show", surface, lists, {"FOUND": 0, "FARTHEST": 0, "FILL": 0, "LARGE": 0}, again=True)
 
 
 def _mapping(gpu: Gpu) -> tuple[int, int]:

@@ -1,0 +1,24 @@
+// Lists the tiles in which a pixel shows a disc that does not reach it, each once, with a dispatch of TILES in a work
+// group.
+#include "surfels/tiles/nearest.glsl"
+
+layout(std430, binding = STORAGE_FARTHEST) buffer Flags { uint flags[]; };  // 1: the tile is listed
+layout(std430, binding = STORAGE_AGAIN) buffer Again { uint groups_x, groups_y, groups_z, again_count, again[]; };
+
+void main() {
+    int tile = this_tile();
+    if (tile < 0) return;
+    bool changes = false;
+    for (int k = 0; k < ROWS; ++k) {
+        uint row = in_picture(k) ? rows[index_of(k)] : NOTHING;
+        if (row == NOTHING) continue;
+        Column c = column_of(row);
+        float y = down_at(c, k);
+        changes = changes || !is_inside(form_at(c, y), key_at(c, y));
+    }
+    if (!changes || atomicExchange(flags[tile], 1u) == 1u) return;
+    uint at = atomicAdd(again_count, 1u), groups = (at + uint(TILES)) / uint(TILES);
+    again[at] = uint(tile);
+    atomicMax(groups_x, min(groups, 1024u));
+    atomicMax(groups_y, (groups + 1023u) / 1024u);
+}
