@@ -6,6 +6,7 @@ TYPE_CHECKING = False  # as `typing` has it, which takes its time to import
 if TYPE_CHECKING:
     from typing import Any
 
+    from .analysis.visible_normals import VisibleNormals, estimate_normals
     from .camera import Camera
     from .errors import Scan4DError
     from .gpu.surface import Surface
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
-    "Camera", "Layers", "Look", "PointCloud", "Pose", "RangeView", "Rigid", "Scan4DError", "open_scan",
-    "render",
+    "Camera", "Layers", "Look", "PointCloud", "Pose", "RangeView", "Rigid", "Scan4DError", "VisibleNormals",
+    "estimate_normals", "open_scan", "render",
 ]  # fmt: skip
 
 _HOMES = {
@@ -32,6 +33,8 @@ _HOMES = {
     "RangeView": "scan.range_view",
     "Rigid": "rigid",
     "Scan4DError": "errors",
+    "VisibleNormals": "analysis.visible_normals",
+    "estimate_normals": "analysis.visible_normals",
     "open_scan": "scan.open",
 }
 

@@ -1,18 +1,18 @@
-// A splat in three words. The normal's (0: none); the bits of its radius, of an ellipse the shorter half-axis; and of
+// A splat in three words. The normal's; the bits of its radius, of an ellipse the shorter half-axis; and of
 // the longer one: its angle, 0 to 1 for half a turn, and what it makes of the shorter one's length, 1 where it is round.
 #include "common/octahedron.glsl"
 #include "common/tangent.glsl"
 
 const uint ROUND = 0xFFFFu;
 
-vec3 packed_normal(uvec3 words) { return unpack_normal(words.x); }
+vec3 packed_normal(uvec3 words) { return unfolded(unpackSnorm2x16(words.x)); }
 
 float packed_radius(uvec3 words) { return uintBitsToFloat(words.y); }
 
 // The longer half-axis, and the shorter one's length, which is given; 0 where the splat is round.
 vec4 packed_axes(uvec3 words, float shorter) {
     vec3 n = packed_normal(words);
-    if (words.z >> 16 == ROUND || words.x == 0u) return vec4(0.0);
+    if (words.z >> 16 == ROUND) return vec4(0.0);
     vec2 axis = unpackUnorm2x16(words.z);
     float angle = axis.x * 3.14159265;
     vec3 u = tangent_of(n), v = cross(n, u);

@@ -12,6 +12,7 @@ precise vec3 disc_u, disc_v;  // half-axes at the cut-off, view space
 
 // False where it shows nothing: it faces away and such are left out, or it is thinner than a line.
 bool begin_disc(Point point) {
+    if (!has_splat(point)) return false;
     disc_center = to_view(point.position);
     float radius = splat_reach(point, -disc_center.z);
     disc_area = radius * radius * mask_limit;

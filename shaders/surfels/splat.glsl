@@ -11,6 +11,15 @@ float splat_radius(float stored, float depth) {
     return max(radius * radius_scale * enlarged, least_radius / scale_at(max(depth, view_near)));
 }
 
+// Points of which a compute pass made no splat have a radius of 0.
+bool has_splat(Point point) {
+#if PACKED
+    return point.radius > 0.0;
+#else
+    return true;
+#endif
+}
+
 // From a splat's centre towards the eye, view space.
 vec3 towards_eye(vec3 center) {
     return view_perspective ? -center : vec3(0.0, 0.0, 1.0);

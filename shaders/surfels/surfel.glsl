@@ -5,6 +5,7 @@ vec3 surfel_u, surfel_v;  // half edges, view space
 vec3 surfel_center;
 
 bool begin_shape(Point point) {
+    if (!has_splat(point)) return false;
     surfel_center = to_view(point.position);
     float depth = -surfel_center.z;
     vec3 to_eye = towards_eye(surfel_center);

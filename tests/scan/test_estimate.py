@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.estimate import estimate_normals, estimate_radii, fake_color
+from viewer.scan.estimate import cloud_normals, cloud_radii, fake_color
 from viewer.scan.points import PointCloud
 
 
@@ -32,7 +32,7 @@ def cosines(a: NDArray, b: NDArray) -> NDArray:
 
 def test_normals_of_a_sphere_are_the_analytic_ones_and_point_out() -> None:
     points = sphere()
-    normals = estimate_normals(PointCloud.from_arrays(points))
+    normals = cloud_normals(PointCloud.from_arrays(points))
     assert normals.dtype == np.float32
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-6)
     angles = np.degrees(np.arccos(np.clip(cosines(normals, points), -1, 1)))
@@ -43,15 +43,15 @@ def test_normals_of_a_sphere_are_the_analytic_ones_and_point_out() -> None:
 def test_normals_face_a_viewpoint_given_in_absolute_units() -> None:
     center = np.array([1000, 0, 0])
     points = sphere() + center
-    normals = estimate_normals(PointCloud.from_arrays(points), viewpoint=center)
+    normals = cloud_normals(PointCloud.from_arrays(points), viewpoint=center)
     assert cosines(normals, points - center).max() < -0.99
 
 
 def test_normals_of_a_sheet_face_the_front() -> None:
     x, y = np.random.default_rng(2).uniform(-1, 1, (2, 20_000))
     wave = np.stack([x, y, 0.2 * np.sin(4 * x) * np.cos(3 * y)], axis=1)
-    assert estimate_normals(PointCloud.from_arrays(wave))[:, 2].min() > 0
-    flat = estimate_normals(PointCloud.from_arrays(grid()))
+    assert cloud_normals(PointCloud.from_arrays(wave))[:, 2].min() > 0
+    flat = cloud_normals(PointCloud.from_arrays(grid()))
     assert flat == pytest.approx(np.tile([0, 0, 1], (1600, 1)), abs=1e-6)
 
 
@@ -62,30 +62,30 @@ def test_normals_of_real_bodies_point_out(data_dir: Path, model: str) -> None:
     mesh = io.read_triangle_mesh(str(data_dir / "models" / model))
     mesh.compute_vertex_normals()
     agreement = cosines(
-        estimate_normals(formats.read(data_dir / "models" / model)), np.array(mesh.vertex_normals)
+        cloud_normals(formats.read(data_dir / "models" / model)), np.array(mesh.vertex_normals)
     )
     assert np.mean(agreement[np.abs(agreement) > 0.7] > 0) > 0.998
 
 
 def test_real_noisy_hands(data_dir: Path) -> None:
     cloud = formats.read(data_dir / "sequences" / "hands_knot_5" / "00001.ply")
-    normals, radii = estimate_normals(cloud), estimate_radii(cloud)
+    normals, radii = cloud_normals(cloud), cloud_radii(cloud)
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-6)
     assert 0.0005 < radii.min() < np.median(radii) < 0.003  # metres, of points about a millimetre apart
     assert radii.max() < 0.05
-    facing = estimate_normals(cloud, viewpoint=(0, 0, 1))
+    facing = cloud_normals(cloud, viewpoint=(0, 0, 1))
     assert cosines(facing, np.array([0, 0, 1]) - cloud.world()).min() >= -1e-6
 
 
 def test_normals_far_from_the_origin_are_those_at_the_origin() -> None:
     points = np.round(sphere(2000) * 2**12) / 2**12  # exact after the shift
-    here = estimate_normals(PointCloud.from_arrays(points))
-    there = estimate_normals(PointCloud.from_arrays(points + np.array([2**19, 2**22, 0])))
+    here = cloud_normals(PointCloud.from_arrays(points))
+    there = cloud_normals(PointCloud.from_arrays(points + np.array([2**19, 2**22, 0])))
     assert there == pytest.approx(here, abs=1e-3)
 
 
 def test_radii_of_a_grid_follow_its_spacing() -> None:
-    radii = estimate_radii(PointCloud.from_arrays(grid(spacing=0.25))).reshape(40, 40)
+    radii = cloud_radii(PointCloud.from_arrays(grid(spacing=0.25))).reshape(40, 40)
     assert radii[2:-2, 2:-2] == pytest.approx(0.25 * np.sqrt(2))
 
 
@@ -96,19 +96,19 @@ def test_radii_are_the_brute_force_ones() -> None:
     nearest = np.argsort(distances, axis=1)[:, :8]
     radii = np.take_along_axis(distances, nearest, axis=1)[:, 7]
     usual = np.median(radii[nearest], axis=1)
-    assert estimate_radii(cloud, k=7) == pytest.approx(np.clip(radii, usual / 2, usual * 2), rel=1e-6)
+    assert cloud_radii(cloud, k=7) == pytest.approx(np.clip(radii, usual / 2, usual * 2), rel=1e-6)
 
 
 def test_duplicates_change_nothing() -> None:
     points = sphere(1000).astype(np.float32)
     many = np.repeat(points, 20, axis=0)
-    for estimate in (estimate_normals, estimate_radii):
+    for estimate in (cloud_normals, cloud_radii):
         once, often = estimate(PointCloud.from_arrays(points)), estimate(PointCloud.from_arrays(many))
         assert often == pytest.approx(np.repeat(once, 20, axis=0), abs=1e-6)
 
 
 def test_a_stray_point_gets_no_huge_splat() -> None:
-    radii = estimate_radii(PointCloud.from_arrays(np.vstack([grid(), [[20, 20, 500]]])))
+    radii = cloud_radii(PointCloud.from_arrays(np.vstack([grid(), [[20, 20, 500]]])))
     assert radii.max() < 10
 
 
@@ -133,7 +133,7 @@ def test_degenerate_clouds_give_unit_normals_and_positive_radii(
     points: NDArray, viewpoint: tuple[float, float, float] | None
 ) -> None:
     cloud = PointCloud.from_arrays(np.asarray(points, np.float64))
-    normals, radii = estimate_normals(cloud, viewpoint=viewpoint), estimate_radii(cloud)
+    normals, radii = cloud_normals(cloud, viewpoint=viewpoint), cloud_radii(cloud)
     assert normals.shape == (len(points), 3)
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-5)
     assert radii.shape == (len(points),)
@@ -143,14 +143,14 @@ def test_degenerate_clouds_give_unit_normals_and_positive_radii(
 
 def test_normals_across_a_line() -> None:
     direction = np.array([1, 2, 3]) / np.sqrt(14)
-    normals = estimate_normals(PointCloud.from_arrays(np.outer(np.arange(30.0), direction)))
+    normals = cloud_normals(PointCloud.from_arrays(np.outer(np.arange(30.0), direction)))
     assert normals @ direction == pytest.approx(0, abs=1e-3)
 
 
 @pytest.mark.parametrize("viewpoint", [(0, 0), (0, 0, np.nan)])
 def test_an_unusable_viewpoint(viewpoint: tuple[float, ...]) -> None:
     with pytest.raises(InputError, match="is not a viewpoint"):
-        estimate_normals(PointCloud.from_arrays(grid(3)), viewpoint=viewpoint)
+        cloud_normals(PointCloud.from_arrays(grid(3)), viewpoint=viewpoint)
 
 
 def test_fake_color_tells_the_direction() -> None:

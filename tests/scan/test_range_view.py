@@ -11,7 +11,7 @@ from range_scenes import LENSES, shape_view, sphere_view
 
 from viewer.errors import InputError
 from viewer.scan.colors import linear_from_srgb8, srgb8_from_linear
-from viewer.scan.estimate import estimate, estimate_normals
+from viewer.scan.estimate import cloud_normals, estimate
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView, mask_of, merge, up_axis
 
@@ -141,7 +141,7 @@ def test_noise_hurts_normals_of_the_grid_no_more_than_those_of_neighbours() -> N
     outward = view.positions()
     errors = [
         np.median(np.arccos(np.clip(np.abs(np.einsum("ij,ij->i", normals, outward)), 0, 1)))
-        for normals in (noisy.normals(), estimate_normals(noisy.points()))
+        for normals in (noisy.normals(), cloud_normals(noisy.points()))
     ]
     assert errors[0] <= 1.05 * errors[1]
     assert np.degrees(errors[0]) < 3

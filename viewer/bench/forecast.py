@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..scan.estimate import estimate_normals
+from ..scan.estimate import cloud_normals
 from .plan import Group
 from .run import PREPARED, Bench
 from .scenes import catalog
@@ -67,5 +67,5 @@ def _estimating() -> float:
     """The seconds that estimating normals takes for a point."""
     cloud = catalog.subject(_REHEARSED, None).moment(0).pose.cloud
     start = time.perf_counter()
-    estimate_normals(replace(cloud, normals=None))
+    cloud_normals(replace(cloud, normals=None))
     return (time.perf_counter() - start) / len(cloud)

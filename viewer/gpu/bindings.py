@@ -61,6 +61,11 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
+    # Neighborhoods, beside splats.
+    SLOTS = auto()  # participants in the order of their cells
+    ACTIVE = auto()
+    USUAL = auto()
+    COUNTS = auto()
     # Samples of range views.
     RANGE_DEPTHS = auto()
     RANGE_LOOKS = auto()
@@ -119,6 +124,17 @@ class Storage(IntEnum):
     LARGE = 5
     AGAIN = 6
     FARTHEST = 7
+    # Neighborhoods and their splats, beside a list.
+    SPLATS = 0
+    FOUND = 1
+    SLOTS = 0
+    DRAWN_ROWS = 1
+    ACTIVE = 0
+    USUAL = 0
+    LOOKS = 6
+    TOTALS = 4
+    COUNTS = 5
+    NEXT = 5
     # Splats that become smaller, beside the forms of tiles.
     RADII = 4
     # Samples of range views: a level that is made.

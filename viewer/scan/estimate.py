@@ -31,19 +31,17 @@ _GRID = 1024  # cells along an axis at most
 
 
 def estimate(pose: Pose, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
-    """The attributes named, "normals" and "radii", by name. See `estimate_normals`, `estimate_radii`; the
+    """The attributes named, "normals" and "radii", by name. See `cloud_normals`, `cloud_radii`; the
     normals of range views are those of their grids (`merged_normals`)."""
-    work = {"normals": _normals, "radii": lambda pose: estimate_radii(pose.cloud)}
+    work = {"normals": _normals, "radii": lambda pose: cloud_radii(pose.cloud)}
     return {name: work[name](pose) for name in names}
 
 
 def _normals(pose: Pose) -> NDArray[np.float32]:
-    return merged_normals(pose.views, pose.cloud) if pose.views else estimate_normals(pose.cloud)
+    return merged_normals(pose.views, pose.cloud) if pose.views else cloud_normals(pose.cloud)
 
 
-def estimate_normals(
-    cloud: PointCloud, k: int = 16, viewpoint: ArrayLike | None = None
-) -> NDArray[np.float32]:
+def cloud_normals(cloud: PointCloud, k: int = 16, viewpoint: ArrayLike | None = None) -> NDArray[np.float32]:
     """Unit normals of the planes through each point's k nearest neighbours, (N, 3) float32.
 
     viewpoint: (3,), where the scanner stood, in absolute scan units: normals face it. None:
@@ -70,7 +68,7 @@ def estimate_normals(
     return normals.astype(np.float32)[copies]
 
 
-def estimate_radii(cloud: PointCloud, k: int = 7) -> NDArray[np.float32]:
+def cloud_radii(cloud: PointCloud, k: int = 7) -> NDArray[np.float32]:
     """Splat radii that close the surface between points, (N,) float32, scan units, above 0.
 
     The distance to the k-th nearest other point, so that about k splats overlap at each place

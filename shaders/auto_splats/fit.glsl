@@ -1,0 +1,86 @@
+// The plane through a neighborhood by linear regression (Preiner 2012, 6), and its splat.
+#include "common/octahedron.glsl"
+#include "common/tangent.glsl"
+#include "auto_splats/eigen.glsl"
+
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+#if HAS_COLORS
+layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
+#endif
+#if BY_SCANNER
+layout(binding = TEXTURE_RANGE_VIEWS) uniform samplerBuffer range_views;  // its eye, and its first row
+#endif
+layout(std430, binding = STORAGE_SPLATS) writeonly buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
+layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; };  // as surfels/passes/look.glsl does
+layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
+
+const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
+const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
+const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
+
+// Means are of offsets from the point, over the neighborhood's radius: small numbers, whatever the scan's
+// place and size.
+vec3 fit_plane(vec3 place, Extent extent, out mat3 vectors) {
+    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0;
+    vec3 offsets[K], mean = vec3(0.0);
+    for (int k = 0; k < K; ++k) {
+        bool counts = k < extent.count;
+        vec3 offset = (texelFetch(positions, counts ? int(near_rows[k]) : 0).xyz * unit - place) * scale;
+        offsets[k] = counts ? offset : vec3(0.0);
+        mean += offsets[k];
+    }
+    mean /= float(extent.count);
+    vec3 squares = vec3(0.0), products = vec3(0.0);
+    for (int k = 0; k < K; ++k) {
+        vec3 d = k < extent.count ? offsets[k] - mean : vec3(0.0);
+        squares += d * d;
+        products += d.yzx * d.zxy;
+    }
+    return eigen(squares, products, vectors);
+}
+
+// What a normal of this place points to, along the pose's axes.
+vec3 seen_from(uint row) {
+    vec3 place = texelFetch(positions, int(row)).xyz;
+#if BY_SCANNER
+    vec3 scanner = vec3(0.0);
+    for (int i = 0; i < SCANNERS; ++i) {
+        vec4 view = texelFetch(range_views, i);
+        if (row >= floatBitsToUint(view.w)) scanner = view.xyz;
+    }
+    return scanner - place;
+#else
+    return transpose(mat3(world_to_view)) * (view_perspective ? -to_view(place) : vec3(0.0, 0.0, 1.0));
+#endif
+}
+
+// Which way a splat's longer half-axis lies, and how round it is, as amplify/packed.glsl has it.
+uint pack_axes(vec3 normal, vec3 longer, float roundness) {
+    vec3 u = tangent_of(normal), v = cross(normal, u);
+    float angle = atan(dot(longer, v), dot(longer, u)) / 3.14159265;
+    return packUnorm2x16(vec2(angle < 0.0 ? angle + 1.0 : angle, max(roundness, LEAST_ROUND)));
+}
+
+void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
+    mat3 vectors;
+    vec3 values = max(fit_plane(place, extent, vectors), 0.0), to_eye = seen_from(row);
+    vec3 normal = vectors[0];
+    if (values.y <= COLLINEAR * values.z) {
+        // Of points on a line, or one: what faces the eye most.
+        vec3 along = values.z > 0.0 ? vectors[2] : vec3(0.0);
+        normal = normalize(to_eye - dot(to_eye, along) * along);
+    }
+    if (dot(normal, to_eye) < 0.0) normal = -normal;
+    bool is_outlier = extent.count == 1 && alone < UNKNOWN;
+    float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
+    float splat = max(2.0 * radius * inversesqrt(float(extent.count)), LEAST);
+    splats[3u * row] = packSnorm2x16(folded(normal));
+    splats[3u * row + 1u] = is_outlier ? 0u : floatBitsToUint(splat);
+    splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);
+#if HAS_COLORS
+    looks[2u * row] = packUnorm4x8(vec4(texelFetch(colors, int(row)).rgb, 0.0));
+#endif
+    uvec3 steps = uvec3(roundEven(normal * 511.0 + 512.0));
+    looks[2u * row + 1u] = steps.x | steps.y << 10 | steps.z << 20;
+    found[n] = vec4(radius, extent.count, sum > 0.0 ? values.x / sum : 0.0, usual_radius);
+}

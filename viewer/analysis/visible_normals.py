@@ -1,0 +1,125 @@
+"""Visible normals: what a camera sees of a scan's points, with normals found from their positions alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..backends.auto_splats.neighborhoods import Neighborhoods, Search
+from ..camera import Camera
+from ..errors import InputError
+from ..frame import shared_renderer
+from ..geometry import UP
+from ..gpu.constants import UNKNOWN
+from ..gpu.surface import Surface
+from ..scan.pods import first_camera
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from ..view import View
+
+_MOST_NEIGHBORS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class VisibleNormals:
+    """Points that a camera sees, by their ids ascending, and what their neighborhoods tell.
+
+    ids:        (M,) uint32, index in the file
+    rows:       (M,) uint32, row in the cloud's arrays
+    normals:    (M, 3) float32, unit length, world space, towards the eye
+    radii:      (M,) float32, distance of a neighborhood's farthest point, scan units: r_k where counts is k
+    counts:     (M,) int64, points of a neighborhood, the point itself among them: k, or fewer before a gap
+    curvatures: (M,) float32, the least eigenvalue of the covariance over the sum of all, 0 to 1/3
+    usual:      (M,) float32, the radius that should hold k points by how dense the picture is there
+    outliers:   (M,) bool, no other point within 2^expansions of the usual radius
+    neighbors:  (P,) uint32, rows of all that could be neighbors: seen, and with `layers` hidden ones too
+    """
+
+    ids: NDArray[np.uint32]
+    rows: NDArray[np.uint32]
+    normals: NDArray[np.float32]
+    radii: NDArray[np.float32]
+    counts: NDArray[np.int64]
+    curvatures: NDArray[np.float32]
+    usual: NDArray[np.float32]
+    outliers: NDArray[np.bool_]
+    neighbors: NDArray[np.uint32]
+
+    @property
+    def splat_radii(self) -> NDArray[np.float32]:
+        """(M,) float32: twice the radius of the disc that is a point's share of its neighborhood."""
+        shares = 2 * self.radii / np.sqrt(self.counts)
+        return shares.astype(np.float32)
+
+
+def estimate_normals(
+    pose: Pose | PointCloud,
+    camera: Camera | None = None,
+    *,
+    size: tuple[int, int] = (1760, 900),
+    k: int = 10,
+    layers: bool = True,
+    expansions: int | None = 3,
+    growth: float = 4.0,
+) -> VisibleNormals:
+    """Normals of the points that a picture of this size shows (Preiner 2012, 4 to 6).
+
+    A neighborhood is the k nearest points in space of those that take part, ties by the lowest row. It ends
+    before a gap: let d_1 = 0, d_2, ... be the distances of the points by size, and u the usual radius; a
+    point with d_2 > 2^expansions u is an outlier, and the first j from 2 on with d_{j+1} > sqrt(growth)
+    max(d_j, u) is the count.
+
+    camera: None fits the pose from the front. layers: whether points that another hides take part which is
+    at most some neighborhoods nearer. expansions: None: there are no outliers. Raises InputError,
+    NoOpenGLError.
+    """
+    if not 3 <= k <= _MOST_NEIGHBORS:
+        raise InputError(f"a neighborhood of {k} points; from 3 to {_MOST_NEIGHBORS} are possible")
+    if growth < 1:
+        raise InputError(f"a growth of {growth:g} is less than 1")
+    if isinstance(pose, PointCloud):
+        pose = Pose(0, 0.0, "points", pose)
+    renderer = shared_renderer()
+    resident = renderer.resident(pose)
+    bounds = resident.bounds
+    camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.up or UP)
+    surface = Surface(renderer.gpu, size)
+    view = View.of(camera, size, resident.origin, bounds)
+    surface.start(resident, view)
+    found = surface.keep(Neighborhoods)
+    alone = UNKNOWN if expansions is None else 2.0**expansions
+    found.find(resident, surface, view, Search(k, layers, math.inf, growth, alone))
+    return _read(resident.cloud, found, expansions is not None)
+
+
+def _read(cloud: PointCloud, found: Neighborhoods, drops: bool) -> VisibleNormals:
+    rows = found.read("drawn", np.uint32, 1)[: found.count, 0]
+    order = np.argsort(rows)
+    rows = rows[order]
+    radii, counts, curvatures, usual = found.read("found", np.float32, 4)[: found.count][order].T
+    words = found.read("splats", np.uint32, 3)[rows, 0]
+    return VisibleNormals(
+        ids=rows if cloud.ids is None else cloud.ids[rows],
+        rows=rows,
+        normals=_unfolded(words),
+        radii=radii,
+        counts=counts.astype(np.int64),
+        curvatures=curvatures,
+        usual=usual,
+        outliers=(counts == 1) & drops,
+        neighbors=np.sort(found.read("slots", np.uint32, 4)[: found.participants, 3]),
+    )
+
+
+def _unfolded(words: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Unit normals (N, 3) of words as shaders/common/octahedron.glsl packs them."""
+    net = np.maximum(
+        np.stack([words & 0xFFFF, words >> 16], 1).astype(np.uint16).view(np.int16) / 32767, -1.0
+    )
+    z = 1 - np.abs(net).sum(1)
+    under = np.maximum(-z, 0)[:, None]
+    normals = np.column_stack([net - np.where(net < 0, -under, under), z])
+    return (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)

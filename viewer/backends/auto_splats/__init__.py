@@ -1,0 +1,152 @@
+"""Splats from bare positions, found anew for each picture from the points that it shows.
+
+Preiner 2012. Points are projected; each one that is seen finds its nearest neighbors among them in space, a
+plane through these, and a splat as large as they are apart. Neighborhoods are exact, so that they do not
+change with the view (`neighborhoods.py`); points that another hides take part, so that none is missed at
+outlines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ...gpu.amplify import Points
+from ...gpu.constants import UNKNOWN
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Surface
+from ...params import param
+from ...scan.pose import Pose
+from .. import FrameView, Limit
+from .._auto_splatting import WAYS, draw_splats
+from .neighborhoods import Neighborhoods, Search
+
+TITLE = "Auto splats"
+BLENDS = True
+
+_BY_STEPS = "normals are blended as whole numbers of 1/511, which turn with the scan"
+_HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
+_NO_SURFACE = "points on a line make no surface, and how wide it is goes by the last bit"
+LIMITS = {
+    "rotated by 37 degrees": Limit(0.0005, _BY_STEPS),
+    "points x1000, one after the other": Limit(0.02, _HIDDEN_COPIES),
+    "points x1000, all over again": Limit(0.02, _HIDDEN_COPIES),
+    "collinear points end on, perspective": Limit(0.04, _NO_SURFACE),
+    "collinear points end on, orthographic": Limit(0.04, _NO_SURFACE),
+}
+
+_NEIGHBORS, _SPLATS, _SPEED = "Neighbors", "Splats", "Speed"
+_ACTIVE_SIDES = 2.0
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of auto splats."""
+
+    k: int = param(
+        10,
+        "Points of a neighborhood, the point itself among them: more smooth away noise, fewer keep details",
+        low=3,
+        high=64,
+        sweep=(6, 10, 20),
+        group=_NEIGHBORS,
+    )
+    layers: bool = param(
+        True, "Points that another one of about the same surface hides are neighbors too", group=_NEIGHBORS
+    )
+    outliers: bool = param(False, "Show points that have no neighbors near", key="Shift+O", group=_NEIGHBORS)
+    expansions: int = param(
+        3,
+        "How often the usual radius is doubled in search of a second point, before one counts as an outlier",
+        low=0,
+        high=10,
+        group=_NEIGHBORS,
+        when={"outliers": (False,)},
+    )
+    growth: float = param(
+        4.0,
+        "A neighborhood ends before k where its area could be so many times as large without a further point",
+        low=1,
+        high=100,
+        group=_NEIGHBORS,
+    )
+    orient: str = param(
+        "eye",
+        "Which side normals point to: the eye's, or that of the range view that saw the point",
+        choices=("eye", "scanner"),
+        group=_NEIGHBORS,
+    )
+    passes: str = param(
+        "two",
+        "one: the nearest splat is seen; two: those close behind it are blended with it",
+        choices=("one", "two"),
+        group=_SPLATS,
+    )
+    elliptical: bool = param(
+        False, "Splats are longer where neighbors are farther apart, else round", group=_SPLATS
+    )
+    radius_scale: float = param(
+        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group=_SPLATS
+    )
+    cull: bool = param(
+        False,
+        "Leave out points far behind the nearest around them, until they turn out to be seen",
+        affects="speed",
+        group=_SPEED,
+    )
+    instancing: str = param(
+        "auto",
+        "How points become splats. auto: what is fastest on this device",
+        choices=("auto", *WAYS),
+        affects="speed",
+        group=_SPEED,
+    )
+
+
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
+    """Nothing but positions."""
+    return ()
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
+    params: Params = frame.params
+    if not len(pose.cloud):
+        surface.clear()
+        return False
+    found = surface.keep(Neighborhoods)
+    search = search_of(params, pose)
+    found.find(pose, surface, frame.view, search, frame.share)
+    if not found.count:
+        surface.clear()
+        return surface.stats.share < 1
+    if params.cull:
+        _draw(pose, found, surface, params, two=False)
+        found.find_late(pose, surface, search)
+    _draw(pose, found, surface, params, two=params.passes == "two")
+    return surface.stats.share < 1
+
+
+def _draw(pose: GpuPose, found: Neighborhoods, surface: Surface, params: Params, two: bool) -> None:
+    buffers = {name: found[name] for name in ("splats", "looks")}
+    points = Points(
+        pose,
+        use_radii=True,
+        count=found.count,
+        rows=found["drawn"],
+        buffers=buffers,
+        elliptical=params.elliptical,
+    )
+    draw_splats(points, surface, instancing=params.instancing, radius_scale=params.radius_scale, two=two)
+
+
+def search_of(params: Params, pose: GpuPose) -> Search:
+    """The search that parameters ask for."""
+    return Search(
+        k=params.k,
+        layers=params.layers,
+        active_sides=_ACTIVE_SIDES if params.cull else math.inf,
+        growth=params.growth,
+        alone=UNKNOWN if params.outliers else 2.0**params.expansions,
+        by_scanner=params.orient == "scanner" and bool(pose.views),
+    )

@@ -1,0 +1,68 @@
+"""Grids over a picture: small cells that points are listed by, and coarse ones for what is known around."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .neighborhoods import Search
+
+FINEST_COARSE, COARSEST = 4, 7  # shifts of coarse cells: 16 to 128 pixels
+_COARSEST_FINE = 4
+_FINE = 0.5  # edge of fine cells, in usual radii
+
+
+@dataclass(frozen=True)
+class Grids:
+    """The grids, and what else their shaders read (shaders/auto_splats/place.glsl).
+
+    Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
+    pixels round the picture whose points take part. unit: factor on places, a power of two. active_sides,
+    growth, alone: as `Search` has them.
+    """
+
+    fine_size: tuple[int, int]
+    coarse_size: tuple[int, int]
+    fine_shift: int
+    coarse_shift: int
+    margin: int
+    active_sides: float
+    growth: float
+    alone: float
+    unit: float
+
+    @classmethod
+    def of(
+        cls, size: tuple[int, int], coarse_shift: int, search: Search, unit: float, radius: float = 1.0
+    ) -> Grids:
+        """The grids over a picture of a size, pixels. radius: of a usual neighborhood, pixels."""
+        fine_shift = min(max(round(math.log2(_FINE * radius)), 0), _COARSEST_FINE)
+        margin = 1 << coarse_shift
+        return cls(
+            _cells(size, margin, fine_shift),
+            _cells(size, margin, coarse_shift),
+            fine_shift,
+            coarse_shift,
+            margin,
+            search.active_sides,
+            search.growth,
+            search.alone,
+            unit,
+        )
+
+    @property
+    def fine_cells(self) -> int:
+        """How many fine cells there are."""
+        return math.prod(self.fine_size)
+
+    @property
+    def coarse_cells(self) -> int:
+        """How many coarse cells there are."""
+        return math.prod(self.coarse_size)
+
+
+def _cells(size: tuple[int, int], margin: int, shift: int) -> tuple[int, int]:
+    x, y = (-(-(pixels + 2 * margin) >> shift) for pixels in size)
+    return x, y

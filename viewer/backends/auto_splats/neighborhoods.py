@@ -1,0 +1,349 @@
+"""Neighborhoods: the k nearest of each point that is seen, and the splat through them, found in the picture.
+
+Preiner 2012, 4 to 6. The paper narrows radii down in rounds of splats that count what they cover. Here points
+are listed by small cells of the picture, and those cells are searched that a ball round a point may reach in
+the image, so that what is found is exact, whatever the view; 23 in 24 points need one search, nearly all
+others two.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...gpu import gl
+from ...gpu.bindings import Storage, Texture
+from ...gpu.bins import Bins
+from ...gpu.compact import IndexList, list_covered, list_flagged
+from ...gpu.constants import NO_DEPTH, UNKNOWN
+from ...gpu.context import Gpu, Program
+from ...gpu.pose import GpuPose
+from ...gpu.scatter import Visits, scatter
+from ...gpu.surface import Surface
+from ...scan.points import PointCloud
+from ...scan.range_points import RangePoints
+from ...view import View
+from .grids import COARSEST, FINEST_COARSE, Grids
+
+# Bytes of a pose's row, of a participant, of a point that is seen.
+_SPLAT, _LOOK, _SLOT, _FOUND = 12, 8, 16, 16
+_FIRST_BALL = 1.4  # that is searched, in usual radii: most neighborhoods are within
+_ENOUGH = 10  # points of a region that tell how dense they are
+# Participants at most, with those that others hide: 84 MB. And of a coarse cell: llvmpipe ends all loops of
+# an invocation after 65 535 turns.
+MOST_PARTICIPANTS, _LARGEST_CROWD = 1 << 22, 6000
+_SPARE = 4  # times the room that is needed, beyond which it is given up
+
+
+@dataclass(frozen=True)
+class Search:
+    """Rules of what belongs to a neighborhood.
+
+    k: points of one, the point itself among them. layers: whether points that others hide take part.
+    active_sides: how far behind the nearest that its cell of the picture sees a point is active, in sides of
+    the cell. growth: of the area of a ball within which another point must follow; alone: the radius within
+    which the second point must lie, in usual ones, where others are outliers. by_scanner: whether normals
+    point to the side that a range view saw, not to the eye.
+    """
+
+    k: int = 10
+    layers: bool = True
+    active_sides: float = math.inf
+    growth: float = 4.0
+    alone: float = UNKNOWN
+    by_scanner: bool = False
+
+
+@dataclass(frozen=True)
+class _Pixels:
+    """How points are projected: what points/cells.glsl reads."""
+
+    point_size: int = 1
+
+
+class Neighborhoods:
+    """The neighborhoods of points that a picture shows, and their splats.
+
+    Buffers by name, as texels. "splats" and "looks": by the pose's row, as `Points.buffers` has them. Of the
+    points whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan
+    units, 0 where it is alone; number of points; curvature; usual radius. "slots": the participants, places
+    and rows.
+    """
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._gpu, self._size = gpu, size
+        self._pixels = IndexList(gpu, size[0] * size[1])  # that show a point; later, what is not known yet
+        self._searched = IndexList(gpu, size[0] * size[1])  # slots
+        self._texels: dict[str, gl.BufferTexture] = {}
+        self._totals = gpu.ctx.buffer(reserve=8)
+        self._bins = Bins(gpu, 1)
+        self._grids = Grids.of(size, FINEST_COARSE, Search(), 1.0)
+        self.participants = 0
+        self.count = 0  # of those searched
+        self._made_of: tuple[object, ...] | None = None
+        self._pose: weakref.ref[GpuPose] | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        lists = self._pixels.nbytes + self._searched.nbytes + self._bins.nbytes
+        return lists + sum(texels.buffer.size for texels in self._texels.values())
+
+    def release(self) -> None:
+        """Delete everything."""
+        self._gpu.discard(self._pixels, self._searched, self._bins, self._totals, *self._texels.values())
+
+    def __getitem__(self, name: str) -> gl.BufferTexture:
+        return self._texels[name]
+
+    def read(self, name: str, dtype: type, words: int) -> NDArray:
+        """A buffer as an array of a number of words each, (N, words); waits for the GPU."""
+        return np.frombuffer(self[name].buffer.read(), dtype).reshape(-1, words)
+
+    def find(self, pose: GpuPose, surface: Surface, view: View, search: Search, share: float = 1.0) -> bool:
+        """Find the neighborhoods of the active points; False where nothing has changed since the last
+        call."""
+        made_of = (view.key, search, share)
+        if self._pose is not None and self._pose() is pose and self._made_of == made_of:
+            surface.stats.skipped["neighborhoods"] = "points, camera and search are those of the last picture"
+            return False
+        self._made_of, self._pose = None, weakref.ref(pose)
+        self.count = 0
+        visible = self._project(pose, surface, share)
+        if visible:
+            self._divide(search, visible, pose)
+            self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
+            self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
+            for name, nbytes, texel in (
+                ("drawn", 4, gl.R32UI),
+                ("found", _FOUND, gl.RGBA32F),
+                ("next", 4, gl.R32F),
+            ):
+                self._reserve(name, nbytes * visible, texel)
+            self._gather(pose, surface, search, share)
+            self._search(pose, search)
+        self._made_of = made_of
+        return True
+
+    def find_late(self, pose: GpuPose, surface: Surface, search: Search) -> None:
+        """Find the neighborhoods of the points too that were not active, but are not behind what the surface
+        shows by now (Preiner 2012, 7)."""
+        if not self.count:
+            return
+        with self._gpu.timers.measure("late"):
+            self._list_searched("auto_splats/late.comp", pose, surface)
+        self._search(pose, search)
+
+    def _project(self, pose: GpuPose, surface: Surface, share: float) -> int:
+        """Find the nearest point of each pixel; how many pixels have one."""
+        sample = surface.take_sample(share)
+        self._reserve("depths", 4 * self._size[0] * self._size[1], gl.R32UI)
+        self._reserve("rows", 4 * self._size[0] * self._size[1], gl.R32UI)
+        visits = self._visits("points/cells.glsl", pose, sample, {"SINGLE": 1}, _Pixels())
+        scatter(self._gpu, visits, self["depths"], self["rows"])
+        self["depths"].bind(Texture.DEPTHS)
+        list_covered(self._gpu, self._size[0] * self._size[1], self._pixels)
+        return len(self._pixels)
+
+    def _visits(
+        self,
+        cells: str,
+        pose: GpuPose,
+        sample: tuple[gl.BufferTexture | None, int],
+        defines: Mapping[str, object],
+        params: Any,
+    ) -> Visits:
+        """The visits of a sample of the points to cells."""
+        rows, count = sample
+
+        def bind(_: Program) -> None:
+            pose.array("positions").bind(Texture.POSITIONS)
+            if rows is not None:
+                rows.bind(Texture.DRAWN_ROWS)
+            if params is self._grids:
+                self["rows"].bind(Texture.ROWS)
+                self["farthest"].bind(Texture.FARTHEST)
+
+        return Visits(cells, count, bind, {"SAMPLED": int(rows is not None), **defines}, params)
+
+    def _divide(self, search: Search, visible: int, pose: GpuPose) -> None:
+        """Divide the picture into cells as large as neighborhoods usually are, and tell how near each
+        sees."""
+        shift = FINEST_COARSE
+        while True:
+            grids = Grids.of(self._size, shift, search, _unit(pose))
+            occupied = self._measure_depths(grids)
+            radius = math.sqrt(occupied * 4**shift / visible * search.k / math.pi)
+            wanted = min(max(math.ceil(math.log2(radius)), shift), COARSEST)
+            if wanted == shift:
+                break
+            shift = wanted
+        self._grids = grids = Grids.of(self._size, shift, search, _unit(pose), radius)
+        for name in ("active", "farthest"):
+            self._reserve(name, 4 * grids.coarse_cells, gl.R32F)
+        with self._gpu.timers.measure("planes"):
+            program = self._gpu.compute("auto_splats/planes.comp", params=grids)
+            self["nearest"].bind(Texture.KEYS)
+            self._bind_storage(active=Storage.ACTIVE, farthest=Storage.FARTHEST)
+            self._gpu.dispatch(program, grids.coarse_cells)
+
+    def _measure_depths(self, grids: Grids) -> int:
+        """Find how near each coarse cell sees anything; how many see any."""
+        self._reserve("nearest", 4 * grids.coarse_cells, gl.R32UI)
+        with self._gpu.timers.measure("nearest"):
+            gl.clear_words(self["nearest"].buffer, NO_DEPTH)
+            gl.clear_words(self._totals, 0)
+            program = self._gpu.compute("auto_splats/nearest.comp", params=grids)
+            self["depths"].bind(Texture.DEPTHS)
+            self._bind_storage(nearest=Storage.KEYS)
+            self._totals.bind_to_storage_buffer(Storage.TOTALS)
+            self._pixels.run(program)
+            return self._read_totals()[0]
+
+    def _gather(self, pose: GpuPose, surface: Surface, search: Search, share: float) -> None:
+        """List the participants by cells, and those of them that are active. Where too many would take part
+        that others hide, none of these does."""
+        sample, grids = surface.take_sample(share), self._grids
+        if self._bins.cells != grids.fine_cells:
+            self._gpu.discard(self._bins)
+            self._bins = Bins(self._gpu, grids.fine_cells)
+        for layers in (True, False) if search.layers else (False,):
+            defines = {"LAYERS": int(layers)}
+            visits = self._visits("auto_splats/participants.glsl", pose, sample, defines, grids)
+            self._bins.count(visits)
+            self.participants = self._bins.length()
+            if layers and self.participants > MOST_PARTICIPANTS:
+                continue
+            self._bins.fill(visits, self.participants)
+            self._arrange(pose)
+            if self._find_usual(search) <= _LARGEST_CROWD:
+                break
+        if search.layers and not layers:
+            surface.stats.skipped["hidden neighbors"] = "too many points would take part"
+        if self.participants < search.k:  # an outlier is far from others, of which there are none
+            self._grids = replace(grids, alone=UNKNOWN)
+        self._searched.clear()
+        with self._gpu.timers.measure("active"):
+            self._list_searched("auto_splats/active.comp", pose, surface)
+
+    def _arrange(self, pose: GpuPose) -> None:
+        """Put participants in the order of their cells, and count how many each coarse cell has."""
+        self._reserve("slots", _SLOT * self.participants, gl.RGBA32UI)
+        self._reserve("counts", 4 * self._grids.coarse_cells, gl.R32UI)
+        with self._gpu.timers.measure("arrange"):
+            gl.clear_words(self["counts"].buffer, 0)
+            program = self._gpu.compute("auto_splats/arrange.comp", params=self._grids)
+            pose.array("positions").bind(Texture.POSITIONS)
+            self._bins.items.bind(Texture.LISTED)
+            self["active"].bind(Texture.ACTIVE)
+            self._bind_storage(slots=Storage.SLOTS, counts=Storage.COUNTS)
+            self._gpu.dispatch(program, self.participants)
+
+    def _find_usual(self, search: Search) -> int:
+        """Find the usual radius in each coarse cell; how many participants the fullest one has."""
+        self._reserve("usual", 4 * self._grids.coarse_cells, gl.R32F)
+        with self._gpu.timers.measure("usual"):
+            gl.clear_words(self._totals, 0)
+            defines = {"K": search.k, "ENOUGH": f"{_ENOUGH}u"}
+            program = self._gpu.compute("auto_splats/usual.comp", defines, params=self._grids)
+            self["counts"].bind(Texture.COUNTS)
+            self._bind_storage(usual=Storage.USUAL)
+            self._totals.bind_to_storage_buffer(Storage.TOTALS)
+            self._gpu.dispatch(program, self._grids.coarse_cells)
+            return self._read_totals()[1]
+
+    def _list_searched(self, name: str, pose: GpuPose, surface: Surface) -> None:
+        """Add slots to those that are searched, with their rows."""
+        program = self._gpu.compute(name, params=self._grids)
+        self._searched.bind()
+        pose.array("positions").bind(Texture.POSITIONS)
+        self["slots"].bind(Texture.SLOTS)
+        self["rows"].bind(Texture.ROWS)
+        self["active"].bind(Texture.ACTIVE)
+        self["usual"].bind(Texture.USUAL)
+        surface.depths.bind(Texture.DEPTHS)
+        self._bind_storage(drawn=Storage.DRAWN_ROWS)
+        self._gpu.dispatch(program, self.participants)
+
+    def _search(self, pose: GpuPose, search: Search) -> None:
+        """Search the neighborhoods of those listed since the last call."""
+        first, self.count = self.count, len(self._searched)
+        if self.count == first:
+            return
+        for number in range(3):
+            if number:
+                with self._gpu.timers.measure("unknown"):
+                    list_flagged(
+                        self._gpu, "auto_splats/unknown.glsl", self.count, self._pixels, self._bind_next
+                    )
+            self._run_search(pose, search, number, first)
+
+    def _run_search(self, pose: GpuPose, search: Search, number: int, first: int) -> None:
+        """Search with a ball that most neighborhoods are within; one that what is left is within; all that
+        there may be to search for what is left then."""
+        defines = {
+            "K": search.k,
+            "ROUND": number,
+            "FIRST_BALL": _FIRST_BALL,
+            "HAS_COLORS": int(pose.cloud.colors is not None),
+            "BY_SCANNER": int(search.by_scanner),
+            "SCANNERS": len(pose.views) if search.by_scanner else 0,
+        }
+        with self._gpu.timers.measure("search"):
+            program = self._gpu.compute("auto_splats/search.comp", defines, params=self._grids)
+            pose.array("positions").bind(Texture.POSITIONS)
+            if pose.cloud.colors is not None:
+                pose.array("colors").bind(Texture.COLORS)
+            if search.by_scanner:
+                pose.packed(_scanners, pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
+            self["slots"].bind(Texture.SLOTS)
+            self["drawn"].bind(Texture.DRAWN_ROWS)
+            self._searched.texels.bind(Texture.LISTED)
+            self._bins.starts.bind(Texture.STARTS)
+            self["usual"].bind(Texture.USUAL)
+            self._bind_storage(splats=Storage.SPLATS, looks=Storage.LOOKS, found=Storage.FOUND)
+            self._bind_next(program)
+            if number:
+                self._pixels.run(program)
+            else:
+                self._gpu.set(program, first=first)
+                self._gpu.dispatch(program, self.count - first)
+
+    def _bind_next(self, _: Program) -> None:
+        self._bind_storage(next=Storage.NEXT)
+
+    def _bind_storage(self, **bindings: Storage) -> None:
+        for name, binding in bindings.items():
+            self[name].buffer.bind_to_storage_buffer(binding)
+
+    def _read_totals(self) -> tuple[int, int]:
+        return struct.unpack("2I", self._totals.read())
+
+    def _reserve(self, name: str, nbytes: int, texel_format: int) -> None:
+        """Make room for so many bytes, and give up what something much larger has left."""
+        old, nbytes = self._texels.get(name), max(nbytes, 16)
+        if old is None or not nbytes <= old.buffer.size <= _SPARE * nbytes:
+            self._gpu.discard(self._texels.pop(name, None))
+            self._texels[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+
+
+def _unit(pose: GpuPose) -> float:
+    """A power of two with which the scan's size is about 1, so that squares of distances are numbers."""
+    size = 2 * pose.bounds.radius
+    return 2.0 ** -round(math.log2(size)) if size > 0 else 1.0
+
+
+def _scanners(cloud: PointCloud, points: RangePoints) -> NDArray[np.float32]:
+    """Place of each range view's eye, relative to the origin, and the bits of its first row, (V, 4)."""
+    scanners = np.zeros((len(points.views), 4), np.float32)
+    scanners[:, :3] = np.array([view.eye for view in points.views]) - cloud.origin
+    first_rows = np.searchsorted(cast(NDArray, cloud.ids), points.firsts[:-1])
+    scanners.view(np.uint32)[:, 3] = first_rows
+    return scanners
