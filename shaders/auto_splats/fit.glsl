@@ -71,16 +71,16 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
         normal = normalize(to_eye - dot(to_eye, along) * along);
     }
     if (dot(normal, to_eye) < 0.0) normal = -normal;
-    bool is_outlier = extent.count == 1 && alone < UNKNOWN;
+    bool is_outlier = is_alone(usual_radius * unit);
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
     float splat = max(2.0 * radius * inversesqrt(float(extent.count)), LEAST);
     splats[3u * row] = packSnorm2x16(folded(normal));
-    splats[3u * row + 1u] = is_outlier ? 0u : floatBitsToUint(splat);
+    splats[3u * row + 1u] = is_outlier && drops ? 0u : floatBitsToUint(splat);
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);
 #if HAS_COLORS
     looks[2u * row] = packUnorm4x8(vec4(texelFetch(colors, int(row)).rgb, 0.0));
 #endif
     uvec3 steps = uvec3(roundEven(normal * 511.0 + 512.0));
     looks[2u * row + 1u] = steps.x | steps.y << 10 | steps.z << 20;
-    found[n] = vec4(radius, extent.count, sum > 0.0 ? values.x / sum : 0.0, usual_radius);
+    found[n] = vec4(radius, is_outlier ? -extent.count : extent.count, sum > 0.0 ? values.x / sum : 0.0, usual_radius);
 }

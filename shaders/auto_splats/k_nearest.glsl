@@ -31,12 +31,18 @@ void take(vec3 offset, uint row) {
 // radius; search: how far others could belong to it that are not known yet, 0 where none could.
 struct Extent { int count; float squared; float search; };
 
+// Whether the point is an outlier: without another one within `alone` times the usual radius.
+bool is_alone(float usual) {
+    float limit = usual * alone;
+    return near_squared[1] > limit * limit;
+}
+
 // A neighborhood ends with its k-th, or before a gap (Preiner 2012, 5.3): where a ball round those found so
 // far, at least of the usual radius, can grow to `growth` times its area without a further one; and round
-// the point alone to `alone` times the usual radius. All participants within `known` were taken.
+// the point alone to `alone` times the usual radius, where outliers are dropped. All participants within `known` were taken.
 Extent extent_of(float known, float usual) {
     Extent extent = Extent(1, 0.0, 0.0);
-    float limit = usual * alone;
+    float limit = drops ? usual * alone : UNKNOWN;
     bool open = true;
     for (int k = 1; k < K; ++k) {
         bool is_known = near_rows[k] != NOTHING && near_squared[k] <= known * known;

@@ -135,8 +135,9 @@ def draw_all(renderer: Renderer) -> None:
         draw(cloud, baselines.gl_points())
         for look in LOOKS:
             draw(cloud, filling.BACKEND, look)
-        for name in finding.VALUES:
-            draw(cloud, finding.BACKEND, Look(color_by=name))
+        for one in (*backends().values(), finding.BACKEND):
+            for name in one.values:
+                draw(cloud, one, Look(color_by=name))
     for pose in range_poses():
         for name, setting in settings():
             if name == "pyramidal":

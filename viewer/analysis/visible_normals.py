@@ -92,10 +92,10 @@ def estimate_normals(
     found = surface.keep(Neighborhoods)
     alone = UNKNOWN if expansions is None else 2.0**expansions
     found.find(resident, surface, view, Search(k, layers, math.inf, growth, alone))
-    return _read(resident.cloud, found, expansions is not None)
+    return _read(resident.cloud, found)
 
 
-def _read(cloud: PointCloud, found: Neighborhoods, drops: bool) -> VisibleNormals:
+def _read(cloud: PointCloud, found: Neighborhoods) -> VisibleNormals:
     rows = found.read("drawn", np.uint32, 1)[: found.count, 0]
     order = np.argsort(rows)
     rows = rows[order]
@@ -106,10 +106,10 @@ def _read(cloud: PointCloud, found: Neighborhoods, drops: bool) -> VisibleNormal
         rows=rows,
         normals=_unfolded(words),
         radii=radii,
-        counts=counts.astype(np.int64),
+        counts=np.abs(counts).astype(np.int64),
         curvatures=curvatures,
         usual=usual,
-        outliers=(counts == 1) & drops,
+        outliers=counts < 0,
         neighbors=np.sort(found.read("slots", np.uint32, 4)[: found.participants, 3]),
     )
 

@@ -66,6 +66,7 @@ class Texture(IntEnum):
     ACTIVE = auto()
     USUAL = auto()
     COUNTS = auto()
+    FOUND = auto()  # what a neighborhood tells
     # Samples of range views.
     RANGE_DEPTHS = auto()
     RANGE_LOOKS = auto()

@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass
 
 from ...gpu.amplify import Points
-from ...gpu.constants import UNKNOWN
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
@@ -20,9 +19,12 @@ from ...scan.pose import Pose
 from .. import FrameView, Limit
 from .._auto_splatting import WAYS, draw_splats
 from .neighborhoods import Neighborhoods, Search
+from .values import VALUES as VALUES
+from .values import give_value
 
 TITLE = "Auto splats"
 BLENDS = True
+FINDS_NORMALS = True
 
 _BY_STEPS = "normals are blended as whole numbers of 1/511, which turn with the scan"
 _HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
@@ -61,7 +63,6 @@ class Params:
         low=0,
         high=10,
         group=_NEIGHBORS,
-        when={"outliers": (False,)},
     )
     growth: float = param(
         4.0,
@@ -111,19 +112,19 @@ def needs(pose: Pose, params: Params) -> tuple[str, ...]:
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
     params: Params = frame.params
-    if not len(pose.cloud):
-        surface.clear()
-        return False
     found = surface.keep(Neighborhoods)
     search = search_of(params, pose)
     found.find(pose, surface, frame.view, search, frame.share)
     if not found.count:
         surface.clear()
+        surface.own("normal")
+        give_value(found, surface, params.radius_scale)
         return surface.stats.share < 1
     if params.cull:
         _draw(pose, found, surface, params, two=False)
         found.find_late(pose, surface, search)
     _draw(pose, found, surface, params, two=params.passes == "two")
+    give_value(found, surface, params.radius_scale)
     return surface.stats.share < 1
 
 
@@ -147,6 +148,7 @@ def search_of(params: Params, pose: GpuPose) -> Search:
         layers=params.layers,
         active_sides=_ACTIVE_SIDES if params.cull else math.inf,
         growth=params.growth,
-        alone=UNKNOWN if params.outliers else 2.0**params.expansions,
+        alone=2.0**params.expansions,
+        drops=not params.outliers,
         by_scanner=params.orient == "scanner" and bool(pose.views),
     )

@@ -20,7 +20,7 @@ class Grids:
 
     Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
     pixels round the picture whose points take part. unit: factor on places, a power of two. active_sides,
-    growth, alone: as `Search` has them.
+    growth, alone, drops: as `Search` has them.
     """
 
     fine_size: tuple[int, int]
@@ -31,6 +31,7 @@ class Grids:
     active_sides: float
     growth: float
     alone: float
+    drops: bool
     unit: float
 
     @classmethod
@@ -49,6 +50,7 @@ class Grids:
             search.active_sides,
             search.growth,
             search.alone,
+            search.drops,
             unit,
         )
 

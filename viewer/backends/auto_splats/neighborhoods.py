@@ -49,8 +49,8 @@ class Search:
     k: points of one, the point itself among them. layers: whether points that others hide take part.
     active_sides: how far behind the nearest that its cell of the picture sees a point is active, in sides of
     the cell. growth: of the area of a ball within which another point must follow; alone: the radius within
-    which the second point must lie, in usual ones, where others are outliers. by_scanner: whether normals
-    point to the side that a range view saw, not to the eye.
+    which the second point must lie, in usual ones; others are outliers. drops: whether these have no splat.
+    by_scanner: whether normals point to the side that a range view saw, not to the eye.
     """
 
     k: int = 10
@@ -58,6 +58,7 @@ class Search:
     active_sides: float = math.inf
     growth: float = 4.0
     alone: float = UNKNOWN
+    drops: bool = True
     by_scanner: bool = False
 
 
@@ -73,8 +74,8 @@ class Neighborhoods:
 
     Buffers by name, as texels. "splats" and "looks": by the pose's row, as `Points.buffers` has them. Of the
     points whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan
-    units, 0 where it is alone; number of points; curvature; usual radius. "slots": the participants, places
-    and rows.
+    units, 0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots":
+    the participants, places and rows.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:

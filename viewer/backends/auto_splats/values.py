@@ -1,0 +1,68 @@
+"""Numbers of neighborhoods, for looks to colour by (Preiner 2012, Figs. 9 and 12)."""
+
+from __future__ import annotations
+
+from ...gpu import gl
+from ...gpu.bindings import Storage, Texture
+from ...gpu.context import Gpu
+from ...gpu.surface import Surface
+from ...look import ValueKind
+from .neighborhoods import Neighborhoods
+
+VALUES = {
+    "neighborhood": ValueKind(
+        "Radius of the neighborhood that a splat is fitted to: how sparse points are",
+        is_length=True,
+        is_log=True,
+    ),
+    "curvature": ValueKind(
+        "Share of a neighborhood's variance that is across its plane: 0 where flat, at most 1/3"
+    ),
+    "splat_radius": ValueKind(
+        "Radius of a splat, the shorter one of an ellipse", is_length=True, is_log=True
+    ),
+    "outlier": ValueKind(
+        "1 where no neighbor is near, else 0; `outliers` shows such points", range=(0.0, 1.0)
+    ),
+}
+
+
+class _ByRow:
+    """A number for each row of a pose."""
+
+    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self.texels: gl.BufferTexture | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return 0 if self.texels is None else self.texels.buffer.size
+
+    def reserve(self, count: int) -> gl.BufferTexture:
+        """Room for so many rows."""
+        if self.texels is None or self.nbytes != 4 * count:
+            self.release()
+            self.texels = gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * count), gl.R32F)
+        return self.texels
+
+    def release(self) -> None:
+        """Delete it."""
+        self._gpu.discard(self.texels)
+        self.texels = None
+
+
+def give_value(found: Neighborhoods, surface: Surface, radius_scale: float) -> None:
+    """Give the surface the one of `VALUES` that it wants, if any. radius_scale: factor on radii of splats."""
+    if (name := surface.wanted) is None:
+        return
+    gpu, texels = surface.gpu, surface.keep(_ByRow).reserve(max(len(surface.pose.cloud), 1))
+    surface.give(texels)
+    if found.count:
+        with gpu.timers.measure("values"):
+            program = gpu.compute("auto_splats/values.comp", {"NUMBER": list(VALUES).index(name)})
+            found["drawn"].bind(Texture.DRAWN_ROWS)
+            found["found"].bind(Texture.FOUND)
+            texels.buffer.bind_to_storage_buffer(Storage.VALUE)
+            gpu.set(program, radius_scale=radius_scale)
+            gpu.dispatch(program, found.count)
