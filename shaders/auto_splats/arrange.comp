@@ -1,10 +1,8 @@
-// Participants in the order of their cells: place, and row. Those not behind what is active are counted.
-#include "common/item.glsl"
-#include "auto_splats/place.glsl"
+// Participants in the order of their cells: place, and row. Those not behind what is active are counted, and
+// those of them that a pixel shows are listed.
+#include "auto_splats/seen.glsl"
 
-layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // rows
-layout(binding = TEXTURE_ACTIVE) uniform samplerBuffer active_to;
 layout(std430, binding = STORAGE_COUNTS) buffer Counts { uint counts[]; };  // of each coarse cell
 layout(std430, binding = STORAGE_SLOTS) writeonly buffer Slots { uvec4 slots[]; };
 
@@ -12,10 +10,12 @@ void main() {
     uint i = item();
     if (i >= item_count) return;
     uint row = texelFetch(listed, int(i)).r;
-    vec3 place = texelFetch(positions, int(row)).xyz, view = to_view(place);
+    vec3 place = texelFetch(positions, int(row)).xyz;
     slots[i] = uvec4(floatBitsToUint(place * unit), row);
     vec2 pixel;
-    if (!find_pixel(view, pixel)) return;
-    int cell = coarse_cell(pixel);
-    if (-view.z <= texelFetch(active_to, cell).r) atomicAdd(counts[cell], 1u);
+    float depth;
+    bool seen = is_seen(row, pixel, depth);
+    if (!is_active(pixel, depth)) return;
+    atomicAdd(counts[coarse_cell(pixel)], 1u);
+    if (seen) add(i, row);
 }

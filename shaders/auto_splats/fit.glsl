@@ -10,7 +10,7 @@ layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #if BY_SCANNER
 layout(binding = TEXTURE_RANGE_VIEWS) uniform samplerBuffer range_views;  // its eye, and its first row
 #endif
-layout(std430, binding = STORAGE_SPLATS) writeonly buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
+layout(std430, binding = STORAGE_SPLATS) buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
 layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; };  // as surfels/passes/look.glsl does
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 

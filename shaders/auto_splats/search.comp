@@ -80,6 +80,15 @@ Extent search(vec3 place, float radius, float usual_radius) {
     return extent_of(known < UNKNOWN ? known * unit : UNKNOWN, usual_radius * unit);
 }
 
+#if ROUND == 0
+// The radius that is searched first: as large as this row's neighborhood was in the last picture that it had
+// one in, of whatever pose; else what most are within.
+float first_ball(uint row, float usual_radius) {
+    float before = uintBitsToFloat(splats[3u * row + 1u]) * (0.5 * sqrt(float(K)));
+    return usual_radius * (before > 0.0 ? clamp(before / usual_radius * 1.001, 0.3, 3.0) : FIRST_BALL);
+}
+#endif
+
 void main() {
     uint i = item();
 #if ROUND == 0
@@ -94,7 +103,7 @@ void main() {
     center = to_view(texelFetch(positions, int(slot.w)).xyz);
     float usual_radius = texelFetch(usual, coarse_cell(to_pixel(center))).r / scale_at(-center.z);
 #if ROUND == 0
-    Extent extent = search(place, FIRST_BALL * usual_radius, usual_radius);
+    Extent extent = search(place, first_ball(slot.w, usual_radius), usual_radius);
 #else
     Extent extent = search(place, next[n], usual_radius);
 #endif

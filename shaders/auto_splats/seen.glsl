@@ -1,22 +1,21 @@
-// Participants that a pixel shows, some of which are searched.
+// Participants that a pixel shows, and whose neighborhoods are searched.
 #include "common/item.glsl"
 #include "common/list.glsl"
 #include "auto_splats/place.glsl"
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
-layout(binding = TEXTURE_SLOTS) uniform usamplerBuffer slots;
 layout(binding = TEXTURE_ACTIVE) uniform samplerBuffer active_to;
 layout(std430, binding = STORAGE_DRAWN_ROWS) writeonly buffer DrawnRows { uint drawn_rows[]; };
 
 bool is_active(vec2 pixel, float depth) { return depth <= texelFetch(active_to, coarse_cell(pixel)).r; }
 
-// Whether a participant is seen; where, and its row.
-bool is_seen(uint slot, out vec2 pixel, out float depth, out uint row) {
-    row = texelFetch(slots, int(slot)).w;
+// Whether a pixel shows a participant; and where it is.
+bool is_seen(uint row, out vec2 pixel, out float depth) {
     vec3 view = to_view(texelFetch(positions, int(row)).xyz);
     depth = -view.z;
-    return find_pixel(view, pixel) && in_picture(pixel) && texelFetch(rows, pixel_number(pixel)).r == row;
+    find_pixel(view, pixel);
+    return in_picture(pixel) && texelFetch(rows, pixel_number(pixel)).r == row;
 }
 
 void add(uint slot, uint row) {

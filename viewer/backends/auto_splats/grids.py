@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 FINEST_COARSE, COARSEST = 4, 7  # shifts of coarse cells: 16 to 128 pixels
 _COARSEST_FINE = 4
-_FINE = 0.5  # edge of fine cells, in usual radii
+_FINE = 0.7  # edge of fine cells, in usual radii
 
 
 @dataclass(frozen=True)

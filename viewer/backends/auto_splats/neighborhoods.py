@@ -120,7 +120,8 @@ class Neighborhoods:
         visible = self._project(pose, surface, share)
         if visible:
             self._divide(search, visible, pose)
-            self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
+            if self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI):
+                gl.clear_words(self["splats"].buffer, 0)
             self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
             for name, nbytes, texel in (
                 ("drawn", 4, gl.R32UI),
@@ -139,7 +140,10 @@ class Neighborhoods:
         if not self.count:
             return
         with self._gpu.timers.measure("late"):
-            self._list_searched("auto_splats/late.comp", pose, surface)
+            self["slots"].bind(Texture.SLOTS)
+            self["usual"].bind(Texture.USUAL)
+            surface.depths.bind(Texture.DEPTHS)
+            self._list_seen("auto_splats/late.comp", pose)
         self._search(pose, search)
 
     def _project(self, pose: GpuPose, surface: Surface, share: float) -> int:
@@ -230,22 +234,18 @@ class Neighborhoods:
             surface.stats.skipped["hidden neighbors"] = "too many points would take part"
         if self.participants < search.k:  # an outlier is far from others, of which there are none
             self._grids = replace(grids, alone=UNKNOWN)
-        self._searched.clear()
-        with self._gpu.timers.measure("active"):
-            self._list_searched("auto_splats/active.comp", pose, surface)
 
     def _arrange(self, pose: GpuPose) -> None:
-        """Put participants in the order of their cells, and count how many each coarse cell has."""
+        """Put participants in the order of their cells, count how many each coarse cell has, and list those
+        to be searched."""
         self._reserve("slots", _SLOT * self.participants, gl.RGBA32UI)
         self._reserve("counts", 4 * self._grids.coarse_cells, gl.R32UI)
         with self._gpu.timers.measure("arrange"):
             gl.clear_words(self["counts"].buffer, 0)
-            program = self._gpu.compute("auto_splats/arrange.comp", params=self._grids)
-            pose.array("positions").bind(Texture.POSITIONS)
+            self._searched.clear()
             self._bins.items.bind(Texture.LISTED)
-            self["active"].bind(Texture.ACTIVE)
             self._bind_storage(slots=Storage.SLOTS, counts=Storage.COUNTS)
-            self._gpu.dispatch(program, self.participants)
+            self._list_seen("auto_splats/arrange.comp", pose)
 
     def _find_usual(self, search: Search) -> int:
         """Find the usual radius in each coarse cell; how many participants the fullest one has."""
@@ -260,16 +260,14 @@ class Neighborhoods:
             self._gpu.dispatch(program, self._grids.coarse_cells)
             return self._read_totals()[1]
 
-    def _list_searched(self, name: str, pose: GpuPose, surface: Surface) -> None:
-        """Add slots to those that are searched, with their rows."""
+    def _list_seen(self, name: str, pose: GpuPose) -> None:
+        """Run a program that includes auto_splats/seen.glsl on all participants: it adds to those
+        searched."""
         program = self._gpu.compute(name, params=self._grids)
         self._searched.bind()
         pose.array("positions").bind(Texture.POSITIONS)
-        self["slots"].bind(Texture.SLOTS)
         self["rows"].bind(Texture.ROWS)
         self["active"].bind(Texture.ACTIVE)
-        self["usual"].bind(Texture.USUAL)
-        surface.depths.bind(Texture.DEPTHS)
         self._bind_storage(drawn=Storage.DRAWN_ROWS)
         self._gpu.dispatch(program, self.participants)
 
@@ -327,12 +325,14 @@ class Neighborhoods:
     def _read_totals(self) -> tuple[int, int]:
         return struct.unpack("2I", self._totals.read())
 
-    def _reserve(self, name: str, nbytes: int, texel_format: int) -> None:
-        """Make room for so many bytes, and give up what something much larger has left."""
+    def _reserve(self, name: str, nbytes: int, texel_format: int) -> bool:
+        """Make room for so many bytes, and give up what something much larger has left; whether it is new."""
         old, nbytes = self._texels.get(name), max(nbytes, 16)
-        if old is None or not nbytes <= old.buffer.size <= _SPARE * nbytes:
-            self._gpu.discard(self._texels.pop(name, None))
-            self._texels[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+        if old is not None and nbytes <= old.buffer.size <= _SPARE * nbytes:
+            return False
+        self._gpu.discard(self._texels.pop(name, None))
+        self._texels[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+        return True
 
 
 def _unit(pose: GpuPose) -> float:
