@@ -13,7 +13,7 @@ from packed import Packed
 from scenes import NOTHING, looking_down_z, sphere
 from test_instancing import CAMERAS, CLOUD, assert_agree, assert_equal
 
-from viewer.backends._auto_splatting import WAYS, _Radii, draw_splats
+from viewer.backends.auto_splats.splatting import WAYS, _Radii, draw_splats
 from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera

@@ -17,10 +17,9 @@ from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
 from .. import FrameView, Limit
-from .._auto_splatting import WAYS, draw_splats
 from .neighborhoods import Neighborhoods, Search
-from .values import VALUES as VALUES
-from .values import give_value
+from .splatting import WAYS, draw_depths, draw_splats
+    give_value(found, surface, params.radius_scale)
 
 TITLE = "Auto splats"
 BLENDS = True
@@ -89,6 +88,11 @@ class Params:
     radius_scale: float = param(
         1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group=_SPLATS
     )
+    refine: bool = param(
+        True,
+        "Make splats of points that others hide as small as those: they reach beyond outlines",
+        group=_SPLATS,
+    )
     cull: bool = param(
         False,
         "Leave out points far behind the nearest around them, until they turn out to be seen",
@@ -120,17 +124,30 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.own("normal")
         give_value(found, surface, params.radius_scale)
         return surface.stats.share < 1
+    way, scale = params.instancing, params.radius_scale
     if params.cull:
-        _draw(pose, found, surface, params, two=False)
+        draw_depths(_points(pose, found, params), surface, instancing=way, radius_scale=scale)
         found.find_late(pose, surface, search)
+<<<<<<< HEAD
     _draw(pose, found, surface, params, two=params.passes == "two")
     give_value(found, surface, params.radius_scale)
+=======
+    draw_splats(
+        _points(pose, found, params),
+        surface,
+        instancing=way,
+        radius_scale=scale,
+        two=params.passes == "two",
+        refine=params.refine,
+    )
+>>>>>>> 7acc0b8 (Splats of auto splats are refined, and drawn by a file of their own; their depths alone where that will do)
     return surface.stats.share < 1
 
 
-def _draw(pose: GpuPose, found: Neighborhoods, surface: Surface, params: Params, two: bool) -> None:
+def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:
+    """The points whose neighborhoods were found, with their splats."""
     buffers = {name: found[name] for name in ("splats", "looks")}
-    points = Points(
+    return Points(
         pose,
         use_radii=True,
         count=found.count,
@@ -138,7 +155,6 @@ def _draw(pose: GpuPose, found: Neighborhoods, surface: Surface, params: Params,
         buffers=buffers,
         elliptical=params.elliptical,
     )
-    draw_splats(points, surface, instancing=params.instancing, radius_scale=params.radius_scale, two=two)
 
 
 def search_of(params: Params, pose: GpuPose) -> Search:

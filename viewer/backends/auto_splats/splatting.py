@@ -9,17 +9,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from ..gpu import gl
-from ..gpu.amplify import Points, amplify
-from ..gpu.bindings import Storage, Texture
-from ..gpu.constants import LEAST_RADIUS
-from ..gpu.context import Gpu
-from ..gpu.fastest import instancing_for
-from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
-from .surfels.passes import blend, blend_by_tiles
-from .surfels.splats import FRAGMENT, SURFEL, Splats
-from .surfels.tiles import FALLBACK, TileLists, show_all, show_smaller, show_with, tile_lists
+from ...gpu import gl
+from ...gpu.amplify import Points, amplify
+from ...gpu.bindings import Storage, Texture
+from ...gpu.constants import LEAST_RADIUS
+from ...gpu.context import Gpu
+from ...gpu.fastest import instancing_for
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Surface
+from ..surfels.passes import blend, blend_by_tiles
+from ..surfels.splats import FRAGMENT, SURFEL, Splats
+from ..surfels.tiles import FALLBACK, TileLists, show_all, show_smaller, show_with, tile_lists
 
 WAYS = ("tiles", "tbo", "pull")  # how packed points become splats
 _SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it
@@ -47,6 +47,14 @@ def draw_splats(
     _draw(points, surface, splats, _instancing(surface, instancing, two), two, refine)
     if not two:
         _take_normals(points, surface)
+
+
+def draw_depths(
+    points: Points, surface: Surface, *, instancing: str = "auto", radius_scale: float = 1.0
+) -> None:
+    """The nearest splat at each pixel, as `draw_splats` has it before any is made smaller; no more."""
+    splats = _splats(radius_scale, 0.0)
+    _draw(points, surface, splats, _instancing(surface, instancing, two=False), two=False, refine=False)
 
 
 def _splats(radius_scale: float, epsilon: float) -> Splats:
