@@ -19,7 +19,8 @@ from ...scan.pose import Pose
 from .. import FrameView, Limit
 from .neighborhoods import Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
-    give_value(found, surface, params.radius_scale)
+from .values import VALUES as VALUES
+from .values import give_value
 
 TITLE = "Auto splats"
 BLENDS = True
@@ -128,10 +129,6 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if params.cull:
         draw_depths(_points(pose, found, params), surface, instancing=way, radius_scale=scale)
         found.find_late(pose, surface, search)
-<<<<<<< HEAD
-    _draw(pose, found, surface, params, two=params.passes == "two")
-    give_value(found, surface, params.radius_scale)
-=======
     draw_splats(
         _points(pose, found, params),
         surface,
@@ -140,7 +137,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         two=params.passes == "two",
         refine=params.refine,
     )
->>>>>>> 7acc0b8 (Splats of auto splats are refined, and drawn by a file of their own; their depths alone where that will do)
+    give_value(found, surface, params.radius_scale)
     return surface.stats.share < 1
 
 
