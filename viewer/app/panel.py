@@ -108,9 +108,9 @@ def _colors(look: Look, scalars: Collection[str], found: Collection[str]) -> dic
 
     scalars: that the frame has. found: what the backend finds.
     """
-    there = [*COLOR_BY, *scalars, *found]
-    titles = {name: printable(name) for name in there}
-    if look.color_by in there:
+    titles = {name: printable(name) for name in (*COLOR_BY, *scalars)}
+    titles |= {name: name.replace("_", " ") for name in found if name not in titles}
+    if look.color_by in titles:
         return titles
     is_here = drawable(look, scalars) == look  # as the scalar's number
     return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not here)")}
