@@ -61,6 +61,7 @@ def estimate_normals(
     *,
     size: tuple[int, int] = (1760, 900),
     k: int = 10,
+    adaptive: bool = True,
     layers: bool = True,
     expansions: int | None = 3,
     growth: float = 4.0,
@@ -71,6 +72,9 @@ def estimate_normals(
     before a gap: let d_1 = 0, d_2, ... be the distances of the points by size, and u the usual radius; a
     point with d_2 > 2^expansions u is an outlier, and the first j from 2 on with d_{j+1} > sqrt(growth)
     max(d_j, u) is the count.
+
+    The normal is that of the plane through the neighborhood; adaptive: through as few of the nearest as tell
+    it within 3 degrees of their residuals, or as tell it best.
 
     camera: None fits the pose from the front. layers: whether points that another hides take part which is
     at most some neighborhoods nearer. expansions: None: there are no outliers. Raises InputError,
@@ -91,7 +95,7 @@ def estimate_normals(
     surface.start(resident, view)
     found = surface.keep(Neighborhoods)
     alone = UNKNOWN if expansions is None else 2.0**expansions
-    found.find(resident, surface, view, Search(k, layers, math.inf, growth, alone))
+    found.find(resident, surface, view, Search(k, layers, math.inf, growth, alone, adaptive=adaptive))
     return _read(resident.cloud, found)
 
 

@@ -53,6 +53,12 @@ class Params:
         sweep=(6, 10, 20),
         group=_NEIGHBORS,
     )
+    adaptive: bool = param(
+        True,
+        "Normals go by as few of these as tell the plane within 3 degrees of noise",
+        group=_NEIGHBORS,
+        sweep=(True, False),
+    )
     layers: bool = param(
         True, "Points that another one of about the same surface hides are neighbors too", group=_NEIGHBORS
     )
@@ -163,5 +169,6 @@ def search_of(params: Params, pose: GpuPose) -> Search:
         growth=params.growth,
         alone=2.0**params.expansions,
         drops=not params.outliers,
+        adaptive=params.adaptive,
         by_scanner=params.orient == "scanner" and bool(pose.views),
     )

@@ -50,7 +50,8 @@ class Search:
     active_sides: how far behind the nearest that its cell of the picture sees a point is active, in sides of
     the cell. growth: of the area of a ball within which another point must follow; alone: the radius within
     which the second point must lie, in usual ones; others are outliers. drops: whether these have no splat.
-    by_scanner: whether normals point to the side that a range view saw, not to the eye.
+    by_scanner: whether normals point to the side that a range view saw, not to the eye. adaptive: whether
+    planes go through as few of the nearest as noise allows.
     """
 
     k: int = 10
@@ -60,6 +61,7 @@ class Search:
     alone: float = UNKNOWN
     drops: bool = True
     by_scanner: bool = False
+    adaptive: bool = False
 
 
 @dataclass(frozen=True)
@@ -293,6 +295,7 @@ class Neighborhoods:
             "FIRST_BALL": _FIRST_BALL,
             "HAS_COLORS": int(pose.cloud.colors is not None),
             "BY_SCANNER": int(search.by_scanner),
+            "ADAPTIVE": int(search.adaptive),
             "SCANNERS": len(pose.views) if search.by_scanner else 0,
         }
         with self._gpu.timers.measure("search"):
