@@ -7,10 +7,14 @@ layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if HAS_COLORS
 layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #endif
+#if LAYERS
+layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
+#endif
 #if BY_SCANNER
 layout(binding = TEXTURE_RANGE_VIEWS) uniform samplerBuffer range_views;  // its eye, and its first row
 #endif
-layout(std430, binding = STORAGE_SPLATS) buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
+layout(std430, binding = STORAGE_SPLATS) writeonly buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
+layout(std430, binding = STORAGE_EXTENTS) buffer Extents { float extents[]; };  // radii of neighborhoods, by row
 layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; };  // as surfels/passes/look.glsl reads
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
@@ -95,6 +99,23 @@ uint pack_axes(vec3 normal, vec3 longer, float roundness) {
     return packUnorm2x16(vec2(angle < 0.0 ? angle + 1.0 : angle, max(roundness, LEAST_ROUND)));
 }
 
+// How many of the nearest have splats, which alone have to close the surface: those that pixels show.
+int shown_of(int count) {
+#if LAYERS
+    int shown = 0;
+    for (int k = 0; k < K; ++k) {
+        uint row = k < count ? near_rows[k] : near_rows[0];
+        vec2 pixel;
+        find_pixel(to_view(texelFetch(positions, int(row)).xyz), pixel);
+        bool is_shown = in_picture(pixel) && texelFetch(rows, pixel_number(pixel)).r == row;
+        shown += int(is_shown && k < count);
+    }
+    return max(shown, 1);
+#else
+    return count;
+#endif
+}
+
 void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     int count = extent.count;
 #if ADAPTIVE
@@ -111,7 +132,8 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     if (dot(normal, to_eye) < 0.0) normal = -normal;
     bool is_outlier = is_alone(usual_radius * unit);
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
-    float splat = max(2.0 * radius * inversesqrt(float(extent.count)), LEAST);
+    float splat = max(2.0 * radius * inversesqrt(float(shown_of(extent.count))), LEAST);
+    extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = is_outlier && drops ? 0u : floatBitsToUint(splat);
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);

@@ -84,7 +84,7 @@ Extent search(vec3 place, float radius, float usual_radius) {
 // The radius that is searched first: as large as this row's neighborhood was in the last picture that it had
 // one in, of whatever pose; else what most are within.
 float first_ball(uint row, float usual_radius) {
-    float before = uintBitsToFloat(splats[3u * row + 1u]) * (0.5 * sqrt(float(K)));
+    float before = extents[row];
     return usual_radius * (before > 0.0 ? clamp(before / usual_radius * 1.001, 0.3, 3.0) : FIRST_BALL);
 }
 #endif

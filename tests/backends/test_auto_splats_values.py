@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, sphere
+from scipy.spatial import cKDTree
 
 import viewer
 from viewer.backends import backend
 from viewer.backends.auto_splats.values import VALUES
+from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.mesh.reference import trace
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -56,6 +59,32 @@ def test_each_pixel_has_the_number_of_its_point(
         assert seen.sum() > 5000
         np.testing.assert_allclose(surface.value[seen], numbers[name][surface.row[seen]], rtol=1e-6)
         assert surface.value_kind is kind
+
+
+@pytest.mark.backend("auto_splats")
+@pytest.mark.parametrize("layers", [True, False])
+def test_splats_close_the_surface_where_points_hide_each_other(
+    draw: Callable[..., Surface], layers: bool
+) -> None:
+    """Some points to a pixel: neighborhoods have hidden ones, too, which have no splats."""
+    dense = sphere(100_000)
+    found = viewer.estimate_normals(dense, CAMERA, size=SIZE, layers=layers, growth=100)
+    tree = cKDTree(dense.positions[found.neighbors].astype(np.float64))
+    near = found.neighbors[tree.query(dense.positions[found.rows].astype(np.float64), k=10)[1]]
+    shown = np.isin(near, found.rows).sum(axis=1)
+    whole = found.counts == 10
+    assert whole.mean() > 0.9
+    expected = 2 * found.radii / np.sqrt(shown)
+    agree = np.abs(found.splat_radii / expected - 1)[whole] < 1e-3
+    assert agree.mean() > 0.99, "but where neighbors are equally far"
+    assert (shown < 10).any() == layers
+    surface = draw(dense, CAMERA, SIZE, "auto_splats", params={"layers": layers})
+    truth = trace(AnalyticScene((Sphere(),)), CAMERA, SIZE)
+    inside = truth.incidence() > 0.3  # steeper, points that are seen lie apart more one way than the other
+    assert not (inside & (surface.row == NOTHING)).any(), "a hole"
+    assert (surface.depth[inside] - truth.depth[inside]).max() < 0.1, (
+        "the other side is seen through this one"
+    )
 
 
 @pytest.mark.backend("auto_splats")

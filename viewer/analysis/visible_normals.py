@@ -34,6 +34,8 @@ class VisibleNormals:
     counts:     (M,) int64, points of a neighborhood, the point itself among them: k, or fewer before a gap
     curvatures: (M,) float32, the least eigenvalue of the covariance over the sum of all, 0 to 1/3
     usual:      (M,) float32, the radius that should hold k points by how dense the picture is there
+    splat_radii: (M,) float32, twice the radius of the disc that is each one's share of a neighborhood's, of
+                which share those alone that are seen, and have a splat; 0 of outliers
     outliers:   (M,) bool, no other point within 2^expansions of the usual radius
     neighbors:  (P,) uint32, rows of all that could be neighbors: seen, and with `layers` hidden ones too
     """
@@ -45,14 +47,9 @@ class VisibleNormals:
     counts: NDArray[np.int64]
     curvatures: NDArray[np.float32]
     usual: NDArray[np.float32]
+    splat_radii: NDArray[np.float32]
     outliers: NDArray[np.bool_]
     neighbors: NDArray[np.uint32]
-
-    @property
-    def splat_radii(self) -> NDArray[np.float32]:
-        """(M,) float32: twice the radius of the disc that is a point's share of its neighborhood."""
-        shares = 2 * self.radii / np.sqrt(self.counts)
-        return shares.astype(np.float32)
 
 
 def estimate_normals(
@@ -104,15 +101,16 @@ def _read(cloud: PointCloud, found: Neighborhoods) -> VisibleNormals:
     order = np.argsort(rows)
     rows = rows[order]
     radii, counts, curvatures, usual = found.read("found", np.float32, 4)[: found.count][order].T
-    words = found.read("splats", np.uint32, 3)[rows, 0]
+    words = found.read("splats", np.uint32, 3)[rows]
     return VisibleNormals(
         ids=rows if cloud.ids is None else cloud.ids[rows],
         rows=rows,
-        normals=_unfolded(words),
+        normals=_unfolded(words[:, 0]),
         radii=radii,
         counts=np.abs(counts).astype(np.int64),
         curvatures=curvatures,
         usual=usual,
+        splat_radii=words[:, 1].view(np.float32),
         outliers=counts < 0,
         neighbors=np.sort(found.read("slots", np.uint32, 4)[: found.participants, 3]),
     )

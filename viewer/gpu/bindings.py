@@ -134,6 +134,7 @@ class Storage(IntEnum):
     USUAL = 0
     LOOKS = 6
     TOTALS = 4
+    EXTENTS = 4
     COUNTS = 5
     NEXT = 5
     # Splats that become smaller, beside the forms of tiles.

@@ -74,10 +74,11 @@ class _Pixels:
 class Neighborhoods:
     """The neighborhoods of points that a picture shows, and their splats.
 
-    Buffers by name, as texels. "splats" and "looks": by the pose's row, as `Points.buffers` has them. Of the
-    points whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan
-    units, 0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots":
-    the participants, places and rows.
+    Buffers by name, as texels. By the pose's row: "splats" and "looks", as `Points.buffers` has them;
+    "extents", the radius of the neighborhood in the last picture that found one, 0: none. Of the points
+    whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan units,
+    0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots": the
+    participants, places and rows.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
@@ -122,8 +123,9 @@ class Neighborhoods:
         visible = self._project(pose, surface, share)
         if visible:
             self._divide(search, visible, pose)
-            if self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI):
-                gl.clear_words(self["splats"].buffer, 0)
+            self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
+            if self._reserve("extents", 4 * len(pose.cloud), gl.R32F):
+                gl.clear_words(self["extents"].buffer, 0)
             self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
             for name, nbytes, texel in (
                 ("drawn", 4, gl.R32UI),
@@ -296,6 +298,7 @@ class Neighborhoods:
             "HAS_COLORS": int(pose.cloud.colors is not None),
             "BY_SCANNER": int(search.by_scanner),
             "ADAPTIVE": int(search.adaptive),
+            "LAYERS": int(search.layers),
             "SCANNERS": len(pose.views) if search.by_scanner else 0,
         }
         with self._gpu.timers.measure("search"):
@@ -306,11 +309,13 @@ class Neighborhoods:
             if search.by_scanner:
                 pose.packed(_scanners, pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
             self["slots"].bind(Texture.SLOTS)
+            self["rows"].bind(Texture.ROWS)
             self["drawn"].bind(Texture.DRAWN_ROWS)
             self._searched.texels.bind(Texture.LISTED)
             self._bins.starts.bind(Texture.STARTS)
             self["usual"].bind(Texture.USUAL)
             self._bind_storage(splats=Storage.SPLATS, looks=Storage.LOOKS, found=Storage.FOUND)
+            self._bind_storage(extents=Storage.EXTENTS)
             self._bind_next(program)
             if number:
                 self._pixels.run(program)

@@ -63,6 +63,7 @@ def give_value(found: Neighborhoods, surface: Surface, radius_scale: float) -> N
             program = gpu.compute("auto_splats/values.comp", {"NUMBER": list(VALUES).index(name)})
             found["drawn"].bind(Texture.DRAWN_ROWS)
             found["found"].bind(Texture.FOUND)
+            found["splats"].bind(Texture.SPLATS)
             texels.buffer.bind_to_storage_buffer(Storage.VALUE)
             gpu.set(program, radius_scale=radius_scale)
             gpu.dispatch(program, found.count)
