@@ -20,7 +20,8 @@ _PREFERRED = ("torus", "dragon", "torus-simulated", "bunny-simulated")  # to var
 
 @dataclass(frozen=True)
 class Contender:
-    """A backend with its parameters. params: None for the floor and the ceiling, which have none.
+    """A backend with its parameters. params: None for the floor and the ceiling, which have none; those of
+    surfels for `PRECOMPUTED` (viewer/bench/baselines.py).
 
     sweep: the parameter that differs from its default; empty: none does.
     """

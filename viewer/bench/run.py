@@ -32,7 +32,7 @@ from ..renderer import Renderer
 from ..signals import Interrupts
 from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from . import baselines, numerics
-from .baselines import CEILING, FLOOR, RANGE_MESH
+from .baselines import CEILING, FLOOR, PLANE_POINTS, PRECOMPUTED, RANGE_MESH
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
 from .plan import Contender, Group
@@ -337,6 +337,10 @@ class Bench:
             mesh = moment.mesh if truth else self._triangulated(moment.pose.views)
             pose = replace(moment.pose, points=mesh.points)
             return Request(pose, camera, baselines.mesh(mesh, contender.backend), look=LOOK)
+        if contender.backend == PRECOMPUTED:
+            points = baselines.with_planes(moment.pose.cloud, camera, PLANE_POINTS)
+            pose = replace(moment.pose, points=points)
+            return Request(pose, camera, "surfels", contender.params, LOOK)
         drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
         return Request(moment.pose, camera, drawn, contender.params, LOOK)
 

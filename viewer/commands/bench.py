@@ -24,6 +24,11 @@ from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
 from ..bench.papers.farooq_2013.farooq import write_farooq
 from ..bench.papers.farooq_2013.large_views import measure_large_views
 from ..bench.papers.farooq_2013.playing import measure_playing
+from ..bench.papers.preiner_2012 import auto_splats
+from ..bench.papers.preiner_2012.fits import measure_fits
+from ..bench.papers.preiner_2012.preiner import NAME as PREINER
+from ..bench.papers.preiner_2012.preiner import write_preiner
+from ..bench.papers.preiner_2012.searches import measure_searches
 from ..bench.papers.slomp_2014 import octree_sizes, octrees
 from ..bench.papers.slomp_2014 import surfels as slomp
 from ..bench.papers.slomp_2014.octree_tables import NAME as OCTREE_TABLES
@@ -34,6 +39,7 @@ from ..bench.plan import Group, plan
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
+    FITS,
     LARGE_VIEWS,
     NOTES,
     NUMERICS,
@@ -41,6 +47,7 @@ from ..bench.report.results import (
     OCTREES,
     PLAYING,
     RESULTS,
+    SEARCHES,
     Row,
     compare,
     read_rows,
@@ -98,6 +105,13 @@ _OF_THE_PAPERS = {
         FAROOQ,
         {LARGE_VIEWS: measure_large_views, PLAYING: measure_playing},
         BenchSettings(size=(640, 480), views=8, frames=0),
+    ),
+    "preiner": _PaperSuite(
+        auto_splats.groups,
+        write_preiner,
+        PREINER,
+        {SEARCHES: measure_searches, FITS: measure_fits},
+        BenchSettings(size=auto_splats.SIZE, views=4, frames=3),
     ),
 }
 _SUITES = ("scenes", "numerics", *_OF_THE_PAPERS)

@@ -19,6 +19,7 @@ Row = dict[str, Any]
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
 OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
+SEARCHES, FITS = "searches.jsonl", "fits.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -33,6 +34,8 @@ _NEEDED: dict[str, dict[str, Any]] = {
     OCTREE_SIZES: {"scene": str, "points": int, "stop": str, "bits": dict},
     LARGE_VIEWS: {"scenario": str, "levels": int, "primitive": str, "samples": int},
     PLAYING: {"scene": str, "poses": int, "primitive": str, "reading": dict, "playing": dict},
+    SEARCHES: {"scene": str, "n": int, "visible": int, "params": dict, "first": dict, "later": dict},
+    FITS: {"scene": str, "noise": int | float, "params": dict, "found_inside": dict, "found_band": dict},
 }  # fmt: skip
 
 # --- what is measured -----------------------------------------------------------------

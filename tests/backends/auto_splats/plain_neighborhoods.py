@@ -1,0 +1,162 @@
+"""Neighbourhoods and planes through them the slow, obvious way, in float64, to compare with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.scan.points import PointCloud
+
+Floats = NDArray[np.float64]
+
+_MORE = 24  # neighbours beyond the k-th among which ties with it are looked for
+
+
+@dataclass(frozen=True, eq=False)
+class PlainNeighborhoods:
+    """What is to be found of M points.
+
+    nearest: (M, K), rows of the k nearest participants, by distance, then by row; -1 where there are less.
+    distances: (M, K), theirs; +inf where there are less. beyond: (M,), the distance of the next one.
+    counts: (M,), how many belong to the neighbourhood.
+    """
+
+    nearest: NDArray[np.intp]
+    distances: Floats
+    beyond: Floats
+    counts: NDArray[np.intp]
+
+    @property
+    def radii(self) -> Floats:
+        """(M,), of the balls around the neighbourhoods."""
+        return self.distances[np.arange(len(self.counts)), self.counts - 1]
+
+    def clear(self, least: float) -> NDArray[np.bool_]:
+        """Tell which have no candidate beyond their last neighbour that is nearly as far, by this share,
+        (M,): where float32 rounds distances, it may take either."""
+        after = np.column_stack([self.distances, self.beyond])[np.arange(len(self.counts)), self.counts]
+        return after > self.radii * (1 + least)
+
+
+def k_nearest(
+    cloud: PointCloud, rows: NDArray[np.integer], participants: NDArray[np.integer], k: int
+) -> tuple[NDArray[np.intp], Floats]:
+    """(rows (M, K), distances (M, K)) of the k nearest participants of each row, itself among them.
+
+    Ties go to the lowest row.
+    """
+    from scipy.spatial import cKDTree
+
+    participants = np.sort(participants).astype(np.intp)
+    points = cloud.positions[participants].astype(np.float64)
+    centers = cloud.positions[rows].astype(np.float64)
+    tree = cKDTree(points)
+    found = min(k + _MORE, len(points))
+    distances, places = (a.reshape(len(rows), -1) for a in tree.query(centers, found, workers=2))
+    order = np.lexsort((places, distances), axis=-1)[:, :k]
+    nearest = np.take_along_axis(places, order, axis=1)
+    kept = np.take_along_axis(distances, order, axis=1)
+    if found < len(points) and k <= found:
+        crowded = np.flatnonzero(distances[:, -1] <= kept[:, -1] * (1 + 1e-12))  # more ties than were found
+        for i in crowded:
+            squared = ((points - centers[i]) ** 2).sum(axis=1)
+            nearest[i] = np.lexsort((np.arange(len(points)), squared))[:k]
+            kept[i] = np.sqrt(squared[nearest[i]])
+    lacking = ((0, 0), (0, k - nearest.shape[1]))
+    return (
+        np.pad(participants[nearest], lacking, constant_values=-1),
+        np.pad(kept, lacking, constant_values=np.inf),
+    )
+
+
+def neighborhoods(
+    cloud: PointCloud,
+    rows: NDArray[np.integer],
+    participants: NDArray[np.integer],
+    k: int,
+    expected: NDArray[np.floating],
+    alone: float,
+    growth: float,
+) -> PlainNeighborhoods:
+    """Neighbourhoods that end with the k-th, or before a gap (Preiner 2012, 5.3).
+
+    expected: (M,), the radius that the density of the picture lets expect. A first neighbour is at most
+    `alone` times as far; each further one within `growth` times the area of the ball round those before,
+    which is at least as large as the expected one.
+    """
+    nearest, distances = k_nearest(cloud, rows, participants, k + 1)
+    nearest, distances, beyond = nearest[:, :k], distances[:, :k], distances[:, k]
+    counts = np.ones(len(rows), np.intp)
+    limit = alone * expected.astype(np.float64)
+    is_open = np.ones(len(rows), bool)
+    for place in range(1, k):
+        is_open &= distances[:, place] <= limit
+        counts[is_open] = place + 1
+        reached = np.where(is_open, distances[:, place], 0)
+        limit = np.sqrt(growth) * np.maximum(reached, expected)
+    return PlainNeighborhoods(nearest, distances, beyond, counts)
+
+
+@dataclass(frozen=True, eq=False)
+class PlainPlanes:
+    """Planes through M neighbourhoods: eigenvalues (M, 3), ascending, their vectors (M, 3, 3) in columns."""
+
+    values: Floats
+    vectors: Floats
+
+    @property
+    def normals(self) -> Floats:
+        """(M, 3), of either sign."""
+        return self.vectors[:, :, 0]
+
+    @property
+    def curvature(self) -> Floats:
+        """(M,), the lowest eigenvalue over the sum; 0 where all points are in one place."""
+        total = self.values.sum(axis=1)
+        return np.divide(self.values[:, 0], total, out=np.zeros(len(total)), where=total > 0)
+
+    def distinct(self, least: float) -> NDArray[np.bool_]:
+        """Tell where the two lowest eigenvalues differ by this share of the largest, (M,)."""
+        return self.values[:, 1] - self.values[:, 0] > least * self.values[:, 2]
+
+
+def planes(
+    cloud: PointCloud, rows: NDArray[np.integer], found: PlainNeighborhoods, counts: NDArray | None = None
+) -> PlainPlanes:
+    """Planes by the covariance about the mean of each neighbourhood, over the square of its radius.
+
+    counts: (M,), of the nearest that planes go through; None: all of the neighbourhood.
+    """
+    counts = found.counts if counts is None else counts
+    belongs = np.arange(found.nearest.shape[1]) < counts[:, None]
+    centers = cloud.positions[rows].astype(np.float64)
+    offsets = cloud.positions[found.nearest].astype(np.float64) - centers[:, None]
+    radii = np.where(found.radii > 0, found.radii, 1)
+    offsets = np.where(belongs[..., None], offsets / radii[:, None, None], 0)
+    mean = offsets.sum(axis=1) / counts[:, None]
+    apart = np.where(belongs[..., None], offsets - mean[:, None], 0)
+    values, vectors = np.linalg.eigh(np.einsum("mki,mkj->mij", apart, apart))
+    return PlainPlanes(np.maximum(values, 0), vectors)
+
+
+def certain_counts(
+    cloud: PointCloud, rows: NDArray[np.integer], found: PlainNeighborhoods, least: int, certain: float
+) -> NDArray[np.intp]:
+    """The number of the nearest (M,) whose plane the residuals leave certain to an angle, radians; else with
+    which it is most certain.
+
+    Tried are `least` and numbers a third larger each; all where there are not so many.
+    """
+    counts, best = found.counts.copy(), np.full(len(rows), np.inf)
+    tried = least
+    while tried <= found.nearest.shape[1]:
+        values = planes(cloud, rows, found, np.minimum(found.counts, tried)).values
+        is_plane = values[:, 1] > 1e-5 * values[:, 2]
+        turned = np.full(len(rows), np.inf)
+        turned[is_plane] = np.sqrt(values[is_plane, 0] / ((tried - 3) * values[is_plane, 1]))
+        better = (found.counts >= tried) & (best > certain) & (turned < best)
+        counts[better], best[better] = tried, turned[better]
+        tried += tried // 3
+    return counts

@@ -1,0 +1,196 @@
+"""Neighbourhoods found in a picture are those of a k-d tree, for every visible point; so are the planes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from bare_scenes import SCENES, BareScene, every_scene, on_unit_sphere, seen
+from numpy.typing import NDArray
+from plain_neighborhoods import PlainNeighborhoods, certain_counts, neighborhoods, planes
+
+import viewer
+from viewer.analysis.visible_normals import VisibleNormals
+from viewer.bench.metrics import angles_between
+from viewer.bench.scenes import catalog
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.scan.open import open_scan
+from viewer.scan.points import NOTHING, PointCloud
+from viewer.scan.pose import Pose
+
+if TYPE_CHECKING:
+    from viewer.gpu.surface import Surface
+
+pytestmark = pytest.mark.backend("auto_splats")
+
+K = 10
+RULES = {"growth": 4.0, "alone": 8.0}  # by default
+LEAST_COUNT, CERTAIN = 6, 0.05  # of adaptive planes
+EXACT = 4e-6  # of a radius: some roundings of float32
+DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
+
+
+def estimated(scene: BareScene, **params: Any) -> VisibleNormals:
+    return viewer.estimate_normals(
+        pose_of(scene), scene.camera, size=scene.size, **{"k": K, "adaptive": False, **params}
+    )
+
+
+def pose_of(scene: BareScene) -> Pose:
+    return Pose(0, 0.0, "bare", scene.cloud)
+
+
+def check(
+    scene: BareScene, found: VisibleNormals, k: int = K, *, rounded: bool = False, **rules: float
+) -> PlainNeighborhoods:
+    """Compare with the reference, every visible point.
+
+    rounded: whether distances that are equal but for rounding are common; planes are then not compared where
+    the last neighbour is one of several.
+    """
+    cloud = scene.cloud
+    true = neighborhoods(cloud, found.rows, found.neighbors, k, found.usual, **{**RULES, **rules})
+    np.testing.assert_array_equal(found.counts, true.counts)
+    np.testing.assert_allclose(found.radii, true.radii, rtol=EXACT, atol=0)
+    fitted = planes(cloud, found.rows, true)
+    clear = true.clear(EXACT) if rounded else np.ones(len(found.rows), bool)
+    known = clear & fitted.distinct(DISTINCT)
+    angle = angles_between(found.normals[known], fitted.normals[known])
+    assert np.minimum(angle, 180 - angle).max(initial=0) < 0.1
+    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1, atol=1e-4)
+    np.testing.assert_allclose(found.curvatures[clear], fitted.curvature[clear], atol=1e-4)
+    return true
+
+
+def seen_rows(scene: BareScene, draw: Callable[..., Surface]) -> NDArray[np.intp]:
+    """The rows that plain points of a pixel show."""
+    rows = draw(scene.cloud, scene.camera, scene.size, "points").row
+    return np.unique(rows[rows != NOTHING]).astype(np.intp)
+
+
+@pytest.mark.parametrize("layers", [True, False])
+@every_scene
+def test_neighborhoods_are_those_of_a_tree(name: str, layers: bool, draw: Callable[..., Surface]) -> None:
+    scene = SCENES[name]()
+    found = estimated(scene, layers=layers)
+    visible = seen_rows(scene, draw)
+    np.testing.assert_array_equal(np.sort(found.rows), visible)
+    assert len(np.unique(found.neighbors)) == len(found.neighbors)
+    assert np.isin(visible, found.neighbors).all()
+    if not layers:
+        np.testing.assert_array_equal(np.sort(found.neighbors), visible)
+    check(scene, found)
+    eye = np.array(scene.camera.eye) - scene.cloud.origin - scene.cloud.positions[found.rows]
+    if scene.camera.projection == "orthographic":
+        eye = np.broadcast_to(scene.camera.rotation()[2], eye.shape)
+    towards = np.einsum("ij,ij->i", found.normals, eye) / np.linalg.norm(eye, axis=1)
+    assert towards.min() > -1e-3
+    np.testing.assert_allclose(found.splat_radii, 2 * found.radii / np.sqrt(found.counts), rtol=1e-6)
+
+
+@pytest.mark.parametrize("k", [3, 4, 7, 16, 33])
+@pytest.mark.parametrize("name", ["bumpy", "copied", "lattice", "strays", "three-points"])
+def test_any_number_of_neighbors(name: str, k: int) -> None:
+    scene = SCENES[name]()
+    check(scene, estimated(scene, k=k), k)
+
+
+@pytest.mark.parametrize("growth", [1.0, 2.0, 100.0])
+@pytest.mark.parametrize("expansions", [0, 3, 10])
+def test_gaps_end_neighborhoods(growth: float, expansions: int) -> None:
+    scene = SCENES["strays"]()
+    found = estimated(scene, growth=growth, expansions=expansions)
+    true = check(scene, found, growth=growth, alone=2.0**expansions)
+    np.testing.assert_array_equal(found.outliers, true.counts == 1)
+
+
+@pytest.mark.parametrize("name", ["bumpy", "noisy", "two-scales"])
+def test_planes_go_through_as_few_points_as_are_certain(name: str) -> None:
+    scene = SCENES[name]()
+    found = estimated(scene, k=30, adaptive=True)
+    all_of_them = estimated(scene, k=30)
+    np.testing.assert_array_equal(found.radii, all_of_them.radii)
+    np.testing.assert_array_equal(found.counts, all_of_them.counts)
+    true = neighborhoods(scene.cloud, found.rows, found.neighbors, 30, found.usual, **RULES)
+    counts = certain_counts(scene.cloud, found.rows, true, LEAST_COUNT, CERTAIN)
+    assert (counts < true.counts).mean() > 0.01
+    angle = angles_between(found.normals, planes(scene.cloud, found.rows, true, counts).normals)
+    assert (np.minimum(angle, 180 - angle) < 0.1).mean() > 0.99  # rounding decides here and there
+
+
+def test_outliers_are_kept_where_they_are_wanted() -> None:
+    scene = SCENES["strays"]()
+    assert estimated(scene).outliers.any()
+    kept = estimated(scene, expansions=None)
+    assert not kept.outliers.any()
+    check(scene, kept, alone=np.inf)
+
+
+def test_neighborhoods_are_the_same_wherever_they_are_seen_from() -> None:
+    """With all points taking part or none hidden: an open sheet, from several sides, near and far."""
+    x, y = np.random.default_rng(0).uniform(-1, 1, (2, 3000))
+    sheet = seen(np.stack([x, y, 0.2 * np.sin(3 * x) * np.cos(2 * y)], axis=1), (640, 480))
+    first = estimated(sheet)
+    for camera in (sheet.camera.orbited(2, 0), sheet.camera.orbited(-30, 10), sheet.camera.zoomed(0.8)):
+        other = estimated(replace(sheet, camera=camera))
+        both, at, there = np.intersect1d(first.rows, other.rows, return_indices=True)
+        assert len(both) > 2500
+        np.testing.assert_array_equal(first.radii[at], other.radii[there])
+        angle = angles_between(first.normals[at], other.normals[there])
+        assert np.minimum(angle, 180 - angle).max() < 0.01
+
+
+def test_points_without_ids_of_their_own_keep_those_of_the_file() -> None:
+    points = on_unit_sphere(800)
+    points[::5] = np.nan
+    scene = seen(points)
+    found = estimated(scene)
+    np.testing.assert_array_equal(found.ids, scene.cloud.ids[found.rows])
+
+
+@pytest.mark.parametrize("values", [{"k": 2}, {"k": 65}, {"growth": 0.5}])
+def test_what_cannot_be_searched_is_told(values: dict[str, Any]) -> None:
+    with pytest.raises(InputError):
+        viewer.estimate_normals(SCENES["sphere"]().cloud, **values)
+
+
+# --- real scans -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def real(data_dir: Path) -> Callable[[str], BareScene]:
+    """A real scan in the paper's picture size, or a scene of the benchmark."""
+
+    def load(name: str) -> BareScene:
+        if name in catalog.scene_names(None):
+            pose = catalog.subject(name, data_dir).moment(0).pose
+        else:
+            with open_scan(data_dir / name) as timeline:
+                pose = timeline.pose(0)
+        cloud = PointCloud(pose.cloud.positions, pose.cloud.origin)
+        camera = Camera.orbit(cloud.bounds(), 20, 15, aspect=1760 / 900)
+        return BareScene(cloud, camera, (1760, 900))
+
+    return load
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "two-bunnies",
+        "sequences/hands_knot_5",
+        "sequences/waving_cat_16",
+        "sequences/kitti_lidar_street_10",
+        "models/bimba_points_80002.ply",
+        "models/open3d_living_room_fragment.pcd",
+        "odd/pcd/CSite1_red2-utm.pcd",
+    ],
+)
+def test_neighborhoods_of_real_scans_are_those_of_a_tree(name: str, real: Callable[[str], BareScene]) -> None:
+    scene = real(name)
+    check(scene, estimated(scene), rounded=True)
