@@ -242,7 +242,8 @@ def test_what_octrees_are_compared_with_is_needed_for_them_alone(
 @pytest.mark.slow
 def test_ctrl_c_keeps_what_was_measured(mesh: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "viewer.cli", "bench", "--scene", str(mesh), "--suite", "scenes",
-               "--quick", "--size", "96x64", "--views", "400", "-o", str(tmp_path / "out")]  # fmt: skip
+               "--backend", "surfels", "--quick", "--size", "96x64", "--views", "400",
+               "-o", str(tmp_path / "out")]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         process.stdout.readline()  # until then it draws to foretell how long it takes
