@@ -1,10 +1,12 @@
-// The radii of splats, those of hidden points no larger than what hides these. TILES: the forms of their discs as well.
+// The radii of splats, those of hidden points no larger than what hides these. TILES: the forms of their discs as well,
+// and which disc each row has.
 #include "auto_splats/hidden.glsl"
 #include "common/item.glsl"
 
 layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float new_radii[]; };
 #if TILES
 layout(std430, binding = STORAGE_FORMS) buffer Forms { vec4 forms[]; };
+layout(std430, binding = STORAGE_DISCS) writeonly buffer Discs { uint discs[]; };
 #endif
 
 void main() {
@@ -17,8 +19,9 @@ void main() {
     if (is_hidden(row, at, shown)) share = min(shown / reach, 1.0);
     new_radii[row] = point.radius * share;
 #if TILES
+    discs[row] = i;
     if (share == 1.0) return;
     share = max(share, least_radius / scale_at(-at.z) / reach);
-    forms[row].yzw /= share * share;
+    forms[i].yzw /= share * share;
 #endif
 }

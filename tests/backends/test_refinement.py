@@ -13,10 +13,11 @@ from packed import Packed
 from scenes import NOTHING, looking_down_z, sphere
 from test_instancing import CAMERAS, CLOUD, assert_agree, assert_equal
 
-from viewer.backends.auto_splats.splatting import WAYS, _Radii, draw_splats
+from viewer.backends.auto_splats.splatting import WAYS, _ByRow, draw_splats
 from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
+from viewer.gpu import gl
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
@@ -109,7 +110,8 @@ def test_tiles_that_are_not_shown_again_are_those_that_stay(draw: Draw) -> None:
     refined = splatted(draw, ROW_OF_BALLS, splats, ALONG_IT, instancing="tiles")
     counts = refined.stats.counted["refined tiles"]()
     assert 0 < counts["again"] < 0.8 * counts["in"]
-    radii = np.frombuffer(refined.keep(_Radii).reserve(len(ROW_OF_BALLS)).buffer.read(), np.uint32)
+    texels = refined.keep(_ByRow).reserve("radii", len(ROW_OF_BALLS), gl.R32F)
+    radii = np.frombuffer(texels.buffer.read(), np.uint32)
     words = splats.words.copy()
     words[splats.rows, 1] = radii[splats.rows]
     smaller = splatted(draw, ROW_OF_BALLS, Packed(words, splats.rows), ALONG_IT, refine=False)

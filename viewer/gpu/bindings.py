@@ -61,6 +61,7 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
+    DISCS = auto()  # of each row of a pose
     # Neighborhoods, beside splats.
     SLOTS = auto()  # participants in the order of their cells
     ACTIVE = auto()
@@ -139,6 +140,7 @@ class Storage(IntEnum):
     NEXT = 5
     # Splats that become smaller, beside the forms of tiles.
     RADII = 4
+    DISCS = 5
     # Samples of range views: a level that is made.
     RANGE_DEPTHS = 0
     RANGE_LOOKS = 1

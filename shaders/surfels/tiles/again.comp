@@ -2,6 +2,7 @@
 // group.
 #include "surfels/tiles/nearest.glsl"
 
+layout(binding = TEXTURE_DISCS) uniform usamplerBuffer discs;  // of each row
 layout(std430, binding = STORAGE_FARTHEST) buffer Flags { uint flags[]; };  // 1: the tile is listed
 layout(std430, binding = STORAGE_AGAIN) buffer Again { uint groups_x, groups_y, groups_z, again_count, again[]; };
 
@@ -12,7 +13,7 @@ void main() {
     for (int k = 0; k < ROWS; ++k) {
         uint row = in_picture(k) ? rows[index_of(k)] : NOTHING;
         if (row == NOTHING) continue;
-        Column c = column_of(row);
+        Column c = column_of(texelFetch(discs, int(row)).r);
         float y = down_at(c, k);
         changes = changes || !is_inside(form_at(c, y), key_at(c, y));
     }

@@ -28,9 +28,9 @@ void blend(int first, int last) {
         color_sum[k] = normal_sum[k] = vec3(0.0);
     }
     for (int i = first; i < last; ++i) {
-        uint row = texelFetch(listed, i).r;
-        Column c = column_of(row);
-        uvec2 look = texelFetch(looks, int(row)).xy;
+        uint disc = texelFetch(listed, i).r;
+        Column c = column_of(disc);
+        uvec2 look = texelFetch(looks, int(row_of(disc))).xy;
         vec3 rgb = color_of(look), n = normal_of(look);
         for (int k = 0; k < ROWS; ++k) {
             float y = down_at(c, k), here = key_at(c, y), form = form_at(c, y);

@@ -21,10 +21,10 @@ layout(binding = TEXTURE_REACH) uniform usamplerBuffer reach;
 // First tile 11 + 11 bits, width and height 5 + 5: pictures up to 2048 tiles, discs up to 31.
 const int SPAN = 31;
 
-void visit_tiles(uint word, uint row) {
+void visit_tiles(uint word, uint disc) {
     ivec2 first = ivec2(word & 0x7FFu, word >> 11 & 0x7FFu), span = ivec2(word >> 22 & 31u, word >> 27);
     for (int y = first.y; y < first.y + span.y; ++y)
-        for (int x = first.x; x < first.x + span.x; ++x) visit(uint(y * tiles.x + x), 0u, row);
+        for (int x = first.x; x < first.x + span.x; ++x) visit(uint(y * tiles.x + x), 0u, disc);
 }
 
 #if PASS == 0
@@ -45,8 +45,8 @@ bool is_hidden(ivec4 t, float nearest) {
 }
 #endif
 
-// The tiles that a disc reaches, as a word; its key and form are written down.
-uint tiles_of(Point point) {
+// The tiles that a disc reaches, as a word; its key and form are written down. disc: its number.
+uint tiles_of(Point point, uint disc) {
     if (!begin_disc(point)) return 0u;
     bool faces = dot(disc_normal, towards_eye(disc_center)) > 0.0;
 #if SIDE == 2
@@ -72,19 +72,18 @@ uint tiles_of(Point point) {
     if (is_hidden(t, depths.x * (1.0 - 1e-6))) return 0u;
 #endif
     vec3 form, key = disc_key(form);
-    places[point.row] = vec4(to_pixel(disc_center), key.xy);
-    forms[point.row] = vec4(key.z, form);
+    places[disc] = vec4(to_pixel(disc_center), key.xy);
+    forms[disc] = vec4(key.z, form);
     return uint(t.x | t.y << 11 | (t.z - t.x) << 22) | uint(t.w - t.y) << 27;
 }
 #endif
 
 void scatter(uint i) {
-    int row = drawn_row(int(i));
 #if PASS == 0
-    uint word = tiles_of(texel_point(row));
+    uint word = tiles_of(texel_point(drawn_row(int(i))), i);
     reach[i] = word;
 #else
     uint word = texelFetch(reach, int(i)).r;
 #endif
-    visit_tiles(word, uint(row));
+    visit_tiles(word, i);
 }

@@ -7,7 +7,10 @@ layout(local_size_x = TILE, local_size_y = COLUMNS, local_size_z = TILES) in;
 layout(binding = TEXTURE_PLACES) uniform samplerBuffer places;  // centre, pixels; key there; its step right
 layout(binding = TEXTURE_FORMS) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;  // of each tile's part of the list
-layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;
+layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // discs, in the order of the points drawn
+#if SAMPLED
+layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
+#endif
 layout(binding = TEXTURE_WORK) uniform usamplerBuffer work;  // tiles that discs reach, after a dispatch and their number
 layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
 layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
@@ -36,11 +39,19 @@ ivec2 part_of(int tile) {
     return ivec2(texelFetch(starts, tile).r, texelFetch(starts, tile + 1).r);
 }
 
+uint row_of(uint disc) {
+#if SAMPLED
+    return texelFetch(drawn_rows, int(disc)).r;
+#else
+    return disc;
+#endif
+}
+
 struct Column { float center_y, key, key_step, form, skew, curve; };
 
 // What a disc is along this invocation's column of pixels.
-Column column_of(uint row) {
-    vec4 a = texelFetch(places, int(row)), b = texelFetch(forms, int(row));
+Column column_of(uint disc) {
+    vec4 a = texelFetch(places, int(disc)), b = texelFetch(forms, int(disc));
     precise float x = float(pixel.x) + 0.5 - a.x;
     precise float key = a.z + a.w * x;
     precise float form = b.y * x * x;
@@ -69,8 +80,8 @@ bool is_inside(float form, float key) { return form <= (PERSPECTIVE != 0 ? key *
 // No `continue` in a loop over pixels: Mesa would not unroll it, arrays would go to memory, and each loop be slower.
 void take_nearest(ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
-        uint row = texelFetch(listed, i).r;
-        Column c = column_of(row);
+        uint disc = texelFetch(listed, i).r, row = row_of(disc);
+        Column c = column_of(disc);
         for (int k = 0; k < ROWS; ++k) {
             float y = down_at(c, k), here = key_at(c, y);
             bool better = is_inside(form_at(c, y), here) && (here > best[k] || (here == best[k] && row < shown[k]));

@@ -109,7 +109,8 @@ def _shrunk(points: Points, surface: Surface, splats: Splats, lists: TileLists |
     made small, those behind it still close them, and one depth map more is enough.
     """
     gpu = surface.gpu
-    radii = surface.keep(_Radii).reserve(len(points.pose.cloud))
+    by_row, count = surface.keep(_ByRow), len(points.pose.cloud)
+    radii = by_row.reserve("radii", count, gl.R32F)
     defines = {"TILES": int(lists is not None), **points.defines}
     program = gpu.compute("auto_splats/shrink.comp", defines, params=splats)
     with gpu.timers.measure("shrink"):
@@ -119,33 +120,37 @@ def _shrunk(points: Points, surface: Surface, splats: Splats, lists: TileLists |
         radii.buffer.bind_to_storage_buffer(Storage.RADII)
         if lists is not None:
             lists.bind_forms()
+            discs = by_row.reserve("discs", count, gl.R32UI)
+            discs.bind(Texture.DISCS)
+            discs.buffer.bind_to_storage_buffer(Storage.DISCS)
         gpu.dispatch(program, points.count)
     return replace(points, buffers={**points.buffers, "radii": radii})
 
 
-class _Radii:
-    """The radii of a pose's splats as they are drawn, kept with a surface."""
+class _ByRow:
+    """Numbers of a pose's rows, kept with a surface: "radii", of splats as they are drawn; "discs", by which
+    tiles know them."""
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._gpu = gpu
-        self._texels: gl.BufferTexture | None = None
+        self._texels: dict[str, gl.BufferTexture] = {}
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        return self._texels.buffer.size if self._texels else 0
+        return sum(texels.buffer.size for texels in self._texels.values())
 
-    def reserve(self, count: int) -> gl.BufferTexture:
+    def reserve(self, name: str, count: int, texel_format: int) -> gl.BufferTexture:
         """Texels for so many rows."""
-        if not 4 * count <= self.nbytes <= 4 * _SPARE * max(count, 1):
-            self.release()
-            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * max(count, 1)), gl.R32F)
-        assert self._texels is not None
-        return self._texels
+        old, nbytes = self._texels.get(name), 4 * max(count, 1)
+        if old is None or not nbytes <= old.buffer.size <= _SPARE * nbytes:
+            self._gpu.discard(old)
+            self._texels[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+        return self._texels[name]
 
     def release(self) -> None:
         """Delete them."""
-        self._gpu.discard(self._texels)
+        self._gpu.discard(*self._texels.values())
 
 
 def _take_normals(points: Points, surface: Surface) -> None:

@@ -47,8 +47,9 @@ FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 class TileLists:
     """The discs that reach each tile of a picture, made anew for each frame (shaders/surfels/tiles/).
 
-    length: entries of all lists. large: how many discs are left to the rasteriser. away: whether
-    some that face away from the eye were left to a second filling.
+    Discs are numbered in the order of the points that are drawn. length: entries of all lists. large: how
+    many discs are left to the rasteriser. away: whether some that face away from the eye were left to a
+    second filling.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
@@ -63,6 +64,7 @@ class TileLists:
         for name in ("work", "again"):
             self._textures[name] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
         self._large_rows: gl.BufferTexture | None = None
+        self._rows: gl.BufferTexture | None = None
 
     @property
     def nbytes(self) -> int:
@@ -78,7 +80,8 @@ class TileLists:
         for AWAY.
         """
         gpu = self._gpu
-        self._reserve(max(len(points.pose.cloud), 1))
+        self._reserve(max(points.count, 1))
+        self._rows = points.rows
         self._buffer("large").write(bytes(_LARGE_HEAD))
 
         def bind(program: Program) -> None:
@@ -126,6 +129,8 @@ class TileLists:
         self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
         self._bins.items.bind(Texture.LISTED)
+        if self._rows is not None:
+            self._rows.bind(Texture.DRAWN_ROWS)
         self._bind_storage("farthest")
         self._gpu.dispatch_indirect(program, self._buffer(work))
 
@@ -149,6 +154,11 @@ class TileLists:
     def release(self) -> None:
         """Delete everything."""
         self._gpu.discard(self._bins, *self._textures.values(), self._large_rows)
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """Macros for shaders that include surfels/tiles/nearest.glsl."""
+        return {"SAMPLED": int(self._rows is not None)}
 
     @property
     def farthest(self) -> moderngl.Buffer:
@@ -274,7 +284,8 @@ def run(
     perspective = int(surface.view.perspective)
     layout = {"TILE": TILE, "ROWS": rows, "COLUMNS": TILE // rows, "TILES": tiles, "PERSPECTIVE": perspective}
     with gpu.timers.measure(name):
-        program = gpu.compute(f"surfels/tiles/{name}.comp", {**defines, **layout}, params=splats)
+        given = {**defines, **layout, **lists.defines}
+        program = gpu.compute(f"surfels/tiles/{name}.comp", given, params=splats)
         if first is not None:
             bind_visible(first, program)
         surface.bind_storage()
@@ -283,7 +294,7 @@ def run(
 
 def show_smaller(surface: Surface, lists: TileLists) -> None:
     """Show the tiles again in which a pixel shows a disc that does not reach it any more, now that some have
-    become smaller."""
+    become smaller. `Texture.DISCS` is bound to the number of each row's."""
     lists.start_again()
     run("again", surface, lists, {})
     run("show", surface, lists, {"FOUND": 0, "FARTHEST": 0, "FILL": 0, "LARGE": 0}, again=True)
@@ -303,4 +314,4 @@ def _unfit(points: Points, surface: Surface) -> str:
     if max(surface.size) > _MOST_TILES * TILE:
         return f"more than {_MOST_TILES * TILE} pixels along an edge"
     most = surface.gpu.max_storage_bytes // _DISC_BYTES
-    return f"more than {most:,} points" if len(points.pose.cloud) > most else ""
+    return f"more than {most:,} points" if points.count > most else ""
