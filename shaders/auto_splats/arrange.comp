@@ -1,5 +1,5 @@
-// Participants in the order of their cells: place, and row. Those not behind what is active are counted, and
-// those of them that a pixel shows are listed.
+// Participants in the order of their cells: place, and twice the row, 1 more where it is hidden. Near ones are
+// counted, and those that a pixel shows are listed, or, where it `culls`, near ones of these.
 #include "auto_splats/seen.glsl"
 
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // rows
@@ -11,11 +11,11 @@ void main() {
     if (i >= item_count) return;
     uint row = texelFetch(listed, int(i)).r;
     vec3 place = texelFetch(positions, int(row)).xyz;
-    slots[i] = uvec4(floatBitsToUint(place * unit), row);
     vec2 pixel;
     float depth;
-    bool seen = is_seen(row, pixel, depth);
-    if (!is_active(pixel, depth)) return;
-    atomicAdd(counts[coarse_cell(pixel)], 1u);
-    if (seen) add(i, row);
+    bool seen = is_seen(row, pixel, depth), hidden = !seen && in_picture(pixel);
+    slots[i] = uvec4(floatBitsToUint(place * unit), 2u * row + uint(hidden));
+    bool near = is_near(pixel, depth);
+    if (near) atomicAdd(counts[coarse_cell(pixel)], 1u);
+    if (seen && (near || !culls)) add(i, row);
 }

@@ -7,34 +7,33 @@ layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if HAS_COLORS
 layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #endif
-#if LAYERS
-layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
-#endif
 #if BY_SCANNER
 layout(binding = TEXTURE_RANGE_VIEWS) uniform samplerBuffer range_views;  // its eye, and its first row
 #endif
-layout(std430, binding = STORAGE_SPLATS) writeonly buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
 layout(std430, binding = STORAGE_EXTENTS) buffer Extents { float extents[]; };  // radii of neighborhoods, by row
+layout(std430, binding = STORAGE_SPLATS) writeonly buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
 layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; };  // as surfels/passes/look.glsl reads
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
+const int LEAST_COUNT = 6;  // points that tell of a surface
+const float SPARSE = 3.0;  // times the picture's typical radius
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
 
 #if ADAPTIVE
-// How far residuals may let a normal turn, in radians: the root of their variance over the sum of squares
-// along the narrower side of the neighborhood.
-const float CERTAIN = 0.05;
-const int LEAST_COUNT = 6;
+// A plane is told by as few of the nearest as tell it for certain: their residuals let its normal turn by no more
+// than this, the root of their variance over the sum of squares along the narrower side; and some more turn it by no
+// more.
+const float CERTAIN = 0.08;        // radians
+const float MOST_TURNED = 0.9781;  // cosine of 12 degrees
 
-// The least number of the nearest with which the plane is that certain, or with which it is most certain.
 int count_of_plane(vec3 place, Extent extent) {
-    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0, least = UNKNOWN;
-    vec3 sum = vec3(0.0), squares = vec3(0.0), products = vec3(0.0);
-    int best = extent.count, tried = LEAST_COUNT;
+    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0;
+    vec3 sum = vec3(0.0), squares = vec3(0.0), products = vec3(0.0), normal = vec3(0.0);
+    int best = 0, before = 0, tried = LEAST_COUNT;  // before: how many tell the plane that is compared, 0: none
     for (int k = 0; k < K; ++k) {
-        int count = k + 1, row = count <= extent.count ? int(near_rows[k]) : 0;
+        int count = k + 1, row = count <= extent.count ? int(near_rows[k] >> 1) : 0;
         vec3 offset = (texelFetch(positions, row).xyz * unit - place) * scale;
         sum += offset;
         squares += offset * offset;
@@ -44,15 +43,15 @@ int count_of_plane(vec3 place, Extent extent) {
             mat3 vectors;
             vec3 mean = sum / float(count);
             vec3 values = eigen(squares - sum * mean, products - sum.yzx * mean.zxy, vectors);
-            bool is_plane = values.y > COLLINEAR * values.z;
-            float turned = is_plane ? max(values.x, 0.0) / (float(count - 3) * values.y) : UNKNOWN;
-            if (count <= extent.count && least > CERTAIN * CERTAIN && turned < least) {
-                least = turned;
-                best = count;
-            }
+            bool is_there = best == 0 && count <= extent.count;
+            if (is_there && before > 0 && abs(dot(normal, vectors[0])) >= MOST_TURNED) best = before;
+            float turned = max(values.x, 0.0) / float(count - 3);
+            bool is_certain = values.y > COLLINEAR * values.z && turned <= CERTAIN * CERTAIN * values.y;
+            before = is_there && is_certain ? count : 0;
+            normal = vectors[0];
         }
     }
-    return best;
+    return best > 0 ? best : extent.count;
 }
 #endif
 
@@ -63,7 +62,7 @@ vec3 fit_plane(vec3 place, Extent extent, int count, out mat3 vectors) {
     vec3 offsets[K], mean = vec3(0.0);
     for (int k = 0; k < K; ++k) {
         bool counts = k < count;
-        vec3 offset = (texelFetch(positions, counts ? int(near_rows[k]) : 0).xyz * unit - place) * scale;
+        vec3 offset = (texelFetch(positions, counts ? int(near_rows[k] >> 1) : 0).xyz * unit - place) * scale;
         offsets[k] = counts ? offset : vec3(0.0);
         mean += offsets[k];
     }
@@ -99,21 +98,27 @@ uint pack_axes(vec3 normal, vec3 longer, float roundness) {
     return packUnorm2x16(vec2(angle < 0.0 ? angle + 1.0 : angle, max(roundness, LEAST_ROUND)));
 }
 
-// How many of the nearest have splats, which alone have to close the surface: those that pixels show.
-int shown_of(int count) {
-#if LAYERS
-    int shown = 0;
+// Whether the point is an outlier: without another one within `alone` times the usual radius; or where neighbors are
+// far, with all of them about as far as the farthest, which those of a point of a surface are not.
+bool is_outlier(Extent extent, float usual_radius, bool sparse) {
+    float limit = usual_radius * unit * alone;
+    bool apart = alone < UNKNOWN && sparse && extent.count >= LEAST_COUNT && near_squared[1] > 0.7 * extent.squared;
+    return near_squared[1] > limit * limit || apart;
+}
+
+// The radius of a splat: twice that of a point's share of the surface. Hidden neighbors have no splats: those that are seen
+// share it. Where neighbors are far, and not spread over a surface, discs would hide the rest: they do not touch there.
+float splat_radius(Extent extent, vec3 values, bool sparse) {
+    float spread = 0.0;  // of a half of the points, squared
+    int seen = 0;
     for (int k = 0; k < K; ++k) {
-        uint row = k < count ? near_rows[k] : near_rows[0];
-        vec2 pixel;
-        find_pixel(to_view(texelFetch(positions, int(row)).xyz), pixel);
-        bool is_shown = in_picture(pixel) && texelFetch(rows, pixel_number(pixel)).r == row;
-        shown += int(is_shown && k < count);
+        spread = 2 * k < extent.count ? near_squared[k] : spread;
+        seen += k < extent.count && (near_rows[k] & 1u) == 0u ? 1 : 0;
     }
-    return max(shown, 1);
-#else
-    return count;
-#endif
+    bool is_spread = spread > 0.15 * extent.squared && spread < 0.85 * extent.squared && values.x < 0.3 * values.y;
+    int shared_by = values.y > COLLINEAR * values.z ? max(seen, 1) : extent.count;
+    float radius = 2.0 * sqrt(extent.squared / float(shared_by));
+    return sparse && !is_spread ? min(radius, 0.5 * sqrt(near_squared[1])) : radius;
 }
 
 void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
@@ -130,18 +135,20 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
         normal = normalize(to_eye - dot(to_eye, along) * along);
     }
     if (dot(normal, to_eye) < 0.0) normal = -normal;
-    bool is_outlier = is_alone(usual_radius * unit);
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
-    float splat = max(2.0 * radius * inversesqrt(float(shown_of(extent.count))), LEAST);
+    float depth = -to_view(texelFetch(positions, int(row)).xyz).z;
+    bool sparse = radius * scale_at(depth) > SPARSE * typical;  // neighbors are much farther than elsewhere in the picture
+    float splat = max(splat_radius(extent, values, sparse) / unit, LEAST);
+    bool outlier = is_outlier(extent, usual_radius, sparse);
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));
-    splats[3u * row + 1u] = is_outlier && drops ? 0u : floatBitsToUint(splat);
+    splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(splat);
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);
 #if HAS_COLORS
     looks[2u * row] = packUnorm4x8(vec4(texelFetch(colors, int(row)).rgb, 0.0));
 #endif
     uvec3 steps = uvec3(roundEven(normal * 511.0 + 512.0));
     looks[2u * row + 1u] = steps.x | steps.y << 10 | steps.z << 20;
-    found[n] = vec4(radius, is_outlier ? -extent.count : extent.count, sum > 0.0 ? values.x / sum : 0.0,
-    usual_radius);
+    found[n] = vec4(radius, outlier ? -extent.count : extent.count,
+                    sum > 0.0 ? values.x / sum : 0.0, usual_radius);
 }

@@ -1,4 +1,5 @@
-// The nearest K that were taken, by distance, then by row.
+// The nearest K that were taken, by distance, then by row. near_rows: twice the row, 1 more where it is hidden;
+// NOTHING: none.
 float near_squared[K];
 uint near_rows[K];
 
@@ -13,9 +14,7 @@ bool goes_before(float squared, uint row, int k) {
     return squared < near_squared[k] || (squared == near_squared[k] && row < near_rows[k]);
 }
 
-void take(vec3 offset, uint row) {
-    precise float squared = offset.x * offset.x + offset.y * offset.y;
-    squared = squared + offset.z * offset.z;
+void take_squared(float squared, uint row) {
     bool before = goes_before(squared, row, K - 1);
     for (int k = K - 1; k > 0; --k) {
         bool before_next = goes_before(squared, row, k - 1);
@@ -27,19 +26,20 @@ void take(vec3 offset, uint row) {
     near_rows[0] = before ? row : near_rows[0];
 }
 
+void take(vec3 offset, uint row) {
+    precise float squared = offset.x * offset.x + offset.y * offset.y;
+    squared = squared + offset.z * offset.z;
+    take_squared(squared, row);
+}
+
 // A neighborhood, as far as it is known. count: its participants, the point among them; squared: of its
 // radius; search: how far others could belong to it that are not known yet, 0 where none could.
 struct Extent { int count; float squared; float search; };
 
-// Whether the point is an outlier: without another one within `alone` times the usual radius.
-bool is_alone(float usual) {
-    float limit = usual * alone;
-    return near_squared[1] > limit * limit;
-}
-
 // A neighborhood ends with its k-th, or before a gap (Preiner 2012, 5.3): where a ball round those found so
 // far, at least of the usual radius, can grow to `growth` times its area without a further one; and round
-// the point alone to `alone` times the usual radius, where outliers are dropped. All participants within `known` were taken.
+// the point alone to `alone` times the usual radius, where outliers are dropped. All participants within
+// `known` were taken.
 Extent extent_of(float known, float usual) {
     Extent extent = Extent(1, 0.0, 0.0);
     float limit = drops ? usual * alone : UNKNOWN;

@@ -1,4 +1,4 @@
-// A participant's cell is the fine one that it falls into: points that are seen, and, LAYERS, those that another one
+// A participant's cell is the fine one that it falls into: points that are seen, and, HIDDEN_NEIGHBORS, those that another one
 // hides which is not much nearer than what the coarse cells around see. One in the same place tells nothing.
 #include "auto_splats/place.glsl"
 
@@ -7,7 +7,7 @@ layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
 #if SAMPLED
 layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
-#if LAYERS
+#if HIDDEN_NEIGHBORS
 layout(binding = TEXTURE_FARTHEST) uniform samplerBuffer farthest;
 #endif
 
@@ -20,7 +20,7 @@ void scatter(uint i) {
     if (!find_pixel(view, pixel)) return;
     uint shown = in_picture(pixel) ? texelFetch(rows, pixel_number(pixel)).r : NOTHING;
     if (shown != i) {
-#if LAYERS
+#if HIDDEN_NEIGHBORS
         if (-view.z > texelFetch(farthest, coarse_cell(pixel)).r) return;
         if (shown != NOTHING && texelFetch(positions, int(shown)).xyz == place) return;
 #else

@@ -1,13 +1,14 @@
-// Two depths for each coarse cell: how far points are active, and how far such take part that another hides.
-// The first is a cell's side behind the nearest that it sees (Preiner 2012, 7); the second is the farthest
-// of the first around, and another side.
+// Two depths for each coarse cell: how far points are near, a cell's sides behind the nearest that it sees (Preiner
+// 2012, 7); and how far points take part that others hide, a side behind the farthest of the first around.
 #include "common/item.glsl"
 #include "common/split.glsl"
 #include "auto_splats/place.glsl"
 
 layout(binding = TEXTURE_KEYS) uniform usamplerBuffer nearest;  // depth bits; NO_DEPTH: nothing
-layout(std430, binding = STORAGE_ACTIVE) writeonly buffer Active { float active_to[]; };
+layout(std430, binding = STORAGE_NEAR_TO) writeonly buffer NearTo { float near_to[]; };
 layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { float farthest[]; };
+
+const float SIDES = 2.0;
 
 // How far behind a depth, in sides of cells.
 float behind(float depth, float sides) { return depth + sides * float(1 << coarse_shift) / scale_at(depth); }
@@ -25,6 +26,6 @@ void main() {
     float most = 0.0;
     for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x) most = max(most, nearest_of(cell + ivec2(x, y)));
-    active_to[i] = behind(nearest_of(cell), active_sides);
-    farthest[i] = most > 0.0 ? behind(most, active_sides + 1.0) : 0.0;
+    near_to[i] = behind(nearest_of(cell), SIDES);
+    farthest[i] = most > 0.0 ? behind(most, SIDES + 6.0) : 0.0;
 }

@@ -5,10 +5,10 @@
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 layout(binding = TEXTURE_ROWS) uniform usamplerBuffer rows;
-layout(binding = TEXTURE_ACTIVE) uniform samplerBuffer active_to;
+layout(binding = TEXTURE_NEAR_TO) uniform samplerBuffer near_to;
 layout(std430, binding = STORAGE_DRAWN_ROWS) writeonly buffer DrawnRows { uint drawn_rows[]; };
 
-bool is_active(vec2 pixel, float depth) { return depth <= texelFetch(active_to, coarse_cell(pixel)).r; }
+bool is_near(vec2 pixel, float depth) { return depth <= texelFetch(near_to, coarse_cell(pixel)).r; }
 
 // Whether a pixel shows a participant; and where it is.
 bool is_seen(uint row, out vec2 pixel, out float depth) {

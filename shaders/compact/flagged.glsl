@@ -8,7 +8,7 @@ void take_sum(uint i, uint sum) {
     uint found = word_of(i);
     if (found > 0u) list[sum] = i;
     if (i == word_count - 1u) {
-        list_count = sum + found;
+        list_count = (sum + found) * EACH;
         groups_x = columns_for(list_count);
     }
 }

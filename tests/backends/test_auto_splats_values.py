@@ -62,13 +62,13 @@ def test_each_pixel_has_the_number_of_its_point(
 
 
 @pytest.mark.backend("auto_splats")
-@pytest.mark.parametrize("layers", [True, False])
+@pytest.mark.parametrize("hidden_neighbors", [True, False])
 def test_splats_close_the_surface_where_points_hide_each_other(
-    draw: Callable[..., Surface], layers: bool
+    draw: Callable[..., Surface], hidden_neighbors: bool
 ) -> None:
     """Some points to a pixel: neighborhoods have hidden ones, too, which have no splats."""
     dense = sphere(100_000)
-    found = viewer.estimate_normals(dense, CAMERA, size=SIZE, layers=layers, growth=100)
+    found = viewer.estimate_normals(dense, CAMERA, size=SIZE, hidden_neighbors=hidden_neighbors, growth=100)
     tree = cKDTree(dense.positions[found.neighbors].astype(np.float64))
     near = found.neighbors[tree.query(dense.positions[found.rows].astype(np.float64), k=10)[1]]
     shown = np.isin(near, found.rows).sum(axis=1)
@@ -77,8 +77,8 @@ def test_splats_close_the_surface_where_points_hide_each_other(
     expected = 2 * found.radii / np.sqrt(shown)
     agree = np.abs(found.splat_radii / expected - 1)[whole] < 1e-3
     assert agree.mean() > 0.99, "but where neighbors are equally far"
-    assert (shown < 10).any() == layers
-    surface = draw(dense, CAMERA, SIZE, "auto_splats", params={"layers": layers})
+    assert (shown < 10).any() == hidden_neighbors
+    surface = draw(dense, CAMERA, SIZE, "auto_splats", params={"hidden_neighbors": hidden_neighbors})
     truth = trace(AnalyticScene((Sphere(),)), CAMERA, SIZE)
     inside = truth.incidence() > 0.3  # steeper, points that are seen lie apart more one way than the other
     assert not (inside & (surface.row == NOTHING)).any(), "a hole"

@@ -11,6 +11,7 @@ from scenes import NOTHING, sphere, sphere_mesh
 
 from viewer.analysis.measure import End, Measurement, reading_of
 from viewer.analysis.pick import is_seen, pick
+from viewer.backends import backend as find_backend
 from viewer.backends import backends
 from viewer.bench.judge import Judge
 from viewer.camera import Camera
@@ -182,10 +183,16 @@ def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(
         assert np.quantile(steps, 0.999) <= 1
         found, expected = one.arrays(), other.arrays()
         covered = same & (one.row != NOTHING)
-        np.testing.assert_allclose(found["depth"][covered], expected["depth"][covered], rtol=5e-6)
-        np.testing.assert_allclose(found["normal"][covered], expected["normal"][covered], atol=3e-6)
+        # Normals that a backend finds go by one neighbor more or less, and are blended in steps of 1/511.
+        estimated = find_backend(backend).finds_normals
+        most = 0.995 if estimated else 1.0
+        depth_step = np.abs(found["depth"][covered] / expected["depth"][covered] - 1)
+        assert np.quantile(depth_step, most) <= (2e-5 if estimated else 5e-6)
+        normal_step = np.abs(found["normal"][covered] - expected["normal"][covered])
+        assert np.quantile(normal_step, most) <= (0.01 if estimated else 3e-6)
         np.testing.assert_allclose(found["value"][covered], expected["value"][covered], atol=0.3)
-        np.testing.assert_array_equal(found["color"][covered], expected["color"][covered])
+        color_step = np.abs(found["color"][covered] - expected["color"][covered])
+        assert np.quantile(color_step, most) == 0
 
 
 def positions(surface: Surface) -> NDArray[np.float64]:

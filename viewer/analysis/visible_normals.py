@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends.auto_splats.neighborhoods import Neighborhoods, Search
+from ..backends.auto_splats.neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from ..camera import Camera
 from ..errors import InputError
 from ..frame import shared_renderer
@@ -20,8 +19,6 @@ from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..view import View
 
-_MOST_NEIGHBORS = 64
-
 
 @dataclass(frozen=True, eq=False)
 class VisibleNormals:
@@ -32,12 +29,14 @@ class VisibleNormals:
     normals:    (M, 3) float32, unit length, world space, towards the eye
     radii:      (M,) float32, distance of a neighborhood's farthest point, scan units: r_k where counts is k
     counts:     (M,) int64, points of a neighborhood, the point itself among them: k, or fewer before a gap
+    splat_radii: (M,) float32, twice the radius of the disc that is a point's share of its neighborhood, or of
+                what is seen of that; 0 where no splat is drawn
     curvatures: (M,) float32, the least eigenvalue of the covariance over the sum of all, 0 to 1/3
     usual:      (M,) float32, the radius that should hold k points by how dense the picture is there
-    splat_radii: (M,) float32, twice the radius of the disc that is each one's share of a neighborhood's, of
-                which share those alone that are seen, and have a splat; 0 of outliers
-    outliers:   (M,) bool, no other point within 2^expansions of the usual radius
-    neighbors:  (P,) uint32, rows of all that could be neighbors: seen, and with `layers` hidden ones too
+    outliers:   (M,) bool, whether it is far from all others
+    neighbors:  (P,) uint32, rows of all that could be neighbors
+    hidden:     (P,) bool, which of these another point hides
+    ones too
     """
 
     ids: NDArray[np.uint32]
@@ -45,11 +44,12 @@ class VisibleNormals:
     normals: NDArray[np.float32]
     radii: NDArray[np.float32]
     counts: NDArray[np.int64]
+    splat_radii: NDArray[np.float32]
     curvatures: NDArray[np.float32]
     usual: NDArray[np.float32]
-    splat_radii: NDArray[np.float32]
     outliers: NDArray[np.bool_]
     neighbors: NDArray[np.uint32]
+    hidden: NDArray[np.bool_]
 
 
 def estimate_normals(
@@ -59,7 +59,7 @@ def estimate_normals(
     size: tuple[int, int] = (1760, 900),
     k: int = 10,
     adaptive: bool = True,
-    layers: bool = True,
+    hidden_neighbors: bool = True,
     expansions: int | None = 3,
     growth: float = 4.0,
 ) -> VisibleNormals:
@@ -68,31 +68,32 @@ def estimate_normals(
     A neighborhood is the k nearest points in space of those that take part, ties by the lowest row. It ends
     before a gap: let d_1 = 0, d_2, ... be the distances of the points by size, and u the usual radius; a
     point with d_2 > 2^expansions u is an outlier, and the first j from 2 on with d_{j+1} > sqrt(growth)
-    max(d_j, u) is the count.
+    max(d_j, u) is the count. Where neighbors are thrice as far as is typical for the picture or more, points
+    are outliers too that lie off all others: d_2^2 > 0.7 d_count^2.
 
     The normal is that of the plane through the neighborhood; adaptive: through as few of the nearest as tell
-    it within 3 degrees of their residuals, or as tell it best.
+    it in spite of noise, so that neither their residuals nor some more of them turn it by much.
 
-    camera: None fits the pose from the front. layers: whether points that another hides take part which is
-    at most some neighborhoods nearer. expansions: None: there are no outliers. Raises InputError,
+    camera: None fits the pose from the front. hidden_neighbors: whether points that another hides take part
+    which is at most some neighborhoods nearer. expansions: None: there are no outliers. Raises InputError,
     NoOpenGLError.
     """
-    if not 3 <= k <= _MOST_NEIGHBORS:
-        raise InputError(f"a neighborhood of {k} points; from 3 to {_MOST_NEIGHBORS} are possible")
-    if growth < 1:
+    if not 3 <= k <= MOST_NEIGHBORS:
+        raise InputError(f"a neighborhood of {k} points; from 3 to {MOST_NEIGHBORS} are possible")
+    if not growth >= 1:
         raise InputError(f"a growth of {growth:g} is less than 1")
     if isinstance(pose, PointCloud):
         pose = Pose(0, 0.0, "points", pose)
     renderer = shared_renderer()
+    surface = Surface(renderer.gpu, size)
     resident = renderer.resident(pose)
     bounds = resident.bounds
     camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.up or UP)
-    surface = Surface(renderer.gpu, size)
     view = View.of(camera, size, resident.origin, bounds)
     surface.start(resident, view)
     found = surface.keep(Neighborhoods)
     alone = UNKNOWN if expansions is None else 2.0**expansions
-    found.find(resident, surface, view, Search(k, layers, math.inf, growth, alone, adaptive=adaptive))
+    found.find(resident, surface, view, Search(k, hidden_neighbors, False, growth, alone, adaptive=adaptive))
     return _read(resident.cloud, found)
 
 
@@ -101,6 +102,7 @@ def _read(cloud: PointCloud, found: Neighborhoods) -> VisibleNormals:
     order = np.argsort(rows)
     rows = rows[order]
     radii, counts, curvatures, usual = found.read("found", np.float32, 4)[: found.count][order].T
+    slots = np.sort(found.read("slots", np.uint32, 4)[: found.participants, 3])
     words = found.read("splats", np.uint32, 3)[rows]
     return VisibleNormals(
         ids=rows if cloud.ids is None else cloud.ids[rows],
@@ -108,11 +110,12 @@ def _read(cloud: PointCloud, found: Neighborhoods) -> VisibleNormals:
         normals=_unfolded(words[:, 0]),
         radii=radii,
         counts=np.abs(counts).astype(np.int64),
+        splat_radii=np.ascontiguousarray(words[:, 1]).view(np.float32),
         curvatures=curvatures,
         usual=usual,
-        splat_radii=words[:, 1].view(np.float32),
         outliers=counts < 0,
-        neighbors=np.sort(found.read("slots", np.uint32, 4)[: found.participants, 3]),
+        neighbors=slots // np.uint32(2),
+        hidden=slots % 2 == 1,
     )
 
 

@@ -64,7 +64,7 @@ class Texture(IntEnum):
     DISCS = auto()  # of each row of a pose
     # Neighborhoods, beside splats.
     SLOTS = auto()  # participants in the order of their cells
-    ACTIVE = auto()
+    NEAR_TO = auto()
     USUAL = auto()
     COUNTS = auto()
     FOUND = auto()  # what a neighborhood tells
@@ -131,7 +131,7 @@ class Storage(IntEnum):
     FOUND = 1
     SLOTS = 0
     DRAWN_ROWS = 1
-    ACTIVE = 0
+    NEAR_TO = 0
     USUAL = 0
     LOOKS = 6
     TOTALS = 4

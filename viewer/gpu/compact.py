@@ -29,7 +29,7 @@ class IndexList:
     """
 
     def __init__(self, gpu: Gpu, capacity: int, each: int = 1) -> None:
-        self._gpu, self._each = gpu, each
+        self._gpu, self.each = gpu, each
         self.capacity = capacity
         self.nbytes = 4 * capacity + 16
         self.texels = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * capacity), gl.R32UI)
@@ -43,7 +43,7 @@ class IndexList:
 
     def write(self, indices: NDArray[np.uint32]) -> None:
         """Make it these indices, (N,)."""
-        count = len(indices) * self._each
+        count = len(indices) * self.each
         self.texels.buffer.write(indices)
         self._dispatch.write(struct.pack("4I", -(-count // (GROUP * self._rows)), self._rows, 1, count))
 
@@ -97,7 +97,8 @@ def list_flagged(
         listed.bind()
         bind(program)
 
-    scan_words(gpu, "compact/flagged.glsl", count, bind_list, defines, {"flags": flags})
+    given = {"EACH": f"{listed.each}u", **(defines or {})}
+    scan_words(gpu, "compact/flagged.glsl", count, bind_list, given, {"flags": flags})
 
 
 def prefix_sums(gpu: Gpu, words: moderngl.Buffer, count: int) -> None:

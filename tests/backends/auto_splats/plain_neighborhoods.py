@@ -142,21 +142,26 @@ def planes(
 
 
 def certain_counts(
-    cloud: PointCloud, rows: NDArray[np.integer], found: PlainNeighborhoods, least: int, certain: float
+    cloud: PointCloud,
+    rows: NDArray[np.integer],
+    found: PlainNeighborhoods,
+    least: int,
+    certain: float,
+    turned: float,
 ) -> NDArray[np.intp]:
-    """The number of the nearest (M,) whose plane the residuals leave certain to an angle, radians; else with
-    which it is most certain.
+    """The least number of the nearest (M,) whose plane the residuals leave certain to an angle, radians, and
+    the next number turns by no more than another, degrees; else all.
 
-    Tried are `least` and numbers a third larger each; all where there are not so many.
+    Tried are `least` and numbers a third larger each.
     """
-    counts, best = found.counts.copy(), np.full(len(rows), np.inf)
-    tried = least
-    while tried <= found.nearest.shape[1]:
-        values = planes(cloud, rows, found, np.minimum(found.counts, tried)).values
-        is_plane = values[:, 1] > 1e-5 * values[:, 2]
-        turned = np.full(len(rows), np.inf)
-        turned[is_plane] = np.sqrt(values[is_plane, 0] / ((tried - 3) * values[is_plane, 1]))
-        better = (found.counts >= tried) & (best > certain) & (turned < best)
-        counts[better], best[better] = tried, turned[better]
-        tried += tried // 3
+    tried = [least]
+    while tried[-1] + tried[-1] // 3 <= found.nearest.shape[1]:
+        tried.append(tried[-1] + tried[-1] // 3)
+    fitted = [planes(cloud, rows, found, np.minimum(found.counts, count)) for count in tried]
+    counts = found.counts.copy()
+    for count, one, other in reversed(list(zip(tried, fitted, fitted[1:], strict=False))):
+        residual = one.values[:, 0] <= certain**2 * (count - 3) * one.values[:, 1]
+        is_plane = one.values[:, 1] > 1e-5 * one.values[:, 2]
+        agree = np.abs(np.einsum("mi,mi->m", one.normals, other.normals)) >= np.cos(np.radians(turned))
+        counts[residual & is_plane & agree & (found.counts >= count + count // 3)] = count
     return counts

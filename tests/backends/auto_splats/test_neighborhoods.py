@@ -30,7 +30,7 @@ pytestmark = pytest.mark.backend("auto_splats")
 
 K = 10
 RULES = {"growth": 4.0, "alone": 8.0}  # by default
-LEAST_COUNT, CERTAIN = 6, 0.05  # of adaptive planes
+LEAST_COUNT, CERTAIN, TURNED = 6, 0.08, 12.0  # of adaptive planes: points, radians, degrees
 EXACT = 4e-6  # of a radius: some roundings of float32
 DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
 
@@ -73,16 +73,18 @@ def seen_rows(scene: BareScene, draw: Callable[..., Surface]) -> NDArray[np.intp
     return np.unique(rows[rows != NOTHING]).astype(np.intp)
 
 
-@pytest.mark.parametrize("layers", [True, False])
+@pytest.mark.parametrize("hidden_neighbors", [True, False])
 @every_scene
-def test_neighborhoods_are_those_of_a_tree(name: str, layers: bool, draw: Callable[..., Surface]) -> None:
+def test_neighborhoods_are_those_of_a_tree(
+    name: str, hidden_neighbors: bool, draw: Callable[..., Surface]
+) -> None:
     scene = SCENES[name]()
-    found = estimated(scene, layers=layers)
+    found = estimated(scene, hidden_neighbors=hidden_neighbors)
     visible = seen_rows(scene, draw)
     np.testing.assert_array_equal(np.sort(found.rows), visible)
     assert len(np.unique(found.neighbors)) == len(found.neighbors)
     assert np.isin(visible, found.neighbors).all()
-    if not layers:
+    if not hidden_neighbors:
         np.testing.assert_array_equal(np.sort(found.neighbors), visible)
     true = check(scene, found)
     eye = np.array(scene.camera.eye) - scene.cloud.origin - scene.cloud.positions[found.rows]
@@ -91,13 +93,20 @@ def test_neighborhoods_are_those_of_a_tree(name: str, layers: bool, draw: Callab
     towards = np.einsum("ij,ij->i", found.normals, eye) / np.linalg.norm(eye, axis=1)
     assert towards.min() > -1e-3
     belongs = np.arange(K) < true.counts[:, None]
-    sharing = (belongs & np.isin(true.nearest, visible)).sum(axis=1)
-    shares = np.where(found.outliers, 0, 2 * true.radii / np.sqrt(sharing))
-    clear = true.clear(EXACT)  # elsewhere rounding decides who belongs
-    np.testing.assert_allclose(found.splat_radii[clear], shares[clear], rtol=EXACT, atol=1e-29)
+    sharing = (belongs & ~np.isin(true.nearest, found.neighbors[found.hidden])).sum(axis=1)
+    values = planes(scene.cloud, found.rows, true).values
+    on_line = values[:, 1] <= 1e-5 * values[:, 2]
+    shares = 2 * true.radii / np.sqrt(np.where(on_line, true.counts, sharing))
+    apart = shares if true.nearest.shape[1] < 2 else 0.5 * true.distances[:, 1]  # strays
+    clear = true.clear(EXACT) & ~found.outliers  # elsewhere rounding decides who belongs
+    is_share = np.isclose(found.splat_radii, shares, rtol=1e-5, atol=1e-29)
+    assert (is_share | np.isclose(found.splat_radii, apart, rtol=1e-5, atol=1e-29))[clear].all()
+    assert np.count_nonzero(is_share[clear]) >= 0.9 * np.count_nonzero(clear) or name == "strays"
+    assert not found.splat_radii[found.outliers].any()
+    assert not found.hidden[np.isin(found.neighbors, visible)].any()
 
 
-@pytest.mark.parametrize("k", [3, 4, 7, 16, 33])
+@pytest.mark.parametrize("k", [3, 4, 7, 16, 32])
 @pytest.mark.parametrize("name", ["bumpy", "copied", "lattice", "strays", "three-points"])
 def test_any_number_of_neighbors(name: str, k: int) -> None:
     scene = SCENES[name]()
@@ -110,7 +119,9 @@ def test_gaps_end_neighborhoods(growth: float, expansions: int) -> None:
     scene = SCENES["strays"]()
     found = estimated(scene, growth=growth, expansions=expansions)
     true = check(scene, found, growth=growth, alone=2.0**expansions)
-    np.testing.assert_array_equal(found.outliers, true.counts == 1)
+    assert found.outliers[true.counts == 1].all()
+    others = found.outliers & (true.counts > 1)  # as far from all others as these are
+    assert (true.distances[others, 1] ** 2 > 0.7 * (1 - EXACT) * true.radii[others] ** 2).all()
 
 
 @pytest.mark.parametrize("name", ["bumpy", "noisy", "two-scales"])
@@ -121,7 +132,7 @@ def test_planes_go_through_as_few_points_as_are_certain(name: str) -> None:
     np.testing.assert_array_equal(found.radii, all_of_them.radii)
     np.testing.assert_array_equal(found.counts, all_of_them.counts)
     true = neighborhoods(scene.cloud, found.rows, found.neighbors, 30, found.usual, **RULES)
-    counts = certain_counts(scene.cloud, found.rows, true, LEAST_COUNT, CERTAIN)
+    counts = certain_counts(scene.cloud, found.rows, true, LEAST_COUNT, CERTAIN, TURNED)
     assert (counts < true.counts).mean() > 0.01
     angle = angles_between(found.normals, planes(scene.cloud, found.rows, true, counts).normals)
     assert (np.minimum(angle, 180 - angle) < 0.1).mean() > 0.99  # rounding decides here and there
@@ -157,7 +168,7 @@ def test_points_without_ids_of_their_own_keep_those_of_the_file() -> None:
     np.testing.assert_array_equal(found.ids, scene.cloud.ids[found.rows])
 
 
-@pytest.mark.parametrize("values", [{"k": 2}, {"k": 65}, {"growth": 0.5}])
+@pytest.mark.parametrize("values", [{"k": 2}, {"k": 33}, {"growth": 0.5}])
 def test_what_cannot_be_searched_is_told(values: dict[str, Any]) -> None:
     with pytest.raises(InputError):
         viewer.estimate_normals(SCENES["sphere"]().cloud, **values)

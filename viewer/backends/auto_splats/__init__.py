@@ -8,7 +8,6 @@ outlines.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from ...gpu.amplify import Points
@@ -17,7 +16,7 @@ from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
 from .. import FrameView, Limit
-from .neighborhoods import Neighborhoods, Search
+from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
 from .values import give_value
@@ -28,17 +27,19 @@ FINDS_NORMALS = True
 
 _BY_STEPS = "normals are blended as whole numbers of 1/511, which turn with the scan"
 _HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
+_BY_PICTURE = "how large splats are goes by the points that the picture shows, and by those around them"
 _NO_SURFACE = "points on a line make no surface, and how wide it is goes by the last bit"
 LIMITS = {
     "rotated by 37 degrees": Limit(0.0005, _BY_STEPS),
     "points x1000, one after the other": Limit(0.02, _HIDDEN_COPIES),
     "points x1000, all over again": Limit(0.02, _HIDDEN_COPIES),
+    "1x1 pixels": Limit(0.001, _BY_PICTURE),
+    "8192x1 pixels": Limit(0.001, _BY_PICTURE),
     "collinear points end on, perspective": Limit(0.04, _NO_SURFACE),
     "collinear points end on, orthographic": Limit(0.04, _NO_SURFACE),
 }
 
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbors", "Splats", "Speed"
-_ACTIVE_SIDES = 2.0
 
 
 @dataclass(frozen=True)
@@ -49,17 +50,17 @@ class Params:
         10,
         "Points of a neighborhood, the point itself among them: more smooth away noise, fewer keep details",
         low=3,
-        high=64,
+        high=MOST_NEIGHBORS,
         sweep=(6, 10, 20),
         group=_NEIGHBORS,
     )
     adaptive: bool = param(
         True,
-        "Normals go by as few of these as tell the plane within 3 degrees of noise",
+        "Normals go by as few of these as tell the plane in spite of noise",
         group=_NEIGHBORS,
         sweep=(True, False),
     )
-    layers: bool = param(
+    hidden_neighbors: bool = param(
         True, "Points that another one of about the same surface hides are neighbors too", group=_NEIGHBORS
     )
     outliers: bool = param(False, "Show points that have no neighbors near", key="Shift+O", group=_NEIGHBORS)
@@ -125,7 +126,9 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     params: Params = frame.params
     found = surface.keep(Neighborhoods)
     search = search_of(params, pose)
-    found.find(pose, surface, frame.view, search, frame.share)
+    anew = bool(frame.changed - {"parameters", "values"})
+    found.find(pose, surface, frame.view, search, frame.share, anew)
+    surface.stats.counted["neighborhoods by searches"] = found.read_rounds
     if not found.count:
         surface.clear()
         surface.own("normal")
@@ -164,8 +167,8 @@ def search_of(params: Params, pose: GpuPose) -> Search:
     """The search that parameters ask for."""
     return Search(
         k=params.k,
-        layers=params.layers,
-        active_sides=_ACTIVE_SIDES if params.cull else math.inf,
+        hidden_neighbors=params.hidden_neighbors,
+        culls=params.cull,
         growth=params.growth,
         alone=2.0**params.expansions,
         drops=not params.outliers,

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 FINEST_COARSE, COARSEST = 4, 7  # shifts of coarse cells: 16 to 128 pixels
 _COARSEST_FINE = 4
-_FINE = 0.7  # edge of fine cells, in usual radii
+_FINE = 0.7  # edge of fine cells, in typical radii
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,9 @@ class Grids:
     """The grids, and what else their shaders read (shaders/auto_splats/place.glsl).
 
     Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
-    pixels round the picture whose points take part. unit: factor on places, a power of two. active_sides,
-    growth, alone, drops: as `Search` has them.
+    pixels round the picture whose points take part. unit: factor on places, a power of two.
+    typical: radius of neighborhoods as points are dense in the picture, pixels. culls, growth, alone, drops:
+    as `Search` has them.
     """
 
     fine_size: tuple[int, int]
@@ -28,18 +29,19 @@ class Grids:
     fine_shift: int
     coarse_shift: int
     margin: int
-    active_sides: float
+    culls: bool
     growth: float
     alone: float
     drops: bool
     unit: float
+    typical: float
 
     @classmethod
     def of(
-        cls, size: tuple[int, int], coarse_shift: int, search: Search, unit: float, radius: float = 1.0
+        cls, size: tuple[int, int], coarse_shift: int, search: Search, unit: float, typical: float = 1.0
     ) -> Grids:
-        """The grids over a picture of a size, pixels. radius: of a usual neighborhood, pixels."""
-        fine_shift = min(max(round(math.log2(_FINE * radius)), 0), _COARSEST_FINE)
+        """The grids over a picture of a size, pixels. typical: as above."""
+        fine_shift = min(max(round(math.log2(_FINE * typical)), 0), _COARSEST_FINE)
         margin = 1 << coarse_shift
         return cls(
             _cells(size, margin, fine_shift),
@@ -47,11 +49,12 @@ class Grids:
             fine_shift,
             coarse_shift,
             margin,
-            search.active_sides,
+            search.culls,
             search.growth,
             search.alone,
             search.drops,
             unit,
+            typical,
         )
 
     @property

@@ -22,7 +22,7 @@ from ...gpu import gl
 from ...gpu.bindings import Storage, Texture
 from ...gpu.bins import Bins
 from ...gpu.compact import IndexList, list_covered, list_flagged
-from ...gpu.constants import NO_DEPTH, UNKNOWN
+from ...gpu.constants import GROUP, NO_DEPTH, UNKNOWN
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
@@ -34,10 +34,12 @@ from .grids import COARSEST, FINEST_COARSE, Grids
 
 # Bytes of a pose's row, of a participant, of a point that is seen.
 _SPLAT, _LOOK, _SLOT, _FOUND = 12, 8, 16, 16
-_FIRST_BALL = 1.4  # that is searched, in usual radii: most neighborhoods are within
+_FIRST_BALL = 0.56  # that is searched, in usual radii: most neighborhoods are within
+_LANES = 32  # that search together for one point, of the few that are left
 _ENOUGH = 10  # points of a region that tell how dense they are
 # Participants at most, with those that others hide: 84 MB. And of a coarse cell: llvmpipe ends all loops of
 # an invocation after 65 535 turns.
+MOST_NEIGHBORS = 32  # loops over more are not unrolled, and take far longer
 MOST_PARTICIPANTS, _LARGEST_CROWD = 1 << 22, 6000
 _SPARE = 4  # times the room that is needed, beyond which it is given up
 
@@ -46,17 +48,17 @@ _SPARE = 4  # times the room that is needed, beyond which it is given up
 class Search:
     """Rules of what belongs to a neighborhood.
 
-    k: points of one, the point itself among them. layers: whether points that others hide take part.
-    active_sides: how far behind the nearest that its cell of the picture sees a point is active, in sides of
-    the cell. growth: of the area of a ball within which another point must follow; alone: the radius within
-    which the second point must lie, in usual ones; others are outliers. drops: whether these have no splat.
-    by_scanner: whether normals point to the side that a range view saw, not to the eye. adaptive: whether
-    planes go through as few of the nearest as noise allows.
+    k: points of one, the point itself among them. hidden_neighbors: whether points that others hide take
+    part. culls: whether points far behind the nearest of their part of the picture wait for `find_late`.
+    growth: of the area of a ball within which another point must follow; alone: the radius within which the
+    second point must lie, in usual ones; others are outliers. drops: whether these have no splat. by_scanner:
+    whether normals point to the side that a range view saw, not to the eye. adaptive: whether planes go
+    through as few of the nearest as noise allows.
     """
 
     k: int = 10
-    layers: bool = True
-    active_sides: float = math.inf
+    hidden_neighbors: bool = True
+    culls: bool = False
     growth: float = 4.0
     alone: float = UNKNOWN
     drops: bool = True
@@ -83,7 +85,8 @@ class Neighborhoods:
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._gpu, self._size = gpu, size
-        self._pixels = IndexList(gpu, size[0] * size[1])  # that show a point; later, what is not known yet
+        self._pixels = IndexList(gpu, size[0] * size[1])  # that show a point; then what one search left
+        self._rest = IndexList(gpu, size[0] * size[1], GROUP)  # what two left
         self._searched = IndexList(gpu, size[0] * size[1])  # slots
         self._texels: dict[str, gl.BufferTexture] = {}
         self._totals = gpu.ctx.buffer(reserve=8)
@@ -97,25 +100,38 @@ class Neighborhoods:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        lists = self._pixels.nbytes + self._searched.nbytes + self._bins.nbytes
+        lists = self._pixels.nbytes + self._rest.nbytes + self._searched.nbytes + self._bins.nbytes
         return lists + sum(texels.buffer.size for texels in self._texels.values())
 
     def release(self) -> None:
         """Delete everything."""
-        self._gpu.discard(self._pixels, self._searched, self._bins, self._totals, *self._texels.values())
+        self._gpu.discard(
+            self._pixels, self._rest, self._searched, self._bins, self._totals, *self._texels.values()
+        )
 
     def __getitem__(self, name: str) -> gl.BufferTexture:
         return self._texels[name]
 
     def read(self, name: str, dtype: type, words: int) -> NDArray:
         """A buffer as an array of a number of words each, (N, words); waits for the GPU."""
-        return np.frombuffer(self[name].buffer.read(), dtype).reshape(-1, words)
+        if name not in self._texels:  # nothing was seen yet
+            return np.empty((0, words), dtype)
+        content: NDArray = np.frombuffer(self[name].buffer.read(), dtype)
+        return content[: len(content) // words * words].reshape(-1, words)
 
-    def find(self, pose: GpuPose, surface: Surface, view: View, search: Search, share: float = 1.0) -> bool:
-        """Find the neighborhoods of the active points; False where nothing has changed since the last
-        call."""
+    def find(
+        self,
+        pose: GpuPose,
+        surface: Surface,
+        view: View,
+        search: Search,
+        share: float = 1.0,
+        anew: bool = True,
+    ) -> bool:
+        """Find the neighborhoods of the points that are seen, or of the near ones; False where that is known
+        from the last call. anew: even so."""
         made_of = (view.key, search, share)
-        if self._pose is not None and self._pose() is pose and self._made_of == made_of:
+        if not anew and self._pose is not None and self._pose() is pose and self._made_of == made_of:
             surface.stats.skipped["neighborhoods"] = "points, camera and search are those of the last picture"
             return False
         self._made_of, self._pose = None, weakref.ref(pose)
@@ -195,12 +211,13 @@ class Neighborhoods:
                 break
             shift = wanted
         self._grids = grids = Grids.of(self._size, shift, search, _unit(pose), radius)
-        for name in ("active", "farthest"):
+        for name in ("near to", "farthest"):
             self._reserve(name, 4 * grids.coarse_cells, gl.R32F)
         with self._gpu.timers.measure("planes"):
             program = self._gpu.compute("auto_splats/planes.comp", params=grids)
             self["nearest"].bind(Texture.KEYS)
-            self._bind_storage(active=Storage.ACTIVE, farthest=Storage.FARTHEST)
+            self["near to"].buffer.bind_to_storage_buffer(Storage.NEAR_TO)
+            self._bind_storage(farthest=Storage.FARTHEST)
             self._gpu.dispatch(program, grids.coarse_cells)
 
     def _measure_depths(self, grids: Grids) -> int:
@@ -223,18 +240,18 @@ class Neighborhoods:
         if self._bins.cells != grids.fine_cells:
             self._gpu.discard(self._bins)
             self._bins = Bins(self._gpu, grids.fine_cells)
-        for layers in (True, False) if search.layers else (False,):
-            defines = {"LAYERS": int(layers)}
+        for hidden in (True, False) if search.hidden_neighbors else (False,):
+            defines = {"HIDDEN_NEIGHBORS": int(hidden)}
             visits = self._visits("auto_splats/participants.glsl", pose, sample, defines, grids)
             self._bins.count(visits)
             self.participants = self._bins.length()
-            if layers and self.participants > MOST_PARTICIPANTS:
+            if hidden and self.participants > MOST_PARTICIPANTS:
                 continue
             self._bins.fill(visits, self.participants)
             self._arrange(pose)
             if self._find_usual(search) <= _LARGEST_CROWD:
                 break
-        if search.layers and not layers:
+        if search.hidden_neighbors and not hidden:
             surface.stats.skipped["hidden neighbors"] = "too many points would take part"
         if self.participants < search.k:  # an outlier is far from others, of which there are none
             self._grids = replace(grids, alone=UNKNOWN)
@@ -271,7 +288,7 @@ class Neighborhoods:
         self._searched.bind()
         pose.array("positions").bind(Texture.POSITIONS)
         self["rows"].bind(Texture.ROWS)
-        self["active"].bind(Texture.ACTIVE)
+        self["near to"].bind(Texture.NEAR_TO)
         self._bind_storage(drawn=Storage.DRAWN_ROWS)
         self._gpu.dispatch(program, self.participants)
 
@@ -280,25 +297,30 @@ class Neighborhoods:
         first, self.count = self.count, len(self._searched)
         if self.count == first:
             return
-        for number in range(3):
-            if number:
+        for number, listed in enumerate((None, self._pixels, self._rest)):
+            if listed is not None:
                 with self._gpu.timers.measure("unknown"):
-                    list_flagged(
-                        self._gpu, "auto_splats/unknown.glsl", self.count, self._pixels, self._bind_next
-                    )
-            self._run_search(pose, search, number, first)
+                    list_flagged(self._gpu, "auto_splats/unknown.glsl", self.count, listed, self._bind_next)
+            self._run_search(pose, search, number, first, listed)
 
-    def _run_search(self, pose: GpuPose, search: Search, number: int, first: int) -> None:
-        """Search with a ball that most neighborhoods are within; one that what is left is within; all that
-        there may be to search for what is left then."""
+    def read_rounds(self) -> dict[str, int]:
+        """How many neighborhoods were known after one search, two, and more, in the last picture."""
+        after_one, after_two = len(self._pixels), len(self._rest) // GROUP
+        return {"one": self.count - after_one, "two": after_one - after_two, "more": after_two}
+
+    def _run_search(
+        self, pose: GpuPose, search: Search, number: int, first: int, listed: IndexList | None
+    ) -> None:
+        """Search with a ball that most neighborhoods are within; one that nearly all others are within; as
+        far as it takes. listed: those not known yet, but at first."""
         defines = {
             "K": search.k,
             "ROUND": number,
             "FIRST_BALL": _FIRST_BALL,
+            "LANES": _LANES if number == 2 else 1,
             "HAS_COLORS": int(pose.cloud.colors is not None),
             "BY_SCANNER": int(search.by_scanner),
             "ADAPTIVE": int(search.adaptive),
-            "LAYERS": int(search.layers),
             "SCANNERS": len(pose.views) if search.by_scanner else 0,
         }
         with self._gpu.timers.measure("search"):
@@ -309,7 +331,6 @@ class Neighborhoods:
             if search.by_scanner:
                 pose.packed(_scanners, pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
             self["slots"].bind(Texture.SLOTS)
-            self["rows"].bind(Texture.ROWS)
             self["drawn"].bind(Texture.DRAWN_ROWS)
             self._searched.texels.bind(Texture.LISTED)
             self._bins.starts.bind(Texture.STARTS)
@@ -317,11 +338,11 @@ class Neighborhoods:
             self._bind_storage(splats=Storage.SPLATS, looks=Storage.LOOKS, found=Storage.FOUND)
             self._bind_storage(extents=Storage.EXTENTS)
             self._bind_next(program)
-            if number:
-                self._pixels.run(program)
-            else:
+            if listed is None:
                 self._gpu.set(program, first=first)
                 self._gpu.dispatch(program, self.count - first)
+            else:
+                listed.run(program)
 
     def _bind_next(self, _: Program) -> None:
         self._bind_storage(next=Storage.NEXT)

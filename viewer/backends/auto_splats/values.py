@@ -65,5 +65,6 @@ def give_value(found: Neighborhoods, surface: Surface, radius_scale: float) -> N
             found["found"].bind(Texture.FOUND)
             found["splats"].bind(Texture.SPLATS)
             texels.buffer.bind_to_storage_buffer(Storage.VALUE)
-            gpu.set(program, radius_scale=radius_scale)
+            if name == "splat_radius":
+                gpu.set(program, radius_scale=radius_scale)
             gpu.dispatch(program, found.count)

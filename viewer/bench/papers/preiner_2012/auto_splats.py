@@ -75,15 +75,15 @@ def fitted(noise: float) -> list[dict[str, Any]]:
     As many as told, and as few of these as tell the plane ("adaptive").
     """
     ks = (K, 2 * K, 4 * K) if noise else (K,)
-    fixed = [{"k": k, "layers": True, "adaptive": False} for k in ks]
-    alone = [] if noise else [{"k": K, "layers": False, "adaptive": False}]
-    return [*fixed, *alone, {"k": ks[-1], "layers": True, "adaptive": True}]
+    fixed = [{"k": k, "hidden_neighbors": True, "adaptive": False} for k in ks]
+    alone = [] if noise else [{"k": K, "hidden_neighbors": False, "adaptive": False}]
+    return [*fixed, *alone, {"k": ks[-1], "hidden_neighbors": True, "adaptive": True}]
 
 
 def groups() -> list[Group]:
     """Pictures that are judged: with and without hidden neighbours, and with the paper's two savings."""
     return [
-        *(Group(scene, _against_precomputed("layers")) for scene in (*_MODELS, _TWO_SCALES)),
+        *(Group(scene, _against_precomputed("hidden_neighbors")) for scene in (*_MODELS, _TWO_SCALES)),
         Group(DEEP, tuple(_saving())),
     ]
 

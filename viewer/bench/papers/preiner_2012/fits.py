@@ -65,7 +65,7 @@ class _Pooled:
 
 
 def measure_fits(bench: Bench) -> Iterator[Row]:
-    """Yield a row for each model and setting: layers on and off, and numbers of neighbours under noise."""
+    """Yield a row for each model and setting: hidden neighbors or not, and numbers of them under noise."""
     for scene in SCENES:
         moment = bench.subject(Group(scene, ())).moment(0)
         for noise in NOISES if scene == SCENES[0] else NOISES[:1]:

@@ -79,7 +79,7 @@ def read_measurement(path: Path) -> Measurement:
 
 def _pictured(row: Row) -> dict[str, Any]:
     """Values of a judged scene, drawn one way."""
-    kept = {name: row["params"].get(name) for name in ("layers", "cull", "refine")}
+    kept = {name: row["params"].get(name) for name in ("hidden_neighbors", "cull", "refine")}
     return {
         "scene": row["scene"],
         "n": row["n"],
@@ -224,7 +224,7 @@ def _fits(rows: Sequence[dict[str, Any]]) -> str:
             row["turned"],
             100 * row["grown"],
         ]
-        hidden = _on(row["params"]["layers"])
+        hidden = _on(row["params"]["hidden_neighbors"])
         lines.append([f"`{row['scene']}`", hidden, _count(row), *map(three_digits, shown)])
     return markdown_table(head, lines, left=("scene", "hidden neighbours"))
 
@@ -234,7 +234,7 @@ def _noise(rows: Sequence[dict[str, Any]]) -> str:
     head = ["scene", "noise", "k", "median, °", "95 %, °", "open3d's median, °", "turned in 2°, median °"]
     lines = []
     for row in sorted(rows, key=lambda row: row["noise"]):
-        if not row["params"]["layers"]:
+        if not row["params"]["hidden_neighbors"]:
             continue
         angles = (*row["found_inside"].values(), row["open3d_inside"]["median"], row["turned"])
         lines.append([f"`{row['scene']}`", f"{row['noise']:g}", _count(row), *map(three_digits, angles)])
@@ -273,7 +273,7 @@ def _drawn(row: dict[str, Any]) -> str:
         return "planes of all points"
     if row["drawn"] != BACKEND:
         return f"`{row['drawn']}`"
-    return f"`{BACKEND}`" if row["layers"] else f"`{BACKEND}`, what is seen alone"
+    return f"`{BACKEND}`" if row["hidden_neighbors"] else f"`{BACKEND}`, what is seen alone"
 
 
 def _titled(row: dict[str, Any]) -> str:
