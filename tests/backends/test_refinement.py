@@ -159,3 +159,24 @@ def test_surfaces_behind_others_are_nearer_the_truth(renderer: Renderer, draw: D
     assert refined["spill_percent"] < 0.9 * without["spill_percent"]
     assert refined["hole_percent"] < 0.02
     assert refined["psnr"] > without["psnr"] + 1
+
+
+@pytest.mark.backend("auto_splats")
+def test_grid_culling_leaves_no_gaps(renderer: Renderer, draw: Draw) -> None:
+    """Points at random leave gaps between splats of the nearest surface, which those behind it close."""
+    rng, size = np.random.default_rng(0), (480, 360)
+    random = [
+        directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        for directions in rng.normal(size=(5, 15_000, 3))
+    ]
+    cloud = PointCloud.from_arrays(
+        np.concatenate([ball + center for ball, center in zip(random, CENTERS, strict=True)])
+    )
+    truth = AnalyticScene(tuple(Sphere(center=center) for center in CENTERS))
+    judge = Judge.of(renderer.gpu, truth, ALONG_IT, size, LOOK, cloud, None)
+    without, culled = (
+        judge.errors(draw(cloud, ALONG_IT, size, "auto_splats", LOOK, {"cull": cull}))
+        for cull in (False, True)
+    )
+    assert culled["hole_percent"] < without["hole_percent"] + 0.04
+    assert culled["psnr"] > without["psnr"] - 0.5
