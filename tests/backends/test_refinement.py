@@ -179,4 +179,5 @@ def test_grid_culling_leaves_no_gaps(renderer: Renderer, draw: Draw) -> None:
         for cull in (False, True)
     )
     assert culled["hole_percent"] < without["hole_percent"] + 0.04
-    assert culled["psnr"] > without["psnr"] - 0.5
+    assert culled["through_percent"] < without["through_percent"] + 0.1
+    assert culled["psnr"] > 36
