@@ -15,6 +15,7 @@ import pytest
 
 from viewer.backends import backends
 from viewer.bench.papers.farooq_2013 import farooq
+from viewer.bench.papers.preiner_2012 import preiner
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
 from viewer.look import Look, ValueKind
 from viewer.params import Parameter, describe
@@ -72,7 +73,9 @@ def test_the_page_of_backends_is_up_to_date(bless: bool) -> None:
     assert page.read_text(encoding="utf-8") == backends_page()
 
 
-@pytest.mark.parametrize("tables", [table_two, octree_tables, farooq], ids=lambda tables: tables.NAME)
+@pytest.mark.parametrize(
+    "tables", [table_two, octree_tables, farooq, preiner], ids=lambda tables: tables.NAME
+)
 def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: bool) -> None:
     page = ROOT / "docs" / f"{tables.NAME}.md"
     files = sorted((ROOT / "docs" / "data").glob(f"{tables.NAME}*.json"))

@@ -166,6 +166,7 @@ SCENES: dict[str, Callable[[], BareScene]] = {
     "line": _line,
     "lattice": _lattice,
     "cubes": _cubes,
+    "one-point": _few(1),
     "two-points": _few(2),
     "three-points": _few(3),
     "far-away": _far_away,

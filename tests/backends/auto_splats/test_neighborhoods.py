@@ -160,6 +160,15 @@ def test_neighborhoods_are_the_same_wherever_they_are_seen_from() -> None:
         assert np.minimum(angle, 180 - angle).max() < 0.01
 
 
+def test_empty_poses_have_no_neighborhoods() -> None:
+    nothing = PointCloud.from_arrays(np.empty((0, 3)))
+    found = viewer.estimate_normals(Pose(0, 0.0, "empty", nothing), Camera((0.0, 0.0, 3.0)), size=(64, 48))
+    assert len(found.rows) == len(found.normals) == len(found.neighbors) == 0
+    away = seen(on_unit_sphere(500))
+    turned = replace(away, camera=Camera((0.0, 0.0, 5.0), (0.0, 0.0, 10.0)))
+    assert not len(estimated(turned).rows)
+
+
 def test_points_without_ids_of_their_own_keep_those_of_the_file() -> None:
     points = on_unit_sphere(800)
     points[::5] = np.nan
@@ -168,7 +177,9 @@ def test_points_without_ids_of_their_own_keep_those_of_the_file() -> None:
     np.testing.assert_array_equal(found.ids, scene.cloud.ids[found.rows])
 
 
-@pytest.mark.parametrize("values", [{"k": 2}, {"k": 33}, {"growth": 0.5}])
+@pytest.mark.parametrize(
+    "values", [{"k": 2}, {"k": 33}, {"growth": 0.5}, {"growth": np.nan}, {"size": (0, 9)}]
+)
 def test_what_cannot_be_searched_is_told(values: dict[str, Any]) -> None:
     with pytest.raises(InputError):
         viewer.estimate_normals(SCENES["sphere"]().cloud, **values)
@@ -198,6 +209,7 @@ def real(data_dir: Path) -> Callable[[str], BareScene]:
     "name",
     [
         "two-bunnies",
+        "dragon-scans",
         "sequences/hands_knot_5",
         "sequences/waving_cat_16",
         "sequences/kitti_lidar_street_10",

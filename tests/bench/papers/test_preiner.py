@@ -27,7 +27,7 @@ WHERE = {
     "device": "a card", "driver": "4.6", "timer": "finish", "processors": 4, "version": "0.1.0",
     "date": "2026-01-31", "size": [1760, 900], "seed": 0, "repeat": 3,
 }  # fmt: skip
-PARAMS = {"k": 10, "layers": True, "adaptive": False, "cull": True, "refine": True}
+PARAMS = {"k": 10, "hidden_neighbors": True, "adaptive": False, "cull": True, "refine": True}
 
 
 def a_picture(scene: str, psnr: float, backend: str = "auto_splats", sweep: str = "", **params: Any) -> Row:
@@ -68,14 +68,18 @@ def a_fit(scene: str, noise: float, median: float, **params: Any) -> Row:
 
 DRAWN = [
     a_picture("bunny", 31),
-    a_picture("bunny", 30, sweep="layers", layers=False),
+    a_picture("bunny", 30, sweep="hidden_neighbors", hidden_neighbors=False),
     a_picture("bunny", 32, "precomputed"),
     a_picture("horses", 25, sweep="cull, refine", cull=False, refine=False),
     a_picture("horses", 26, sweep="cull, refine"),
 ]
 TREES = {"all": 1200.0, "visible": 800.0, "all_build": 100.0, "visible_build": 90.0}
 SEARCHED = [a_search(10, False, TREES), a_search(10, True, TREES), a_search(20, True, {})]
-FITTED = [a_fit("bunny", 0.0, 1.5), a_fit("bunny", 0.0, 2.5, layers=False), a_fit("bunny", 0.5, 9.0)]
+FITTED = [
+    a_fit("bunny", 0.0, 1.5),
+    a_fit("bunny", 0.0, 2.5, hidden_neighbors=False),
+    a_fit("bunny", 0.5, 9.0),
+]
 MADE = digest(DRAWN, SEARCHED, FITTED)
 
 
@@ -211,7 +215,7 @@ def test_fits_of_a_sphere_are_nearly_right(renderer: Renderer) -> None:
         sphere(4000),
         sphere_mesh(),
         BenchSettings(size=(320, 240), views=2),
-        {"k": 10, "layers": True, "adaptive": False},
+        {"k": 10, "hidden_neighbors": True, "adaptive": False},
     )
     assert found["found_inside"]["median"] < 1
     assert found["found_inside"]["p95"] < 3
@@ -227,5 +231,7 @@ def test_searches_are_timed_beside_trees(renderer: Renderer) -> None:
     assert [row["params"]["k"] for row in rows] == [10, 10, *searches.KS[1:]]
     for row in rows[:2]:
         assert row["trees"]["visible"] > 0
+        assert 4000 > row["rounds"][0] > 1000
+        assert row["rounds"] == sorted(row["rounds"], reverse=True)
         assert row["first"]["search"] > 2 * row["still"]["search"]
     assert not rows[2]["trees"]

@@ -27,7 +27,8 @@ _STAGE_OF = {
     **dict.fromkeys(
         ("nearest", "planes", "arrange", "usual", "active", "search", "unknown", "late"), "search"
     ),
-    **dict.fromkeys(("work", "show", "blend", "splat", "normals", "copy", "resolve"), "splats"),
+    **dict.fromkeys(("work", "show", "shrink", "again", "limit", "limits", "visibility", "blend"), "splats"),
+    **dict.fromkeys(("splat", "normals", "copy", "resolve", "values"), "splats"),
     "shade": "shading",
 }
 _MODELS = ("bunny", "armadillo", "igea", "dragon")  # Fig. 6
@@ -53,8 +54,8 @@ def normals(pose: Pose, camera: Camera, size: tuple[int, int], values: dict[str,
 
 def rounds(surface: Surface) -> list[int]:
     """How many points were left before each round of the search for a surface's last picture."""
-    counted = surface.stats.counted.get("rounds")
-    return [] if counted is None else list(counted().values())
+    known = list(surface.stats.counted["neighborhoods by searches"]().values())
+    return [sum(known[number:]) for number in range(len(known))]
 
 
 def by_stage(passes: Sequence[tuple[str, float]]) -> dict[str, float]:
@@ -74,7 +75,7 @@ def fitted(noise: float) -> list[dict[str, Any]]:
 
     As many as told, and as few of these as tell the plane ("adaptive").
     """
-    ks = (K, 2 * K, 4 * K) if noise else (K,)
+    ks = (K, 2 * K, 3 * K) if noise else (K,)
     fixed = [{"k": k, "hidden_neighbors": True, "adaptive": False} for k in ks]
     alone = [] if noise else [{"k": K, "hidden_neighbors": False, "adaptive": False}]
     return [*fixed, *alone, {"k": ks[-1], "hidden_neighbors": True, "adaptive": True}]

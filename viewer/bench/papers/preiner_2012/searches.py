@@ -31,7 +31,7 @@ _ELEVATION = 10.0
 _ELSEWHERE = 90.0  # degrees aside that the picture before is from, where nothing of it shall help
 _STEP = 0.5  # degrees from one picture to the next while the camera moves
 _WORKERS = 2  # of the k-d tree
-KS = (10, 5, 20, 40)  # the first is the paper's
+KS = (10, 5, 20, 30)  # the first is the paper's
 
 
 @dataclass(frozen=True)
