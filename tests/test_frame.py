@@ -49,12 +49,11 @@ def test_render_takes_parameters_by_name_and_explains_wrong_ones() -> None:
 
 def test_the_default_follows_what_the_scan_stores() -> None:
     assert backend_for(_of(sphere(10)))[0] == "surfels"
-    assert backend_for(_of(BARE))[0] == "points"
-    assert backend_for(_of(BARE))[1].point_size == 0
+    assert backend_for(_of(BARE))[0] == "auto_splats"
     assert backend_for(_of(BARE), "points")[1].point_size == 1
-    assert backend_for(_of(BARE), None, {"point_size": "3"})[1].point_size == 3
+    assert backend_for(_of(BARE), None, {"k": "12"})[1].k == 12
     assert viewer.render(sphere(10), size=(8, 8)).stats.backend == "surfels"
-    assert viewer.render(BARE, size=(8, 8)).stats.backend == "points"
+    assert viewer.render(BARE, size=(8, 8)).stats.backend == "auto_splats"
 
 
 def test_missing_normals_are_estimated_when_asked_for() -> None:

@@ -16,7 +16,7 @@ layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; }
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
 const int LEAST_COUNT = 6;  // points that tell of a surface
-const float SPARSE = 3.0;  // times the picture's typical radius
+const float SPARSE = 3.0;  // radius from which neighbors are far, in the picture's typical ones
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
@@ -107,18 +107,12 @@ bool is_outlier(Extent extent, float usual_radius, bool sparse) {
 }
 
 // The radius of a splat: twice that of a point's share of the surface. Hidden neighbors have no splats: those that are seen
-// share it. Where neighbors are far, and not spread over a surface, discs would hide the rest: they do not touch there.
-float splat_radius(Extent extent, vec3 values, bool sparse) {
-    float spread = 0.0;  // of a half of the points, squared
+// share it. most: that a neighborhood counts for, as discs of the few points of sparse parts would hide the rest.
+float splat_radius(Extent extent, vec3 values, float most) {
     int seen = 0;
-    for (int k = 0; k < K; ++k) {
-        spread = 2 * k < extent.count ? near_squared[k] : spread;
-        seen += k < extent.count && (near_rows[k] & 1u) == 0u ? 1 : 0;
-    }
-    bool is_spread = spread > 0.15 * extent.squared && spread < 0.85 * extent.squared && values.x < 0.3 * values.y;
+    for (int k = 0; k < K; ++k) seen += k < extent.count && (near_rows[k] & 1u) == 0u ? 1 : 0;
     int shared_by = values.y > COLLINEAR * values.z ? max(seen, 1) : extent.count;
-    float radius = 2.0 * sqrt(extent.squared / float(shared_by));
-    return sparse && !is_spread ? min(radius, 0.5 * sqrt(near_squared[1])) : radius;
+    return 2.0 * min(sqrt(extent.squared), most) * inversesqrt(float(shared_by));
 }
 
 void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
@@ -136,10 +130,9 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     }
     if (dot(normal, to_eye) < 0.0) normal = -normal;
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
-    float depth = -to_view(texelFetch(positions, int(row)).xyz).z;
-    bool sparse = radius * scale_at(depth) > SPARSE * typical;  // neighbors are much farther than elsewhere in the picture
-    float splat = max(splat_radius(extent, values, sparse) / unit, LEAST);
-    bool outlier = is_outlier(extent, usual_radius, sparse);
+    float most = SPARSE * typical / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z);
+    float splat = max(splat_radius(extent, values, most * unit) / unit, LEAST);
+    bool outlier = is_outlier(extent, usual_radius, radius > most);
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(splat);

@@ -70,13 +70,13 @@ def test_opening_is_cancelled_replaced_and_done(app: RunningApp, folder: Path) -
     app.screen.do("key", "Next")
     app.told(r"Cannot open: \S+3_damaged.ply")
     app.screen.do("key", "Prior", "key", "Prior")
-    app.see(scan=text, frame=0, backend="points", points=3_000_000)
+    app.see(scan=text, frame=0, backend="auto_splats", points=3_000_000)
     assert names[3] not in {state.scan for state in app.states}
 
 
 def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningApp, folder: Path) -> None:
     go_to(app, folder / "2_bare.npz")
-    app.see(frame=0, backend="points")
+    app.see(frame=0, backend="auto_splats")
     app.screen.do("mousemove", *(v - 1 for v in SIZE), "key", "Escape")  # away with the notes
     app.settle()
     left, top, width, height = app.view()
@@ -87,7 +87,7 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     press_until(app, "Escape", "Cancelled: Estimating normals")
     app.screen.do("key", "Escape")  # away with the note
     after = app.settle()
-    assert (after.frame, after.backend) == (0, "points")
+    assert (after.frame, after.backend) == (0, "auto_splats")
     assert after.pictures <= drawn + 3, "the same picture is not drawn again and again"
     assert (app.screen.picture()[part] == before).all()
     app.choose(PANEL, "##backend", "Surfels##surfels")

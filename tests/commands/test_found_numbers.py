@@ -67,7 +67,8 @@ def test_other_backends_name_the_one_that_finds_it(run: Run, refused: Callable[.
         "render", "ball.npz", *FOUND, "--look", "color_by=gop", "-o", "a.png"
     )
     assert not list(Path().glob("*.png"))
-    done = run("render", "two", "--all", *SMALL, "--look", "color_by=slope", "-o", "%d.png")
+    points = (*SMALL, "--backend", "points")
+    done = run("render", "two", "--all", *points, "--look", "color_by=slope", "-o", "%d.png")
     assert done.code == 0
     assert "frame 0 (0.npz) has no 'slope', and is drawn in other colours" in done.err
 

@@ -15,7 +15,7 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import FrameView, Limit
+from .. import FrameView, Limit, Suited
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
@@ -39,6 +39,7 @@ LIMITS = {
     "collinear points end on, orthographic": Limit(0.04, _NO_SURFACE),
 }
 
+_FEW = 1000  # points
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbors", "Splats", "Speed"
 
 
@@ -102,7 +103,7 @@ class Params:
         group=_SPLATS,
     )
     cull: bool = param(
-        False,
+        True,
         "Leave out points far behind the nearest around them, until they turn out to be seen",
         affects="speed",
         group=_SPEED,
@@ -121,6 +122,12 @@ def needs(pose: Pose, params: Params) -> tuple[str, ...]:
     return ()
 
 
+def suits(pose: Pose) -> Suited | None:
+    """Scans of positions alone, but for a few points: their surface is found while they are drawn."""
+    is_bare = pose.overview.normals is None and pose.count >= _FEW
+    return Suited(1) if is_bare else None
+
+
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
     params: Params = frame.params
@@ -135,7 +142,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         give_value(found, surface, params.radius_scale)
         return surface.stats.share < 1
     way, scale = params.instancing, params.radius_scale
-    if params.cull:
+    if not found.is_whole:
         draw_depths(_points(pose, found, params), surface, instancing=way, radius_scale=scale)
         found.find_late(pose, surface, search)
     draw_splats(

@@ -41,6 +41,7 @@ _ENOUGH = 10  # points of a region that tell how dense they are
 # an invocation after 65 535 turns.
 MOST_NEIGHBORS = 32  # loops over more are not unrolled, and take far longer
 MOST_PARTICIPANTS, _LARGEST_CROWD = 1 << 22, 6000
+_BLOCK = 8  # pixels along an edge, of which the farthest is known where points may be late
 _SPARE = 4  # times the room that is needed, beyond which it is given up
 
 
@@ -94,6 +95,7 @@ class Neighborhoods:
         self._grids = Grids.of(size, FINEST_COARSE, Search(), 1.0)
         self.participants = 0
         self.count = 0  # of those searched
+        self.is_whole = False  # whether none that is seen is left to be searched
         self._made_of: tuple[object, ...] | None = None
         self._pose: weakref.ref[GpuPose] | None = None
 
@@ -135,7 +137,7 @@ class Neighborhoods:
             surface.stats.skipped["neighborhoods"] = "points, camera and search are those of the last picture"
             return False
         self._made_of, self._pose = None, weakref.ref(pose)
-        self.count = 0
+        self.count, self.is_whole = 0, not search.culls
         visible = self._project(pose, surface, share)
         if visible:
             self._divide(search, visible, pose)
@@ -157,12 +159,14 @@ class Neighborhoods:
     def find_late(self, pose: GpuPose, surface: Surface, search: Search) -> None:
         """Find the neighborhoods of the points too that were not active, but are not behind what the surface
         shows by now (Preiner 2012, 7)."""
+        self.is_whole = True
         if not self.count:
             return
         with self._gpu.timers.measure("late"):
+            self._find_blocks(surface)
             self["slots"].bind(Texture.SLOTS)
             self["usual"].bind(Texture.USUAL)
-            surface.depths.bind(Texture.DEPTHS)
+            self["blocks"].bind(Texture.FARTHEST)
             self._list_seen("auto_splats/late.comp", pose)
         self._search(pose, search)
 
@@ -281,10 +285,18 @@ class Neighborhoods:
             self._gpu.dispatch(program, self._grids.coarse_cells)
             return self._read_totals()[1]
 
+    def _find_blocks(self, surface: Surface) -> None:
+        """Find the farthest depth that the surface shows in each block of pixels."""
+        blocks = math.prod(-(-pixels // _BLOCK) for pixels in self._size)
+        self._reserve("blocks", 4 * blocks, gl.R32UI)
+        surface.depths.bind(Texture.DEPTHS)
+        self._bind_storage(blocks=Storage.FARTHEST)
+        self._gpu.dispatch(self._gpu.compute("auto_splats/blocks.comp", {"BLOCK": _BLOCK}), blocks)
+
     def _list_seen(self, name: str, pose: GpuPose) -> None:
         """Run a program that includes auto_splats/seen.glsl on all participants: it adds to those
         searched."""
-        program = self._gpu.compute(name, params=self._grids)
+        program = self._gpu.compute(name, {"BLOCK": _BLOCK}, params=self._grids)
         self._searched.bind()
         pose.array("positions").bind(Texture.POSITIONS)
         self["rows"].bind(Texture.ROWS)
