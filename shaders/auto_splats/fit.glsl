@@ -16,7 +16,9 @@ layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; }
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
 const int LEAST_COUNT = 6;  // points that tell of a surface
-const float SPARSE = 3.0;  // radius from which neighbors are far, in the picture's typical ones
+// Radii in the picture's typical ones: from which neighbors are far; from which on splats grow no more.
+const float FAR = 3.0;
+const float MOST = 9.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
@@ -130,9 +132,9 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     }
     if (dot(normal, to_eye) < 0.0) normal = -normal;
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
-    float most = SPARSE * typical / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z);
-    float splat = max(splat_radius(extent, values, most * unit) / unit, LEAST);
-    bool outlier = is_outlier(extent, usual_radius, radius > most);
+    float typical_radius = typical / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z);
+    float splat = max(splat_radius(extent, values, MOST * typical_radius * unit) / unit, LEAST);
+    bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(splat);
