@@ -180,4 +180,4 @@ def test_grid_culling_leaves_no_gaps(renderer: Renderer, draw: Draw) -> None:
     )
     assert culled["hole_percent"] < without["hole_percent"] + 0.04
     assert culled["through_percent"] < without["through_percent"] + 0.1
-    assert culled["psnr"] > 36
+    assert culled["psnr"] > without["psnr"] - 0.5

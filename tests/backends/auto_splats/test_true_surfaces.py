@@ -23,21 +23,18 @@ pytestmark = [pytest.mark.backend("auto_splats"), pytest.mark.slow]
 # is a quarter of the published one, are 3.9 off.
 MEDIANS = {"armadillo": 4.2, "igea": 1.0, "dragon": 3.0}
 MOST = 3.0  # of planes that go through as few points as noise allows
-# At silhouettes, over what it is inside. Wanted is 1.5, which planes of all points of the dragon have.
-BAND = {"armadillo": 1.5, "igea": 1.5, "dragon": 1.52}
 
 
 @pytest.mark.parametrize("scene", MEDIANS)
-def test_normals_are_right_inside_and_at_silhouettes_and_stay(scene: str, data_dir: Path) -> None:
+def test_normals_are_right_and_stay(scene: str, data_dir: Path) -> None:
     moment = catalog.subject(scene, data_dir).moment(0)
     settings = BenchSettings(size=auto_splats.SIZE, views=2)
     found = fits.fit_errors(moment.pose.cloud, moment.mesh, settings, {"k": auto_splats.K, "adaptive": False})
-    inside, band = found["found_inside"], found["found_band"]
+    inside = found["found_inside"]
     assert inside["median"] < MEDIANS[scene]
     assert inside["p95"] < 20
     assert inside["median"] < found["open3d_inside"]["median"] + 1
     assert inside["p95"] < found["open3d_inside"]["p95"] + 1
-    assert band["p95"] < BAND[scene] * inside["p95"]
     assert found["turned"] < 0.5
     assert found["grown"] < 0.01
     adaptive = fits.fit_errors(
@@ -45,6 +42,18 @@ def test_normals_are_right_inside_and_at_silhouettes_and_stay(scene: str, data_d
     )
     assert adaptive["found_inside"]["median"] < MOST
     assert adaptive["found_inside"]["p95"] < 20
+
+
+# Planes through 10 of all points of the dragon have 1.50 there.
+LACKS = pytest.mark.xfail(reason="1.52 in place of 1.5", strict=True)
+
+
+@pytest.mark.parametrize("scene", ["armadillo", "igea", pytest.param("dragon", marks=LACKS)])
+def test_normals_at_silhouettes_are_about_as_right_as_inside(scene: str, data_dir: Path) -> None:
+    moment = catalog.subject(scene, data_dir).moment(0)
+    settings = BenchSettings(size=auto_splats.SIZE, views=2)
+    found = fits.fit_errors(moment.pose.cloud, moment.mesh, settings, {"k": auto_splats.K, "adaptive": False})
+    assert found["found_band"]["p95"] < 1.5 * found["found_inside"]["p95"]
 
 
 @pytest.mark.parametrize("scene", ["bunny", "armadillo", "igea", "dragon"])

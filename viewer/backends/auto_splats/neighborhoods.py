@@ -129,13 +129,13 @@ class Neighborhoods:
         search: Search,
         share: float = 1.0,
         anew: bool = True,
-    ) -> bool:
-        """Find the neighborhoods of the points that are seen, or of the near ones; False where that is known
-        from the last call. anew: even so."""
+    ) -> None:
+        """Find the neighborhoods of the points that are seen, or of the near ones, unless they are known from
+        the last call. anew: even so."""
         made_of = (view.key, search, share)
         if not anew and self._pose is not None and self._pose() is pose and self._made_of == made_of:
             surface.stats.skipped["neighborhoods"] = "points, camera and search are those of the last picture"
-            return False
+            return
         self._made_of, self._pose = None, weakref.ref(pose)
         self.count, self.is_whole = 0, not search.culls
         visible = self._project(pose, surface, share)
@@ -154,11 +154,10 @@ class Neighborhoods:
             self._gather(pose, surface, search, share)
             self._search(pose, search)
         self._made_of = made_of
-        return True
 
     def find_late(self, pose: GpuPose, surface: Surface, search: Search) -> None:
-        """Find the neighborhoods of the points too that were not active, but are not behind what the surface
-        shows by now (Preiner 2012, 7)."""
+        """Find the neighborhoods of the points too that are not near, but whose splats may be seen
+        beside what the surface shows by now (Preiner 2012, 7)."""
         self.is_whole = True
         if not self.count:
             return
