@@ -109,7 +109,7 @@ def test_the_sign_of_the_bias_is_positive_behind() -> None:
 
 def test_pixels_that_one_picture_lacks_have_no_depth_error() -> None:
     errors = metrics.depth(np.full(SIZE, np.inf), np.ones(SIZE), np.ones(SIZE), 1)
-    assert errors.pop("through_percent") == 0
+    assert errors.pop("through_percent") == errors.pop("closed_percent") == 0
     assert all(math.isnan(value) for value in errors.values())
 
 
@@ -122,6 +122,9 @@ def test_through_counts_what_lies_behind_in_parts_of_the_silhouette() -> None:
     drawn[:, 30:40] += 0.35  # of one sheet still
     errors = metrics.depth(drawn, true, np.ones(SIZE), step=0.1)
     assert errors["through_percent"] == 25
+    assert errors["closed_percent"] == 50  # what floats before the surface hides what is behind it
+    holes = metrics.coverage(np.isfinite(drawn), np.isfinite(true))["hole_percent"]
+    assert holes + errors["through_percent"] + errors["closed_percent"] == 100
     assert errors["wrong_layer_percent"] == pytest.approx(100 * 2 / 3)
 
 

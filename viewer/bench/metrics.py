@@ -64,10 +64,11 @@ def depth(
             f"depth_median{unit}": _quantile(size, 0.5),
             f"depth_p95{unit}": _quantile(size, 0.95),
         }
-    limit = WRONG_LAYER * step
+    limit, area = WRONG_LAYER * step, _count(np.isfinite(true))
     return errors | {
         "wrong_layer_percent": _percent(_count(np.abs(error) > limit), len(error)),
-        "through_percent": _percent(_count(error > limit), _count(np.isfinite(true))),
+        "through_percent": _percent(_count(error > limit), area),
+        "closed_percent": _percent(_count(error <= limit), area),
     }
 
 

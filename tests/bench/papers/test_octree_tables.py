@@ -20,8 +20,8 @@ WHERE = {
     "version": "0.1.0", "date": "2026-01-31",
 }  # fmt: skip
 ERRORS = {
-    "hole_percent": 0.25, "spill_percent": 1.5, "depth_median_px": 2.0, "depth_p95_px": 4.0,
-    "normal_mean": 6.0, "psnr": 30.0,
+    "hole_percent": 0.25, "through_percent": 0.75, "spill_percent": 1.5, "depth_median_px": 2.0,
+    "depth_p95_px": 4.0, "normal_mean": 6.0, "psnr": 30.0,
 }  # fmt: skip
 
 
@@ -99,7 +99,7 @@ def test_feeds_stand_beside_the_papers_at_its_level() -> None:
 def test_levels_have_time_and_error() -> None:
     first, second = lines(page([measured()]), "6")
     assert first[:5] == ["`demo`", "octants", "a card", "6", "4.00"]
-    assert first[5:] == ["8.00", "0.250", "1.50", "2.00", "4.00", "6.00", "30.0"]
+    assert first[5:] == ["8.00", "0.250", "0.750", "1.50", "2.00", "4.00", "6.00", "30.0"]
     assert second[:4] == ["`demo`", "closed", "a card", "6"]
     assert lines(page([measured()]), "7")[0][:4] == ["", "", "", "7"]
 

@@ -37,18 +37,19 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 # What the summary shows of each default row; then what is plotted besides.
 _SUMMARY = (
-    "gpu_ms", "cpu_ms", "prepare_ms", "bytes_gpu", "hole_percent", "spill_percent", "depth_median_px",
-    "wrong_layer_percent", "normal_mean", "psnr", "ssim", "flip", "visibility_error_percent",
+    "gpu_ms", "cpu_ms", "prepare_ms", "bytes_gpu", "hole_percent", "through_percent", "closed_percent",
+    "spill_percent", "depth_median_px", "wrong_layer_percent", "normal_mean", "psnr", "ssim", "flip",
+    "visibility_error_percent",
 )  # fmt: skip
 _JUDGED = _SUMMARY[4:]
 _PLOTTED = (
-    *_JUDGED, "through_percent", "spill_p95", "boundary_mean", "depth_bias_px", "depth_rmse_px",
+    *_JUDGED, "spill_p95", "boundary_mean", "depth_bias_px", "depth_rmse_px",
     "depth_p95_px", "normal_signed_mean",
     "flicker_orbit_color", "flicker_orbit_normal", "flicker_pose_color", "flicker_pose_normal",
 )  # fmt: skip
 _SWEPT_COSTS = ("gpu_ms", "prepare_ms", "bytes_gpu")
 _SWEPT_ERRORS = (
-    "hole_percent", "depth_median_px", "wrong_layer_percent", "normal_mean", "psnr",
+    "hole_percent", "through_percent", "depth_median_px", "wrong_layer_percent", "normal_mean", "psnr",
     "visibility_error_percent",
 )  # fmt: skip
 

@@ -79,6 +79,8 @@ COSTS = [
 ]
 _ERRORS = [
     Metric("hole_percent", "%", "true silhouette that is left empty"),
+    Metric("through_percent", "%", "true silhouette where a farther sheet shows through"),
+    Metric("closed_percent", "%", "true silhouette that is neither empty nor seen through", "high"),
     Metric("hole_scanned_percent", "%", "what is seen and was scanned that is left empty"),
     Metric("spill_percent", "%", "covered pixels outside the true silhouette, in parts of it"),
     Metric("spill_p95", "px", "distance of such pixels to the true silhouette, 95th percentile"),
@@ -95,7 +97,6 @@ _ERRORS = [
         )
     ),
     Metric("wrong_layer_percent", "%", "pixels more than four point spacings off in depth"),
-    Metric("through_percent", "%", "true silhouette where a farther sheet shows through"),
     *(
         Metric(f"normal{suffix}_{name}", "°", f"angle to the true normal, {text}{sign}")
         for suffix, sign in (("", ", sign ignored"), ("_signed", ""))

@@ -28,7 +28,15 @@ NAME = "octree-tables"
 _SUITE = "octrees"
 _TIMED = [work for work in octrees.WORKS if work != octrees.SORT]
 _PAPERS = {"build": "build_ms", "cut": "traverse_ms"}  # which of them it has
-_ERRORS = ("hole_percent", "spill_percent", "depth_median_px", "depth_p95_px", "normal_mean", "psnr")
+_ERRORS = {
+    "hole_percent": "holes, %",
+    "through_percent": "through, %",
+    "spill_percent": "spill, %",
+    "depth_median_px": "depth, median px",
+    "depth_p95_px": "depth, 95 % px",
+    "normal_mean": "normal, °",
+    "psnr": "PSNR, dB",
+}
 
 # --- files ----------------------------------------------------------------------------
 
@@ -170,8 +178,7 @@ def _tree_cells(row: dict[str, Any]) -> list[str]:
 def _levels(measurements: Sequence[Measurement]) -> str:
     """Time against error, level by level."""
     head = [
-        "scene", "cubes", "machine", "level", "ms", "its processors, ms", "holes, %", "spill, %",
-        "depth, median px", "depth, 95 % px", "normal, °", "PSNR, dB",
+        "scene", "cubes", "machine", "level", "ms", "its processors, ms", *_ERRORS.values(),
     ]  # fmt: skip
     rows, above = [], None
     for each in measurements:
@@ -183,7 +190,7 @@ def _levels(measurements: Sequence[Measurement]) -> str:
                 three_digits(np.median(row["gpu_ms"])),
                 three_digits(busy) if each["timer"] == "finish" else "",
             ]
-            errors = [three_digits(row["errors"][name]) for name in _ERRORS]
+            errors = [three_digits(row["errors"].get(name, np.nan)) for name in _ERRORS]
             rows.append([*(["", "", ""] if named == above else named), str(row["level"]), *times, *errors])
             above = named
     return markdown_table(head, rows, left=("scene", "cubes", "machine"))
