@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from scenes import sphere
 
 from viewer.app.scene import viewport as viewport_module
 from viewer.app.scene.viewport import Viewport
+from viewer.backends import Backend, FrameView
 from viewer.camera import Camera
 from viewer.frame import Request, shared_renderer
+from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import NOTHING, Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
@@ -98,6 +101,45 @@ def test_a_preview_is_drawn_in_full_at_rest_and_on_demand(viewport: Viewport) ->
     viewport.finish()
     for before, after in zip(full, shown(viewport), strict=True):
         np.testing.assert_array_equal(after, before)
+
+
+@dataclass(frozen=True)
+class _NoParams:
+    """None."""
+
+
+def test_a_backend_that_draws_more_simply_in_motion_is_called_again_at_rest(viewport: Viewport) -> None:
+    told: list[bool] = []
+
+    def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        told.append(frame.moving)
+        surface.clear()
+        surface.stats.simplified = frame.moving
+        return False
+
+    module = ModuleType("simple")
+    vars(module).update(TITLE="Simple", Params=_NoParams, needs=lambda pose, params: (), draw=draw)
+    request = replace(REQUEST, backend=Backend("simple", module))
+    viewport.draw(request)
+    assert (told, viewport.is_complete) == ([False], True)
+    dragged = turned(request)
+    viewport.draw(dragged, held=True)
+    viewport.draw(turned(dragged), playing=True)
+    assert told == [False, True, True]
+    assert viewport.is_preview
+    assert not viewport.draw(turned(dragged), playing=True), "it goes on moving"
+    assert math.isinf(viewport.better_at(playing=True))
+    while not viewport.draw(turned(dragged)):
+        assert len(told) == 3
+        time.sleep(0.005)
+    assert told == [False, True, True, False]
+    assert viewport.is_complete
+    viewport.took(1000.0, goal_ms=10.0)  # which says nothing of motion
+    viewport.draw(request, held=True)
+    assert viewport.surface is not None
+    assert viewport.surface.size == SIZE
+    viewport.finish()
+    assert told[-2:] == [True, False], "at once where something asks for it"
 
 
 def test_what_is_under_the_mouse_in_a_preview_is_about_what_it_is_in_full(viewport: Viewport) -> None:

@@ -96,7 +96,8 @@ class FrameView:
     backend that can draw something coarser does, and says that a later call would refine it; None: never.
     changed: what of `CHANGES` is another than in the call before for this surface; all in the first one, and
     after one that failed. "values": what `row_values` and `resolve` of the Surface give, by look and layers.
-    moving: whether other pictures will follow at once.
+    moving: whether other pictures will follow at once; a backend that then draws more simply says so by
+    `surface.stats.simplified`, and is called again at rest.
     """
 
     view: View

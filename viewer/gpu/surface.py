@@ -47,7 +47,8 @@ class Stats:
     many of it became what; it waits for the GPU, and tells of the last picture of its surface. chosen:
     parameter -> what "auto" stood for. faces_away: whether points that face away from the eye were left
     out. share: of the points that needed to be drawn, by the order of gpu/sample.py, less than 1 in a
-    preview. left_out: the points that are not in that share.
+    preview. left_out: the points that are not in that share. simplified: whether it is drawn more simply than
+    a picture at rest would be, as `FrameView.moving` allows; the window draws it anew then.
     """
 
     backend: str = ""
@@ -62,6 +63,7 @@ class Stats:
     faces_away: bool = False
     share: float = 1.0
     left_out: int = 0
+    simplified: bool = False
 
 
 class Workspace(Resource, Protocol):

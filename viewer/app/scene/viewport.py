@@ -58,6 +58,7 @@ class Viewport:
         self._asked_for: Request | None = None  # the last one that was drawn as it says
         self._motion = Motion()
         self._details: defaultdict[str, Detail] = defaultdict(Detail)  # by the backend's name
+        self._simplifies: defaultdict[str, bool] = defaultdict(bool)  # whether it does in motion, the same
         self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
         self._picked: tuple[tuple[int, int], Picked | None] | None = None
@@ -102,6 +103,8 @@ class Viewport:
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
             return True
+        if moving:
+            self._simplifies[surface.stats.backend] = surface.stats.simplified
         self._note_drawn(request, surface, refinable)
         return True
 
@@ -140,9 +143,11 @@ class Viewport:
 
     @property
     def is_preview(self) -> bool:
-        """Whether points or pixels were left out to be in time."""
+        """Whether points or pixels were left out to be in time, or it was drawn more simply in motion."""
         surface = self.surface if self.is_there else None
-        return surface is not None and (surface.stats.left_out > 0 or surface.size != self.size)
+        if surface is None:
+            return False
+        return surface.stats.left_out > 0 or surface.stats.simplified or surface.size != self.size
 
     @property
     def is_complete(self) -> bool:
@@ -159,7 +164,8 @@ class Viewport:
         surface, request = self.surface, self.request
         if self.problem is not None or surface is None or request is None:
             return
-        if surface.stats.backend == str(request.backend):
+        is_typical = surface.stats.simplified or not self._simplifies[str(request.backend)]  # of motion
+        if surface.stats.backend == str(request.backend) and is_typical:
             self._detail(request).note(ms, self._quality, goal_ms, request.pose.count)
 
     def _detail(self, request: Request) -> Detail:
