@@ -38,14 +38,22 @@ def brute_octants(cloud: PointCloud, low: NDArray, edge: float, depth: int) -> l
             part = [corner[a] + half * (octant >> a & 1) for a in range(3)]
             divide(level + 1, code << 3 | octant, part, half, inside)
 
-    if points:
-        divide(0, 0, [Fraction(float(v)) for v in low], Fraction(edge), list(range(len(points))))
+    corner = [Fraction(float(v)) for v in low]
+    inside = [
+        row
+        for row, point in enumerate(points)
+        if all(corner[a] <= point[a] <= corner[a] + Fraction(edge) for a in range(3))
+    ]
+    if inside:
+        divide(0, 0, corner, Fraction(edge), inside)
     return levels
 
 
 def check(cloud: PointCloud, tree: Octree) -> list[dict[int, list[int]]]:
-    """That counts, codes, masks and lowest rows agree with brute force, the leaves' points included."""
+    """That counts, codes, masks and lowest rows agree with brute force, the leaves' points included; and that
+    strays are the points outside."""
     levels = brute_octants(cloud, tree.low, tree.edge, tree.depth)
+    assert tree.points + len(tree.strays) == len(cloud)
     assert tree.counts.tolist() == [len(level) for level in levels]
     for level, octants in enumerate(levels):
         assert tree.codes(level).tolist() == sorted(octants)
@@ -86,8 +94,9 @@ def test_a_tree_is_that_of_exact_comparisons(name: str, shift: float, depth: int
     cloud = PointCloud.from_arrays(clouds()[name] + np.array([shift, -shift, 2 * shift]))
     tree = build(cloud, Stop("depth", depth=depth))
     check(cloud, tree)
-    assert tree.distinct == len(np.unique(cloud.positions + np.float32(0), axis=0))
-    assert tree.points == len(cloud)
+    inside = np.delete(cloud.positions, tree.strays, axis=0)
+    assert tree.distinct == len(np.unique(inside + np.float32(0), axis=0))
+    assert len(tree.strays) == (name in ("one cell", "outlier"))
 
 
 LARGEST = float(np.nextafter(np.float32(1e18), np.float32(0)))
@@ -129,7 +138,7 @@ def test_a_cube_holds_its_points_wherever_their_origin_is(
     points: list[tuple[float, float, float]], origin: tuple[float, float, float]
 ) -> None:
     cloud = PointCloud(np.array(points, np.float32), np.array(origin))
-    low, edge = Cube.of(cloud)
+    low, edge = Cube.holding(cloud)
     for position in cloud.positions:
         for axis in range(3):
             inside = Fraction(float(position[axis])) + Fraction(origin[axis]) - Fraction(float(low[axis]))
@@ -174,7 +183,7 @@ def test_no_loss_ends_where_every_position_has_its_octant_or_at_the_last_level()
     assert even.depth < 8
     assert even.loss == 0
     assert shortfall(even, stop) is None
-    near = np.array([[0, 0, 0], [1e-9, 0, 0], [1, 1, 1]], np.float32)
+    near = np.array([[0, 0, 0], [1e-12, 0, 0], [1, 1, 1]], np.float32)
     split = build(PointCloud.from_arrays(near, origin=[0, 0, 0]), stop)
     assert (split.depth, split.distinct, split.counts[-1]) == (DEEPEST, 3, 2)
     assert "level 21" in str(shortfall(split, stop))
@@ -185,7 +194,7 @@ def test_crowds_within_one_cell_are_counted() -> None:
     crowd = np.repeat(rng.random((700, 3)), 2, axis=0)
     positions = np.concatenate([crowd, [[1e9, 0, 0]], -crowd[:300] - 5e8])
     cloud = PointCloud.from_arrays(positions, origin=[0, 0, 0])
-    tree = build(cloud, Stop("depth", depth=2))
+    tree = build(cloud, Stop("depth", depth=2), Cube.holding(cloud))
     assert tree.distinct == len(np.unique(cloud.positions, axis=0))
 
 
@@ -303,8 +312,45 @@ def test_poses_in_one_cube_have_the_same_octants() -> None:
         assert (tree.low == cube.low).all()
         assert tree.edge == cube.edge
         check(PointCloud.from_arrays(points), tree)
-    with pytest.raises(InputError, match="outside"):
-        build(PointCloud.from_arrays(body + 5), cube=cube)
+    assert len(build(PointCloud.from_arrays(body + 5), cube=cube).strays) == len(body)
+    with pytest.raises(InputError, match="edge"):
+        build(PointCloud.from_arrays(body), cube=Cube(low, np.nan))
+
+
+@pytest.mark.parametrize("distance", [30.0, 1e3, 1e6, 1e12])
+@pytest.mark.parametrize("few", [1, 4, 12])
+def test_points_far_from_the_body_are_strays_and_change_no_octant(distance: float, few: int) -> None:
+    rng = np.random.default_rng(8)
+    body, apart = rng.normal(size=(1000, 3)), rng.normal(size=(few, 3))
+    apart *= distance / np.linalg.norm(apart, axis=1, keepdims=True)
+    alone = build(PointCloud.from_arrays(body, origin=[0, 0, 0]))
+    tree = build(PointCloud.from_arrays(np.concatenate([apart, body]), origin=[0, 0, 0]))
+    assert tree.strays.tolist() == list(range(few))
+    assert (tree.low == alone.low).all()
+    assert tree.edge == alone.edge
+    for one, other in zip(tree.masks, alone.masks, strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(tree.attributes[-1].rows, alone.attributes[-1].rows + few)
+
+
+def test_many_points_apart_are_part_of_the_scan() -> None:
+    rng = np.random.default_rng(8)
+    apart = np.concatenate([rng.normal(size=(1000, 3)), rng.normal(size=(100, 3)) + 50])
+    tree = build(PointCloud.from_arrays(apart))
+    assert tree.points == 1100
+    assert not len(tree.strays)
+
+
+def test_octants_turn_with_the_points() -> None:
+    """The cube is about the middle of the points: a quarter turn, or a mirror, gives the same octants."""
+    points = np.random.default_rng(9).normal(size=(700, 3))
+    turned = points @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+    one, other = (build(PointCloud.from_arrays(p, origin=[0, 0, 0])) for p in (points, turned))
+    assert one.edge == other.edge
+    for level in range(one.depth + 1):
+        expected = one.cells(level)[:, [1, 0, 2]]
+        expected[:, 0] = 2**level - 1 - expected[:, 0]
+        assert {*map(tuple, expected.tolist())} == {*map(tuple, other.cells(level).tolist())}
 
 
 def test_no_points_give_a_tree_without_nodes() -> None:

@@ -121,7 +121,7 @@ def write_poses(path: Path, poses: Iterable[Pose], unit: str, stop: Stop | None 
 def _cube_for(cloud: PointCloud, cube: Cube | None) -> Cube:
     """The cube of the pose before where it fits, else one with a margin; the first pose has one without."""
     if cube is None:
-        return Cube.of(cloud)
+        return Cube.holding(cloud)
     low, high = extremes(cloud.positions)
     offset = cloud.origin - cube.low
     extent = float((high - low).max())

@@ -66,22 +66,33 @@ class Sorted(NamedTuple):
 def build(
     cloud: PointCloud, stop: Stop | None = None, cube: Cube | None = None, attributes: bool = True
 ) -> Octree:
-    """The octree of a cloud's points; one without nodes where there is no point.
+    """The octree of a cloud's points; one without nodes where there is no point in it.
 
-    cube: that of other poses, for trees of the same octants; None: around the points. attributes: means for
-    every node of what the cloud has. Positions are distinct where they differ in float32, relative to the
-    cloud's origin. Raises InputError where points lie outside the cube.
+    cube: that of other poses, for trees of the same octants; None: around the body of the points. Points
+    outside are the tree's strays. attributes: means for every node of what the cloud has. Positions are
+    distinct where they differ in float32, relative to the cloud's origin.
     """
     stop = stop or Stop()
-    if not len(cloud):
-        low, edge = cube or (cloud.origin, 1.0)
-        return Octree(low, edge, (), 0, 0)
-    cube = Cube.of(cloud) if cube is None else Cube(*cube).checked(cloud)
-    points = sort_points(cloud.positions, Grid.of(cube, cloud.origin))
+    cube = Cube(*(cube or (Cube.of(cloud) if len(cloud) else (cloud.origin, 1.0)))).checked()
+    strays = cube.outside(cloud)
+    count = len(cloud) - len(strays)
+    if not count:
+        return Octree(cube.low, cube.edge, (), 0, 0, strays=strays)
+    points = _sorted(cloud, strays, Grid.of(cube, cloud.origin))
     checkpoint()
     ends, counts = _ends(points, stop, stop.limit(cube.edge))
     found = attributes_of(cloud, points.rows, points.levels, ends, counts) if attributes else ()
-    return Octree(cube.low, cube.edge, _masks(points, ends, counts), len(cloud), points.distinct, found)
+    masks = _masks(points, ends, counts)
+    return Octree(cube.low, cube.edge, masks, count, points.distinct, found, strays)
+
+
+def _sorted(cloud: PointCloud, strays: NDArray[np.uint32], grid: Grid) -> Sorted:
+    """The points that are no strays."""
+    if not len(strays):
+        return sort_points(cloud.positions, grid)
+    inside = np.delete(np.arange(len(cloud), dtype=np.uint32), strays)
+    points = sort_points(cloud.positions[inside], grid)
+    return points._replace(rows=inside[points.rows])
 
 
 def shortfall(octree: Octree, stop: Stop) -> str | None:

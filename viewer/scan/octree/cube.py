@@ -14,6 +14,8 @@ from .octree import DEEPEST
 
 _LEAST = 1e-60  # an extent: less than float32 can hold, and a step of it is no denormal number
 _STEP_BITS = 20  # a cell of level 21 is so many bits of steps, see `Grid`
+_SLACK = 4  # steps of the grid of lowest corners that an edge is longer than its box at least
+_MOST_OUTSIDE = 1 / 64  # of the points: more are a part of the scan
 
 
 class Cube(NamedTuple):
@@ -24,36 +26,51 @@ class Cube(NamedTuple):
 
     @classmethod
     def around(cls, low: NDArray[np.float64], high: NDArray[np.float64]) -> Cube:
-        """The cube around a box, absolute, scan units; its upper faces are beyond all of the box.
+        """The cube around a box, absolute, scan units, and about its centre (Slomp 2014, VI-A); its faces are
+        beyond all of the box.
 
         Lowest corner and edge are numbers of few bits, so that borders between cells are exact.
         """
         farthest = float(np.abs([low, high]).max())
         extents = float((high - low).max()), farthest / 2**20, 1.0
         extent = next(extent for extent in extents if extent > _LEAST)
-        grid = max(_step(extent), 2.0 ** (math.frexp(farthest)[1] - 52))
-        low = np.floor(low / grid) * grid
-        extent = max(extent, float((high - low).max()))
+        grid = max(2 * _step(extent), 2.0 ** (math.frexp(farthest)[1] - 52))
         cell = 2**DEEPEST * _step(extent)
-        return cls(low, (math.floor(extent / cell) + 1) * cell)
+        edge = (math.floor((extent + _SLACK * grid) / cell) + 1) * cell
+        return cls(np.floor((low / 2 + high / 2 - edge / 2) / grid) * grid, edge)
 
     @classmethod
-    def of(cls, cloud: PointCloud) -> Cube:
-        """The cube around the points of a cloud, which has some."""
+    def holding(cls, cloud: PointCloud) -> Cube:
+        """The cube around all points of a cloud, which has some."""
         low, high = extremes(cloud.positions)
         return cls.around(_sum_below(low, cloud.origin), -_sum_below(-high, -cloud.origin))
 
-    def checked(self, cloud: PointCloud) -> Cube:
-        """The cube with its edge made a number of few bits; raises InputError where points lie outside."""
+    @classmethod
+    def of(cls, cloud: PointCloud) -> Cube:
+        """The cube around the body of the points of a cloud, which has some: those outside are few, such as
+        one far away that would leave the others few octants. Around all where many lie apart."""
+        body = cloud.bounds()
+        cube = cls.around(body.low, body.high)
+        return cube if len(cube.outside(cloud)) <= _MOST_OUTSIDE * len(cloud) else cls.holding(cloud)
+
+    def checked(self) -> Cube:
+        """The cube with its edge made a number of few bits; raises InputError where it is none."""
         if not (math.isfinite(self.edge) and self.edge > 0 and np.isfinite(self.low).all()):
             raise InputError(f"an octree's cube has an edge of {self.edge} from {self.low}")
         cell = 2**DEEPEST * _step(self.edge)
-        cube = Cube(np.asarray(self.low, np.float64), math.ceil(self.edge / cell) * cell)
-        low, high = extremes(cloud.positions)
-        offset = cloud.origin - cube.low
-        if (low + offset < 0).any() or (high + offset > cube.edge).any():
-            raise InputError(f"points lie outside the octree's cube of edge {cube.edge:g} from {cube.low}")
-        return cube
+        return Cube(np.asarray(self.low, np.float64), math.ceil(self.edge / cell) * cell)
+
+    def outside(self, cloud: PointCloud) -> NDArray[np.uint32]:
+        """The rows of a cloud's points that lie outside, (s,), ascending."""
+        low, high = self.low - cloud.origin, self.low + self.edge - cloud.origin
+        lowest, highest = extremes(cloud.positions)
+        if (lowest >= low).all() and (highest <= high).all():
+            return np.empty(0, np.uint32)
+        outside = np.zeros(len(cloud), bool)
+        for axis in range(3):  # column by column: numpy is slow along the short axis
+            values = cloud.positions[:, axis].astype(np.float64)
+            outside |= (values < low[axis]) | (values > high[axis])
+        return np.flatnonzero(outside).astype(np.uint32)
 
 
 class Grid(NamedTuple):

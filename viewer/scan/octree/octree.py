@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,9 +44,10 @@ class Octree:
     masks:      for each level above the deepest, (n,) uint8, its nodes by ascending Morton code; bit i:
                 child i = x | y << 1 | z << 2 is there. 0: the node is a leaf, which only trees that
                 stop by occupancy have above the deepest level
-    points:     how many points it was made of
+    points:     how many points lie in it
     distinct:   how many different positions these have
     attributes: for each level, the deepest included, or empty: geometry alone
+    strays:     (s,) uint32, ascending: rows, in the arrays of the cloud, of the points outside the cube
     """
 
     low: NDArray[np.float64]
@@ -55,6 +56,7 @@ class Octree:
     points: int
     distinct: int
     attributes: tuple[Attributes, ...] = ()
+    strays: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
 
     @property
     def depth(self) -> int:
@@ -74,9 +76,9 @@ class Octree:
 
     @property
     def nbytes(self) -> int:
-        """Bytes held by masks and attributes."""
-        attributes = (getattr(level, field.name) for level in self.attributes for field in fields(level))
-        return sum(array.nbytes for array in (*self.masks, *attributes) if array is not None)
+        """Bytes held by masks, attributes and strays."""
+        attributes = (getattr(level, one.name) for level in self.attributes for one in fields(level))
+        return sum(a.nbytes for a in (self.strays, *self.masks, *attributes) if a is not None)
 
     @property
     def loss(self) -> float:
