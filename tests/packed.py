@@ -18,6 +18,7 @@ from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.srgb import roots_from_bytes
 from viewer.view import View
 
 ROUND = 0xFFFF
@@ -109,8 +110,8 @@ def looks(cloud: PointCloud, normals: NDArray) -> NDArray[np.uint32]:
     """(N, 2) words as surfels/passes/look.glsl reads them."""
     words = np.zeros((len(cloud), 2), np.uint32)
     if cloud.colors is not None:
-        rgb = cloud.colors.astype(np.uint32)
-        words[:, 0] = rgb[:, 0] | rgb[:, 1] << 8 | rgb[:, 2] << 16
+        roots = roots_from_bytes(cloud.colors).astype(np.uint32)
+        words[:, 0] = roots[:, 0] | roots[:, 1] << 10 | roots[:, 2] << 20
     n = np.rint(normals.astype(np.float32) * 511 + 512).astype(np.uint32)
     words[:, 1] = n[:, 0] | n[:, 1] << 10 | n[:, 2] << 20
     return words

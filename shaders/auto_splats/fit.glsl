@@ -1,4 +1,5 @@
 // The plane through a neighborhood by linear regression (Preiner 2012, 6), and its splat.
+#include "common/color.glsl"
 #include "common/octahedron.glsl"
 #include "common/tangent.glsl"
 #include "auto_splats/eigen.glsl"
@@ -140,7 +141,8 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(splat);
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);
 #if HAS_COLORS
-    looks[2u * row] = packUnorm4x8(vec4(texelFetch(colors, int(row)).rgb, 0.0));
+    uvec3 roots = uvec3(to_roots(texelFetch(colors, int(row)).rgb));
+    looks[2u * row] = roots.x | roots.y << 10 | roots.z << 20;
 #endif
     uvec3 steps = uvec3(roundEven(normal * 511.0 + 512.0));
     looks[2u * row + 1u] = steps.x | steps.y << 10 | steps.z << 20;

@@ -10,3 +10,11 @@ vec3 to_srgb(vec3 c) {
     vec3 curve = SRGB_SCALE * pow(c, vec3(1.0 / SRGB_POWER)) - SRGB_OFFSET;
     return mix(c * SRGB_SLOPE, curve, greaterThan(c, vec3(SRGB_LINEAR_KNEE)));
 }
+
+// Linear light in whole steps, up to LIGHT_STEPS, whose sums are exact; from square roots, up to LIGHT_ROOTS, as stored.
+vec3 light_of(vec3 roots) { return roundEven(roots * roots * (LIGHT_STEPS / (LIGHT_ROOTS * LIGHT_ROOTS))); }
+
+vec3 to_roots(vec3 encoded) { return roundEven(sqrt(to_linear(encoded)) * LIGHT_ROOTS); }
+
+// sRGB of a sum of such light, times weights that add up to `total`.
+vec3 srgb_of_light(vec3 sum, float total) { return to_srgb(sum / (LIGHT_STEPS * total)); }

@@ -109,12 +109,12 @@ def test_enlarging_closes_gaps_and_keeps_the_outline(surfels: Draw, way: str) ->
     """What was filled is taken back by as much as ellipses grow in each direction: by a radius for all, more
     gaps would stay open, or the outline would grow."""
     camera, size = Camera((9.0, 5.0, 14.0), (0, 0, 0), fov_y=30), (320, 320)
-    cloud, truth = ellipsoid(1600), surfels(ellipsoid(50_000), camera, size).row != NOTHING
+    cloud, truth = ellipsoid(1600), np.isfinite(surfels(ellipsoid(50_000), camera, size).depth)
     params = {"instancing": way, "passes": "two", "cull_back": True}
 
     def holes_and_beyond(radius_scale: float, enlarge: float) -> tuple[int, int]:
-        drawn = (
-            surfels(cloud, camera, size, radius_scale=radius_scale, enlarge=enlarge, **params).row != NOTHING
+        drawn = np.isfinite(
+            surfels(cloud, camera, size, radius_scale=radius_scale, enlarge=enlarge, **params).depth
         )
         return int(np.count_nonzero(truth & ~drawn)), int(np.count_nonzero(drawn & ~truth))
 

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, plane, sphere
 
+from viewer.analysis.pick import pick
 from viewer.backends import backend
 from viewer.bench import metrics
 from viewer.bench.judge import Judge, Walk
@@ -26,6 +27,7 @@ from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.simulate.scanner import Faults, around, capture, rig
+from viewer.srgb import bytes_from_linear, linear_from_bytes
 
 pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
@@ -120,7 +122,7 @@ def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
     holes, spill, boundary = [], [], []
     for enlarge in (1.0, 2.0):
         surface = surfels(draw, pose.cloud, camera, size, passes="two", enlarge=enlarge)
-        drawn = surface.row != NOTHING
+        drawn = np.isfinite(surface.depth)
         holes.append(np.count_nonzero(scanned & ~drawn))
         spill.append(np.count_nonzero(drawn & ~truth.covered) / outline)
         boundary.append(metrics.coverage(drawn, truth.covered)["boundary_mean"])
@@ -148,7 +150,7 @@ def test_a_slit_is_closed_but_the_outline_stays(draw: Draw, instancing: str) -> 
     )
     camera, size = looking_down_z(fov_y=50), (200, 200)
     plain, large = (
-        surfels(draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=e).row != NOTHING
+        np.isfinite(surfels(draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=e).depth)
         for e in (1.0, 2.0)
     )
     assert not plain[60:140, 97:103].any()
@@ -160,6 +162,42 @@ def test_a_slit_is_closed_but_the_outline_stays(draw: Draw, instancing: str) -> 
 
 
 @every_feed
+@pytest.mark.parametrize("color_by", ["auto", "height", "q"])
+def test_what_is_filled_has_a_level_and_no_point(draw: Draw, instancing: str, color_by: str) -> None:
+    whole = plane(40, 3.0)
+    kept = np.abs(whole.world()[:, 0]) > 0.1
+    cloud = PointCloud.from_arrays(
+        whole.world()[kept],
+        normals=whole.normals[kept],
+        radii=whole.radii[kept],
+        colors=np.full((int(kept.sum()), 3), [200, 90, 40], np.uint8),
+        scalars={"q": 5 + whole.world()[kept, 1]},
+    )
+    camera, size, look = looking_down_z(fov_y=50), (200, 200), Look(light="flat", color_by=color_by)
+    plain, large = (
+        surfels(draw, cloud, camera, size, look, instancing=instancing, passes="two", enlarge=e)
+        for e in (1.0, 2.0)
+    )
+    filled = np.isfinite(large.depth) & ~np.isfinite(plain.depth)
+    assert filled[60:140, 97:103].all()
+    assert (large.level[filled] == 1).all()
+    assert (large.row[filled] == NOTHING).all()
+    assert (large.id[filled] == NOTHING).all()
+    np.testing.assert_array_equal(large.row[~filled], plain.row[~filled])
+    assert (large.level[~filled] == plain.level[~filled]).all()
+    np.testing.assert_allclose(large.depth[filled], 3.0, rtol=1e-6)
+    picked = pick(large, 100, 100)
+    assert picked is not None
+    assert not picked.measured
+    if color_by == "auto":
+        assert (large.image()[filled][:, :3] == [200, 90, 40]).all()
+    else:
+        y = large.view.unproject(np.argwhere(filled)[:, ::-1] + 0.5, large.depth[filled])[:, 1]
+        expected = y + cloud.origin[1] + (5 if color_by == "q" else 0)
+        np.testing.assert_allclose(large.value[filled], expected, atol=0.15, err_msg="two radii")
+
+
+@every_feed
 def test_what_is_filled_goes_by_what_the_mask_leaves(draw: Draw, instancing: str) -> None:
     """A slit in small splats, and in splats of twice their radius of which the mask leaves a half."""
     whole = plane(40, 3.0)
@@ -167,20 +205,71 @@ def test_what_is_filled_goes_by_what_the_mask_leaves(draw: Draw, instancing: str
     positions, normals, radii = whole.world()[kept], whole.normals[kept], whole.radii[kept]
     camera, size = looking_down_z(fov_y=50), (200, 200)
     small, masked = (
-        surfels(
-            draw,
-            PointCloud.from_arrays(positions, normals=normals, radii=factor * radii),
-            camera,
-            size,
-            instancing=instancing,
-            passes="two",
-            mask_cutoff=np.exp(-4 / factor**2) + 1e-6,
-        ).row
-        != NOTHING
+        np.isfinite(
+            surfels(
+                draw,
+                PointCloud.from_arrays(positions, normals=normals, radii=factor * radii),
+                camera,
+                size,
+                instancing=instancing,
+                passes="two",
+                mask_cutoff=np.exp(-4 / factor**2) + 1e-6,
+            ).depth
+        )
         for factor in (1, 2)
     )
     assert small[60:140, 90:110].all()
     assert (small != masked).mean() < 1e-3
+
+
+@every_feed
+@pytest.mark.parametrize("passes", ["two", "two_large", "sorted", "one_blended", "one_no_depth"])
+def test_every_level_comes_back(draw: Draw, instancing: str, passes: str) -> None:
+    """One splat alone, and many of one colour that overlap, show that very colour: all 256 levels."""
+    levels = np.arange(256)
+    colors = np.stack([levels, levels[::-1], (levels * 77) % 256], axis=1).astype(np.uint8)
+    x, y = levels % 16 - 7.5, levels // 16 - 7.5
+    positions = np.stack([x, y, np.full(256, -5.0)], axis=1)
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=16.0), (96, 96)
+    for overlapping in (1, 20):
+        places = np.repeat(positions, overlapping, axis=0)
+        places[:, 2] -= np.tile(0.01 * np.arange(overlapping), 256)
+        cloud = PointCloud.from_arrays(
+            places,
+            normals=np.tile([0, 0, 1.0], (len(places), 1)),
+            colors=np.repeat(colors, overlapping, axis=0),
+            radii=np.full(len(places), 0.45),
+        )
+        surface = surfels(
+            draw, cloud, camera, size, Look(light="flat"), instancing=instancing, passes=passes, enlarge=1
+        )
+        owns = surface._read_texels("color", np.uint8)[..., :3]
+        for level in range(256):
+            pixel = int(6 * (x[level] + 8)), int(6 * (8 - y[level]))
+            assert (owns[pixel[1], pixel[0]] == colors[level]).all(), (overlapping, level)
+
+
+@pytest.mark.parametrize("instancing", INSTANCING)
+def test_means_are_those_of_linear_light(draw: Draw, instancing: str) -> None:
+    """At most a level off what numbers of any length would give, for pairs of all levels."""
+    levels = np.arange(256)
+    pairs = np.stack([levels, (levels * 97 + 31) % 256]).astype(np.uint8)
+    x, y = levels % 16 - 7.5, levels // 16 - 7.5
+    places = np.concatenate([np.stack([x, y, np.full(256, depth)], axis=1) for depth in (-5.0, -5.1)])
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=16.0), (80, 80)
+    cloud = PointCloud.from_arrays(
+        places,
+        normals=np.tile([0, 0, 1.0], (512, 1)),
+        colors=np.repeat(pairs.reshape(-1, 1), 3, axis=1),
+        radii=np.full(512, 0.45),
+    )
+    surface = surfels(draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=1)
+    mean = bytes_from_linear(linear_from_bytes(pairs).mean(axis=0)).astype(int)
+    middles = surface._read_texels("color", np.uint8)[
+        (5 * (8 - y)).astype(int), (5 * (x + 8)).astype(int), 0
+    ].astype(int)
+    assert np.abs(middles - mean).max() <= 1
+    assert (middles != mean).mean() < 0.15
 
 
 @every_feed
@@ -194,7 +283,7 @@ def test_splats_are_blended_within_epsilon_of_the_nearest(
         surface = surfels(
             draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=1, epsilon=epsilon
         )
-        assert shown(surface, 20, 20) == ([128, 128, 0] if blended else [0, 255, 0])
+        assert shown(surface, 20, 20) == ([188, 188, 0] if blended else [0, 255, 0])
         assert surface.row[20, 20] == 1
         assert surface.depth[20, 20] == pytest.approx(5.0, rel=1e-6)
 
@@ -235,9 +324,11 @@ def test_sorted_blending_is_that_of_the_masks(draw: Draw, instancing: str) -> No
     surface = surfels(draw, cloud, camera, size, look, instancing=instancing, passes="sorted")
     x = 25  # 5 pixels of 4 / 41 off the middle
     mask = np.exp(-4 * (5 * 4 / 41) ** 2)
-    red, green = 255 * mask, 255 * mask * (1 - mask)
-    np.testing.assert_allclose(shown(surface, x, 20), [red, green, 0], atol=2)
-    assert surface.coverage[20, x] == pytest.approx(1 - (1 - mask) ** 2, abs=0.01)
+    covered = 1 - (1 - mask) ** 2
+    light = np.array([mask, mask * (1 - mask), 0]) / covered
+    np.testing.assert_allclose(surface.color[20, x], light, atol=0.01)
+    assert surface.coverage[20, x] == pytest.approx(covered, abs=0.01)
+    np.testing.assert_allclose(shown(surface, x, 20), bytes_from_linear(light) * covered, atol=2)
 
 
 @pytest.mark.parametrize("passes", ["two", "one_blended", "one_no_depth", "sorted"])

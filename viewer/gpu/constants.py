@@ -29,6 +29,8 @@ SRGB_SCALE = srgb.SCALE
 SRGB_POWER = srgb.POWER
 SRGB_LINEAR_KNEE = srgb.LINEAR_KNEE
 SRGB_ENCODED_KNEE = srgb.ENCODED_KNEE
+LIGHT_STEPS = float(srgb.LIGHT_STEPS)
+LIGHT_ROOTS = float(srgb.LIGHT_ROOTS)
 
 
 def constants_glsl() -> str:

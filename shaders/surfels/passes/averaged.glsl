@@ -16,8 +16,8 @@ void visit(uint cell, uint key, uint item_id) {
     vec3 n = normal_of(look);
     n *= turned(1.0, n, normal_of(shown));
 #if HAS_COLORS
-    vec3 color = color_of(look);
-    add(cell, float[](1.0, n.x, n.y, n.z, color.r, color.g, color.b));
+    vec3 light = light_of(look);
+    add(cell, float[](1.0, n.x, n.y, n.z, light.r, light.g, light.b));
 #else
     add(cell, float[](1.0, n.x, n.y, n.z));
 #endif

@@ -1,7 +1,8 @@
 // Larger splats close gaps, but also reach over the outline by as much as they are larger. So what they
 // filled is taken back where nothing is shown at that distance: dilated, then eroded.
-// Filled pixels are listed and have a negative depth. STEP 0 says which are taken back, reading depths
-// alone, which change in STEP 1, so that the order does not matter.
+// Filled pixels are listed and have a negative depth, and a row until the last step. STEP 0 says which are taken back,
+// reading depths alone, which change in STEP 1, so that the order does not matter; STEP 2: filled from level 1, by no
+// point.
 #include "surfels/passes/limit.glsl"
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
@@ -10,6 +11,10 @@
 
 layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
 layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
+
+#if STEP == 2
+layout(std430, binding = STORAGE_LEVEL) writeonly buffer Level { uint own_levels[]; };
+#endif
 
 const int DIRECTIONS = 16;
 const float SLACK = 0.75;  // pixels that the outline may grow by
@@ -47,12 +52,15 @@ void main() {
     uint i = item();
     if (i >= list_count) return;
     uint index = list[i];
-    float depth = -uintBitsToFloat(depths[index]);
 #if STEP == 0
+    float depth = -uintBitsToFloat(depths[index]);
     begin_splat(depth, rows[index]);
     vec2 center = vec2(index % view_size.x, index / view_size.x) + 0.5;
     if (near_outline(center, depth)) rows[index] = NOTHING;
+#elif STEP == 1
+    depths[index] = rows[index] == NOTHING ? NO_DEPTH : depths[index] & 0x7FFFFFFFu;
 #else
-    depths[index] = rows[index] == NOTHING ? NO_DEPTH : floatBitsToUint(depth);
+    rows[index] = NOTHING;
+    own_levels[index] = 1u;
 #endif
 }

@@ -1,6 +1,7 @@
 // The mean of the splats that a pixel shows, or that lie at most so far behind: for splats of about a pixel, where
 // the nearest alone would flicker. STEP 0: the sums of listed pixels are set to zero; 1: once splats are added
-// (surfels/passes/averaged.glsl), sums become means. They are of how many there are, normals and colours.
+// (surfels/passes/averaged.glsl), sums become means. They are of how many there are, normals and linear light;
+// of more than MOST they are nothing.
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
@@ -23,11 +24,11 @@ void main() {
 #else
     // The shown splat passes, unless two programs round apart: then it is alone.
     float count = sum_of(cell, 0u);
-    float mean = count == 0.0 ? 0.0 : mean_share;
+    float mean = count == 0.0 || count > MOST ? 0.0 : mean_share;
     uvec2 look = texelFetch(looks, int(texelFetch(rows, int(cell)).r)).xy;
 #if HAS_COLORS
-    vec3 color = vec3(sum_of(cell, 4u), sum_of(cell, 5u), sum_of(cell, 6u)) / max(count, 1.0);
-    own_colors[cell] = packUnorm4x8(vec4(mix(color_of(look), color, mean) / 255.0, 1.0));
+    vec3 light = vec3(sum_of(cell, 4u), sum_of(cell, 5u), sum_of(cell, 6u)) / max(count, 1.0);
+    own_colors[cell] = packUnorm4x8(vec4(srgb_of_light(mix(light_of(look), light, mean), 1.0), 1.0));
 #endif
     vec3 sum = vec3(sum_of(cell, 1u), sum_of(cell, 2u), sum_of(cell, 3u));
     sum = mix(normal_of(look) / 511.0, sum / max(length(sum), 1e-6), mean);

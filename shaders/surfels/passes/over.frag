@@ -1,4 +1,4 @@
-// A splat over what was drawn before it: colour and normal, transparent as its mask says.
+// A splat over what was drawn before it: light and normal, transparent as its mask says.
 #include "common/view.glsl"
 #include "surfels/passes/visible.glsl"
 #include <params>
@@ -6,7 +6,7 @@
 flat in uint row;
 in vec2 local;
 
-layout(location = 0) out vec4 out_color;   // times its opacity, and that
+layout(location = 0) out vec4 out_light;   // times its opacity, and that
 layout(location = 1) out vec4 out_normal;
 
 void main() {
@@ -16,6 +16,6 @@ void main() {
     float opacity = t > 1.0 ? 0.0 : weight_at(0.25 * falloff * t) / FULL;
     uvec2 look = texelFetch(looks, int(row)).xy;
     vec3 normal = normal_of(look);
-    out_color = opacity * vec4(color_of(look), 1.0);
+    out_light = opacity * vec4(light_of(look), 1.0);
     out_normal = vec4(turned(opacity, normal, visible_normal()) * normal, opacity);
 }

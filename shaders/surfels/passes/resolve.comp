@@ -17,8 +17,8 @@ void main() {
     uint row = texelFetch(rows, index).r;
     if (row == NOTHING) return;
     ivec2 pixel = ivec2(index % view_size.x, index / view_size.x);
-    vec4 color = texelFetch(color_sums, pixel, 0);
+    vec4 light = texelFetch(color_sums, pixel, 0);
     vec3 normal = texelFetch(normal_sums, pixel, 0).xyz;
-    store_mean(index, color.rgb, normal, color.a, OVER != 0 ? color.a : 1.0, row);
+    store_mean(index, light.rgb, normal, light.a, OVER != 0 ? light.a : 1.0, row);
     if (uintBitsToFloat(texelFetch(depths, index).r) < 0.0) list[reserve(1u)] = uint(index);
 }

@@ -6,9 +6,9 @@
 #include "surfels/passes/look.glsl"
 #include "surfels/passes/store.glsl"
 
-// A float holds the sums of so many discs exactly, an integer those of a whole list: the order of a
+// A float holds the sums of so many discs exactly, an integer those of a whole list (TileLists): the order of a
 // tile's list, which changes from frame to frame, does not show.
-const int BLOCK = 256;
+const int BLOCK = 65;
 
 #if LARGE
 layout(binding = TEXTURE_COLOR_SUMS) uniform sampler2D color_sums;  // and weight
@@ -17,21 +17,22 @@ layout(binding = TEXTURE_NORMAL_SUMS) uniform sampler2D normal_sums;
 
 float limit[ROWS];
 int total[ROWS];
-ivec3 color[ROWS], normal[ROWS];
+uvec3 light[ROWS];
+ivec3 normal[ROWS];
 vec3 visible[ROWS];  // normals
 
 void blend(int first, int last) {
     float weight_sum[ROWS];
-    vec3 color_sum[ROWS], normal_sum[ROWS];
+    vec3 light_sum[ROWS], normal_sum[ROWS];
     for (int k = 0; k < ROWS; ++k) {
         weight_sum[k] = 0.0;
-        color_sum[k] = normal_sum[k] = vec3(0.0);
+        light_sum[k] = normal_sum[k] = vec3(0.0);
     }
     for (int i = first; i < last; ++i) {
         uint disc = texelFetch(listed, i).r;
         Column c = column_of(disc);
         uvec2 look = texelFetch(looks, int(row_of(disc))).xy;
-        vec3 rgb = color_of(look), n = normal_of(look);
+        vec3 rgb = light_of(look), n = normal_of(look);
         for (int k = 0; k < ROWS; ++k) {
             float y = down_at(c, k), here = key_at(c, y), form = form_at(c, y);
             float edge = PERSPECTIVE != 0 ? here * here : 1.0;
@@ -39,13 +40,13 @@ void blend(int first, int last) {
             // Rounding takes the form of a disc that is seen edge on below zero, where the mask has no bound.
             float weight = counts ? weight_at(max(0.25 * falloff * form / edge, 0.0)) : 0.0;
             weight_sum[k] += weight;
-            color_sum[k] += weight * rgb;
+            light_sum[k] += weight * rgb;
             normal_sum[k] += turned(weight, n, visible[k]) * n;
         }
     }
     for (int k = 0; k < ROWS; ++k) {
         total[k] += int(weight_sum[k]);
-        color[k] += ivec3(color_sum[k]);
+        light[k] += uvec3(light_sum[k]);
         normal[k] += ivec3(normal_sum[k]);
     }
 }
@@ -57,7 +58,8 @@ void main() {
         limit[k] = 1.0;
         visible[k] = vec3(0.0);
         total[k] = 0;
-        color[k] = normal[k] = ivec3(0);
+        light[k] = uvec3(0u);
+        normal[k] = ivec3(0);
         shown[k] = in_picture(k) ? rows[index_of(k)] : NOTHING;
         if (shown[k] != NOTHING) {
             limit[k] = limit_behind(abs(uintBitsToFloat(depths[index_of(k)])), shown[k]);
@@ -66,7 +68,7 @@ void main() {
 #if LARGE
         vec4 rgb = texelFetch(color_sums, pixel + ivec2(0, k), 0);
         total[k] = int(rgb.a);
-        color[k] = ivec3(rgb.rgb);
+        light[k] = uvec3(rgb.rgb);
         normal[k] = ivec3(texelFetch(normal_sums, pixel + ivec2(0, k), 0).xyz);
 #endif
     }
@@ -74,6 +76,6 @@ void main() {
     if (tile < 0) return;
     for (int k = 0; k < ROWS; ++k)
         if (shown[k] != NOTHING) {
-            store_mean(index_of(k), vec3(color[k]), vec3(normal[k]), float(total[k]), 1.0, shown[k]);
+            store_mean(index_of(k), vec3(light[k]), vec3(normal[k]), float(total[k]), 1.0, shown[k]);
         }
 }

@@ -29,7 +29,7 @@ from .subpixel import average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, splat
 
 TITLE = "Surfels"
-BLENDS = True
+BLENDS = FILLS = True
 
 _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`

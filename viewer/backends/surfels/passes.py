@@ -22,6 +22,7 @@ from ...gpu.context import Gpu
 from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
+from ...srgb import roots_from_bytes
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import FALLBACK, NOT_HIDDEN, TILE, TileLists, run, show_all, splat, tile_lists
 
@@ -232,17 +233,28 @@ def _resolve(points: Points, surface: Surface, over: bool) -> None:
 
 
 def _close(points: Points, surface: Surface, splats: Splats) -> None:
-    """Take back what the second pass filled beyond the outline; `covered` lists what it filled."""
-    gpu = surface.gpu
-    with gpu.timers.measure("close"):
+    """Take back what the second pass filled beyond the outline, and give the rest a level in place of points;
+    `covered` lists what it filled."""
+    gpu, filled = surface.gpu, surface.covered
+
+    def run(*steps: int) -> None:
         surface.bind_storage()
-        for step in range(2):
+        for step in steps:
             program = gpu.compute(
                 "surfels/passes/close.comp", {"STEP": step, **points.defines}, params=splats
             )
             points.bind(program)
             bind_visible(points, program)
-            surface.covered.run(program)
+            filled.run(program)
+
+    with gpu.timers.measure("close"):
+        run(0, 1)
+    if surface.row_values is not None:
+        surface.resolve("value")  # of the splats that fill, as their colours and normals
+    with gpu.timers.measure("level"):
+        gl.clear_words(surface.own("level").buffer, 0)
+        surface.bind_own("level")
+        run(2)
 
 
 def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:
@@ -261,17 +273,22 @@ def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
 
 
 def _pack_looks(cloud: PointCloud) -> NDArray[np.uint32]:
-    """Colour and normal of each point in two words, (N, 2): 3 x 8 bits, 3 x 10 bits."""
+    """Colour and normal of each point in two words, (N, 2): square roots of linear light and normals, 3 x 10
+    bits each."""
     looks = np.zeros((len(cloud), 2), np.uint32)
     for first in range(0, len(cloud), _CHUNK):
         part = slice(first, first + _CHUNK)
         if cloud.colors is not None:
-            rgb = cloud.colors[part, :3].astype(np.uint32)
-            looks[part, 0] = rgb[:, 0] | rgb[:, 1] << 8 | rgb[:, 2] << 16
+            looks[part, 0] = _packed(roots_from_bytes(cloud.colors[part, :3]))
         if cloud.normals is not None:
-            n = np.rint(_unit(cloud.normals[part]) * 511 + 512).astype(np.uint32)
-            looks[part, 1] = n[:, 0] | n[:, 1] << 10 | n[:, 2] << 20
+            looks[part, 1] = _packed(np.rint(_unit(cloud.normals[part]) * 511 + 512))
     return looks
+
+
+def _packed(steps: NDArray) -> NDArray[np.uint32]:
+    """Three numbers below 1024 in a word, of (N, 3)."""
+    shifted = steps.astype(np.uint32) << np.array([0, 10, 20], np.uint32)
+    return np.bitwise_or.reduce(shifted, axis=1)
 
 
 def _unit(normals: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -18,14 +18,18 @@ from ...gpu.context import Gpu, Program
 from ...gpu.scatter import CellSums, FixedPoint, Visits, scatter
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
+from ...srgb import LIGHT_STEPS
 from .passes import bind_looks
 from .splats import Splats, bind_visible
 
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
 _SAMPLE = 1 << 13
-# What a splat gives to a mean, as surfels/passes/averaged.glsl has it: one of it, its normal, its colour.
+# What a splat gives to a mean, as surfels/passes/averaged.glsl has it: one of it, its normal, its light.
 _LIMITS = (1.0, 512.0, 512.0, 512.0)
-_COLORED_LIMITS = (*_LIMITS, 255.0, 255.0, 255.0)
+_COLORED_LIMITS = (*_LIMITS, *[float(LIGHT_STEPS)] * 3)
+# Splats of a pixel whose sums of light fit into 32 bits. Of more, as of a scan far away, the nearest is shown
+# alone.
+_MOST = (2**31 - 1) // LIGHT_STEPS
 
 
 def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
@@ -88,16 +92,15 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
     bound = bind_looks(points, surface)
     limits, make = (_COLORED_LIMITS, _colored_sums) if bound["HAS_COLORS"] else (_LIMITS, _plain_sums)
     sums = surface.keep(make)
-    fixed = FixedPoint(limits, (1.0,) * len(limits), points.count)  # all splats may share a pixel
+    fixed = FixedPoint(limits, (1.0,) * len(limits), _MOST)
 
     def bind(program: Program) -> None:
         bind_visible(points, program)
         points.bind(program)
 
     def run(step: int) -> None:
-        program = gpu.compute(
-            "surfels/passes/mean.comp", {"STEP": step, **fixed.defines, **bound}, params=splats
-        )
+        defines = {"STEP": step, "MOST": float(_MOST), **fixed.defines, **bound}
+        program = gpu.compute("surfels/passes/mean.comp", defines, params=splats)
         sums.buffer.bind_to_storage_buffer(Storage.SUMS)
         covered.run(program)
 
