@@ -4,7 +4,7 @@
 
 layout(binding = TEXTURE_LOOKS) uniform usamplerBuffer looks;  // roots of light, 3 x 10 bits; normal, 3 x 10 bits
 
-const float FULL = 63.0;  // what the centre of a splat counts
+const float FULL = 31.0;  // what the centre of a splat counts
 
 // FULL exp(-4 x) to 0.03, x up to 1: a cubic of exp(-x), to the fourth power.
 float weight_at(float x) {

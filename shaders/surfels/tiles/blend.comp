@@ -8,7 +8,7 @@
 
 // A float holds the sums of so many discs exactly, an integer those of a whole list (TileLists): the order of a
 // tile's list, which changes from frame to frame, does not show.
-const int BLOCK = 65;
+const int BLOCK = 132;
 
 #if LARGE
 layout(binding = TEXTURE_COLOR_SUMS) uniform sampler2D color_sums;  // and weight

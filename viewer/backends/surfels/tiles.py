@@ -34,9 +34,10 @@ _MOST_TILES = 2048  # along an edge of the picture: what cells.glsl's words have
 _DISC_BYTES = 16  # of a point in each of two buffers
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
-# Entries of one tile's list: of more, sums of light could exceed 32 bits (63 x 4095 each); llvmpipe ends all
-# loops of an invocation after 65 535 turns; on hardware a pixel alone with so many would be slow.
-_LONGEST = 16_000
+# Entries of one tile's list: of more, sums of light could exceed 32 bits (31 x 4095 each); llvmpipe ends all
+# loops of an invocation after 65 535 turns, and a pass may go over its list twice; on hardware a pixel alone with
+# so many would be slow.
+_LONGEST = 30_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
 _LARGE_HEAD = 16  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
