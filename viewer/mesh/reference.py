@@ -12,11 +12,13 @@ from ..errors import InputError
 from ..scan.points import NOTHING
 from ..view import View
 from .scene import Hits, Rays, Scene, distance_to_ball
+from .triangles import Mesh
 
 _CHUNK = 1 << 18  # rays cast at a time
-# A hit may come before its own point by so many steps of float32 at the size of the scene: the ray's
-# start, its direction and the hit are each rounded to a few.
-_ROUNDING = 32 * float(np.finfo(np.float32).eps)
+# A hit may come before its own point by so many radii of the scene: points are rounded to float32. A round
+# shape comes farther before such a point where it is slanted; faces that hold the point are left out.
+_ROUNDED = 2 * float(np.finfo(np.float32).eps)
+_ROUNDED_ON_SHAPES = 16 * _ROUNDED
 
 _SAME = 4  # footprints between depths that are of one surface
 
@@ -103,11 +105,12 @@ def visible(
     """Tell which points nothing of the scene hides from the camera's eye, (N,).
 
     positions: (N, 3), relative to the scene's origin. tolerance: how far a hit may lie before the point,
-    scan units; None: 32 float32 epsilons (3.8e-6) of the radius of the scene's bounds. Points behind the
+    scan units; None: 2 float32 epsilons (2.4e-7) of the radius of a mesh's bounds, 32 of shapes'. A face
+    of a mesh within 2 of the point holds it, and does not hide it, however it is slanted. Points behind the
     eye are not visible; the edges of the picture, near and far do not count.
     """
     if tolerance is None:
-        tolerance = _ROUNDING * scene.bounds.radius
+        tolerance = (_ROUNDED if isinstance(scene, Mesh) else _ROUNDED_ON_SHAPES) * scene.bounds.radius
     view = View.of(camera, (1, 1), scene.origin, scene.bounds)
     seen = np.zeros(len(positions), bool)
     for start in range(0, len(positions), _CHUNK):
@@ -119,10 +122,38 @@ def visible(
         depth = -local[ahead, 2]
         across = local[ahead, :2] / (depth[:, None] if view.perspective else 1)
         starts, steps = _rays(view, across)
-        hits = _cast(scene, starts, steps, 0.0, np.inf)
-        hidden = (depth - hits.distance) * np.linalg.norm(steps, axis=1) > tolerance
+        limit = depth - tolerance / np.linalg.norm(steps, axis=1)
+        if isinstance(scene, Mesh):
+            hidden = _hidden(scene, starts, steps, points[ahead], limit)
+        else:
+            hidden = _cast(scene, starts, steps, 0.0, np.inf).distance < limit
         seen[start + ahead] = ~hidden
     return seen
+
+
+def _hidden(
+    mesh: Mesh, starts: Rays, steps: Rays, points: Rays, limit: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether faces hide points (N, 3) at the ends of rays: they are met, in float64, before a depth (N,).
+
+    A face that holds the point is left out: the ray meets it there and nowhere else, but where it is slanted,
+    rounding finds it anywhere along the ray.
+    """
+    hidden = np.zeros(len(points), bool)
+
+    def passed_by(rays: NDArray[np.intp], faces: NDArray[np.uint32]) -> NDArray[np.bool_]:
+        """Note what hides; which faces, though they hold no point, are not met at all."""
+        met = mesh.meet(faces, starts[rays], steps[rays])
+        others = mesh.distances(faces, points[rays]) > _ROUNDED * mesh.bounds.radius
+        hidden[rays[others & (met < limit[rays])]] = True
+        return others & np.isinf(met)
+
+    entries = _entries(mesh, starts, steps)
+    rays, faces = mesh.crossings(starts + entries[:, None] * steps, steps)
+    edges = passed_by(rays, faces) & ~hidden[rays]
+    if edges.any():  # what lies across them may be met
+        passed_by(np.repeat(rays[edges], 3), mesh.neighbors[faces[edges]].ravel())
+    return hidden
 
 
 def both_see(
@@ -172,11 +203,16 @@ def _rays(view: View, across: NDArray[np.float64]) -> tuple[Rays, Rays]:
 
 def _cast(scene: Scene, starts: Rays, steps: Rays, near: float, far: float) -> Hits:
     """The first hits between two depths; distances are depths."""
-    center, radius = scene.bounds.center - scene.origin, scene.bounds.radius
-    entry = np.maximum(distance_to_ball(starts - center, steps, 1.01 * radius), near)
+    entry = np.maximum(_entries(scene, starts, steps), near)
     hits = scene.cast(starts + entry[:, None] * steps, steps)
     hits.distance[:] += entry
     beyond = hits.distance > far
     hits.distance[beyond], hits.face[beyond] = np.inf, NOTHING
     hits.normal[beyond], hits.color[beyond] = 0, 0
     return hits
+
+
+def _entries(scene: Scene, starts: Rays, steps: Rays) -> NDArray[np.float64]:
+    """Depths at which rays enter the ball around a scene, (N,); 0 from inside it."""
+    center, radius = scene.bounds.center - scene.origin, scene.bounds.radius
+    return distance_to_ball(starts - center, steps, 1.01 * radius)

@@ -75,6 +75,54 @@ class Mesh:
         hits.color[hit] = self._colors(face[hit], weights)
         return hits
 
+    def crossings(self, starts: Rays, steps: Rays) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
+        """The faces that rays (N, 3) pass, found in float32: pairs of ray and face.
+
+        A ray that passes an outline closely may have the face beside the one that it meets.
+        """
+        import open3d
+
+        rays = np.concatenate([starts, steps], axis=1, dtype=np.float32)
+        found = self._scene.list_intersections(open3d.core.Tensor.from_numpy(rays))
+        return found["ray_ids"].numpy().astype(np.intp), found["primitive_ids"].numpy()
+
+    @cached_property
+    def neighbors(self) -> Triangles:
+        """The face across each edge of each face, (F, 3); the face itself where there is none."""
+        edges = np.sort(
+            np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1
+        )
+        order = np.lexsort(edges.T)
+        after = np.roll(order, -1)
+        shared = (edges[order] == edges[after]).all(axis=1)
+        across = np.repeat(np.arange(len(self.faces), dtype=np.uint32), 3)
+        face = across.copy()
+        across[order[shared]], across[after[shared]] = face[after[shared]], face[order[shared]]
+        return across.reshape(-1, 3)
+
+    def meet(self, faces: NDArray[np.uint32], starts: Rays, steps: Rays) -> NDArray[np.float64]:
+        """Where each ray (N, 3) meets its face (N,), in steps, in float64; +inf where it passes it by."""
+        a, b, c = self._corners(faces) - starts
+        volumes = np.stack([(np.cross(p, q) * steps).sum(axis=1) for p, q in ((b, c), (c, a), (a, b))])
+        whole = volumes.sum(axis=0)
+        inside = (whole != 0) & ((volumes >= 0).all(axis=0) | (volumes <= 0).all(axis=0))
+        weights = volumes / np.where(inside, whole, 1)
+        place = a * weights[0][:, None] + b * weights[1][:, None] + c * weights[2][:, None]
+        return np.where(inside, (place * steps).sum(axis=1) / (steps * steps).sum(axis=1), np.inf)
+
+    def distances(self, faces: NDArray[np.uint32], positions: Rays) -> NDArray[np.float64]:
+        """How far points (N, 3), relative to the origin, lie off their faces (N,), scan units."""
+        corners = self._corners(faces) - positions
+        normal = _unit(self.areas(faces))
+        height = np.abs((corners[0] * normal).sum(axis=1))
+        ends = np.roll(corners, -1, axis=0)
+        edges = ends - corners
+        squares = (edges * edges).sum(axis=2)
+        part = np.clip(-(corners * edges).sum(axis=2) / np.where(squares > 0, squares, 1), 0, 1)
+        to_edges = np.linalg.norm(corners + part[:, :, None] * edges, axis=2).min(axis=0)
+        above = ((np.cross(corners, ends) * normal).sum(axis=2) >= 0).all(axis=0) & normal.any(axis=1)
+        return np.where(above, height, to_edges)
+
     def carry(self, faces: NDArray[np.uint32], positions: Rays, moved: Mesh) -> Rays:
         """Move points of this mesh with their faces to a moved one, (N, 3).
 
