@@ -392,10 +392,10 @@ def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> N
     own = Renderer(renderer.gpu)
     pose = Pose(0, 0.0, "x", sphere(1000))
     request = Request(pose, Camera.orbit(pose.cloud.bounds()), "surfels")
-    assert bring(own, request, budget_ms=1000)
+    assert bring(own, request, SIZE, budget_ms=1000)
     assert own.bytes_of(pose) == 1000 * (12 + 12), "positions and normals"
     bare = Request(Pose(0, 0.0, "x", BARE), request.camera, "surfels", look=Look(color_by="normal"))
-    assert bring(own, bare, budget_ms=1000)
+    assert bring(own, bare, SIZE, budget_ms=1000)
     assert not is_prepared(own, bare, SIZE)
     assert is_prepared(own, fallback(bare), SIZE)
     own.release()

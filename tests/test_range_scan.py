@@ -120,7 +120,7 @@ def test_a_window_has_points_merged_by_a_worker(scan: Path, renderer: Renderer) 
         pose = timeline.pose(0)
     own, request = Renderer(renderer.gpu), Request(pose, Camera.orbit(pose.bounds), "points")
     assert not is_prepared(own, request, (64, 48))
-    while not bring(own, request, budget_ms=1000):
+    while not bring(own, request, (64, 48), budget_ms=1000):
         assert own.preparing is None or own.preparing.name == "Merging range views"
     assert pose.is_merged
     assert is_prepared(own, request, (64, 48))

@@ -22,7 +22,7 @@ _FIT_MARGIN = 1.04
 _STEEPEST = 89.5  # elevation in degrees that orbiting reaches
 _LARGEST, _SMALLEST = 1e24, 1e-24  # lengths whose squares, sums and ratios stay finite
 _SMALLEST_SUBJECT = 1e-18  # whose distances float32 can square
-_NARROWEST, _WIDEST = 1e-6, 179.9  # fields of view that a picture can be drawn with, degrees
+_NARROWEST, _WIDEST = 1e-6, 170.0  # fields of view that a picture can be drawn with, degrees
 _MOST_BYTES = 2**20  # of a file; ours have some 300
 
 
@@ -30,7 +30,8 @@ _MOST_BYTES = 2**20  # of a file; ours have some 300
 class Camera:
     """A camera: where a picture is taken from.
 
-    eye, target, up: scan units (up: any length). fov_y: degrees. height: scan units that
+    eye, target, up: scan units (up: any length). fov_y: degrees, 1e-6 to 170: in wider ones pixels would
+    show nearly half of all directions, so that no splat is as small as a pixel. height: scan units that
     the picture shows from bottom to top (orthographic only). near, far: scan units along
     the view axis; None: fitted (see `clip_range`).
     """
@@ -52,7 +53,7 @@ class Camera:
         fov_y = _number(self.fov_y)
         if fov_y is None or not _NARROWEST <= fov_y <= _WIDEST:
             what = f"the camera's fov_y is {shortened(self.fov_y)}"
-            raise InputError(f"{what}, expected {_NARROWEST:g} to {_WIDEST} degrees")
+            raise InputError(f"{what}, expected {_NARROWEST:g} to {_WIDEST:g} degrees")
         object.__setattr__(self, "fov_y", fov_y)
         for name in ("height", "near", "far"):
             if getattr(self, name) is not None:

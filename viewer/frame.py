@@ -12,7 +12,7 @@ from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
 from .geometry import UP
-from .gpu.pose import GpuPose
+from .gpu.pose import drawn_bounds
 from .gpu.shade import shade
 from .gpu.surface import Surface
 from .look import Look, drawable
@@ -21,7 +21,7 @@ from .scan.layers import NO_LAYERS, Layers
 from .scan.pods import first_camera
 from .scan.points import PointCloud
 from .scan.pose import Pose
-from .view import View
+from .view import View, origin_near
 
 FALLBACK = "points"
 _BUDGET_MS = 15.0  # of a frame for what a backend can go on with in the next
@@ -67,7 +67,8 @@ def render_frame(
     pose = renderer.resident(request.pose)
     request.layers.check(request.pose)
     backend, params = chosen = _chosen(request)
-    view = _view(request, pose, surface.size)
+    view = _view(request, surface.size)
+    pose.center(view.origin)
     prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
     look = request.look
     if prepared is None:
@@ -104,9 +105,9 @@ def render_frame(
     return refinable or prepared is None
 
 
-def bring(renderer: Renderer, request: Request, budget_ms: float) -> bool:
-    """Upload what the backend reads of the pose, for as long as this; whether all of it is there. Points of
-    range views are merged by a worker before.
+def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms: float) -> bool:
+    """Upload what the backend reads of the pose for a picture of this size, pixels, for as long as that;
+    whether all of it is there. Points of range views are merged by a worker before.
 
     A window calls it again and again before `render_frame`, so that it is stopped by neither.
     """
@@ -114,13 +115,14 @@ def bring(renderer: Renderer, request: Request, budget_ms: float) -> bool:
     backend, params = _chosen(request)
     if not backend.draws_samples(request.pose, params) and not renderer.merge(pose):
         return False
+    pose.center(_view(request, size).origin)
     return pose.upload(pose.names_of(backend.needs(request.pose, params)), budget_ms)
 
 
 def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int]) -> bool:
     """Whether nothing has to be estimated or derived for a picture of this size, pixels."""
     backend, params = _chosen(request)
-    view = _view(request, renderer.resident(request.pose), size)
+    view = _view(request, size)
     return renderer.is_prepared(request.pose, backend, params, request.look, view)
 
 
@@ -138,8 +140,11 @@ def colorable(request: Request) -> Request:
     return request if look is request.look else replace(request, look=look)
 
 
-def _view(request: Request, pose: GpuPose, size: tuple[int, int]) -> View:
-    return View.of(request.camera, size, pose.origin, pose.bounds, request.layers.place)
+def _view(request: Request, size: tuple[int, int]) -> View:
+    pose, camera, place = request.pose, request.camera, request.layers.place
+    origin = origin_near(camera, size, pose.origin, place)
+    bounds = drawn_bounds(pose, camera)
+    return View.of(camera, size, origin, bounds, place).straightened(bounds)
 
 
 def _chosen(request: Request) -> tuple[Backend, Any]:

@@ -1,9 +1,9 @@
-"""What shaders know of the camera: float32, relative to the pose's origin."""
+"""What shaders know of the camera: float32, relative to an origin that is near what is seen."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +12,26 @@ from .bounds import Bounds
 from .camera import Camera
 from .rigid import STILL, Rigid
 
+_FAR = 2.0**14  # pixels: from there on float32 offsets are worth being taken from another origin
+_STRAIGHT = 1 / 32  # of a pixel: rays that part by no more than this are drawn as parallel ones
+
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera at a picture size, seen from a pose's origin.
+    """A camera at a picture size, seen from an origin of a pose's positions.
 
-    rotation: (3, 3) float64, from the pose's axes, which are the world's unless it is moved, to view.
+    origin: (3,) float64, along the pose's axes, which are the world's unless it is moved.
+    rotation: (3, 3) float64, from the pose's axes to view.
     translation: (3,) float64, from the origin to view space. scale: pixels per unit of x/-z (perspective) or
     of x (orthographic).
     near, far: what is outside is not drawn. reach: the depth that an orthographic depth
-    buffer ends at.
+    buffer ends at. All depths count from a plane that lies so far before the eye: base, scan units. It is 0
+    unless the view is `straightened`, so that float32 resolves depths by the scan's size rather than by how
+    far it is away.
     """
 
     size: tuple[int, int]
+    origin: NDArray[np.float64]
     rotation: NDArray[np.float64]
     translation: NDArray[np.float64]
     scale: float
@@ -32,6 +39,7 @@ class View:
     far: float
     reach: float
     perspective: bool
+    base: float = 0.0
 
     @classmethod
     def of(
@@ -51,6 +59,7 @@ class View:
         near, far = camera.clip_range()
         return cls(
             size=size,
+            origin=origin,
             rotation=rotation,
             translation=to_view @ (place.points(origin) - np.array(camera.eye)),
             scale=size[1] / extent,
@@ -60,11 +69,33 @@ class View:
             perspective=perspective,
         )
 
+    def straightened(self, bounds: Bounds) -> View:
+        """The view by parallel rays where these show nothing within the bounds elsewhere by more than 1/32
+        pixel, as through a telephoto lens; else the view itself. bounds: of the pose where it is not
+        moved."""
+        half = math.hypot(*self.size) / 2  # pixels
+        middle = float(self.depths(bounds.center - self.origin))
+        radius = max(bounds.radius, half * middle / self.scale)  # splats may fill the picture
+        bend = half * radius / (middle - radius) if middle > radius else math.inf
+        base = middle - 4 * radius
+        if not self.perspective or bend > _STRAIGHT or not self.near < base < self.far:
+            return self
+        return replace(
+            self,
+            translation=self.translation + np.array([0.0, 0.0, base]),
+            scale=self.scale / middle,
+            near=0.0,
+            far=self.far - base,
+            reach=min(self.far - base, 16 * radius),
+            perspective=False,
+            base=base,
+        )
+
     @property
     def key(self) -> tuple[object, ...]:
         """Equal for views that show the same."""
-        lens = (self.size, self.scale, self.near, self.far, self.reach, self.perspective)
-        return (self.rotation.tobytes(), self.translation.tobytes(), *lens)
+        lens = (self.size, self.scale, self.near, self.far, self.reach, self.perspective, self.base)
+        return (self.origin.tobytes(), self.rotation.tobytes(), self.translation.tobytes(), *lens)
 
     def project(self, positions: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Pixel coordinates (N, 2), row 0 at the top, and depths (N,), in float64.
@@ -105,3 +136,19 @@ class View:
                 return normals @ self.rotation[2] < 0
             eye = -self.translation @ self.rotation
             return np.einsum("ij,ij->i", normals, eye - positions) < 0
+
+
+def origin_near(
+    camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], place: Rigid = STILL
+) -> NDArray[np.float64]:
+    """The origin, (3,), to count a pose's positions from, so that float32 offsets of what is seen are right
+    to 1/1024 pixel: the pose's own, unless the camera looks so closely at something far from it.
+
+    Then it is on a grid of 2^14 to 2^16 pixels at the camera's target, so that moving about there, and
+    zooming by less than 4, keep it. It goes by nothing but the arguments: no picture turns on what was drawn
+    before.
+    """
+    pixel = camera.view_height / size[1]
+    grid = 4.0 ** math.ceil(math.log(pixel * _FAR, 4))
+    away = place.inverse.points(np.array(camera.target)) - origin
+    return origin + np.round(away / grid) * grid

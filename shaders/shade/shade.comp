@@ -123,7 +123,7 @@ float eye_dome(ivec2 pixel, float depth) {
     for (int i = 0; i < 4; ++i) {
         ivec2 step = ivec2(i < 2 ? 1 - 2 * i : 0, i < 2 ? 0 : 5 - 2 * i) * eye_dome_radius;
         float other = depth_at(clamp(pixel + step, ivec2(0), view_size - 1));
-        sum += max(0.0, 1.0 - other / depth);
+        sum += max(0.0, 1.0 - (other + view_base) / (depth + view_base));
     }
     return exp(-50.0 * eye_dome_strength * sum);
 }

@@ -50,7 +50,7 @@ def test_a_sphere_is_picked_where_rays_meet_it(draw: Draw, projection: str) -> N
         depth = -(camera.rotation() @ (picked.position - camera.eye))[2]
         assert depth == pytest.approx(depths[pixel[::-1]], abs=spacing)
         assert picked.normal @ normals[pixel[::-1]] > 0.99, "never the far side"
-        np.testing.assert_array_equal(picked.point, cloud.positions[picked.row])
+        np.testing.assert_array_equal(picked.point, cloud.world(picked.row))
         np.testing.assert_array_equal(picked.normal, cloud.normals[picked.row])
         np.testing.assert_array_equal(picked.color, cloud.colors[picked.row])
         assert picked.scalars == {"height": cloud.scalars["height"][picked.row]}

@@ -171,7 +171,7 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
     assert picked is not None
     assert picked.row is not None
     assert picked.row == octree.attributes[4].rows[shown[0] - starts[4]]  # type: ignore[index]
-    np.testing.assert_array_equal(picked.point, cloud.positions[picked.row] + cloud.origin)
+    np.testing.assert_array_equal(picked.point, cloud.world(picked.row))
     assert picked.scalars == {"row": picked.row}
     assert surface.value[y, x] == pytest.approx(picked.row)
 

@@ -53,7 +53,7 @@ class Image:
 def held(gpu: Gpu, views: tuple[RangeView, ...], **options: object) -> RangeSamples:
     """The samples of views, complete."""
     gpu.activate()
-    samples = RangeSamples(gpu, views, np.zeros(3), **options)
+    samples = RangeSamples(gpu, views, **options)
     assert samples.upload(np.inf)
     return samples
 
@@ -648,9 +648,11 @@ def test_far_from_the_world_s_zero_nothing_is_lost(renderer: Renderer) -> None:
     matrix[:3, 3] -= matrix[:3, :3] @ far
     near, moved = held(renderer.gpu, VIEWS[:1]), replace(VIEWS[0], world_to_camera=matrix)
     expected = probe(near, view, 0, 0)[VIEWS[0].valid()]
-    samples = RangeSamples(renderer.gpu, (moved,), far)
+    samples = RangeSamples(renderer.gpu, (moved,))
     samples.upload(np.inf)
-    np.testing.assert_allclose(probe(samples, view, 0, 0)[moved.valid()][:, :4], expected[:, :4], atol=1e-5)
+    np.testing.assert_allclose(
+        probe(samples, replace(view, origin=far), 0, 0)[moved.valid()][:, :4], expected[:, :4], atol=1e-5
+    )
 
 
 def test_too_many_samples_are_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -681,7 +683,7 @@ def test_two_views_of_3000x4500_are_held(renderer: Renderer, capsys: pytest.Capt
     gpu = renderer.gpu
     held(gpu, VIEWS[:1]).release()  # programs are built
     start = time.perf_counter()
-    samples = RangeSamples(gpu, (view, view), np.zeros(3))
+    samples = RangeSamples(gpu, (view, view))
     slices = []
     while not samples.complete:
         before = time.perf_counter()

@@ -297,7 +297,7 @@ def test_a_sequence_is_drawn_without_merging_anything(renderer: Renderer, backen
     for pose in poses:
         for look in (FLAT, Look(), Look(light="head"), replace(FLAT, color_by="height")):
             request = Request(pose, camera, backend, look=look)
-            while not bring(own, request, budget_ms=5):
+            while not bring(own, request, SIZE, budget_ms=5):
                 pass
             while render_frame(own, request, surface, wait=False, moving=True):
                 time.sleep(0.001)

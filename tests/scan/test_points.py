@@ -102,3 +102,24 @@ def test_facts_are_found_once_and_stay_where_they_were_found() -> None:
     assert np.array_equal(copy.positions, cloud.positions)
     assert copy.remember(count, 2) == 4
     assert found == [2, 3, 2]
+
+
+def test_coordinates_keep_their_float64_precision() -> None:
+    points = np.random.default_rng(3).uniform(-5e3, 5e3, (400_000, 3)) + (5e5, 5.4e6, 300)
+    cloud = PointCloud.from_arrays(points)
+    assert np.abs(cloud.world() - points).max() <= np.spacing(5.4e6)
+    assert np.abs(cloud.positions + cloud.origin - points).max() > 1e-4, "which float32 offsets alone have not"
+    np.testing.assert_array_equal(cloud.world(7), cloud.world()[7])
+    assert cloud.nbytes == 24 * len(points)
+    near = cloud.centered(points[9])
+    close = np.linalg.norm(points - points[9], axis=1) < 500
+    assert close.sum() > 10
+    assert np.abs(near.positions + points[9] - points)[close].max() < 2e-5
+    assert near.remainders is None
+
+
+def test_what_float32_offsets_hold_has_no_remainders() -> None:
+    points = np.random.default_rng(3).random((1000, 3), np.float32) + np.float32(100)
+    assert PointCloud.from_arrays(points).remainders is None
+    assert PointCloud.from_arrays(points.astype(np.float64)).remainders is None
+    assert PointCloud.from_arrays(points.astype(np.float64) + 0.1, precise=False).remainders is None

@@ -62,7 +62,7 @@ def built(gpu: Gpu, view: RangeView) -> tuple[RangeSamples, dict[str, tuple[floa
         taken[name] = (taken[name][0] + more[0], taken[name][1] + more[1])
 
     made: list[RangeSamples] = []
-    add("room", timed(lambda: made.append(RangeSamples(gpu, [view], np.zeros(3)))))
+    add("room", timed(lambda: made.append(RangeSamples(gpu, [view]))))
     names = {"_write": "upload", "_reduce": "levels", "_bound": "tiles"}
     for step in made[0]._steps:
         add(names[step.func.__name__], timed(step))  # type: ignore[attr-defined]

@@ -131,7 +131,7 @@ def reading_of(
             return Reading(measurement, "the scan does not tell which points are the same in other frames")
         if (row := pose.cloud.row_of(end.id)) is None:
             return Reading(measurement, f"point {end.id} is missing in this frame")
-        point = place.points(pose.cloud.positions[row] + pose.cloud.origin)
+        point = place.points(pose.cloud.world(row))
         x, y, z = (float(v) for v in point)
         moved.append(replace(end, frame=pose.index, time=float(pose.time), position=(x, y, z)))
     return Reading(Measurement(*moved), None)

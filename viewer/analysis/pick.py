@@ -69,7 +69,7 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
         return None
     center = np.array([[x + 0.5, y + 0.5]])
     place = surface.layers.place
-    position = place.points(surface.view.unproject(center, np.array([depth]))[0] + surface.pose.origin)
+    position = place.points(surface.view.unproject(center, np.array([depth]))[0] + surface.view.origin)
     if row == NOTHING:
         return Picked(position, level)
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
@@ -82,7 +82,7 @@ def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | 
         level,
         row,
         id=row if cloud.ids is None else int(cloud.ids[at]),
-        point=place.points(cloud.positions[at] + cloud.origin),
+        point=place.points(cloud.world(at)),
         color=None if cloud.colors is None else cloud.colors[at].copy(),
         normal=None if cloud.normals is None else place.directions(cloud.normals[at].copy()),
         scalars=scalars | found,
@@ -129,7 +129,7 @@ def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:
     surface may be that still is the place's own.
     """
     unmoved = surface.layers.place.inverse.points(np.asarray(position, np.float64))
-    offset = (unmoved - surface.pose.origin)[None]
+    offset = (unmoved - surface.view.origin)[None]
     if not surface.view.contains(offset)[0]:
         return False
     pixels, depths = surface.view.project(offset)

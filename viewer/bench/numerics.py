@@ -377,8 +377,7 @@ def _zoomed() -> Iterator[Row]:
         "zoomed in on 10^-6 of the scan",
         detail(6),
         partial(surrounded, power=6),
-        FLOAT32,
-        limit=Limit(0.25, "float32 offsets from one origin resolve two pixels there"),
+        _rounded(np.float32, 2**15 / _UNIT, "offsets from an origin 2^15 pixels away"),
     )
 
     def splat() -> PointView:
@@ -418,7 +417,6 @@ def _zoomed() -> Iterator[Row]:
         flat,
         partial(telephoto, power=6),
         FLOAT32,
-        limit=Limit(0.25, "depth from the eye is float32: it resolves 19 pixels there"),
     )
 
     def far(power: int) -> Callable[[], PointView]:

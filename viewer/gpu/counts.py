@@ -35,9 +35,12 @@ def count_points(
     """
     if isinstance(points, PointCloud):
         count, dropped, numbered, parts = len(points), points.dropped, len(points), _parts(points)
+        origin = points.origin
     else:
         count, dropped, numbered = points.count, 0, int(points.firsts[-1])
         parts = ((*part, None) for part in points.parts())
+        origin = points.overview.origin
+    moved = origin - view.origin
     shown = np.zeros(numbered, bool)
     shown[rows[rows != NOTHING]] = True
     seen = hidden = left_out = away = 0
@@ -49,6 +52,8 @@ def count_points(
             sampled = is_sampled(numbers.astype(np.uint32), share)
             left_out += int(np.count_nonzero(~sampled))
             others &= sampled
+        if moved.any():
+            positions = positions + moved
         inside = view.contains(positions) & others
         if faces_away and normals is not None:
             turned = inside & view.faces_away(positions, normals)

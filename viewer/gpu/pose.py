@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bounds import Bounds
+from ..camera import Camera
 from ..errors import InputError, unknown_name
 from ..scan.points import PointCloud, strided
 from ..scan.pose import Pose
@@ -35,6 +36,7 @@ FORMATS = {
     "axes": gl.RGBA32F,
 }
 _RANGES = "samples"  # the name that samples of range views are uploaded by
+_TELEPHOTO = 0.5  # degrees from bottom to top, below which rays may be as good as parallel
 _SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
 
 
@@ -57,6 +59,7 @@ class GpuPose:
         self._uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._layers: dict[int, Layer] = {}
+        self._origin = pose.origin
 
     @cached_property
     def stored(self) -> PointCloud:
@@ -101,8 +104,26 @@ class GpuPose:
 
     @property
     def origin(self) -> NDArray[np.float64]:
-        """The origin that positions are relative to, (3,) scan units."""
-        return self.pose.origin
+        """The origin that positions on the GPU are relative to, (3,) scan units: the pose's, unless the view
+        that was drawn last has another one."""
+        return self._origin
+
+    def center(self, origin: NDArray[np.float64]) -> None:
+        """Have positions on the GPU count from this origin, (3,), from now on: where it is another one, they
+        are uploaded anew, and what was packed of them."""
+        if (origin == self._origin).all():
+            return
+        self._origin = origin
+        self._uploads.pop("positions", None)
+        for key in [key for key in self._arrays if key == "positions" or isinstance(key, tuple)]:
+            self._drop_array(key)
+
+    @property
+    def _centered(self) -> PointCloud:
+        """The cloud as the GPU has it: relative to its origin."""
+        if (self._origin == self.cloud.origin).all():
+            return self.cloud
+        return self.cloud.centered(self._origin)
 
     @property
     def uploaded_bytes(self) -> int:
@@ -113,7 +134,7 @@ class GpuPose:
     @property
     def bounds(self) -> Bounds:
         """The pose's robust bounds; a box of two units where there is no point."""
-        return self.pose.bounds if len(self.overview) else Bounds(self.origin - 1, self.origin + 1)
+        return drawn_bounds(self.pose)
 
     def array(self, name: str) -> gl.BufferTexture:
         """positions, normals, colors, radii, axes, ids, or 'scalar:NAME', with a texel for each row; or
@@ -159,7 +180,7 @@ class GpuPose:
         key = (pack, *args)
         if key not in self._arrays:
             with self.preparing("upload"):
-                upload = _array_upload(self.gpu, pack(self.cloud, *args))
+                upload = _array_upload(self.gpu, pack(self._centered, *args))
                 upload.go_on(np.inf)
                 self._keep_array(key, upload, texel_format)
         return self._arrays[key]
@@ -178,12 +199,17 @@ class GpuPose:
 
     def _upload_samples(self, end: float) -> bool:
         if self._samples is None:
-            self._samples = RangeSamples(self.gpu, self.range_points.views, self.origin)
+            self._samples = RangeSamples(self.gpu, self.range_points.views)
         return self._samples.upload(end)
 
     def _keep_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
         self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
         self._uploaded_bytes += upload.nbytes
+
+    def _drop_array(self, key: Hashable) -> None:
+        texels = self._arrays.pop(key)
+        self._uploaded_bytes -= texels.buffer.size
+        self.gpu.discard(texels)
 
     def _values(self, name: str) -> NDArray:
         kind, _, scalar = name.partition(":")
@@ -191,7 +217,7 @@ class GpuPose:
             zero = self.scalar_range(scalar)[0]
             stored = self.scalar(scalar) if kind == "scalar" else self.range_points.all_samples(scalar)
             return as_float32(stored, zero)
-        values: NDArray | None = getattr(self.cloud, name)
+        values: NDArray | None = getattr(self._centered if name == "positions" else self.cloud, name)
         if values is None:
             hint = (
                 "Give the look when rendering, which estimates what is missing" if name == "normals" else None
@@ -246,20 +272,18 @@ class GpuPose:
         key = (_heights, axis, by_sample)
         for gone in [name for name in self._arrays if isinstance(name, tuple) and name[0] is _heights]:
             if gone != key:
-                texels = self._arrays.pop(gone)
-                self._uploaded_bytes -= texels.buffer.size
-                self.gpu.discard(texels)
+                self._drop_array(gone)
         if by_sample and key not in self._arrays:
             samples = self.samples
             with self.preparing("upload"):
-                self._arrays[key] = samples.heights(np.array(axis))
+                self._arrays[key] = samples.heights(np.array(axis), self.origin)
                 self._uploaded_bytes += self._arrays[key].buffer.size
         return self._arrays[key] if by_sample else self.packed(_heights, axis, by_sample)
 
-    @cached_property
+    @property
     def sample(self) -> NDArray[np.float64]:
         """Some of the positions, (M, 3), relative to the origin: for ranges."""
-        return self.pose.sample
+        return self.pose.sample + (self.pose.origin - self.origin)
 
     @contextmanager
     def preparing(self, kind: str) -> Iterator[None]:
@@ -281,6 +305,16 @@ class GpuPose:
         begun = (upload.target for upload in self._uploads.values())
         layers = (texels for layer in self._layers.values() for texels in layer.texels.values())
         self.gpu.discard(*self._arrays.values(), *layers, *begun, self._samples)
+
+
+def drawn_bounds(pose: Pose, camera: Camera | None = None) -> Bounds:
+    """The pose's robust bounds, or through a telephoto lens those of all of its points and their splats, none
+    of which may be drawn elsewhere for that; a box of two units where there is no point."""
+    if not len(pose.overview):
+        return Bounds(pose.origin - 1, pose.origin + 1)
+    if camera is None or camera.fov_y > _TELEPHOTO or not isinstance(pose.points, PointCloud):
+        return pose.bounds
+    return pose.points.whole_bounds().grown(pose.points.longest_reach())
 
 
 @dataclass(eq=False)

@@ -122,7 +122,7 @@ class RangeSamples:
     view; level k has 2^k times fewer columns and rows, rounded up. defines: macros for programs that include
     range/samples.glsl: what the views have, so that nothing is computed for what none has.
 
-    origin: (3,) float64, the pose's. levels: at most 8; None: 6, or fewer where all views are small. Raises
+    levels: at most 8; None: 6, or fewer where all views are small. Raises
     InputError where the driver takes no so many samples.
     """
 
@@ -130,11 +130,10 @@ class RangeSamples:
         self,
         gpu: Gpu,
         views: Sequence[RangeView],
-        origin: NDArray[np.float64],
         levels: int | None = None,
         how: Filter = BOX,
     ) -> None:
-        self._gpu, self._origin, self.filter = gpu, origin, how
+        self._gpu, self.filter = gpu, how
         if not 0 <= (levels or 0) <= RANGE_MOST_LEVELS:
             raise ValueError(f"{levels} levels; at most {RANGE_MOST_LEVELS}")
         self._pods = [_pod(view) for view in views]
@@ -199,16 +198,17 @@ class RangeSamples:
         for step in self._reductions(tiled_from=1):
             step()
 
-    def heights(self, axis: NDArray[np.float64]) -> gl.BufferTexture:
+    def heights(self, axis: NDArray[np.float64], origin: NDArray[np.float64]) -> gl.BufferTexture:
         """Make texels of the height along an axis, (3,) in the world, of each sample of level 0 by its id,
-        scan units, relative to the origin; any number where there is no sample. The caller keeps them."""
+        scan units, relative to an origin, (3,); any number where there is no sample. The caller keeps
+        them."""
         made = self._texels(gl.R32F, 4 * self.count)
         program = self._gpu.compute("range/heights.comp", self.defines)
         self._bind_read()
         made.buffer.bind_to_storage_buffer(Storage.RANGE_VALUES)
         for number, (pod, levels) in enumerate(zip(self._pods, self.places, strict=True)):
             to_world = np.linalg.inv(pod.world_to_camera)
-            up = (*(axis @ to_world[:3, :3]), axis @ (to_world[:3, 3] - self._origin))
+            up = (*(axis @ to_world[:3, :3]), axis @ (to_world[:3, 3] - origin))
             for first in range(0, levels[0].count, _SLICE):
                 self._gpu.set(program, number=number, up=up, first=first)
                 with self._gpu.timers.measure("heights"):
@@ -367,7 +367,8 @@ class RangeSamples:
     def _write_table(self, view: View | None) -> None:
         """Write what shaders know of each view, as `range_view` of samples.glsl reads it. view: None leaves
         each in its pod's space."""
-        key = () if view is None else (view.rotation.tobytes(), view.translation.tobytes())
+        place = () if view is None else (view.rotation, view.translation, view.origin)
+        key = tuple(values.tobytes() for values in place)
         if key == self._tabled:
             return
         words = np.zeros((len(self._pods), RANGE_ENTRY, 4), np.uint32)
@@ -400,7 +401,7 @@ class RangeSamples:
         """The way from the pod's space to the picture's, (4, 4)."""
         to_view = np.eye(4)
         to_view[:3, :3] = view.rotation
-        to_view[:3, 3] = view.translation - view.rotation @ self._origin
+        to_view[:3, 3] = view.translation - view.rotation @ view.origin
         return to_view @ np.linalg.inv(pod.world_to_camera)
 
 

@@ -196,7 +196,7 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     if kind := surface.value_kind:
         low, high = kind.range or surface.found_range()
     elif source == "depth":
-        low, high = robust_range(surface.view.depths(pose.sample))
+        low, high = robust_range(surface.view.depths(pose.sample) + surface.view.base)
     elif source == "height":
         world = surface.layers.place.points(pose.sample + pose.origin)
         low, high = robust_range(world @ up_vector(look.up))

@@ -78,7 +78,7 @@ W = TypeVar("W", bound=Workspace)
 
 
 class Texel(NamedTuple):
-    """One pixel of a Surface, as its properties of the same names have it."""
+    """One pixel of a Surface, as its properties of the same names have it; depth: in terms of its view."""
 
     depth: float
     row: int
@@ -88,7 +88,7 @@ class Texel(NamedTuple):
 class Surface:
     """A picture's pixels before shading. Row 0 is the top.
 
-    On the GPU: `depths` (float bits, +inf: nothing) and `rows` (the point that a pixel
+    On the GPU: `depths` (float bits, from the view's base, +inf: nothing) and `rows` (the point that a pixel
     shows, 0xFFFFFFFF: none), one word a pixel. A pixel is covered where its depth is finite. Colour,
     normal and value are those of the row, unless the backend wrote its `own`; a pixel without a row is
     filled, and what the backend did not write of it is unknown. Reading a property copies it to the CPU.
@@ -368,7 +368,9 @@ class Surface:
         source = self.value_source
         if source == "height":
             return float(self.layers.place.points(self.pose.origin) @ up_vector(self.look.up))
-        if source is None or source == "depth" or source in self.finds:
+        if source == "depth":
+            return self.view.base
+        if source is None or source in self.finds:
             return 0.0
         return self.scalar_range(source, self.pose)[0]
 
@@ -459,7 +461,7 @@ class Surface:
         if self.samples is None:
             return self.scan, self.point_of(row)
         offset = self.samples.of_samples("positions", np.array([row]))[0]
-        cloud = self.samples.around(offset + self.pose.origin, least)
+        cloud = self.samples.around(offset + self.samples.overview.origin, least)
         found = cloud.row_of(row)
         assert found is not None
         return cloud, found
@@ -472,9 +474,11 @@ class Surface:
     # --- for readers ------------------------------------------------------------------
 
     @property
-    def depth(self) -> NDArray[np.float32]:
-        """(H, W) float32, scan units along the view axis; +inf where nothing is."""
-        return self._read(self.depths.buffer, np.float32)
+    def depth(self) -> NDArray[np.floating]:
+        """(H, W), scan units from the eye along the view axis; +inf where nothing is. float32; float64 where
+        the view counts its depths from another base (see `View`)."""
+        depths, base = self._read(self.depths.buffer, np.float32), self.view.base
+        return depths.astype(np.float64) + base if base else depths
 
     @property
     def row(self) -> NDArray[np.uint32]:
@@ -538,7 +542,8 @@ class Surface:
         return Texel(float(depth), int(row), int(_levels(depth, row, np.frombuffer(level, np.uint32)[0])))
 
     def depth_around(self, x: int, y: int, reach: int) -> NDArray[np.float32]:
-        """(2 reach + 1, 2 reach + 1) float32: `depth` round pixel (x, y); +inf outside the picture."""
+        """(2 reach + 1, 2 reach + 1) float32: `depth` round pixel (x, y), in terms of its view; +inf
+        outside the picture."""
         self.gpu.activate()
         width, height = self.size
         top, bottom = max(y - reach, 0), min(y + reach + 1, height)
@@ -653,7 +658,7 @@ class Surface:
         assert find is not None
         if source != "height":
             return find(rows)
-        return self.layers.place.points(find(rows) + self.pose.origin) @ up_vector(self.look.up)
+        return self.layers.place.points(find(rows) + self.pose.pose.origin) @ up_vector(self.look.up)
 
     def _points_of(self, rows: NDArray) -> NDArray:
         """Rows in `scan` of the points that rows (n,) stand for; see `point_of`."""

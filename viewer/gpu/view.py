@@ -10,11 +10,11 @@ from .blocks import Mat4, Vec4
 
 @dataclass(frozen=True)
 class ViewBlock:
-    """The camera in float32, from positions relative to the pose's origin.
+    """The camera in float32, from positions relative to the view's origin.
 
     world_to_view: columns. view_scale: pixels per unit of x / depth, or of x (orthographic). view_near,
     view_far: scan units along the view axis, infinite where nothing was said. view_reach: what an
-    orthographic depth buffer ends at. view_size: pixels.
+    orthographic depth buffer ends at. view_size: pixels. view_base: how far from the eye depths begin.
     """
 
     world_to_view: Mat4
@@ -24,6 +24,7 @@ class ViewBlock:
     view_reach: float
     view_size: tuple[int, int]
     view_perspective: bool
+    view_base: float
 
     @classmethod
     def of(cls, view: View) -> ViewBlock:
@@ -42,6 +43,7 @@ class ViewBlock:
             view_reach=view.reach,
             view_size=view.size,
             view_perspective=view.perspective,
+            view_base=view.base,
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
@@ -42,6 +42,8 @@ class PointCloud:
     ids:       (N,) uint32, increasing, the index in the file before anything was dropped; None: 0..N-1
     dropped:   how many points were dropped because a coordinate was NaN or infinite
     shortened: how many splats were, to a million times the extent of the points
+    remainders: (N, 3) float32, scan units, or None: what the coordinates have beyond their float32 offsets,
+               which are right to 3e-8 of the extent; None where they have nothing
     topology:  names the faces between the points: clouds with the same one hold the same points of the
                subject under the same ids; None where the scan does not tell
     """
@@ -57,6 +59,7 @@ class PointCloud:
     dropped: int = 0
     shortened: int = 0
     topology: str | None = None
+    remainders: NDArray[np.float32] | None = None
     _facts: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -70,12 +73,14 @@ class PointCloud:
         axes: ArrayLike | None = None,
         scalars: Mapping[str, ArrayLike] | None = None,
         origin: ArrayLike | None = None,
+        precise: bool = True,
     ) -> PointCloud:
         """Points with a NaN or infinite coordinate are dropped and counted.
 
         positions: (N, 3) absolute, any real type. colors: (N, 3) or (N, 4), uint8 or
         float in 0..1. axes: (N, 4), of which rows without two lengths count as round, with the radius
-        given; the others set it. origin: (3,); chosen by `choose_origin` where None.
+        given; the others set it. origin: (3,); chosen by `choose_origin` where None. precise: whether what
+        the coordinates have beyond float32 offsets is kept.
         Raises InputError where shapes do not fit.
         """
         points = np.asarray(positions)
@@ -109,8 +114,9 @@ class PointCloud:
                 radii_, axes_, _LONGEST_SPLAT * (_robust_extent(points) or 1.0)
             )
         base = choose_origin(points) if origin is None else np.array(origin, np.float64)
+        offsets, remainders = _relative(points, base, precise)
         return cls(
-            positions=_relative(points, base),
+            positions=offsets,
             origin=base,
             normals=None if normals_ is None else np.ascontiguousarray(normals_, np.float32),
             colors=None if colors_ is None else _rgba8(colors_),
@@ -121,6 +127,7 @@ class PointCloud:
             ids=None if keep is None else np.flatnonzero(keep).astype(np.uint32),
             dropped=count - kept,
             shortened=shortened,
+            remainders=remainders,
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -129,12 +136,26 @@ class PointCloud:
     @property
     def nbytes(self) -> int:
         """Bytes held by all arrays."""
-        arrays = [self.positions, self.normals, self.colors, self.radii, self.axes, self.ids]
+        arrays = [self.positions, self.normals, self.colors, self.radii, self.axes, self.ids, self.remainders]
         return sum(a.nbytes for a in [*arrays, *self.scalars.values()] if a is not None)
 
-    def world(self) -> NDArray[np.float64]:
-        """Absolute positions, (N, 3) float64."""
-        return self.positions + self.origin
+    def world(self, rows: Any = slice(None)) -> NDArray[np.float64]:
+        """Absolute positions, (N, 3) float64, as precise as the file has them. rows: of these alone."""
+        offsets = self.positions[rows].astype(np.float64)
+        if self.remainders is not None:
+            offsets += self.remainders[rows]
+        return offsets + self.origin
+
+    def centered(self, origin: NDArray[np.float64]) -> PointCloud:
+        """The points relative to another origin, (3,): as precise near it as the file has them."""
+        shift, offsets = self.origin - origin, np.empty_like(self.positions)
+        for start in range(0, len(self), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            away = self.positions[part] + shift
+            if self.remainders is not None:
+                away += self.remainders[part]
+            offsets[part] = away
+        return replace(self, positions=offsets, origin=origin, remainders=None)
 
     def splat_reach(self) -> NDArray[np.float32]:
         """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
@@ -159,6 +180,14 @@ class PointCloud:
         """
         return self.remember(PointCloud._find_bounds)
 
+    def whole_bounds(self) -> Bounds:
+        """The box around all points, outliers too. Found once. Raises InputError where there is no point."""
+        return self.remember(PointCloud._find_whole_bounds)
+
+    def longest_reach(self) -> float:
+        """The farthest that any splat reaches from its point, scan units; 0 where there are no radii."""
+        return 0.0 if self.radii is None else self.remember(PointCloud._find_longest_reach)
+
     def remember(self, find: Callable[Concatenate[PointCloud, P], T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Find a small fact about the points, once for the same arguments, and keep it."""
         key = (find, *args, *kwargs.items())
@@ -169,6 +198,16 @@ class PointCloud:
     def __getstate__(self) -> dict[str, Any]:
         """All but the facts, which another process finds again where it needs them."""
         return {**self.__dict__, "_facts": {}}
+
+    def _find_whole_bounds(self) -> Bounds:
+        if not len(self):
+            raise InputError("no points to fit a view to")
+        low, high = _extremes(self.positions)
+        return Bounds(low + self.origin, high + self.origin)
+
+    def _find_longest_reach(self) -> float:
+        reach = self.splat_reach()
+        return float(reach.max(where=np.isfinite(reach), initial=0.0))
 
     def _find_bounds(self) -> Bounds:
         if not len(self):
@@ -259,15 +298,26 @@ def _quantile_box(points: NDArray) -> tuple[NDArray[np.float64], NDArray[np.floa
     return low, high
 
 
-def _relative(points: NDArray, origin: NDArray[np.float64]) -> NDArray[np.float32]:
+def _relative(
+    points: NDArray, origin: NDArray[np.float64], precise: bool
+) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    """Offsets from the origin, and their remainders, None where there are none."""
     if points.dtype == np.float32 and not origin.any():
-        return np.ascontiguousarray(points)
-    offsets = np.empty(points.shape, np.float32)
+        return np.ascontiguousarray(points), None
+    offsets, remainders = np.empty(points.shape, np.float32), None
     for start in range(0, len(points), _CHUNK):
         checkpoint()
-        stop = start + _CHUNK
-        offsets[start:stop] = points[start:stop].astype(np.float64) - origin
-    return offsets
+        part = slice(start, start + _CHUNK)
+        away = points[part].astype(np.float64) - origin
+        offsets[part] = away
+        if not precise:
+            continue
+        away -= offsets[part]
+        if away.any():
+            if remainders is None:
+                remainders = np.zeros(points.shape, np.float32)
+            remainders[part] = away
+    return offsets, remainders
 
 
 def _splats(

@@ -332,6 +332,7 @@ def _cloud(
         colors=of_points("color", srgb8),
         scalars=scalars if confidence is None else scalars | {"confidence": confidence},
         origin=origin,
+        precise=False,  # depths are float32
     )
     if not len(cloud):
         what = "holds no points: no pixel inside the masks has a depth"

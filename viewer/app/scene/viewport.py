@@ -87,7 +87,7 @@ class Viewport:
             self._prepared_at = now + _PREPARED_LATER  # the same again would be the same
             return False
         try:
-            if not bring(self.renderer, request, _UPLOAD_MS):
+            if not bring(self.renderer, request, size, _UPLOAD_MS):
                 later = 0.0 if self.renderer.preparing is None else _PREPARED_LATER
                 self._prepared_at = now + later  # until then the picture before stays
                 return False

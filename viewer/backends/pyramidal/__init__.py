@@ -37,6 +37,7 @@ _NO_SURFACE = "how far apart points of a surface are is not to be told from a li
 LIMITS = {
     "eye inside the cloud": Limit(0.02, _BY_CELLS),
     "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
+    "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
     "coplanar points": Limit(0.02, _BY_CELLS),
     "collinear points": Limit(0.04, _BY_CELLS),
     "collinear points end on, perspective": Limit(0.1, _NO_SURFACE),
@@ -358,6 +359,6 @@ def _parts(size: tuple[int, int]) -> int:
 
 def _density(pose: GpuPose, view: View, spacing: float) -> int:
     """The level whose cells samples fill in the middle of the scan."""
-    depth = max(float(view.depths(pose.bounds.center - pose.overview.origin)), view.near)
+    depth = max(float(view.depths(pose.bounds.center - pose.origin)), view.near)
     apart = spacing * view.scale / (depth if view.perspective else 1.0)
     return min(math.ceil(math.log2(max(apart, 1.0))), LEVELS - 1)

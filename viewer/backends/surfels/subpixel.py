@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...gpu.amplify import Points
 from ...gpu.bindings import Storage
@@ -39,7 +38,7 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     Outliers count for what none may be.
     """
     pose, view = points.pose, surface.view
-    nearest = float(view.depths(pose.cloud.remember(_box)).min())
+    nearest = float(view.depths(pose.cloud.whole_bounds().corners() - pose.origin).min())
     usually_nearest = float(view.depths(pose.bounds.corners() - pose.origin).min())
     if view.perspective and min(nearest, usually_nearest) <= view.near:
         return 0.0
@@ -53,12 +52,6 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     if largest * pixels > _LARGEST_RADIUS:
         return 0.0
     return min(max(2 - usual * pixels / LEAST_RADIUS, 0.0), 1.0)
-
-
-def _box(cloud: PointCloud) -> NDArray[np.float32]:
-    """The corners of the box around all points, (8, 3), relative to the origin."""
-    low, high = (np.array([f(column) for column in cloud.positions.T]) for f in (np.min, np.max))
-    return np.where([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], high, low)
 
 
 def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:

@@ -239,7 +239,7 @@ class Voxels:
         seen = (asked, frame.view.key)
         if self._shown is not None and self._seen == seen and self._shown.cut.complete:
             return self._shown
-        sight = sight_of(frame.view, pose.cloud.origin)
+        sight = sight_of(frame.view)
         if self._traversal is None or self._asked != asked:
             self._traversal = Traversal(
                 self.octree,
@@ -253,7 +253,7 @@ class Voxels:
             self._traversal.look(sight)
         self._asked, self._seen = asked, seen
         self._traversal.advance(frame.budget_ms)
-        self._shown = self._look_at(self._traversal.cut(pose.cloud.origin), pose, params, flat)
+        self._shown = self._look_at(self._traversal.cut(pose.origin), pose, params, flat)
         return self._shown
 
     def _margin(self, least: float) -> float:
@@ -268,8 +268,8 @@ class Voxels:
         strays as they are, in cubes of typical leaves."""
         cloud, strays = pose.cloud, self.octree.strays
         rows = np.concatenate([cut.gather(self.octree, "rows"), strays])
-        positions = np.concatenate([cut.centers, cloud.positions[strays]])
-        unlike = _unlike(self.octree, cut, cloud.origin)
+        positions = np.concatenate([cut.centers, (cloud.world(strays) - pose.origin).astype(np.float32)])
+        unlike = _unlike(self.octree, cut, pose.origin)
         closing = np.ldexp(np.float32(self.octree.edge / 2), -cut.pick(self._closing).astype(np.int32))
         radii = np.maximum(cut.halves, params.least * unlike * closing)
         typical = params.least * math.ldexp(self.octree.edge / 2, -int(np.median(self._closing[-1])))
@@ -279,7 +279,7 @@ class Voxels:
 
         shown = PointCloud(
             positions=positions,
-            origin=cloud.origin,
+            origin=pose.origin,
             # Faces give their own normals to pixels.
             normals=np.zeros_like(positions) if flat else of_nodes("normals"),
             colors=None if cloud.colors is None else of_nodes("colors"),
@@ -291,9 +291,9 @@ class Voxels:
         return _Shown(cut, GpuPose(self._gpu, replace(pose.pose, points=shown)), rows)
 
 
-def sight_of(view: View, origin: NDArray[np.float64]) -> Sight:
-    """The view of a pose with this origin, (3,), as a cut has to know it."""
-    eye = origin - view.rotation.T @ view.translation
+def sight_of(view: View) -> Sight:
+    """The view as a cut has to know it."""
+    eye = view.origin - view.rotation.T @ view.translation
     return Sight(eye, view.rotation, view.scale, view.size, view.near, view.far, view.perspective)
 
 

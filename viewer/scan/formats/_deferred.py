@@ -48,7 +48,7 @@ def cloud_of(
     if held is not None:
         admit(held, _memory(positions[0], attributes, scalars, origin, at_hand))
     points = Deferred(positions.pop, positions[0].dtype, 3)
-    return PointCloud.from_arrays(points, **attributes, scalars=scalars, origin=origin)
+    return PointCloud.from_arrays(points, **attributes, scalars=scalars, origin=origin, precise=True)
 
 
 def _memory(
@@ -74,7 +74,8 @@ def _memory(
         steps.append((kept * points.itemsize * 3, (kept - rows) * points.itemsize * 3))
     if "axes" in attributes:
         steps.append((kept * _SPLAT, kept * _SPLAT))
-    steps.append((kept * 12 * moved,) * 2)
+    beyond = points.dtype != np.float32  # what float32 offsets do not hold
+    steps.append((kept * 12 * (moved + beyond),) * 2)
     for name, size in _FINAL.items():
         if name in attributes and (name == "colors" or attributes[name].dtype != np.float32):
             steps.append((kept * size,) * 2)

@@ -116,7 +116,7 @@ def _measure(cloud: PointCloud, camera: Camera, delta: float, bench: Bench, foun
     """Add what is found of one pose from one viewpoint."""
     settings = bench.settings
     view = View.of(camera, settings.size, cloud.origin, cloud.bounds())
-    sight = sight_of(view, cloud.origin)
+    sight = sight_of(view)
     tree = build(cloud, Stop(delta=delta), attributes=False)
     works = _works(cloud, tree, sight, Stop(delta=delta))
     found.trees.append(tree)
