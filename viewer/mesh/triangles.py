@@ -101,7 +101,7 @@ class Mesh:
         return across.reshape(-1, 3)
 
     def meet(self, faces: NDArray[np.uint32], starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """Distances, in steps and in float64, at which each ray (N, 3) meets its face (N,); +inf: it passes by."""
+        """Distances in steps, found in float64, at which rays (N, 3) meet faces (N,); +inf: they do not."""
         a, b, c = self._corners(faces) - starts
         volumes = np.stack([(np.cross(p, q) * steps).sum(axis=1) for p, q in ((b, c), (c, a), (a, b))])
         whole = volumes.sum(axis=0)

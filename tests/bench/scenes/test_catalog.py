@@ -48,7 +48,8 @@ def test_all_scenes_are_listed_and_say_what_they_lack(tmp_path: Path) -> None:
     listed = catalog.scene_names(None)
     scanned = [f"{name}-{pods}" for pods in ("simulated", "pair") for name in ("torus", *OWN)]
     assert list(listed)[:7] == [*ANALYTIC, *OWN, "bunny"]
-    assert [name for name, reason in listed.items() if not reason] == [*ANALYTIC, *OWN, *scanned]
+    sheets = ["sheets", "sheets-bare"]
+    assert [name for name, reason in listed.items() if not reason] == [*ANALYTIC, *OWN, *sheets, *scanned]
     for pods in ("simulated", "pair"):
         assert {f"{name}-{pods}" for name in ["torus", *OWN, *STILL, *MOVING]} <= set(listed)
     assert {*REAL, *ARRANGED} <= set(listed)

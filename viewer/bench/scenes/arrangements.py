@@ -1,17 +1,24 @@
-"""Several meshes as one: subjects that cover themselves, and of very different scales."""
+"""Several bodies as one: subjects that cover themselves, of very different scales, and with thin parts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...mesh.scene import Rays
 from ...mesh.triangles import Mesh
 from ...scan.points import PointCloud
+from ..truth.shapes import AnalyticScene, Cuboid, Sphere
+from ..truth.tessellation import cube_mesh, sphere_mesh
+from .subjects import with_rows
 
 _GAP = 0.9  # from one to the next in a lattice, in edges of their box
 _HEAD = 8  # times that the upper of two is smaller
+_EAR, _FINGER = (0.25, 0.5, 0.015), (0.5, 0.03, 0.03)  # half of their edges
+_APART = 0.12  # from finger to finger
+_ON = 1e-3  # how far inside a shape its own points may be: those of its triangles
 _SEAT = 0.03  # of its height, that it sinks in
 
 
@@ -37,6 +44,33 @@ def on_its_head(mesh: Mesh) -> Mesh:
     seat = mesh.bounds.center.copy()
     seat[1] = mesh.bounds.low[1] + _SEAT * (mesh.bounds.high - mesh.bounds.low)[1]
     return _joined([mesh, mesh], [1.0, scale], [np.zeros(3), top - scale * seat])
+
+
+def with_sheets() -> tuple[AnalyticScene, Mesh]:
+    """A unit sphere with two thin ears and five fingers; also as triangles, which go on inside."""
+    sheets = [Cuboid(center=(side * 0.45, 1.25, 0.0), half=_EAR) for side in (-1, 1)]
+    sheets += [Cuboid(center=(1.3, _APART * number, 0.2), half=_FINGER) for number in range(-2, 3)]
+    meshes = [sphere_mesh(), *(_stretched(cube_mesh(), sheet.half) for sheet in sheets)]
+    places = [np.zeros(3), *(np.array(sheet.center) for sheet in sheets)]
+    return AnalyticScene((Sphere(), *sheets)), _joined(meshes, [1.0] * len(meshes), places)
+
+
+def outside_sheets(scene: AnalyticScene, cloud: PointCloud) -> PointCloud:
+    """The points of a cloud that lie inside no sphere or box of a scene."""
+    world, outside = cloud.world(), np.ones(len(cloud), bool)
+    for shape in scene.shapes:
+        local = world - shape.center
+        if isinstance(shape, Cuboid):
+            outside &= (np.abs(local) > np.array(shape.half) - _ON).any(axis=1)
+        elif isinstance(shape, Sphere):
+            outside &= np.linalg.norm(local, axis=1) > shape.radius - _ON
+    return with_rows(cloud, np.flatnonzero(outside))
+
+
+def _stretched(cube: Mesh, half: tuple[float, float, float]) -> Mesh:
+    """The cube -1..1 as a box, half: half its edges."""
+    points = replace(cube.points, positions=(cube.points.positions * np.array(half)).astype(np.float32))
+    return Mesh(points, cube.faces)
 
 
 def _joined(meshes: Sequence[Mesh], scales: Sequence[float], shifts: Sequence[Rays]) -> Mesh:

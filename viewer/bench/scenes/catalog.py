@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -16,11 +16,13 @@ from ...scan.demo import DemoSource
 from ...scan.open import find_source
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
+from ...scan.spacing import typical_spacing
 from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
 from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from . import samples
-from .arrangements import in_lattice, on_its_head
+from .arrangements import in_lattice, on_its_head, outside_sheets, with_sheets
+from .defects import SIGMAS, Change, by_turns, changed, noisy, thinned, with_strays, without_normals
 from .real_scans import DepthFrames
 from .samples import Sampler
 from .simulated import simulated
@@ -30,6 +32,8 @@ _STANFORD = "Stanford Computer Graphics Laboratory"
 _CYBERWARE = "Cyberware"
 _COUNT = 100_000  # points of an analytic scene
 _NOISE = 0.5  # of a virtual scanner, in footprints of its pixels
+_NOISES = (0.2, 0.5)  # of scans made noisy, in the points' spacing
+_SHEETS_COUNT = 50_000  # before those inside the body are left out
 _HEAD_TOLERANCE = 0.5  # mm: 99 % of the mesh is within 0.07 mm of the exact surface
 _PHONE = "range/truedepth_head_30"
 _PHONE_TOLERANCE = 2e-3  # m
@@ -234,6 +238,59 @@ def _two_scales(file: str, credit: str) -> _Scene:
     return _Scene(make, (f"models/{file}",), counts=True)
 
 
+def _spoilt(name: str, scene: _Scene, changes: Sequence[Change], noise: float = 0.0) -> _Scene:
+    """Another scene with its points changed. noise: how far they are moved, in their spacing."""
+
+    def make(request: _Request) -> Subject:
+        sound = scene.make(replace(request, name=name))
+        reach = SIGMAS * noise * typical_spacing(sound.moment(0).pose.cloud) if noise else None
+        return changed(sound, request.name, changes, request.seed, reach)
+
+    return replace(scene, make=make)
+
+
+def _spoilt_in_all_ways(name: str, scene: _Scene) -> dict[str, _Scene]:
+    """A mesh's scan without normals, of uneven density, and noisy."""
+    return {
+        f"{name}-bare": _spoilt(name, scene, [without_normals]),
+        f"{name}-ramp": _spoilt(name, scene, [thinned]),
+        f"{name}-ramp-bare": _spoilt(name, scene, [thinned, without_normals]),
+        **{
+            f"{name}-noise-{spacings}": _spoilt(name, scene, [noisy(spacings), without_normals], spacings)
+            for spacings in _NOISES
+        },
+    }
+
+
+def _sheets(request: _Request) -> Subject:
+    """A body with thin parts."""
+
+    def load(_: int) -> Moment:
+        truth, mesh = with_sheets()
+        cloud = outside_sheets(truth, samples.on_mesh(mesh, request.count or _SHEETS_COUNT, request.seed))
+        return Moment(Pose(0, 0.0, request.name, cloud), truth, mesh)
+
+    return Subject(name=request.name, load=load)
+
+
+def _merged(folder: str, model: str, tolerance: float) -> _Scene:
+    """Laser scans as one cloud, with normals of each scan: right, turned around, missing, by turns."""
+    scene = _laser(folder, model, tolerance)
+
+    def make(request: _Request) -> Subject:
+        scanned = scene.make(request)
+
+        def load(index: int) -> Moment:
+            moment = scanned.moment(index)
+            normals = by_turns([view.normals() for view in moment.pose.views])
+            cloud = replace(moment.pose.cloud, normals=normals)
+            return replace(moment, pose=replace(moment.pose, points=cloud))
+
+        return replace(scanned, load=load)
+
+    return replace(scene, make=make)
+
+
 _ANALYTIC = {
     "sphere": _analytic(Sphere(), samples.on_sphere, tessellation.sphere_mesh),
     "plane": _analytic(Plane(), samples.on_square, tessellation.square_mesh),
@@ -268,7 +325,20 @@ _REAL = {
     "bunny-scans": _laser("stanford_bunny_scans", "stanford_bunny_35947.ply", 2e-3),
     "truedepth-head": _Scene(_phone, (_PHONE, f"{_PHONE}/fused_reference_45428.ply")),
 }
-_SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _ARRANGED | _SIMULATED | _REAL
+_SHEETS = _Scene(_sheets)
+_SPOILT = {
+    **{
+        spoilt: scene
+        for name in ("bunny", "armadillo", "horse", "igea")
+        for spoilt, scene in _spoilt_in_all_ways(name, _MESHES[name]).items()
+    },
+    "bunny-strays": _spoilt("bunny", _MESHES["bunny"], [with_strays]),
+    "bunny-strays-bare": _spoilt("bunny", _MESHES["bunny"], [with_strays, without_normals]),
+    "sheets": _SHEETS,
+    "sheets-bare": _spoilt("sheets", _SHEETS, [without_normals]),
+    "bunny-scans-merged": _merged("stanford_bunny_scans", "stanford_bunny_35947.ply", 2e-3),
+}
+_SCENES: dict[str, _Scene] = _ANALYTIC | _MESHES | _ARRANGED | _SPOILT | _SIMULATED | _REAL
 
 
 _FILE = _Scene(_file, counts=True)  # of a user's own mesh

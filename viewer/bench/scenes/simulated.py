@@ -10,11 +10,11 @@ from ...bounds import Bounds
 from ...camera import Camera
 from ...scan.pose import Pose
 from ...simulate.scanner import Faults, around, capture, rig
+from .defects import SIGMAS
 from .subjects import Moment, Subject
 
 _SIZE = (640, 480)  # of a range image
 _FRAMED = 5  # moments that the pods are placed for
-_SIGMAS = 4  # of noise that still belong to the surface: all but one point in 16 000
 
 
 def simulated(subject: Subject, name: str, pods: int, noise: float, seed: int = 0) -> Subject:
@@ -34,7 +34,7 @@ def simulated(subject: Subject, name: str, pods: int, noise: float, seed: int = 
         pose = Pose.of(index, moment.pose.time, moment.pose.label, views)
         return replace(moment, pose=pose)
 
-    tolerance = _SIGMAS * max(deviations) or None
+    tolerance = SIGMAS * max(deviations) or None
     return replace(subject, name=name, load=load, noise=noise, tolerance=tolerance)
 
 
