@@ -19,8 +19,13 @@ layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; }
 const int LEAST_COUNT = 6;  // points that tell of a surface
 // Radii in the picture's typical ones: from which neighbors are far; from which on splats grow no more.
 const float FAR = 3.0;
-const float MOST = 9.0;
+const float MOST = 3.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
+// Directions in which a point's cell is measured; factor for what lies between them, and for splats that lean.
+const int DIRECTIONS = 12;
+const vec2 TURN = vec2(0.8660254, 0.5);
+const float BETWEEN = 1.12;
+const float LEAST_SHARE = 0.9, MOST_SHARE = 2.0;  // of the radius by share, bounds of that by the cell
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
 
@@ -58,21 +63,22 @@ int count_of_plane(vec3 place, Extent extent) {
 }
 #endif
 
+vec3 near_offsets[K];  // from the point, over the neighborhood's radius
+
 // Means are of offsets from the point, over the neighborhood's radius: small numbers, whatever the scan's
 // place and size.
 vec3 fit_plane(vec3 place, Extent extent, int count, out mat3 vectors) {
     float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0;
-    vec3 offsets[K], mean = vec3(0.0);
+    vec3 mean = vec3(0.0);
     for (int k = 0; k < K; ++k) {
-        bool counts = k < count;
-        vec3 offset = (texelFetch(positions, counts ? int(near_rows[k] >> 1) : 0).xyz * unit - place) * scale;
-        offsets[k] = counts ? offset : vec3(0.0);
-        mean += offsets[k];
+        int row = k < extent.count ? int(near_rows[k] >> 1) : 0;
+        near_offsets[k] = (texelFetch(positions, row).xyz * unit - place) * scale;
+        mean += k < count ? near_offsets[k] : vec3(0.0);
     }
     mean /= float(count);
     vec3 squares = vec3(0.0), products = vec3(0.0);
     for (int k = 0; k < K; ++k) {
-        vec3 d = k < count ? offsets[k] - mean : vec3(0.0);
+        vec3 d = k < count ? near_offsets[k] - mean : vec3(0.0);
         squares += d * d;
         products += d.yzx * d.zxy;
     }
@@ -109,13 +115,34 @@ bool is_outlier(Extent extent, float usual_radius, bool sparse) {
     return near_squared[1] > limit * limit || apart;
 }
 
-// The radius of a splat: twice that of a point's share of the surface. Hidden neighbors have no splats: those that are seen
-// share it. most: that a neighborhood counts for, as discs of the few points of sparse parts would hide the rest.
-float splat_radius(Extent extent, vec3 values, float most) {
-    int seen = 0;
-    for (int k = 0; k < K; ++k) seen += k < extent.count && (near_rows[k] & 1u) == 0u ? 1 : 0;
-    int shared_by = values.y > COLLINEAR * values.z ? max(seen, 1) : extent.count;
-    return 2.0 * min(sqrt(extent.squared), most) * inversesqrt(float(shared_by));
+// The radius of a splat: how far the places reach that are nearer to the point than to any other one, its Voronoi cell in
+// the plane, so that splats leave no gap however uneven points lie; where the cell is open, as at borders, and at least about
+// as a point's share of the surface. Hidden neighbors have no splats: those that are seen share it. most: that a
+// neighborhood counts for, as discs of the few points of sparse parts would hide the rest.
+float splat_radius(Extent extent, vec3 values, vec3 normal, float most) {
+    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0, radius = min(sqrt(extent.squared), most);
+    if (values.y <= COLLINEAR * values.z) return 2.0 * radius * inversesqrt(float(extent.count));
+    // Directions turn with the scan: they are counted from the nearest neighbor's.
+    vec3 beside = near_offsets[1] - dot(near_offsets[1], normal) * normal;
+    vec3 u = dot(beside, beside) > 1e-12 ? normalize(beside) : tangent_of(normal), v = cross(normal, u);
+    vec3 near[K];  // in the plane, and half the squared distance there
+    int seen = 1;
+    for (int k = 1; k < K; ++k) {
+        bool counts = k < extent.count && (near_rows[k] & 1u) == 0u;
+        vec2 at = vec2(dot(near_offsets[k], u), dot(near_offsets[k], v));
+        float squared = dot(at, at);
+        near[k] = vec3(at, counts && squared > 0.0 ? 0.5 * squared : UNKNOWN);
+        seen += int(counts);
+    }
+    float share = 2.0 * inversesqrt(float(seen)), reach = LEAST_SHARE * share;
+    vec2 direction = vec2(1.0, 0.0);
+    for (int i = 0; i < DIRECTIONS; ++i) {
+        float edge = UNKNOWN;
+        for (int k = 1; k < K; ++k) edge = min(edge, near[k].z / max(dot(near[k].xy, direction), 1e-9));
+        reach = max(reach, edge > MOST_SHARE * share ? share : edge * BETWEEN);
+        direction = mat2(TURN.x, TURN.y, -TURN.y, TURN.x) * direction;
+    }
+    return radius * reach;
 }
 
 void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
@@ -133,8 +160,9 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     }
     if (dot(normal, to_eye) < 0.0) normal = -normal;
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
-    float typical_radius = typical / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z);
-    float splat = max(splat_radius(extent, values, MOST * typical_radius * unit) / unit, LEAST);
+    float in_picture = typical / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z);
+    float typical_radius = max(in_picture, typical_in_space);  // near the eye, points are sparse in any picture
+    float splat = max(splat_radius(extent, values, normal, MOST * typical_radius * unit) / unit, LEAST);
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));

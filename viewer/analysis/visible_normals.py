@@ -29,8 +29,9 @@ class VisibleNormals:
     normals:    (M, 3) float32, unit length, world space, towards the eye
     radii:      (M,) float32, distance of a neighborhood's farthest point, scan units: r_k where counts is k
     counts:     (M,) int64, points of a neighborhood, the point itself among them: k, or fewer before a gap
-    splat_radii: (M,) float32, twice the radius of the disc that is a point's share of its neighborhood, or of
-                what is seen of that; 0 where no splat is drawn
+    splat_radii: (M,) float32, how far the point's Voronoi cell reaches among those that are seen, in the
+                plane, and a little more; 0.9 to 2.3 times 2 r / sqrt(n), n of the neighbors being seen
+                (Preiner 2012, 6); 0 where no splat is drawn
     curvatures: (M,) float32, the least eigenvalue of the covariance over the sum of all, 0 to 1/3
     usual:      (M,) float32, the radius that should hold k points by how dense the picture is there
     outliers:   (M,) bool, whether it is far from all others

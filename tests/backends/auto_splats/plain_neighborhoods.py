@@ -165,3 +165,33 @@ def certain_counts(
         agree = np.abs(np.einsum("mi,mi->m", one.normals, other.normals)) >= np.cos(np.radians(turned))
         counts[residual & is_plane & agree & (found.counts >= count + count // 3)] = count
     return counts
+
+
+def cell_reaches(
+    cloud: PointCloud,
+    rows: NDArray[np.integer],
+    found: PlainNeighborhoods,
+    normals: NDArray[np.floating],
+    shares: NDArray[np.bool_],
+) -> tuple[Floats, Floats]:
+    """How far each point's Voronoi cell reaches in the plane of its normal, in 12 directions, (M, 12), over the
+    neighbourhood's radius, inf where it is open; and the radius of a point's share, (M,), in the same unit.
+
+    normals: (M, 3), unit. shares: (M, K), the neighbours that cells are between. Directions are counted from
+    that of the nearest neighbour.
+    """
+    radii = np.where(found.radii > 0, found.radii, 1)[:, None, None]
+    offsets = (cloud.positions[found.nearest].astype(np.float64) - cloud.positions[rows][:, None]) / radii
+    first = offsets[:, 1] - np.einsum("mi,mi->m", offsets[:, 1], normals)[:, None] * normals
+    length = np.linalg.norm(first, axis=1, keepdims=True)
+    other = np.cross((0.3, 0.5, 0.8), normals)
+    first = np.where(length > 1e-6, first / np.maximum(length, 1e-6), other)
+    second = np.cross(normals, first)
+    across = np.stack([np.einsum("mki,mi->mk", offsets, axis) for axis in (first, second)], axis=-1)
+    squared = (across**2).sum(axis=-1)
+    angles = np.arange(12) * np.pi / 6
+    along = across @ np.array([np.cos(angles), np.sin(angles)])
+    beyond = shares & (squared > 0) & (np.arange(squared.shape[1]) > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edges = np.where(beyond[..., None] & (along > 1e-9), squared[..., None] / (2 * along), np.inf)
+    return edges.min(axis=1), 2 / np.sqrt(np.maximum(1, shares[:, 1:].sum(axis=1) + 1))

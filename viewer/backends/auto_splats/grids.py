@@ -20,7 +20,8 @@ class Grids:
 
     Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
     pixels round the picture whose points take part. unit: factor on places, a power of two.
-    typical: radius of neighborhoods as points are dense in the picture, pixels. culls, growth, alone, drops:
+    typical: radius of neighborhoods as points are dense in the picture, pixels; typical_in_space: as they are
+    over a body of the scan's size, a rough one, scan units. culls, growth, alone, drops:
     as `Search` has them.
     """
 
@@ -35,12 +36,19 @@ class Grids:
     drops: bool
     unit: float
     typical: float
+    typical_in_space: float
 
     @classmethod
     def of(
-        cls, size: tuple[int, int], coarse_shift: int, search: Search, unit: float, typical: float = 1.0
+        cls,
+        size: tuple[int, int],
+        coarse_shift: int,
+        search: Search,
+        unit: float,
+        typical: float = 1.0,
+        typical_in_space: float = 0.0,
     ) -> Grids:
-        """The grids over a picture of a size, pixels. typical: as above."""
+        """The grids over a picture of a size, pixels. unit and what is typical: as above."""
         fine_shift = min(max(round(math.log2(_FINE * typical)), 0), _COARSEST_FINE)
         margin = 1 << coarse_shift
         return cls(
@@ -55,6 +63,7 @@ class Grids:
             search.drops,
             unit,
             typical,
+            typical_in_space,
         )
 
     @property

@@ -213,7 +213,8 @@ class Neighborhoods:
             if wanted == shift:
                 break
             shift = wanted
-        self._grids = grids = Grids.of(self._size, shift, search, _unit(pose), radius)
+        in_space = _typical_radius(pose, search.k)
+        self._grids = grids = Grids.of(self._size, shift, search, _unit(pose), radius, in_space)
         for name in ("near to", "farthest"):
             self._reserve(name, 4 * grids.coarse_cells, gl.R32F)
         with self._gpu.timers.measure("planes"):
@@ -379,6 +380,11 @@ def _unit(pose: GpuPose) -> float:
     """A power of two with which the scan's size is about 1, so that squares of distances are numbers."""
     size = 2 * pose.bounds.radius
     return 2.0 ** -round(math.log2(size)) if size > 0 else 1.0
+
+
+def _typical_radius(pose: GpuPose, k: int) -> float:
+    """The radius of neighborhoods of k if points lay evenly on a ball of the scan's size, scan units."""
+    return 2 * pose.bounds.radius * math.sqrt(k / max(len(pose.cloud), 1))
 
 
 def _scanners(cloud: PointCloud, points: RangePoints) -> NDArray[np.float32]:
