@@ -174,8 +174,8 @@ def cell_reaches(
     normals: NDArray[np.floating],
     shares: NDArray[np.bool_],
 ) -> tuple[Floats, Floats]:
-    """How far each point's Voronoi cell reaches in the plane of its normal, in 12 directions, (M, 12), over the
-    neighbourhood's radius, inf where it is open; and the radius of a point's share, (M,), in the same unit.
+    """How far each point's Voronoi cell reaches in the plane of its normal, in 12 directions, (M, 12), over
+    the neighbourhood's radius, inf where it is open; and the radius of a point's share, (M,), in that unit.
 
     normals: (M, 3), unit. shares: (M, K), the neighbours that cells are between. Directions are counted from
     that of the nearest neighbour.

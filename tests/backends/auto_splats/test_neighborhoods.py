@@ -32,7 +32,7 @@ K = 10
 RULES = {"growth": 4.0, "alone": 8.0}  # by default
 LEAST_COUNT, CERTAIN, TURNED = 6, 0.08, 12.0  # of adaptive planes: points, radians, degrees
 EXACT = 4e-6  # of a radius: some roundings of float32
-# Bounds of splats in radii of a point's share, and the factor on what cells reach (shaders/auto_splats/fit.glsl).
+# Bounds of splats in radii of a point's share, and the factor on what cells reach.
 LEAST_SHARE, MOST_SHARE, BETWEEN = 0.9, 2.0, 1.12
 DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
 
@@ -88,7 +88,7 @@ def test_neighborhoods_are_those_of_a_tree(
     assert np.isin(visible, found.neighbors).all()
     if not hidden_neighbors:
         np.testing.assert_array_equal(np.sort(found.neighbors), visible)
-    true = check(scene, found)
+    check(scene, found)
     eye = np.array(scene.camera.eye) - scene.cloud.origin - scene.cloud.positions[found.rows]
     if scene.camera.projection == "orthographic":
         eye = np.broadcast_to(scene.camera.rotation()[2], eye.shape)
@@ -100,7 +100,7 @@ def test_neighborhoods_are_those_of_a_tree(
 
 @every_scene
 def test_splats_reach_as_far_as_cells(name: str) -> None:
-    """To the places that are nearer to their point than to any other one that is seen: so they leave no gap."""
+    """To the places that are nearer to their point than to any other one that is seen: so no gap is left."""
     scene = SCENES[name]()
     found = estimated(scene)
     true = check(scene, found)
