@@ -20,7 +20,9 @@ def test_convert_keeps_everything(suffix: str, run: Run, scans: Path, tmp_path: 
     assert run("convert", scans / "ball.npz", out) == (0, f"{out}\n", "")
     assert names(tmp_path) == [out.name]
     before, after = formats.read(scans / "ball.npz"), formats.read(out)
-    assert np.array_equal(before.world(), after.world())
+    # Half a float32 step: PCD has float64 only where that matters, since few programs read it.
+    slack = 2**-25 if suffix == ".pcd" else 1e-15
+    assert np.abs(before.world() - after.world()).max() <= slack
     for name in ("normals", "colors", "radii"):
         assert np.array_equal(getattr(before, name), getattr(after, name)), name
     assert np.array_equal(before.scalars["height"], after.scalars["height"])
@@ -48,7 +50,7 @@ def test_convert_of_one_pose_of_several(
     run: Run, refused: Callable[..., str], scans: Path, tmp_path: Path
 ) -> None:
     assert run("convert", scans / "sequence", tmp_path / "a.pcd", "--pose", 2).code == 0
-    assert np.array_equal(formats.read(tmp_path / "a.pcd").world(), cloud_at(2).world())
+    assert np.array_equal(formats.read(tmp_path / "a.pcd").positions, cloud_at(2).positions)
     assert run("convert", scans / "sequence", tmp_path / "b.pcd", "--time", 0.08).code == 0
     assert (tmp_path / "a.pcd").read_bytes() == (tmp_path / "b.pcd").read_bytes()
     message = refused("convert", scans / "sequence", tmp_path / "c.pcd")

@@ -105,10 +105,10 @@ def test_facts_are_found_once_and_stay_where_they_were_found() -> None:
 
 
 def test_coordinates_keep_their_float64_precision() -> None:
-    points = np.random.default_rng(3).uniform(-5e3, 5e3, (400_000, 3)) + (5e5, 5.4e6, 300)
+    points = np.random.default_rng(3).uniform(-5e3, 5e3, (400_000, 3)) + np.array([5e5, 5.4e6, 300])
     cloud = PointCloud.from_arrays(points)
     assert np.abs(cloud.world() - points).max() <= np.spacing(5.4e6)
-    assert np.abs(cloud.positions + cloud.origin - points).max() > 1e-4, "which float32 offsets alone have not"
+    assert np.abs(cloud.positions + cloud.origin - points).max() > 1e-4, "which offsets alone have not"
     np.testing.assert_array_equal(cloud.world(7), cloud.world()[7])
     assert cloud.nbytes == 24 * len(points)
     near = cloud.centered(points[9])

@@ -98,6 +98,9 @@ def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -
     check_output(args.out, known, several=len(indices) > 1)
     claim(frame_outputs(args.out, indices, timeline), scan_inputs(timeline), args.force)
     with frame_files(args.out) as file_of, progress(len(indices)) as tick:
+        remarks = set()
         for pose in read_poses(timeline, indices):
-            formats.write(file_of(pose), pose.cloud, pose.views)
+            remarks.add(formats.write(file_of(pose), pose.cloud, pose.views))
             tick()
+    for remark in remarks - {None}:
+        warn(f"{args.out}: {remark}")

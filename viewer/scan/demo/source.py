@@ -55,6 +55,7 @@ class DemoSource:
             radii=radii,
             scalars={"displacement": np.sqrt(np.square(positions - rest.positions).sum(axis=0))},
             origin=np.zeros(3),
+            precise=False,
         )
         return replace(cloud, topology=self.name)
 

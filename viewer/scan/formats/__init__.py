@@ -9,7 +9,8 @@ A format module declares
 - where it holds faces: `read_faces(path, frame=0) -> Iterator[Faces]`, in pieces, none where there are none;
 - where frames are told by others: `Frames(path)`, whose `read(frame)` keeps what the next one needs;
 - where it tells the unit of length: `read_unit(path) -> str`, from the header alone;
-- where it can be written: `write(path, cloud)`, or `write_views(path, views)`, or, all poses in one file,
+- where it can be written: `write(path, cloud)`, which may return a remark for the user, or
+  `write_views(path, views)`, or, all poses in one file,
   `write_poses(path, poses, unit, **options)` and `check(path)`, which says whether it can be read again.
 
 A module may raise any exception: the functions below turn it into one InputError that names the file.
@@ -158,13 +159,13 @@ def read_points(path: Path | str, frame: int = 0) -> PointCloud:
         return merge(in_one_unit(scanned, scanned[0].unit))
 
 
-def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) -> None:
+def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) -> str | None:
     """Write the points in the format that the suffix names, in one step.
 
     views: the range views behind the points, which a format of range views takes in their stead.
     The file takes its name only when it is complete; whatever goes wrong, a former file of that name
-    stays as it was and nothing else remains. Raises InputError for an unknown suffix, a failed write,
-    and where a format of range views gets none.
+    stays as it was and nothing else remains. Returns a remark where other programs may not read it. Raises
+    InputError for an unknown suffix, a failed write, and where a format of range views gets none.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -176,9 +177,10 @@ def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) 
         raise InputError(f"{module.TITLE} holds range views, and this scan has none", path, hint)
     with _writing(path, module) as temporary:
         if hasattr(module, "write"):
-            module.write(temporary, cloud)
-        else:
-            module.write_views(temporary, views)
+            remark: str | None = module.write(temporary, cloud)
+            return remark
+        module.write_views(temporary, views)
+        return None
 
 
 def write_poses(path: Path | str, poses: Iterable[Pose], unit: str, **options: Any) -> None:

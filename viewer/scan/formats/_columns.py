@@ -18,6 +18,7 @@ from ...task import checkpoint
 from ..points import PointCloud
 from ._admission import LONGEST_LINE
 from ._deferred import Deferred, cloud_of
+from ._precision import is_enough
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
 _ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
@@ -123,15 +124,16 @@ def cloud_from_columns(columns: Columns, held: int | None = None) -> PointCloud:
 
 
 def columns_from_cloud(
-    cloud: PointCloud, normals: tuple[str, str, str] = ("nx", "ny", "nz")
+    cloud: PointCloud, normals: tuple[str, str, str] = ("nx", "ny", "nz"), slack: float = 0.0
 ) -> dict[str, NDArray]:
     """Everything a cloud holds but its ids as named columns, positions absolute.
 
-    Positions are float32 where that is exact, else float64. normals: what their columns are called.
+    Positions are float32 where that `is_enough`, else float64; slack: see there. normals: what their
+    columns are called.
     Names lose their blanks, types that files do not know (bool, half, long double) are widened.
     """
     blocks = [
-        (("x", "y", "z"), _absolute(cloud)),
+        (("x", "y", "z"), _absolute(cloud, slack)),
         (normals, cloud.normals),
         (("red", "green", "blue", "alpha"), cloud.colors),
         (("radius",), None if cloud.radii is None else cloud.radii[:, None]),
@@ -308,9 +310,9 @@ def _as_ellipses(axes: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.hstack([length, axes[:, 3:], axes[:, :3] / np.where(length > 0, length, 1)])
 
 
-def _absolute(cloud: PointCloud) -> NDArray[np.float32] | NDArray[np.float64]:
-    if not cloud.origin.any():
+def _absolute(cloud: PointCloud, slack: float) -> NDArray[np.float32] | NDArray[np.float64]:
+    if not cloud.origin.any() and cloud.remainders is None:
         return cloud.positions
     world = cloud.world()
     single = world.astype(np.float32)
-    return single if np.array_equal(single, world) else world
+    return single if is_enough(single, world, slack) else world

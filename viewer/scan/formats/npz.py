@@ -32,6 +32,7 @@ from ._admission import MOST_MEMBERS, admit, check_count, opened, size_of
 from ._array_views import makes_views, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
 from ._deferred import Deferred, cloud_of
+from ._precision import within_decimals
 from ._stored import StoredArray
 from ._topology import with_topology
 
@@ -137,9 +138,13 @@ def _shifted(
 
 
 def write(path: Path, cloud: PointCloud) -> None:
-    """Write everything but the ids, as it is in memory, unpacked for speed."""
+    """Write everything but the ids, unpacked for speed; positions as offsets from an origin, float64 where
+    float32 is not enough."""
+    positions: NDArray[np.floating] = cloud.positions
+    if cloud.remainders is not None and not within_decimals(np.abs(cloud.remainders), cloud.world()):
+        positions = cloud.positions + cloud.remainders.astype(np.float64)
     arrays = dict(cloud.scalars) | {
-        "positions": cloud.positions,
+        "positions": positions,
         "origin": cloud.origin,
         "normals": cloud.normals,
         "colors": cloud.colors,

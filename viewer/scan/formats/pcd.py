@@ -57,6 +57,10 @@ _PADDING = "_"
 _HERE = ["0", "0", "0", "1", "0", "0", "0"]  # the viewpoint that nobody tells
 _OF_VIEWS = {"x", "y", "z", "red", "green", "blue", "alpha"}  # columns that range views have
 _VIEW_BYTES, _WORK = 64, 20 << 20  # bytes of a point as it becomes a view, and beside all
+# Open3D 0.20 and PCL's point types do; CloudCompare (2.12) and PDAL read them. Offsets in float32 would need
+# a place for the origin that others know, and programs differ in what VIEWPOINT means.
+_SLACK = 1e-6  # scan units: what is less is no reason for coordinates that few programs read
+_IN_FLOAT64 = "coordinates are float64, since float32 would round them; Open3D and PCL read such as zeros"
 _LONGEST_WORD = 40  # of a file, in a message
 _LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
 
@@ -127,9 +131,10 @@ def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
     return from_camera_to_world(from_rotation(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
 
 
-def write(path: Path, cloud: PointCloud) -> None:
-    """Write a binary PCD; colours are packed as `rgba`, radii are called `radius`."""
-    columns = columns_from_cloud(cloud, normals=("normal_x", "normal_y", "normal_z"))
+def write(path: Path, cloud: PointCloud) -> str | None:
+    """Write a binary PCD; colours are packed as `rgba`, radii are called `radius`. Returns a remark where
+    coordinates are float64, which many programs do not read."""
+    columns = columns_from_cloud(cloud, ("normal_x", "normal_y", "normal_z"), _SLACK)
     if cloud.colors is not None:
         names = ("alpha", "red", "green", "blue")
         alpha, red, green, blue = (columns.pop(name).astype("u4") for name in names)
@@ -150,6 +155,7 @@ def write(path: Path, cloud: PointCloud) -> None:
         for key, values in header.items():
             stream.write(f"{key} {' '.join(map(str, values))}\n".encode())
         records(columns).tofile(stream)
+    return _IN_FLOAT64 if columns["x"].itemsize == 8 else None
 
 
 def _read_header(head: bytes) -> _Header:

@@ -54,6 +54,7 @@ def leaf_points(octree: Octree) -> PointCloud:
         colors=of_leaves("colors"),
         radii=np.ldexp(np.float32(math.sqrt(3) / 2 * octree.edge), -found),
         origin=np.zeros(3),
+        precise=False,
     )
     return replace(cloud, origin=origin)
 
