@@ -278,11 +278,15 @@ def _missing(pose: GpuPose, backend: Backend, params: Any, look: Look) -> tuple[
 
 def _bare(pose: Pose) -> Pose:
     """The pose with all that estimates look at and nothing more, as it may have to go to another process."""
-    bare = pose.with_cloud(PointCloud(pose.cloud.positions, pose.cloud.origin, ids=pose.cloud.ids))
+    bare = pose.with_cloud(_bare_cloud(pose.cloud))
     if isinstance(bare.points, PointCloud):
         return bare
     views = tuple(replace(view, color=None, confidence=None) for view in pose.views)
     return replace(bare, points=replace(bare.points, views=views))
+
+
+def _bare_cloud(cloud: PointCloud) -> PointCloud:
+    return PointCloud(cloud.positions, cloud.origin, ids=cloud.ids, viewpoint=cloud.viewpoint)
 
 
 def _derived_key(backend: Backend, params: Any, view: View) -> DerivedKey:

@@ -18,12 +18,13 @@ from scenes import sphere
 
 from viewer.backends import backend
 from viewer.camera import Camera
-from viewer.document.anonymous import anonymous_request, anonymous_unit, middle_of
+from viewer.document.anonymous import anonymous_pose, anonymous_request, anonymous_unit, middle_of
 from viewer.document.recording import Entry, Recording, fingerprint, fingerprint_as
 from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import read_description
 from viewer.scan import formats
+from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 SIZE = (64, 48)
@@ -179,6 +180,16 @@ def test_range_views_stand_at_the_origin_without_their_names() -> None:
     assert np.abs(made.cloud.bounds().center).max() < 0.1
     moved = made.views[0].positions() + middle_of(pose)
     assert np.allclose(moved, view.positions(), rtol=0, atol=1e-6)
+
+
+def test_where_the_scanner_stood_is_told_from_the_origin() -> None:
+    cloud = PointCloud.from_arrays(
+        np.random.default_rng(1).uniform(size=(50, 3)) + PLACE, viewpoint=PLACE + 2
+    )
+    pose = Pose(0, 0.0, "a.pcd", cloud)
+    anonymous = anonymous_pose(pose, 0.0).cloud
+    assert anonymous.viewpoint == pytest.approx(cloud.viewpoint - middle_of(pose), abs=1e-9)
+    assert np.abs(anonymous.viewpoint).max() < 3
 
 
 @pytest.mark.parametrize("origin", [(0, 0, 0), (691_000, 0, 0)])

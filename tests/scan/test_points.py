@@ -123,3 +123,11 @@ def test_what_float32_offsets_hold_has_no_remainders() -> None:
     assert PointCloud.from_arrays(points).remainders is None
     assert PointCloud.from_arrays(points.astype(np.float64)).remainders is None
     assert PointCloud.from_arrays(points.astype(np.float64) + 0.1, precise=False).remainders is None
+
+
+def test_a_cloud_is_moved_with_its_viewpoint() -> None:
+    cloud = PointCloud.from_arrays(np.eye(3), viewpoint=(1, 2, 3))
+    moved = cloud.moved(np.array([0.5, 0, -4]))
+    assert moved.viewpoint.tolist() == [1.5, 2, -1]
+    assert moved.world() == pytest.approx(cloud.world() + np.array([0.5, 0, -4]))
+    assert PointCloud.from_arrays(np.eye(3)).moved(np.ones(3)).viewpoint is None

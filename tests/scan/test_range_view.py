@@ -11,7 +11,7 @@ from range_scenes import LENSES, shape_view, sphere_view
 
 from viewer.errors import InputError
 from viewer.scan.colors import linear_from_srgb8, srgb8_from_linear
-from viewer.scan.estimate import cloud_normals, estimate
+from viewer.scan.estimate import estimate
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView, mask_of, merge, up_axis
 
@@ -134,14 +134,18 @@ def test_normals_are_of_planes_through_neighbours() -> None:
     assert view.normals() == pytest.approx(np.array(expected), abs=1e-5)
 
 
-def test_noise_hurts_normals_of_the_grid_no_more_than_those_of_neighbours() -> None:
+def test_noise_hurts_normals_of_the_grid_no_more_than_those_of_16_neighbours() -> None:
+    from open3d import geometry, utility
+
     view, rng = sphere_view(EYE, size=(120, 100)), np.random.default_rng(0)
     noise = rng.normal(0, 0.3 * 4 / view.fx, view.depth.shape)  # of 0.3 pixel footprints
     noisy = replace(view, depth=(view.depth + noise).astype(np.float32))
     outward = view.positions()
+    places = geometry.PointCloud(utility.Vector3dVector(noisy.positions()))
+    places.estimate_normals(geometry.KDTreeSearchParamKNN(16))
     errors = [
         np.median(np.arccos(np.clip(np.abs(np.einsum("ij,ij->i", normals, outward)), 0, 1)))
-        for normals in (noisy.normals(), cloud_normals(noisy.points()))
+        for normals in (noisy.normals(), np.asarray(places.normals))
     ]
     assert errors[0] <= 1.05 * errors[1]
     assert np.degrees(errors[0]) < 3
@@ -184,6 +188,14 @@ def test_normals_that_a_pose_lacks_are_those_of_its_grids() -> None:
         normals = estimate(pose, ["normals"])["normals"]
         assert np.array_equal(normals, merge(views, normals=True).normals)
         assert len(normals) == len(pose.cloud)
+
+
+def test_points_of_one_view_know_where_its_pod_stood() -> None:
+    view = sphere_view(EYE)
+    assert view.points().viewpoint == pytest.approx(view.eye, abs=1e-12)
+    assert merge((view, sphere_view((-2, 0, 4)))).viewpoint is None
+    heights = replace(view, kind="height", fx=100.0, fy=100.0)
+    assert heights.points().viewpoint is None  # it looks from nowhere
 
 
 def test_a_view_of_nothing_has_no_points() -> None:

@@ -46,7 +46,7 @@ def anonymous_pose(pose: Pose, start: float) -> Pose:
     middle = middle_of(pose)
     views = tuple(_anonymous_view(view, middle, number) for number, view in enumerate(pose.views))
     if isinstance(pose.points, PointCloud):
-        points: PointCloud | RangePoints = replace(pose.points, origin=pose.origin - middle)
+        points: PointCloud | RangePoints = pose.points.moved(-middle)
     else:
         points = pose.points.moved(views, -middle)
     time = round(pose.time - start, _DECIMALS)  # no rest of a large number tells that it was one

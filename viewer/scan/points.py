@@ -46,6 +46,8 @@ class PointCloud:
                which are right to 3e-8 of the extent; None where they have nothing
     topology:  names the faces between the points: clouds with the same one hold the same points of the
                subject under the same ids; None where the scan does not tell
+    viewpoint: (3,) float64, where the scanner stood that saw all points, absolute, scan units; None where the
+               scan does not tell, or several did
     """
 
     positions: NDArray[np.float32]
@@ -60,6 +62,7 @@ class PointCloud:
     shortened: int = 0
     topology: str | None = None
     remainders: NDArray[np.float32] | None = None
+    viewpoint: NDArray[np.float64] | None = None
     _facts: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -74,14 +77,15 @@ class PointCloud:
         scalars: Mapping[str, ArrayLike] | None = None,
         origin: ArrayLike | None = None,
         precise: bool = True,
+        viewpoint: ArrayLike | None = None,
     ) -> PointCloud:
         """Points with a NaN or infinite coordinate are dropped and counted.
 
         positions: (N, 3) absolute, any real type. colors: (N, 3) or (N, 4), uint8 or
         float in 0..1. axes: (N, 4), of which rows without two lengths count as round, with the radius
         given; the others set it. origin: (3,); chosen by `choose_origin` where None. precise: whether what
-        the coordinates have beyond float32 offsets is kept.
-        Raises InputError where shapes do not fit.
+        the coordinates have beyond float32 offsets is kept. viewpoint: (3,) absolute.
+        Raises InputError where shapes do not fit, and where the viewpoint is not finite.
         """
         points = np.asarray(positions)
         if points.ndim != 2 or points.shape[1] != 3:
@@ -128,6 +132,7 @@ class PointCloud:
             dropped=count - kept,
             shortened=shortened,
             remainders=remainders,
+            viewpoint=None if viewpoint is None else checked_viewpoint(viewpoint),
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -156,6 +161,11 @@ class PointCloud:
                 away += self.remainders[part]
             offsets[part] = away
         return replace(self, positions=offsets, origin=origin, remainders=None)
+
+    def moved(self, by: NDArray[np.float64]) -> PointCloud:
+        """The points and their viewpoint, moved by (3,) scan units; offsets stay as they are."""
+        viewpoint = None if self.viewpoint is None else self.viewpoint + by
+        return replace(self, origin=self.origin + by, viewpoint=viewpoint)
 
     def splat_reach(self) -> NDArray[np.float32]:
         """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
@@ -230,6 +240,14 @@ class PointCloud:
                 part_low, part_high = _extremes(part[inside])
             smallest, largest = np.minimum(smallest, part_low), np.maximum(largest, part_high)
         return Bounds(smallest + self.origin, largest + self.origin)
+
+
+def checked_viewpoint(given: ArrayLike) -> NDArray[np.float64]:
+    """A viewpoint as a PointCloud holds it, (3,) float64; raises InputError where it is none."""
+    viewpoint = np.array(given, np.float64)
+    if viewpoint.shape != (3,) or not np.isfinite(viewpoint).all():
+        raise InputError(f"{given!r} is not a viewpoint", hint="Give x, y and z in scan units")
+    return viewpoint
 
 
 def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:

@@ -175,7 +175,7 @@ class RangePoints:
 
         by: (3,) scan units.
         """
-        overview = _moved(self.overview, by)
+        overview = self.overview.moved(by)
         return RangePoints(views, overview, self.count, partial(_merged_and_moved, self, by))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -242,8 +242,4 @@ def _overview(views: Sequence[RangeView]) -> tuple[PointCloud, int]:
 
 
 def _merged_and_moved(points: RangePoints, by: NDArray[np.float64]) -> PointCloud:
-    return _moved(points.cloud, by)
-
-
-def _moved(cloud: PointCloud, by: NDArray[np.float64]) -> PointCloud:
-    return replace(cloud, origin=cloud.origin + by)
+    return points.cloud.moved(by)

@@ -278,8 +278,8 @@ def merge(views: Sequence[RangeView], normals: bool = False, origin: ArrayLike |
 
     ids count all pixels in that order, so they tell the pixel. Colours and the scalar `confidence` are
     there where every view has them; the scalar `view` is the number of the view. normals: whether to
-    make them, see `RangeView.normals`. origin: as for `PointCloud.from_arrays`. Raises InputError where no
-    view sees a point.
+    make them, see `RangeView.normals`. origin: as for `PointCloud.from_arrays`. One view's eye is the
+    viewpoint. Raises InputError where no view sees a point.
     """
     valid = [view.valid() for view in views]
     counts = [int(np.count_nonzero(pixels)) for pixels in valid]
@@ -332,6 +332,7 @@ def _cloud(
         colors=of_points("color", srgb8),
         scalars=scalars if confidence is None else scalars | {"confidence": confidence},
         origin=origin,
+        viewpoint=views[0].eye if len(views) == 1 and views[0].kind != "height" else None,
         precise=False,  # depths are float32
     )
     if not len(cloud):

@@ -306,3 +306,14 @@ def test_a_header_of_python_2_is_read_without_a_warning(tmp_path: Path) -> None:
     (tmp_path / "scan.npy").write_bytes(old + bytes(24))
     with warnings.catch_warnings(action="error"):
         assert len(read(tmp_path / "scan.npy")) == 2
+
+
+def test_a_viewpoint_is_kept(path: Path) -> None:
+    cloud = PointCloud.from_arrays(np.eye(4)[:, :3], viewpoint=(0.1, 2, 3e6))
+    write(path, cloud)
+    assert np.array_equal(read(path).viewpoint, cloud.viewpoint)
+    np.savez(path, positions=np.eye(4)[:, :3], viewpoint=np.array([1.0, np.nan, 3.0]))
+    with pytest.raises(InputError, match="'viewpoint' is not 3 finite numbers"):
+        read(path)
+    np.savez(path, positions=np.eye(4)[:, :3], viewpoint=np.zeros(4))
+    assert read(path).viewpoint is None

@@ -257,3 +257,17 @@ def test_clouds_of_real_cameras(data_dir: Path) -> None:
     assert mug.color.dtype == np.uint8
     assert np.count_nonzero(mug.valid()) == 209_280
     assert np.einsum("ij,ij->i", mug.normals(), mug.positions()).max() < 0  # all face the camera
+
+
+@pytest.mark.parametrize("told", ["0 0 0 1 0 0 0", None, "1 2", "1 2 nan 1 0 0 0"])
+def test_a_viewpoint_that_nobody_tells(told: str | None, path: Path) -> None:
+    assert read(save(path, VIEWPOINT=told)).viewpoint is None
+
+
+def test_points_know_where_their_sensor_stood_and_it_is_written(path: Path) -> None:
+    assert read(save(path, VIEWPOINT="0 0 0 0 1 0 0")).viewpoint.tolist() == [0, 0, 0]
+    cloud = read(save(path, VIEWPOINT="10 -2.5 1e6 1 0 0 0"))
+    assert cloud.viewpoint.tolist() == [10, -2.5, 1e6]
+    assert cloud.world()[1].tolist() == [-1, 0, 2]  # it moves no point
+    write(path, cloud)
+    assert np.array_equal(read(path).viewpoint, cloud.viewpoint)

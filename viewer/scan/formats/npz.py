@@ -2,10 +2,10 @@
 
 `positions` (N, 3), or (T, N, 3) for a sequence; optional `normals` (…, N, 3), `colors` (…, N, 3 or 4)
 uint8 or float in 0..1, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N)
-by their names, `origin` (3,) that is to be added to the positions, `times` (T,) in seconds, `faces` (F, 3)
-whole numbers, which tell the topology of all frames. Attributes of a sequence may lack T: then all frames
-share them. Arrays of other shapes are left alone. Without `positions`, `depth`, `xyz` or `elevation` make a
-range view; see `_array_views`.
+by their names, `origin` (3,) that is to be added to the positions, `viewpoint` (3,), where the scanner stood,
+`times` (T,) in seconds, `faces` (F, 3) whole numbers, which tell the topology of all frames. Attributes of a
+sequence may lack T: then all frames share them. Arrays of other shapes are left alone. Without `positions`,
+`depth`, `xyz` or `elevation` make a range view; see `_array_views`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
     "radii": [()],
     "axes": [(4,)],
 }
-_OF_ALL = {"origin", "times"}
+_OF_ALL = {"origin", "times", "viewpoint"}
 _FORM = "Name points 'positions', (N, 3) or (T, N, 3), and range images 'depth', (H, W)"
 _SAVE_ANEW = "Save it with numpy.savez"
 _MOST_RATIO, _FREE = 64, 180 << 20  # bytes to unpack for those packed, and beyond: scans pack to a tenth
@@ -103,6 +103,8 @@ def read(path: Path, frame: int = 0) -> Scanned:
         cloud = cloud_of(positions, attributes, values, shift, held)
         if origin is not None:
             cloud = replace(cloud, origin=origin)
+        if "viewpoint" in arrays and arrays["viewpoint"].shape == (3,):
+            cloud = replace(cloud, viewpoint=_vector(arrays["viewpoint"], 3))
         return with_topology(cloud, _faces(arrays, held, cloud.nbytes))
 
 
@@ -150,6 +152,7 @@ def write(path: Path, cloud: PointCloud) -> None:
         "colors": cloud.colors,
         "radii": cloud.radii,
         "axes": cloud.axes,
+        "viewpoint": cloud.viewpoint,
     }
     with ZipFile(path, "w", ZIP_STORED) as archive:
         for name, array in arrays.items():

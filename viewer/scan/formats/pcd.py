@@ -5,7 +5,8 @@ names, 64-bit types).
 
 An organised cloud (HEIGHT above 1) of x, y, z and colours alone is a range view where a pinhole has these
 points in its pixels; VIEWPOINT then is the pose of the camera. Of other clouds it is where the sensor stood,
-not a transform, and is not applied.
+not a transform, and is not applied: normals that are estimated face it. 0 0 0 1 0 0 0, which is written where
+nobody knows, tells nothing.
 """
 
 from __future__ import annotations
@@ -104,7 +105,8 @@ def read(path: Path, frame: int = 0) -> Scanned:
             admit(size_of(stream), header.points * (header.dtype.itemsize + _VIEW_BYTES) + _WORK)
             if (view := _camera_view(columns, header.grid, header.viewpoint)) is not None:
                 return (view,)
-        return cloud_from_columns(columns, held=size_of(stream) if packed else None)
+        cloud = cloud_from_columns(columns, held=size_of(stream) if packed else None)
+        return replace(cloud, viewpoint=_sensor(header.viewpoint))
 
 
 def _camera_view(columns: Columns, shape: tuple[int, int], viewpoint: list[str]) -> RangeView | None:
@@ -120,6 +122,16 @@ def _camera_view(columns: Columns, shape: tuple[int, int], viewpoint: list[str])
     return replace(view, color=color.reshape(*shape, 3)) if color.dtype == np.uint8 else None
 
 
+def _sensor(viewpoint: list[str]) -> NDArray[np.float64] | None:
+    """Place of the sensor that a VIEWPOINT tells, (3,); None where it tells nothing."""
+    try:
+        numbers = np.array(viewpoint or _HERE, np.float64)
+    except ValueError:
+        return None
+    told = numbers.shape == (7,) and np.isfinite(numbers).all() and (numbers != np.array(_HERE, float)).any()
+    return numbers[:3].copy() if told else None
+
+
 def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
     """The pose of a VIEWPOINT: a translation and a quaternion w x y z, from an image's axes to the world."""
     try:
@@ -132,8 +144,8 @@ def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
 
 
 def write(path: Path, cloud: PointCloud) -> str | None:
-    """Write a binary PCD; colours are packed as `rgba`, radii are called `radius`. Returns a remark where
-    coordinates are float64, which many programs do not read."""
+    """Write a binary PCD; colours are packed as `rgba`, radii are called `radius`, a viewpoint VIEWPOINT.
+    Returns a remark where coordinates are float64, which many programs do not read."""
     columns = columns_from_cloud(cloud, ("normal_x", "normal_y", "normal_z"), _SLACK)
     if cloud.colors is not None:
         names = ("alpha", "red", "green", "blue")
@@ -147,7 +159,7 @@ def write(path: Path, cloud: PointCloud) -> str | None:
         "COUNT": [1] * len(columns),
         "WIDTH": [len(cloud)],
         "HEIGHT": [1],
-        "VIEWPOINT": _HERE,
+        "VIEWPOINT": _HERE if cloud.viewpoint is None else [*map(repr, cloud.viewpoint.tolist()), *_HERE[3:]],
         "POINTS": [len(cloud)],
         "DATA": ["binary"],
     }

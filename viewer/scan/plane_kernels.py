@@ -1,0 +1,232 @@
+"""The inner loops of fitting planes to the neighbours of points, compiled by numba; see `planes`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .octree.compiled import compiled
+
+_SWEEPS = 12  # of Jacobi's rotations, at most; four or five are enough as a rule
+_SETTLED = 1e-30  # the square of what lies off the diagonal, of a matrix of trace 1
+_FLATTEST = 0.1  # of a squared width, what noise leaves of it at least
+_ROUNDS = 3  # in which a reference is found, as noise is better known from more neighbours
+
+
+@compiled
+def _rotate(a: NDArray[np.float64], v: NDArray[np.float64], p: int, q: int) -> None:
+    """Make a[p, q] of a symmetric matrix (3, 3) zero, and turn the vectors (3, 3), by column, along."""
+    if a[p, q] == 0.0:
+        return
+    theta = (a[q, q] - a[p, p]) / (2.0 * a[p, q])
+    t = 1.0 / (abs(theta) + np.sqrt(theta * theta + 1.0))
+    if theta < 0.0:
+        t = -t
+    c = 1.0 / np.sqrt(t * t + 1.0)
+    s = t * c
+    r = 3 - p - q
+    rp, rq = a[r, p], a[r, q]
+    a[p, p] -= t * a[p, q]
+    a[q, q] += t * a[p, q]
+    a[p, q] = a[q, p] = 0.0
+    a[r, p] = a[p, r] = c * rp - s * rq
+    a[r, q] = a[q, r] = s * rp + c * rq
+    for i in range(3):
+        ip, iq = v[i, p], v[i, q]
+        v[i, p] = c * ip - s * iq
+        v[i, q] = s * ip + c * iq
+
+
+@compiled
+def _fit(
+    sums: NDArray[np.float64],
+    count: int,
+    a: NDArray[np.float64],
+    v: NDArray[np.float64],
+    normal: NDArray[np.float32],
+    widths: NDArray[np.float64],
+) -> None:
+    """The normal (3,) and squared widths (3,), ascending, of `count` points; +z where all are in one place.
+
+    sums: (9,), of x y z, xx yy zz, and xy yz zx.
+    """
+    x, y, z = sums[0] / count, sums[1] / count, sums[2] / count
+    a[0, 0], a[1, 1], a[2, 2] = (
+        sums[3] / count - x * x,
+        sums[4] / count - y * y,
+        sums[5] / count - z * z,
+    )
+    a[0, 1] = a[1, 0] = sums[6] / count - x * y
+    a[1, 2] = a[2, 1] = sums[7] / count - y * z
+    a[0, 2] = a[2, 0] = sums[8] / count - z * x
+    trace = a[0, 0] + a[1, 1] + a[2, 2]
+    for i in range(3):
+        for j in range(3):
+            v[i, j] = 1.0 if i == j else 0.0
+    if not trace > 0.0:
+        normal[0], normal[1], normal[2] = 0.0, 0.0, 1.0
+        widths[:] = 0.0
+        return
+    for i in range(3):
+        for j in range(3):
+            a[i, j] /= trace
+    for _ in range(_SWEEPS):
+        if a[0, 1] * a[0, 1] + a[1, 2] * a[1, 2] + a[0, 2] * a[0, 2] < _SETTLED:
+            break
+        _rotate(a, v, 0, 1)
+        _rotate(a, v, 1, 2)
+        _rotate(a, v, 0, 2)
+    least, most = 2, 0  # of equal ones, the last is the least: +z
+    for i in (1, 0):
+        if a[i, i] < a[least, least]:
+            least = i
+    for i in (1, 2):
+        if a[i, i] > a[most, most]:
+            most = i
+    if most == least:
+        most = (least + 1) % 3
+    widths[0] = max(a[least, least], 0.0) * trace
+    widths[1] = max(a[3 - least - most, 3 - least - most], 0.0) * trace
+    widths[2] = a[most, most] * trace
+    for i in range(3):
+        normal[i] = v[i, least]
+
+
+@compiled
+def fit_nested(
+    points: NDArray[np.float64],
+    rows: NDArray[np.integer],
+    near: NDArray[np.int32],
+    counts: NDArray[np.int64],
+    normals: NDArray[np.float32],
+    widths: NDArray[np.float64],
+) -> None:
+    """Planes through the nearest counts[0], counts[1], ... neighbours of points.
+
+    points: (N, 3). rows: (M,), which of them. near: (M, K), rows of their neighbours, nearest first. counts:
+    (J,), ascending, up to K. Gets normals, (M, J, 3) unit length, and the squared widths of the neighbours
+    along the principal axes, (M, J, 3), ascending.
+    """
+    sums, a, v = np.empty(9), np.empty((3, 3)), np.empty((3, 3))
+    for m in range(len(rows)):
+        sums[:] = 0.0
+        px, py, pz = points[rows[m], 0], points[rows[m], 1], points[rows[m], 2]
+        j = 0
+        for i in range(counts[-1]):
+            other = near[m, i]
+            x, y, z = points[other, 0] - px, points[other, 1] - py, points[other, 2] - pz
+            sums[0] += x
+            sums[1] += y
+            sums[2] += z
+            sums[3] += x * x
+            sums[4] += y * y
+            sums[5] += z * z
+            sums[6] += x * y
+            sums[7] += y * z
+            sums[8] += z * x
+            if i + 1 == counts[j]:
+                _fit(sums, i + 1, a, v, normals[m, j], widths[m, j])
+                j += 1
+
+
+@compiled
+def _noise(widths: NDArray[np.float64], counts: NDArray[np.int64], fewer: int, more: int) -> float:
+    """The variance of the distances to a surface, from those to two planes: those of a curved surface grow
+    with the square of the number of neighbours, and noise stays."""
+    low, high = float(counts[fewer]) ** 2, float(counts[more]) ** 2
+    of_low = widths[fewer, 0] * counts[fewer] / (counts[fewer] - 3)
+    of_high = widths[more, 0] * counts[more] / (counts[more] - 3)
+    return (high * of_low - low * of_high) / (high - low)
+
+
+@compiled
+def _turned(noise: float, widths: NDArray[np.float64], count: int) -> float:
+    """Mean square of the angle by which noise turns a normal, of small angles."""
+    if noise <= 0.0:
+        return 0.0
+    total = 0.0
+    for axis in (1, 2):
+        left = max(widths[axis] - noise, _FLATTEST * widths[axis])
+        if left == 0.0:
+            return 1.0
+        total += widths[axis] / (left * left)
+    return min(noise * total / count, 1.0)
+
+
+@compiled
+def _median(values: NDArray[np.float64], count: int) -> float:
+    """The median of the first values, which are put in order."""
+    for i in range(1, count):
+        value, j = values[i], i
+        while j > 0 and values[j - 1] > value:
+            values[j] = values[j - 1]
+            j -= 1
+        values[j] = value
+    return 0.5 * (values[(count - 1) // 2] + values[count // 2])
+
+
+@compiled
+def choose(
+    rows: NDArray[np.integer],
+    near: NDArray[np.int32],
+    places: NDArray[np.int32],
+    counts: NDArray[np.int64],
+    normals: NDArray[np.float32],
+    widths: NDArray[np.float64],
+    quiet: float,
+    settled: float,
+    chosen: NDArray[np.float32],
+    further: NDArray[np.bool_],
+) -> None:
+    """The normals (M, 3) of as many neighbours as give the least error around each point, and whether more
+    than counts[-1] may give less, (M,).
+
+    The error of a number of neighbours is what noise leaves of it, and how far it turns normals from those of
+    the least number that noise turns by less than `settled` (the mean square of the angle); less what noise
+    tells of that turn (Mallows' C_p). All are means over the points around. Where noise turns those of
+    counts[0] by less than `quiet`, these are taken.
+
+    rows: (M,). near: (M, K), rows of the points around, of which those with a place count. places: (N,), by
+    row, in normals (P, J, 3) and squared widths (P, J, 3), as `fit_nested` has them for counts (J,), J > 2;
+    or -1.
+    """
+    last = len(counts) - 1
+    around = np.empty(near.shape[1], np.int64)
+    noises = np.empty(near.shape[1])
+    turned = np.empty(len(counts))
+    for m in range(len(rows)):
+        total = 0
+        for i in range(near.shape[1]):
+            place = places[near[m, i]]
+            if place >= 0:
+                around[total] = place
+                total += 1
+        reference, is_quiet = 0, False
+        for _ in range(_ROUNDS):
+            fewer = min(reference, last - 2)
+            for i in range(total):
+                noises[i] = _noise(widths[around[i]], counts, fewer, fewer + 2)
+            noise, before = _median(noises, total), reference
+            for j in range(last + 1):
+                turned[j] = 0.0
+                for i in range(total):
+                    turned[j] += _turned(noise, widths[around[i], j], counts[j]) / total
+                if j == 0 and turned[0] < quiet:
+                    break
+            is_quiet = turned[0] < quiet
+            while not is_quiet and reference < last and turned[reference] >= settled:
+                reference += 1
+            if reference == before:
+                break
+        best, least = reference, np.inf
+        for j in range(reference, 1 if is_quiet else last + 1):
+            away = 0.0
+            for i in range(total):
+                one, other = normals[around[i], j], normals[around[i], reference]
+                cosine = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+                away += (1.0 - cosine * cosine) / total
+            error = away + 2.0 * turned[j]
+            if error < least:
+                best, least = j, error
+        chosen[m] = normals[places[rows[m]], best]
+        further[m] = not is_quiet and (reference > 0 or best >= last - 1)

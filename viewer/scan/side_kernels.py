@@ -1,0 +1,100 @@
+"""The inner loops of finding on which side of a surface normals point, compiled by numba; see `sides`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .octree.compiled import compiled
+
+
+@compiled
+def link(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float32],
+    near: NDArray[np.int32],
+    links: NDArray[np.int32],
+    weights: NDArray[np.float32],
+) -> int:
+    """Link points to their neighbours, each pair once; returns how many links there are.
+
+    points, normals: (N, 3). near: (N, K), each point and its neighbours. Gets links (L, 2) and weights (L,),
+    L at least N (K - 1): from 1, where normals certainly point to the same side, to -1, to opposite ones.
+
+    Normals on a circle through both points mirror each other (Xie et al. 2003), so that links across sharp
+    edges and between the two sides of a thin sheet tell the same as others. Where neighbours lie along a
+    normal they tell nothing: that may be noise, a second layer, or the other side.
+    """
+    found = 0
+    for i in range(len(near)):
+        for k in range(near.shape[1]):
+            j = near[i, k]
+            if j == i:
+                continue
+            if j < i:
+                told = False  # by the other one
+                for n in range(near.shape[1]):
+                    told |= near[j, n] == i
+                if told:
+                    continue
+            along, along_other, cosine, squared = 0.0, 0.0, 0.0, 0.0
+            for axis in range(3):
+                step = points[j, axis] - points[i, axis]
+                along += step * normals[i, axis]
+                along_other += step * normals[j, axis]
+                cosine += normals[i, axis] * normals[j, axis]
+                squared += step * step
+            one, other = along * along / squared, along_other * along_other / squared
+            links[found, 0], links[found, 1] = i, j
+            mirrored = cosine - 2.0 * along * along_other / squared
+            weights[found] = mirrored * (1.0 - min(one, 1.0)) * (1.0 - min(other, 1.0))
+            found += 1
+    return found
+
+
+@compiled
+def join(
+    links: NDArray[np.int32],
+    weights: NDArray[np.float32],
+    order: NDArray[np.integer],
+    most: int,
+    roots: NDArray[np.int32],
+    signs: NDArray[np.int8],
+) -> None:
+    """Join points to patches of `most` points at most, along links in an order, and make their normals agree.
+
+    links: (L, 2), weights: (L,). Gets roots (N,), the patch of each point, numbered from 0 up, and signs
+    (N,), 1 or -1, that make the normals of a patch agree.
+    """
+    size = np.ones(len(roots), np.int32)
+    for i in range(len(roots)):
+        roots[i], signs[i] = i, 1
+    for n in order:
+        a, b, sign = links[n, 0], links[n, 1], np.int8(1 if weights[n] > 0 else -1)
+        while roots[a] != a:
+            sign *= signs[a]
+            a = roots[a]
+        while roots[b] != b:
+            sign *= signs[b]
+            b = roots[b]
+        if a == b or size[a] + size[b] > most:
+            continue
+        if size[a] < size[b]:
+            a, b = b, a
+        roots[b], signs[b] = a, sign
+        size[a] += size[b]
+    numbers = size  # of patches, at their roots
+    found = 0
+    for i in range(len(roots)):
+        if roots[i] == i:
+            numbers[i] = found
+            found += 1
+    # The trees are left as they are till all are read.
+    patches, agreeing = np.empty(len(roots), np.int32), np.empty(len(roots), np.int8)
+    for i in range(len(roots)):
+        at, sign = np.int32(i), np.int8(1)
+        while roots[at] != at:
+            sign *= signs[at]
+            at = roots[at]
+        patches[i], agreeing[i] = numbers[at], sign
+    roots[:], signs[:] = patches, agreeing

@@ -1,0 +1,164 @@
+"""On which side of a surface its normals point: outwards, or towards the front.
+
+Two things tell it. From far around, the side is seen that is outside, unless other parts hide it. And normals
+of neighbours agree. Both are sums: the points become patches within which normals certainly agree, then the
+two patches that all links between them bind most firmly become one, again and again, and the view from
+outside is a patch among them (a greedy way to the least frustration of a signed graph; see Schertler et al.
+2017 and Keuper et al. 2015).
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..task import checkpoint
+
+Vectors = NDArray[np.float64]  # (N, 3)
+
+LINKED = 9  # neighbours that are linked, the point itself included
+# The outside of a surface is the side that more views see, from both ends of each axis.
+_AXES = 13
+_FRONT_BONUS = 0.5  # so that a sheet which is seen from both sides faces the front
+_CELL = 1.4  # of a view's grid, in reaches: wide enough to leave no holes in a surface
+_DEPTH = 1.8  # in reaches: so far behind the first point of its cell a point still counts as seen
+_GRID = 1024  # cells along an axis at most
+_PATCH = 100  # points at most: small enough that a wrong link spoils little, and sums are made of many
+_FIRM = 0.3  # weight of links within patches, at least
+_LEVELS = 255  # of weights that are told apart
+_SEEN = 0.1  # that a view from outside weighs in links
+_OFTEN = 1 << 12  # steps between checkpoints
+
+
+def facing_out(points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32]) -> NDArray[np.float32]:
+    """The normals, turned round where they point into the surface or away from the front, (N, 3).
+
+    points: (N, 3), distinct. near: (N, K), each point and its nearest others, nearest first.
+    """
+    reach = float(np.median(np.linalg.norm(points[near[:, -1]] - points, axis=1)))
+    normals = facing(normals, np.array([[1e-6, 1e-3, 1.0]]))  # whichever sign they came with
+    outwards = np.einsum("ij,ij->i", normals, _seen_from(points, reach))
+    patches, signs, pairs, bonds = _patches(points, normals, near)
+    outside = int(patches.max()) + 1  # the view, beside all patches
+    seen = _SEEN * np.bincount(patches, outwards * signs)
+    checkpoint()
+    pairs = np.concatenate([pairs, np.column_stack([np.arange(outside), np.full(outside, outside)])])
+    agreeing = _agreement(pairs, np.concatenate([bonds, seen]))
+    return normals * (signs * agreeing[patches] * agreeing[outside])[:, None]
+
+
+def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> NDArray[np.float32]:
+    """The normals, (N, 3), turned round where they point away from their direction."""
+    away = (normals * directions).sum(axis=1) < 0
+    return np.where(away[:, None], -normals, normals)
+
+
+def _patches(
+    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int8], NDArray[np.intp], NDArray[np.float64]]:
+    """Patches of points and what binds them: the patch of each point, (N,), numbered from 0 up; 1 or -1,
+    (N,), which makes its normal agree with others of its patch; pairs of patches, (P, 2); and how firmly
+    their normals agree, (P,), below 0 where they oppose each other."""
+    from . import side_kernels
+
+    most = len(near) * (near.shape[1] - 1)
+    links, weights = np.empty((most, 2), np.int32), np.empty(most, np.float32)
+    found = side_kernels.link(points, normals, near, links, weights)
+    links, weights = links[:found], weights[:found]
+    checkpoint()
+    firm = np.flatnonzero(np.abs(weights) >= _FIRM)
+    levels = (_LEVELS * (1 - np.abs(weights[firm]))).astype(np.uint8)
+    order = firm[np.argsort(levels, kind="stable")]
+    checkpoint()
+    patches, signs = np.empty(len(near), np.int32), np.empty(len(near), np.int8)
+    side_kernels.join(links, weights, order, _PATCH, patches, signs)
+    checkpoint()
+    ends = patches[links]
+    across = np.flatnonzero(ends[:, 0] != ends[:, 1])
+    bonds = weights[across] * signs[links[across]].prod(axis=1)
+    count = int(patches.max()) + 1
+    keys = np.sort(ends[across], axis=1) @ np.array([count, 1])
+    pairs, pair_of = np.unique(keys, return_inverse=True)
+    summed = np.bincount(pair_of, bonds, len(pairs)).astype(np.float64)
+    return patches, signs, np.column_stack(np.divmod(pairs, count)), summed
+
+
+def _agreement(pairs: NDArray[np.intp], bonds: NDArray[np.float64]) -> NDArray[np.int8]:
+    """1 or -1 for each thing, (M,), so that bonds between equal ones are above 0 as far as can be.
+
+    pairs: (P, 2) of things 0..M-1. bonds: (P,). The pair with the strongest bond becomes one, whose bonds are
+    the sums of theirs, and so on.
+    """
+    bound: list[dict[int, float]] = [{} for _ in range(int(pairs.max()) + 1)]
+    for (one, other), bond in zip(pairs.tolist(), bonds.tolist(), strict=True):
+        bound[one][other] = bound[other][one] = bond
+    strongest = [(-abs(bond), *pair) for pair, bond in zip(pairs.tolist(), bonds.tolist(), strict=True)]
+    heapq.heapify(strongest)
+    joined: list[tuple[int, int, int]] = []
+    while strongest:
+        strength, kept, gone = heapq.heappop(strongest)
+        bond = bound[kept].get(gone)
+        if bond is None or abs(bond) != -strength:
+            continue  # it has changed since
+        if len(joined) % _OFTEN == 0:
+            checkpoint()
+        if len(bound[kept]) < len(bound[gone]):
+            kept, gone = gone, kept
+        sign = 1 if bond >= 0 else -1
+        joined.append((gone, kept, sign))
+        del bound[gone][kept], bound[kept][gone]
+        for other, of_gone in bound[gone].items():
+            del bound[other][gone]
+            total = bound[kept].get(other, 0.0) + sign * of_gone
+            bound[kept][other] = bound[other][kept] = total
+            heapq.heappush(strongest, (-abs(total), min(kept, other), max(kept, other)))
+        bound[gone] = {}
+    agreeing = np.ones(len(bound), np.int8)
+    for gone, kept, sign in reversed(joined):
+        agreeing[gone] = sign * agreeing[kept]
+    return agreeing
+
+
+def _seen_from(points: Vectors, reach: float) -> NDArray[np.float32]:
+    """Sums for each point of the directions from which nothing hides it, (N, 3)."""
+    center = np.median(points, axis=0)
+    half = 2 * np.quantile(np.linalg.norm(points - center, axis=1), 0.98)  # strays beyond go to the rim
+    cell = max(_CELL * reach, 2 * half / _GRID) or 1.0
+    local = np.clip((points - center) / cell, -_GRID, _GRID).astype(np.float32)  # in cells
+    seen_from = np.zeros_like(local)
+    for axis in _half_sphere(_AXES).astype(np.float32):
+        checkpoint()
+        from_front, from_back = _visible(local, axis, side=int(2 * half / cell) + 1)
+        votes = from_front * (1 + _FRONT_BONUS * axis[2]) - from_back * (1 - _FRONT_BONUS * axis[2])
+        seen_from += votes[:, None] * axis
+    return seen_from
+
+
+def _visible(
+    points: NDArray[np.float32], axis: NDArray[np.float32], side: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether each point is seen from the two ends of an axis, the positive one first, (N,).
+
+    points: in cells. A view looks at side x side cells; in each the first points are seen, and
+    those little behind them.
+    """
+    across = np.cross(axis, np.eye(3, dtype=np.float32)[np.abs(axis).argmin()])
+    across /= np.linalg.norm(across)
+    x, y, depth = (points @ np.stack([across, np.cross(axis, across), axis], axis=1)).T
+    column, row = (np.clip(v + np.float32(side / 2), 0, side - 1).astype(np.intp) for v in (x, y))
+    at = row * side + column
+    nearest, farthest = (np.full(side * side, none, np.float32) for none in (-np.inf, np.inf))
+    np.maximum.at(nearest, at, depth)
+    np.minimum.at(farthest, at, depth)
+    little = np.float32(_DEPTH / _CELL)
+    return depth >= nearest[at] - little, depth <= farthest[at] + little
+
+
+def _half_sphere(count: int) -> Vectors:
+    """Directions spread evenly over the half sphere around +z, (count, 3)."""
+    place = np.arange(count) + 0.5
+    z = place / count
+    turn = place * np.pi * (3 - np.sqrt(5))  # the golden angle
+    return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
