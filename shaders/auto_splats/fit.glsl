@@ -24,8 +24,9 @@ const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the sec
 // Directions in which a point's cell is measured; factor for what lies between them, and for splats that lean.
 const int DIRECTIONS = 12;
 const vec2 TURN = vec2(0.8660254, 0.5);
-const float BETWEEN = 1.12;
-const float LEAST_SHARE = 0.9, MOST_SHARE = 2.0;  // of the radius by share, bounds of that by the cell
+const float BETWEEN = 1.15;
+const float LEAST_SHARE = 0.9, MOST_SHARE = 1.75;  // of the radius by share, bounds of that by the cell
+const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good as in one pixel
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
 
@@ -117,9 +118,9 @@ bool is_outlier(Extent extent, float usual_radius, bool sparse) {
 
 // The radius of a splat: how far the places reach that are nearer to the point than to any other one, its Voronoi cell in
 // the plane, so that splats leave no gap however uneven points lie; where the cell is open, as at borders, and at least about
-// as a point's share of the surface. Hidden neighbors have no splats: those that are seen share it. most: that a
-// neighborhood counts for, as discs of the few points of sparse parts would hide the rest.
-float splat_radius(Extent extent, vec3 values, vec3 normal, float most) {
+// as a point's share of the surface. Hidden neighbors have no splats: near ones, where points crowd the pixels, have no cell
+// either. crowded: how near these are. most: that a neighborhood counts for, as discs of the few points of sparse parts would hide the rest.
+float splat_radius(Extent extent, vec3 values, vec3 normal, float crowded, float most) {
     float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0, radius = min(sqrt(extent.squared), most);
     if (values.y <= COLLINEAR * values.z) return 2.0 * radius * inversesqrt(float(extent.count));
     // Directions turn with the scan: they are counted from the nearest neighbor's.
@@ -128,7 +129,7 @@ float splat_radius(Extent extent, vec3 values, vec3 normal, float most) {
     vec3 near[K];  // in the plane, and half the squared distance there
     int seen = 1;
     for (int k = 1; k < K; ++k) {
-        bool counts = k < extent.count && (near_rows[k] & 1u) == 0u;
+        bool counts = k < extent.count && ((near_rows[k] & 1u) == 0u || near_squared[k] > crowded * crowded);
         vec2 at = vec2(dot(near_offsets[k], u), dot(near_offsets[k], v));
         float squared = dot(at, at);
         near[k] = vec3(at, counts && squared > 0.0 ? 0.5 * squared : UNKNOWN);
@@ -160,13 +161,13 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     }
     if (dot(normal, to_eye) < 0.0) normal = -normal;
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
-    float in_picture = typical / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z);
+    float pixel = 1.0 / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z), in_picture = typical * pixel;
     float typical_radius = max(in_picture, typical_in_space);  // near the eye, points are sparse in any picture
-    float splat = max(splat_radius(extent, values, normal, MOST * typical_radius * unit) / unit, LEAST);
+    float splat = splat_radius(extent, values, normal, CROWDED * pixel * unit, MOST * typical_radius * unit) / unit;
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));
-    splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(splat);
+    splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(max(splat, LEAST));
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);
 #if HAS_COLORS
     uvec3 roots = uvec3(to_roots(texelFetch(colors, int(row)).rgb));

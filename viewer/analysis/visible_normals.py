@@ -30,7 +30,7 @@ class VisibleNormals:
     radii:      (M,) float32, distance of a neighborhood's farthest point, scan units: r_k where counts is k
     counts:     (M,) int64, points of a neighborhood, the point itself among them: k, or fewer before a gap
     splat_radii: (M,) float32, how far the point's Voronoi cell reaches among those that are seen, in the
-                plane, and a little more; 0.9 to 2.3 times 2 r / sqrt(n), n of the neighbors being seen
+                plane, and a little more; 0.9 to 2 times 2 r / sqrt(n), n of the neighbors being seen
                 (Preiner 2012, 6); 0 where no splat is drawn
     curvatures: (M,) float32, the least eigenvalue of the covariance over the sum of all, 0 to 1/3
     usual:      (M,) float32, the radius that should hold k points by how dense the picture is there

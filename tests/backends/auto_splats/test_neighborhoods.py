@@ -33,7 +33,8 @@ RULES = {"growth": 4.0, "alone": 8.0}  # by default
 LEAST_COUNT, CERTAIN, TURNED = 6, 0.08, 12.0  # of adaptive planes: points, radians, degrees
 EXACT = 4e-6  # of a radius: some roundings of float32
 # Bounds of splats in radii of a point's share, and the factor on what cells reach.
-LEAST_SHARE, MOST_SHARE, BETWEEN = 0.9, 2.0, 1.12
+LEAST_SHARE, MOST_SHARE, BETWEEN = 0.9, 1.75, 1.15
+CROWDED = 4.0  # pixels within which hidden neighbours have no cell
 DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
 
 
@@ -98,6 +99,16 @@ def test_neighborhoods_are_those_of_a_tree(
     assert not found.hidden[np.isin(found.neighbors, visible)].any()
 
 
+def pixel_sizes(scene: BareScene, rows: NDArray[np.integer]) -> NDArray[np.float64]:
+    """What a pixel is wide at the depths of some points, (M,), scan units."""
+    camera, height = scene.camera, scene.size[1]
+    if camera.projection == "orthographic":
+        return np.full(len(rows), camera.view_height / height)
+    places = scene.cloud.positions[rows] + scene.cloud.origin
+    depths = (np.array(camera.eye) - places) @ camera.rotation()[2]
+    return depths * 2 * np.tan(np.radians(camera.fov_y) / 2) / height
+
+
 @every_scene
 def test_splats_reach_as_far_as_cells(name: str) -> None:
     """To the places that are nearer to their point than to any other one that is seen: so no gap is left."""
@@ -105,13 +116,16 @@ def test_splats_reach_as_far_as_cells(name: str) -> None:
     found = estimated(scene)
     true = check(scene, found)
     belongs = np.arange(K) < true.counts[:, None]
-    seen = belongs & ~np.isin(true.nearest, found.neighbors[found.hidden])
-    edges, shares = cell_reaches(scene.cloud, found.rows, true, found.normals, seen)
+    hidden = np.isin(true.nearest, found.neighbors[found.hidden])
+    crowded = CROWDED * pixel_sizes(scene, found.rows)[:, None]
+    shared = belongs & ~(hidden & (true.distances <= crowded))
+    edges, shares = cell_reaches(scene.cloud, found.rows, true, found.normals, shared)
     is_open = edges > MOST_SHARE * shares[:, None]
     reach = np.maximum(np.where(is_open, shares[:, None], BETWEEN * edges).max(axis=1), LEAST_SHARE * shares)
     near_limit = (np.abs(edges / shares[:, None] - MOST_SHARE) < 0.01).any(axis=1)
     values = planes(scene.cloud, found.rows, true).values
     on_line = values[:, 1] <= 2e-5 * values[:, 2]
+    near_limit |= (hidden & np.isclose(true.distances, crowded, rtol=1e-4)).any(axis=1)
     clear = true.clear(EXACT) & ~found.outliers & ~on_line & ~near_limit  # elsewhere rounding decides
     expected = (true.radii * reach)[clear]
     as_expected = np.isclose(found.splat_radii[clear], expected, rtol=0.01)
