@@ -17,6 +17,8 @@ from viewer.backends import backends
 from viewer.bench.papers.farooq_2013 import farooq
 from viewer.bench.papers.preiner_2012 import preiner
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
+from viewer.bench.report import defaults_page, scene_table
+from viewer.bench.report.measurement import put_tables
 from viewer.look import Look, ValueKind
 from viewer.params import Parameter, describe
 
@@ -84,6 +86,18 @@ def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: boo
     if bless:
         page.write_text(made, encoding="utf-8")
     assert page.read_text(encoding="utf-8") == made
+
+
+@pytest.mark.parametrize("made", [scene_table, defaults_page], ids=lambda made: made.NAME)
+def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
+    page = ROOT / "docs" / made.PAGE
+    files = sorted((ROOT / "docs" / "data").glob(f"{made.NAME}*.json"))
+    assert files
+    text = page.read_text(encoding="utf-8")
+    filled = put_tables(text, made.tables([made.read_measurement(file) for file in files]))
+    if bless:
+        page.write_text(filled, encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == filled
 
 
 def commands(text: str) -> list[str]:

@@ -30,6 +30,7 @@ It may declare
     VALUES               numbers that it finds for the rows that it draws, for looks to colour by:
                          name -> `ValueKind`; see `Surface.wanted`
     suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
+    KEPT                 parameter -> why its default stays where a benchmark finds a value that beats it
     LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`
 
 Names that begin with an underscore are no backends. No list of backends exists anywhere else.
@@ -167,6 +168,11 @@ class Backend:
     def limits(self) -> Mapping[str, Limit]:
         """Limits of the backend in the stability suite, by the suite's rows."""
         return getattr(self.module, "LIMITS", {})
+
+    @property
+    def kept(self) -> Mapping[str, str]:
+        """Why defaults stay that another value beats on some scene, by parameter."""
+        return getattr(self.module, "KEPT", {})
 
     def params(self, values: Mapping[str, object] | None = None) -> Any:
         """Make its parameters, with these values in place of defaults; raises InputError."""

@@ -18,6 +18,8 @@ from pathlib import Path
 
 from ..backends import backend, backends
 from ..bench import numerics
+from ..bench.defaults import SCENES as DEFAULT_SCENES
+from ..bench.defaults import default_groups
 from ..bench.forecast import forecast
 from ..bench.papers.farooq_2013 import pyramids
 from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
@@ -36,6 +38,8 @@ from ..bench.papers.slomp_2014.octree_tables import write_octree_tables
 from ..bench.papers.slomp_2014.table_two import NAME as TABLE_TWO
 from ..bench.papers.slomp_2014.table_two import write_table_two
 from ..bench.plan import Group, plan
+from ..bench.report.defaults_page import NAME as DEFAULTS
+from ..bench.report.defaults_page import write_defaults
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
@@ -53,6 +57,8 @@ from ..bench.report.results import (
     read_rows,
     write_row,
 )
+from ..bench.report.scene_table import NAME as SCENE_TABLE
+from ..bench.report.scene_table import write_scene_table
 from ..bench.run import Bench, BenchSettings
 from ..bench.scenes import catalog
 from ..errors import InputError, explained
@@ -65,16 +71,18 @@ from ._outputs import add_force_argument, claim
 
 
 @dataclass(frozen=True)
-class _PaperSuite:
-    """A suite of a paper.
+class _PageSuite:
+    """A suite that has a page of its own.
 
-    groups: what is drawn of scenes. write_page: makes the page of a folder. page: its name. others: what else
-    is measured, by the files of its rows. usual: settings unless told otherwise.
+    groups: what is drawn, of some scenes. write_page: makes the page of a folder. page: its name. scenes:
+    which, unless others are named; None: it has its own. others: what else is measured, by the files of its
+    rows. usual: settings unless told otherwise.
     """
 
-    groups: Callable[[], list[Group]]
+    groups: Callable[[BenchSettings, Sequence[str]], list[Group]]
     write_page: Callable[[Path], Path]
     page: str
+    scenes: Sequence[str] | None = None
     others: Mapping[str, Callable[[Bench], Iterator[Row]]] = field(default_factory=dict)
     usual: BenchSettings = field(default_factory=BenchSettings)
 
@@ -90,31 +98,45 @@ def _octree_sizes(bench: Bench) -> Iterator[Row]:
     return map(asdict, octree_sizes.measure(bench.settings.data))
 
 
-_OF_THE_PAPERS = {
-    "slomp": _PaperSuite(slomp.groups, write_table_two, TABLE_TWO),
-    "octrees": _PaperSuite(
-        octrees.groups,
+_WITH_PAGES = {
+    "summary": _PageSuite(
+        lambda _, scenes: plan(scenes, list(backends()), counts=(), noises=(), swept_scenes=0),
+        write_scene_table,
+        SCENE_TABLE,
+        ("bunny", "bunny-bare", "bunny-ramp-bare", "dragon-scans", "bunny-scans", "truedepth-head", "demo"),
+        usual=BenchSettings(size=(960, 640), frames=0),
+    ),
+    "defaults": _PageSuite(
+        default_groups,
+        write_defaults,
+        DEFAULTS,
+        DEFAULT_SCENES,
+        usual=BenchSettings(size=(384, 256), views=4, frames=0),
+    ),
+    "slomp": _PageSuite(lambda *_: slomp.groups(), write_table_two, TABLE_TWO),
+    "octrees": _PageSuite(
+        lambda *_: octrees.groups(),
         write_octree_tables,
         OCTREE_TABLES,
-        {OCTREES: _octree_scans, OCTREE_SIZES: _octree_sizes},
-        BenchSettings(frames=0),  # how voxels flicker, the scenes tell
+        others={OCTREES: _octree_scans, OCTREE_SIZES: _octree_sizes},
+        usual=BenchSettings(frames=0),  # how voxels flicker, the scenes tell
     ),
-    "farooq": _PaperSuite(
-        pyramids.groups,
+    "farooq": _PageSuite(
+        lambda *_: pyramids.groups(),
         write_farooq,
         FAROOQ,
-        {LARGE_VIEWS: measure_large_views, PLAYING: measure_playing},
-        BenchSettings(size=(640, 480), views=8, frames=0),
+        others={LARGE_VIEWS: measure_large_views, PLAYING: measure_playing},
+        usual=BenchSettings(size=(640, 480), views=8, frames=0),
     ),
-    "preiner": _PaperSuite(
-        auto_splats.groups,
+    "preiner": _PageSuite(
+        lambda *_: auto_splats.groups(),
         write_preiner,
         PREINER,
-        {SEARCHES: measure_searches, FITS: measure_fits},
-        BenchSettings(size=auto_splats.SIZE, views=4, frames=3),
+        others={SEARCHES: measure_searches, FITS: measure_fits},
+        usual=BenchSettings(size=auto_splats.SIZE, views=4, frames=3),
     ),
 }
-_SUITES = ("scenes", "numerics", *_OF_THE_PAPERS)
+_SUITES = ("scenes", "numerics", *_WITH_PAGES)
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -186,10 +208,10 @@ def run(args: Namespace) -> int:
         return 0
     if args.compare and args.suite == "numerics":
         raise InputError("--compare is for the scenes", "--suite numerics")
-    if args.suite in _OF_THE_PAPERS and (args.backend or args.scene):
-        raise InputError(
-            "has its own scenes and renderer", f"--suite {args.suite}", "Leave out --scene and --backend"
-        )
+    suite = _WITH_PAGES.get(args.suite)
+    if suite is not None and (args.backend or (args.scene and suite.scenes is None)):
+        own, hint = ("scenes and renderer", "--scene and ") if suite.scenes is None else ("renderers", "")
+        raise InputError(f"has its own {own}", f"--suite {args.suite}", f"Leave out {hint}--backend")
     old = read_rows(args.compare) if args.compare else None
     names = list(dict.fromkeys(args.backend or backends()))
     for name in names:
@@ -232,20 +254,20 @@ def run(args: Namespace) -> int:
 def _report(args: Namespace) -> None:
     """Make the pages of the rows in the folder, and say what is there."""
     tell(write_report(args.out))
-    if args.suite in _OF_THE_PAPERS:
-        tell(_OF_THE_PAPERS[args.suite].write_page(args.out))
+    if args.suite in _WITH_PAGES:
+        tell(_WITH_PAGES[args.suite].write_page(args.out))
 
 
 def _others(args: Namespace) -> Mapping[str, Callable[[Bench], Iterator[Row]]]:
-    """Other measurements of a paper's suite than pictures of scenes, by the files of their rows."""
-    return _OF_THE_PAPERS[args.suite].others if args.suite in _OF_THE_PAPERS else {}
+    """Other measurements of a suite than pictures of scenes, by the files of their rows."""
+    return _WITH_PAGES[args.suite].others if args.suite in _WITH_PAGES else {}
 
 
 def _report_files(args: Namespace) -> list[Path]:
     """The files that `_report` writes, and the plots that it replaces by its own."""
     names = [PAGE]
-    if args.suite in _OF_THE_PAPERS:
-        name = _OF_THE_PAPERS[args.suite].page
+    if args.suite in _WITH_PAGES:
+        name = _WITH_PAGES[args.suite].page
         names += [f"{name}.md", f"{name}.json"]
     return [*(args.out / name for name in names), *sorted((args.out / "plots").glob("*.png"))]
 
@@ -332,7 +354,7 @@ def _settings(args: Namespace) -> BenchSettings:
             f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
-    usual = _OF_THE_PAPERS[args.suite].usual if args.suite in _OF_THE_PAPERS else BenchSettings()
+    usual = _WITH_PAGES[args.suite].usual if args.suite in _WITH_PAGES else BenchSettings()
     if args.quick:
         usual = replace(_QUICK, frames=min(_QUICK.frames, usual.frames))
     return replace(usual, **{name: value for name, value in told.items() if value is not None})
@@ -343,9 +365,12 @@ def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> t
     if args.suite == "numerics":
         return [], []
     missing = {name: reason for name, reason in catalog.scene_names(settings.data).items() if reason}
-    if args.suite in _OF_THE_PAPERS:
-        groups = _OF_THE_PAPERS[args.suite].groups()
+    if args.suite in _WITH_PAGES:
+        suite = _WITH_PAGES[args.suite]
+        scenes = args.scene or [name for name in suite.scenes or () if name not in missing]
+        groups = suite.groups(settings, scenes)
         lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
+        lacking |= {name: missing[name] for name in suite.scenes or () if name in missing and not args.scene}
         return [group for group in groups if group.scene not in lacking], _left_out(lacking)
     known = _QUICK_SCENES if args.quick else catalog.scene_names(settings.data)
     scenes = list(dict.fromkeys(args.scene or [name for name in known if name not in missing]))

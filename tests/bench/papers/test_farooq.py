@@ -124,7 +124,7 @@ def test_what_was_measured_of_pyramids_survives_its_file(tmp_path: Path) -> None
 
 
 def test_what_is_no_measurement_of_pyramids_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no zooms"):
+    with pytest.raises(InputError, match="no such rows"):
         digest([{**row, "sweep": ""} for row in DRAWN], [], [])
     path = tmp_path / "farooq.json"
     for text in ("", "[]", json.dumps({"rows": []})):

@@ -156,7 +156,7 @@ def test_what_was_measured_of_splats_survives_its_file(tmp_path: Path) -> None:
 
 
 def test_what_is_no_measurement_of_splats_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such pictures"):
+    with pytest.raises(InputError, match="no such rows"):
         digest([{**row, "backend": "points"} for row in DRAWN], [], [])
     path = tmp_path / "preiner.json"
     for text in ("", "[]", json.dumps({"rows": []})):

@@ -103,7 +103,7 @@ def test_a_measurement_survives_its_file(tmp_path: Path) -> None:
 
 
 def test_what_is_no_measurement_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no feeds"):
+    with pytest.raises(InputError, match="no such rows"):
         digest([{**row, "sweep": ""} for row in ROWS])
     path = tmp_path / FILE
     for text in ("", "[]", json.dumps({"rows": []})):

@@ -1,20 +1,26 @@
-"""Measurements that stand beside a paper's: what they keep of results, their files, and their machines.
+"""Measurements that the tables of docs/ are made of: what they keep of results, their files, their machines.
 
-A measurement is one small JSON file; those of several machines make one page of docs/. Another machine's
-goes to docs/data/ under a name of its own, with what its numbers do not tell in its `note`; then `python
--m pytest tests/test_docs.py --bless` makes the page.
+A measurement is one small JSON file; those of several machines make one page, or the tables of one. Another
+machine's goes to docs/data/ under a name of its own, with what its numbers do not tell in its `note`; then
+`python -m pytest tests/test_docs.py --bless` makes the page. A module of such a page has
+
+    NAME                              of its files: docs/data/NAME-*.json
+    read_measurement(path)            one of them
+    page(measurements) -> text        all of docs/NAME.md; or, of a page that is mostly written by hand,
+    PAGE, tables(measurements)        its name, and what stands between <!-- KEY --> and <!-- /KEY --> in it
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
 from ...files import whole_file
-from .results import Row
+from .results import Row, read_rows
 
 Measurement = dict[str, Any]
 
@@ -24,14 +30,41 @@ _TIMERS = {"query": "timer queries", "finish": "wall time between finishes"}
 
 
 def circumstances(rows: Sequence[Row]) -> Measurement:
-    """Place and manner of measuring rows of one backend. params: those that all have in common."""
+    """Place and manner of measuring rows. params: those that all have in common."""
     first, *others = rows
-    params = first["params"].items()
+    shared = set(first["params"]).intersection(*(row["params"] for row in others))
+    params = {name: value for name, value in first["params"].items() if name in shared}
     return {
         **{name: first[name] for name in _ONCE},
-        "params": {k: v for k, v in params if all(row["params"][k] == v for row in others)},
+        "params": {k: v for k, v in params.items() if all(row["params"][k] == v for row in others)},
         "note": "",
     }
+
+
+def digest(rows: Sequence[Row], suite: str, kept: Mapping[str, list[dict[str, Any]]]) -> Measurement:
+    """The part of a run that a page needs. rows: those that it is about. kept: lists of what it keeps.
+
+    Raises InputError where there are no such rows: the results are of another suite.
+    """
+    if not rows:
+        raise InputError("no such rows among the results", hint=f"Run scan4d bench --suite {suite}")
+    return {**circumstances(rows), **kept}
+
+
+def rounded_errors(row: Row, names: Iterable[str]) -> dict[str, float]:
+    """Errors of a row by name, without those that it lacks."""
+    found = {name: row["errors"].get(name, math.nan) for name in names}
+    return {name: round(error, 5) for name, error in found.items() if not math.isnan(error)}
+
+
+def rounded_times(row: Row, kinds: Iterable[str] = ("gpu_ms", "busy_ms")) -> dict[str, list[float]]:
+    """Times of each view, ms."""
+    return {kind: [round(ms, 2) for ms in row["times_by_view"][kind]] for kind in kinds}
+
+
+def rows_if_any(path: Path) -> list[Row]:
+    """The rows of a file of results; none where it is not there."""
+    return read_rows(path) if path.exists() else []
 
 
 def write_measurement(folder: Path, name: str, measurement: Measurement, page: str) -> Path:
@@ -78,8 +111,12 @@ def machines(measurements: Sequence[Measurement], backend: str, paper: Mapping[s
     paper: its `year` and `gpu`, and of `cpu`, `system` and `timing` what it tells.
     """
     told = (paper[part] for part in ("gpu", "cpu", "system", "timing") if part in paper)
-    lines = (f"**{paper['year']}**: {'; '.join(told)}", *(_machine(each, backend) for each in measurements))
-    return "\n".join(f"* {line}" for line in lines)
+    return "\n".join([f"* **{paper['year']}**: {'; '.join(told)}", machines_of_today(measurements, backend)])
+
+
+def machines_of_today(measurements: Sequence[Measurement], backend: str = "") -> str:
+    """A Markdown list of where ours were measured. backend: whose parameters are told; empty: of several."""
+    return "\n".join(f"* {_machine(each, backend)}" for each in measurements)
 
 
 def _machine(measurement: Measurement, backend: str) -> str:
@@ -88,13 +125,30 @@ def _machine(measurement: Measurement, backend: str) -> str:
         {len(row["gpu_ms"]) for row in measurement["rows"]}
     )  # fewer of a scan where it was stopped
     params = (f"{name} {str(value).lower()}" for name, value in measurement["params"].items())
-    parts = (
+    parts = [
         f"**{measurement['device']}**: {measurement['driver']}, {measurement['processors']} processors",
         _TIMERS[measurement["timer"]],
         f"{'x'.join(map(str, measurement['size']))}, {' or '.join(map(str, views))} views a scan",
-        f"Scan4D {measurement['version']}, {measurement['date']}, `{backend}` with {', '.join(params)}",
-    )
+        f"Scan4D {measurement['version']}, {measurement['date']}",
+    ]
+    if backend:
+        parts[-1] += f", `{backend}` with {', '.join(params)}"
     return "; ".join(parts) + (f". {measurement['note']}" if measurement["note"] else "")
+
+
+def put_tables(text: str, tables: Mapping[str, str]) -> str:
+    """A page with its tables: each replaces what stands between `<!-- KEY -->` and `<!-- /KEY -->`.
+
+    Raises ValueError where the page has no such place.
+    """
+    for key, table in tables.items():
+        start, end = f"<!-- {key} -->\n", f"<!-- /{key} -->"
+        before, mark, rest = text.partition(start)
+        _, close, after = rest.partition(end)
+        if not mark or not close:
+            raise ValueError(f"no {start.strip()} and {end} in the page")
+        text = f"{before}{start}{table}\n{end}{after}"
+    return text
 
 
 def spaced(number: float) -> str:

@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import InputError
 from ....resources import resource_path
 from ...baselines import RANGE_MESH
 from ...report import measurement
 from ...report.measurement import (
     Measurement,
-    circumstances,
     machines,
     markdown_table,
+    rounded_errors,
+    rounded_times,
+    rows_if_any,
     spaced,
     write_measurement,
 )
@@ -48,9 +49,7 @@ def write_farooq(folder: Path) -> Path:
 
     Raises InputError where they are of another suite.
     """
-    large, playing = (
-        read_rows(folder / name) if (folder / name).exists() else [] for name in (LARGE_VIEWS, PLAYING)
-    )
+    large, playing = (rows_if_any(folder / name) for name in (LARGE_VIEWS, PLAYING))
     made = digest(read_rows(folder), large, playing)
     return write_measurement(folder, NAME, made, page([made]))
 
@@ -61,15 +60,12 @@ def digest(drawn: Sequence[Row], large: Sequence[Row], playing: Sequence[Row]) -
     Raises InputError where the rows are of another suite.
     """
     zoomed = [row for row in drawn if row["sweep"] in ("zoom", HIDE)]
-    own = [row for row in zoomed if row["backend"] == BACKEND]
-    if not own:
-        raise InputError("no zooms among the results", hint=f"Run scan4d bench --suite {NAME}")
-    return {
-        **circumstances(own),
+    kept = {
         "rows": [_zoomed(row) for row in zoomed],
         "large": [_large(row) for row in large],
         "playing": [_played(row) for row in playing],
     }
+    return measurement.digest([row for row in zoomed if row["backend"] == BACKEND], NAME, kept)
 
 
 def read_measurement(path: Path) -> Measurement:
@@ -88,8 +84,8 @@ def _zoomed(row: Row) -> dict[str, Any]:
         "levels": pyramids.levels_of(params) if own else 0,
         HIDE: params[HIDE] if own else None,
         "sweep": row["sweep"],
-        "gpu_ms": [round(ms, 2) for ms in row["times_by_view"]["gpu_ms"]],
-        "errors": {name: round(error, 5) for name in _ERRORS if not np.isnan(error := row["errors"][name])},
+        **rounded_times(row, ["gpu_ms"]),
+        "errors": rounded_errors(row, _ERRORS),
     }
 
 

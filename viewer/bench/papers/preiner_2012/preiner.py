@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import InputError
 from ....resources import resource_path
 from ...baselines import PRECOMPUTED
 from ...report import measurement
 from ...report.measurement import (
     Measurement,
-    circumstances,
     machines,
     markdown_table,
+    rounded_errors,
+    rounded_times,
+    rows_if_any,
     spaced,
     write_measurement,
 )
@@ -49,9 +50,7 @@ def write_preiner(folder: Path) -> Path:
 
     Raises InputError where they are of another suite.
     """
-    searches, fits = (
-        read_rows(folder / name) if (folder / name).exists() else [] for name in (SEARCHES, FITS)
-    )
+    searches, fits = (rows_if_any(folder / name) for name in (SEARCHES, FITS))
     made = digest(read_rows(folder), searches, fits)
     return write_measurement(folder, NAME, made, page([made]))
 
@@ -61,15 +60,12 @@ def digest(drawn: Sequence[Row], searches: Sequence[Row], fits: Sequence[Row]) -
 
     Raises InputError where the rows are of another suite.
     """
-    own = [row for row in drawn if row["backend"] == BACKEND]
-    if not own:
-        raise InputError("no such pictures among the results", hint=f"Run scan4d bench --suite {NAME}")
-    return {
-        **circumstances(own),
+    kept = {
         "rows": [_pictured(row) for row in drawn],
         "searches": [_searched(row) for row in searches],
         "fits": [_fitted(row) for row in fits],
     }
+    return measurement.digest([row for row in drawn if row["backend"] == BACKEND], NAME, kept)
 
 
 def read_measurement(path: Path) -> Measurement:
@@ -86,12 +82,8 @@ def _pictured(row: Row) -> dict[str, Any]:
         "sweep": row["sweep"],
         "drawn": row["backend"],
         **({} if row["backend"] == PRECOMPUTED else kept),
-        "gpu_ms": [round(ms, 2) for ms in row["times_by_view"]["gpu_ms"]],
-        "errors": {
-            name: round(error, 5)
-            for name in _ERRORS
-            if not np.isnan(error := row["errors"].get(name, np.nan))
-        },
+        **rounded_times(row, ["gpu_ms"]),
+        "errors": rounded_errors(row, _ERRORS),
     }
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....errors import InputError
 from ...baselines import FLOOR
-from ...report.measurement import Measurement, circumstances, markdown_table, spaced
+from ...report import measurement
+from ...report.measurement import Measurement, markdown_table, rounded_times, spaced
 from ...report.page import three_digits
 from ...report.results import Row
 from . import surfels as slomp
@@ -58,17 +58,17 @@ class FeedTable:
             theirs = slomp.paper()[self.theirs][scan.name]
             times = {feed: np.array([ms]) for feed, ms in theirs.items() if feed != "depth"}
             yield _Line(scan.points, _COVERED, "2014", times, "{:#.4g}".format)
-        for measurement in measurements:
-            rows = of_scan(measurement["rows"], scan)
+        for each in measurements:
+            rows = of_scan(each["rows"], scan)
             if not rows:
                 continue
             points = rows[0]["n"]
             covered = [percent for row in rows if row["feed"] != FLOOR for percent in row["covered"]]
             seen = (min(covered), max(covered))
             times = {row["feed"]: np.array(row["gpu_ms"]) for row in rows}
-            yield _Line(points, seen, measurement["device"], times)
-            if measurement["timer"] == "finish":
-                busy = {row["feed"]: np.array(row["busy_ms"]) / measurement["processors"] for row in rows}
+            yield _Line(points, seen, each["device"], times)
+            if each["timer"] == "finish":
+                busy = {row["feed"]: np.array(row["busy_ms"]) / each["processors"] for row in rows}
                 yield _Line(points, seen, "its processors", busy)
 
 
@@ -102,27 +102,17 @@ def digest(rows: Sequence[Row], backend: str, suite: str) -> Measurement:
     Raises InputError where the rows are of another suite.
     """
     own = [row for row in rows if row["sweep"] == FEED]
-    drawn = [row for row in own if row["backend"] == backend]
-    if not drawn:
-        raise InputError("no feeds among the results", hint=f"Run scan4d bench --suite {suite}")
-    return {
-        **circumstances(drawn),
-        "rows": [
-            {
-                "scene": row["scene"],
-                "n": row["n"],
-                "feed": row["params"].get(FEED, FLOOR),
-                "covered": [round(percent, 1) for percent in row["covered_by_view"]],
-                **times(row),
-            }
-            for row in own
-        ],
-    }
-
-
-def times(row: Row) -> dict[str, list[float]]:
-    """Times of each view, ms."""
-    return {kind: [round(ms, 2) for ms in row["times_by_view"][kind]] for kind in ("gpu_ms", "busy_ms")}
+    timed = [
+        {
+            "scene": row["scene"],
+            "n": row["n"],
+            "feed": row["params"].get(FEED, FLOOR),
+            "covered": [round(percent, 1) for percent in row["covered_by_view"]],
+            **rounded_times(row),
+        }
+        for row in own
+    ]
+    return measurement.digest([row for row in own if row["backend"] == backend], suite, {"rows": timed})
 
 
 def _ratio(line: _Line, feed: str) -> str:

@@ -13,7 +13,16 @@ import numpy as np
 
 from ....resources import resource_path
 from ...report import measurement
-from ...report.measurement import Measurement, machines, markdown_table, spaced, write_measurement
+from ...report.measurement import (
+    Measurement,
+    machines,
+    markdown_table,
+    rounded_errors,
+    rounded_times,
+    rows_if_any,
+    spaced,
+    write_measurement,
+)
 from ...report.page import three_digits
 from ...report.results import OCTREE_SIZES, OCTREES, Row, read_rows
 from . import feeds, octrees
@@ -46,9 +55,7 @@ def write_octree_tables(folder: Path) -> Path:
 
     Raises InputError where they are of another suite.
     """
-    trees, sizes = (
-        read_rows(folder / name) if (folder / name).exists() else [] for name in (OCTREES, OCTREE_SIZES)
-    )
+    trees, sizes = (rows_if_any(folder / name) for name in (OCTREES, OCTREE_SIZES))
     made = digest(read_rows(folder), trees, sizes)
     return write_measurement(folder, NAME, made, page([made]))
 
@@ -94,8 +101,8 @@ def _level(row: Row) -> dict[str, Any]:
         "n": row["n"],
         "least": row["params"][CUBE],
         "level": row["params"][LEVEL],
-        **feeds.times(row),
-        "errors": _rounded({name: row["errors"][name] for name in _ERRORS}),
+        **rounded_times(row),
+        "errors": rounded_errors(row, _ERRORS),
     }
 
 
