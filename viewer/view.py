@@ -117,6 +117,11 @@ class View:
         offsets = (pixels - np.array(self.size) / 2) * np.array([1, -1]) / scale[:, None]
         return (np.column_stack([offsets, -depth]) - self.translation) @ self.rotation
 
+    def along(self, pixel: NDArray[np.floating]) -> NDArray[np.float64]:
+        """The step (3,) on the ray through a place of the picture, (2,), by which depth grows by one."""
+        ends = self.unproject(np.stack([pixel, pixel]), np.array([1.0, 2.0]))
+        return ends[1] - ends[0]
+
     def depths(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
         """Depths (...) of points (..., 3), relative to the origin."""
         return -(positions @ self.rotation[2] + self.translation[2])

@@ -6,6 +6,7 @@ import csv
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import filling
@@ -24,7 +25,7 @@ from viewer.analysis.measure import (
     table,
     to_text,
 )
-from viewer.analysis.pick import Picked, pick
+from viewer.analysis.pick import Neighbor, Picked, pick
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.gpu.surface import NOTHING, Surface
@@ -56,31 +57,27 @@ def end(position: tuple[float, float, float], spacing: float | None = 0.1, **fie
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("offset", [np.zeros(3), FAR], ids=["near", "far"])
-def test_snapped_distances_are_exact(draw: Draw, projection: str, offset: NDArray[np.float64]) -> None:
+def test_ends_are_the_picked_places_at_points_that_are_known(
+    draw: Draw, projection: str, offset: NDArray[np.float64]
+) -> None:
     rng = np.random.default_rng(5)
     # In steps of 2^-10, so that float64 holds them exactly at either place.
-    points = np.round(rng.uniform([-1, -0.7, -5], [1, 0.7, -4], (12, 3)) * 1024) / 1024 + offset
+    points = np.round(rng.uniform([-1, -0.7, -5], [1, 0.7, -4], (7, 3)) * 1024) / 1024 + offset
     fields = {"projection": projection, "height": 2.0} if projection == "orthographic" else {"fov_y": 29}
     camera = looking_from(offset, **fields)
     surface = draw(PointCloud.from_arrays(points), camera, SIZE)
     seen = sorted(set(surface.id[surface.id != NOTHING].tolist()))
-    assert len(seen) > 9
+    assert len(seen) > 4
+    pixel = 2.6 / SIZE[1]  # at depth 5
     for a, b in itertools.pairwise(seen):
         ends = [clicked(surface, camera, points[i]) for i in (a, b)]
         for made, i in zip(ends, (a, b), strict=True):
-            assert (made.id, made.snapped, made.level) == (i, "point", 0)
-            assert made.position == tuple(points[i])
-        assert Measurement(*ends).distance == math.dist(points[a], points[b])
-
-
-def test_points_of_a_float64_file_are_exact_to_the_step_of_float32_within_the_scan(draw: Draw) -> None:
-    points = np.random.default_rng(6).uniform([-1, -0.7, -5], [1, 0.7, -4], (12, 3)) + FAR
-    camera = looking_from(FAR)
-    surface = draw(PointCloud.from_arrays(points), camera, SIZE)
-    for i in set(surface.id[surface.id != NOTHING].tolist()):
-        np.testing.assert_allclose(
-            clicked(surface, camera, points[i]).position, points[i], atol=2**-22, rtol=0
-        )
+            assert (made.id, made.snapped, made.level) == (i, "surface", 0)
+            assert math.dist(made.position, points[i]) <= pixel / math.sqrt(2), "within the pixel"
+            np.testing.assert_allclose(made.position + np.array(made.neighbors[0].offset), points[i])
+        made = Measurement(*ends)
+        assert made.uncertainty is not None
+        assert abs(made.distance - math.dist(points[a], points[b])) < made.uncertainty
 
 
 def test_an_end_has_the_spacing_around_its_point_and_the_frame_of_its_pose(draw: Draw) -> None:
@@ -106,6 +103,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     nearest = np.linalg.norm(cloud.positions - picked.position, axis=1).min()
     assert made.spacing is not None
     assert made.spacing >= nearest * (1 - 1e-5)
+    assert made.uncertainty is not None
 
 
 def test_on_a_measured_surface_without_a_point_the_spacing_counts() -> None:
@@ -115,32 +113,48 @@ def test_on_a_measured_surface_without_a_point_the_spacing_counts() -> None:
     assert made.spacing == pytest.approx(0.05, rel=0.2)
 
 
-def test_independent_errors_add_in_squares() -> None:
-    assert Measurement(end((0, 0, 0), 0.3), end((0, 8, 6), 0.4)).uncertainty == pytest.approx(0.5)
-    assert Measurement(end((0, 0, 0), 0.3), end((0, 8, 6), None)).uncertainty is None
+def spread(*deviations: float) -> tuple[float, float, float, float, float, float]:
+    """The covariance of independent deviations along the axes."""
+    x, y, z = (deviation**2 for deviation in deviations)
+    return x, 0.0, 0.0, y, 0.0, z
 
 
-def test_the_uncertainty_is_what_ends_that_err_give() -> None:
-    """Its formula against draws: ends that deviate by a spacing (1 sigma) in each direction."""
-    rng, spacings = np.random.default_rng(1), (0.3, 0.1)
-    ends = [end((0.0, 0, 0), spacings[0]), end((20.0, 30, -10), spacings[1])]
-    drawn = [e.position + rng.normal(0, s, (100_000, 3)) for e, s in zip(ends, spacings, strict=True)]
-    deviation = np.linalg.norm(drawn[1] - drawn[0], axis=1).std()
-    assert Measurement(*ends).uncertainty == pytest.approx(deviation, rel=0.02)
+def test_independent_errors_along_the_line_add_in_squares() -> None:
+    one, other = end((0, 0, 0), covariance=spread(5, 5, 0.3)), end((0, 0, 50), covariance=spread(7, 7, 0.4))
+    assert Measurement(one, other).uncertainty == pytest.approx(1.96 * 0.5)
+    assert Measurement(one, end((0, 8, 6))).uncertainty is None, "of a session of before"
+    close = replace(other, position=(0.0, 0, 1))
+    assert Measurement(one, close).uncertainty == pytest.approx(1.96 * math.hypot(5, 7)), "not told apart"
+
+
+def test_the_uncertainty_covers_what_ends_that_err_give() -> None:
+    """Its formula against draws: ends that deviate differently in each direction."""
+    rng, tilted = np.random.default_rng(1), np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    spreads = [tilted @ np.diag([0.3, 0.1, 0.02]) ** 2 @ tilted.T, np.diag([0.05, 0.2, 0.1]) ** 2]
+    places = np.array([[0.0, 0, 0], [20, 30, -10]])
+    ends = [
+        end(tuple(place), covariance=tuple(matrix[np.triu_indices(3)]))
+        for place, matrix in zip(places, spreads, strict=True)
+    ]
+    drawn = [rng.multivariate_normal(place, m, 100_000) for place, m in zip(places, spreads, strict=True)]
+    off = np.linalg.norm(drawn[1] - drawn[0], axis=1) - math.dist(*places)
+    uncertainty = Measurement(*ends).uncertainty
+    assert uncertainty is not None
+    assert np.mean(np.abs(off) <= uncertainty) == pytest.approx(0.95, abs=0.003)
 
 
 @pytest.mark.parametrize(
     ("distance", "uncertainty", "text"),
     [
-        (12.3456, 0.4, "12.3 ± 0.4 mm"),
-        (12.3456, 0.04, "12.35 ± 0.04 mm"),
-        (12.3456, 0.149, "12.35 ± 0.15 mm"),
-        (12.3456, 0.196, "12.3 ± 0.2 mm"),
-        (12.3456, 0.97, "12.3 ± 1.0 mm"),
-        (1234.56, 30.0, "1230 ± 30 mm"),
-        (1234.56, 12.3, "1235 ± 12 mm"),
-        (0.000123456, 2e-6, "0.000123 ± 0.000002 mm"),
-        (1e-15, 2e-17, "1e-15 ± 2e-17 mm"),
+        (12.3456, 0.4, "12.3 ± 0.4 mm (95 %)"),
+        (12.3456, 0.04, "12.35 ± 0.04 mm (95 %)"),
+        (12.3456, 0.149, "12.35 ± 0.15 mm (95 %)"),
+        (12.3456, 0.196, "12.3 ± 0.2 mm (95 %)"),
+        (12.3456, 0.97, "12.3 ± 1.0 mm (95 %)"),
+        (1234.56, 30.0, "1230 ± 30 mm (95 %)"),
+        (1234.56, 12.3, "1235 ± 12 mm (95 %)"),
+        (0.000123456, 2e-6, "0.000123 ± 0.000002 mm (95 %)"),
+        (1e-15, 2e-17, "1e-15 ± 2e-17 mm (95 %)"),
         (12.3456, None, "12.3456 mm"),
     ],
 )
@@ -182,6 +196,49 @@ def test_it_stays_in_space_where_the_scan_does_not_tell(one_topology: bool | Non
     assert "does not tell" in str(reading.fixed)
 
 
+def turned_patch(index: int) -> Pose:
+    """Twelve points in a plane that turn about z by 20 degrees a frame, and go up; a point far away stays."""
+    angle = math.radians(20 * index)
+    turn = np.array(
+        [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]]
+    )
+    x, y = np.meshgrid(np.arange(4.0), np.arange(3.0))
+    patch = np.stack([x.ravel() + 10, y.ravel(), np.zeros(12)], axis=1) @ turn.T + [0, 0, index]
+    return Pose(index, index / 25, "", PointCloud.from_arrays(np.concatenate([patch, [[0, 0, -50]]])))
+
+
+def test_an_end_beside_its_points_turns_with_them() -> None:
+    start, (ox, oy, oz) = turned_patch(0), (11.4, 0.7, 0.05)
+    near = tuple(Neighbor(i, tuple(start.cloud.world(i) - [ox, oy, oz])) for i in (1, 2, 5, 6, 9))
+    one = end((ox, oy, oz), id=1, snapped="surface", covariance=spread(0.3, 0.1, 0), neighbors=near)
+    other = end((0, 0, -50), id=12, covariance=spread(0.1, 0.1, 0.1))
+    made = Measurement(one, other)
+    assert reading_of(made, start, True).measurement == made, "where it was made, nothing moves"
+    reading = reading_of(made, turned_patch(2), True).measurement
+    angle = math.radians(40)
+    expected = [
+        ox * math.cos(angle) - oy * math.sin(angle),
+        ox * math.sin(angle) + oy * math.cos(angle),
+        oz + 2,
+    ]
+    np.testing.assert_allclose(reading.first.position, expected, atol=1e-5)
+    assert reading.first.spread is not None
+    np.testing.assert_allclose(np.linalg.eigvalsh(reading.first.spread), [0, 0.01, 0.09], atol=1e-4)
+    assert reading.first.spread[0, 1] > 0.01, "it is turned too"
+    back = reading_of(reading, start, True).measurement
+    np.testing.assert_allclose(back.first.position, one.position, atol=1e-5)
+
+
+def test_points_that_move_each_their_own_way_make_an_end_less_sure() -> None:
+    start = turned_patch(0)
+    torn = start.cloud.world() + np.random.default_rng(3).normal(0, 0.2, (13, 3))
+    near = tuple(Neighbor(i, tuple(start.cloud.world(i) - [11.4, 0.7, 0.0])) for i in range(12))
+    ends = [end((11.4, 0.7, 0.0), id=i, covariance=spread(0.1, 0.1, 0.1), neighbors=near) for i in (1, 12)]
+    moved_ = reading_of(Measurement(*ends), Pose(1, 0.04, "", PointCloud.from_arrays(torn)), True).measurement
+    assert moved_.first.spread is not None
+    assert np.sqrt(np.diag(moved_.first.spread)) == pytest.approx(math.hypot(0.1, 0.2), rel=0.3)
+
+
 def test_it_stays_in_space_without_points_to_follow() -> None:
     made = measured(moved(0), 0, 1)
     assert reading_of(made, moved(2), True).fixed is None
@@ -198,6 +255,7 @@ def test_it_stays_in_space_without_points_to_follow() -> None:
 
 def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
     made = measured(moved(2), 0, 3)
+    made = Measurement(*(replace(e, covariance=spread(0.1, 0.2, 0.1)) for e in made.ends))
     surface = Measurement(end((0.1, 1 / 3, 2), None, snapped="surface", id=None, level=2), made.second)
     readings = [(1, reading_of(made, moved(2), True)), (2, reading_of(surface, moved(2), True))]
     file = tmp_path / "distances.csv"
@@ -216,6 +274,7 @@ def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
         assert int(first[f"id_{number}"]) == e.id
         assert tuple(float(first[f"{axis}_{number}"]) for axis in "xyz") == e.position
         assert float(first[f"spacing_{number}"]) == e.spacing
+        assert float(first[f"uncertainty_{number}"]) == e.uncertainty
     assert (second["id_1"], second["spacing_1"], second["uncertainty"]) == ("", "", "")
     assert (second["snapped_1"], second["level_1"]) == ("surface", "2")
     assert float(second["y_1"]) == 1 / 3

@@ -71,10 +71,13 @@ def test_every_point_is_picked_at_its_own_pixel(draw: Draw, projection: str) -> 
             if picked := pick(surface, x, y, spacing=False):
                 found[picked.id] = picked
                 assert surface.id[y, x] == picked.id
-                assert surface.depth[y, x] == pytest.approx(-picked.position[2])
+                if not picked.neighbors:
+                    assert surface.depth[y, x] == pytest.approx(-picked.position[2])
     assert len(found) > 25
     assert {4, 5, 17}.isdisjoint(found)
-    for id_, picked in found.items():
+    alone = {id_: picked for id_, picked in found.items() if not picked.neighbors}
+    assert len(alone) > 0.8 * len(found), "points that fill space are no surface"
+    for id_, picked in alone.items():
         np.testing.assert_allclose(picked.point, points[id_], atol=1e-6)
         assert np.abs(picked.position - points[id_]).max() < 0.05, "within the pixel"
         assert (picked.color, picked.normal, picked.scalars, picked.spacing) == (None, None, {}, None)

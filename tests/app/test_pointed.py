@@ -13,6 +13,7 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
     picked = Picked(
         np.array([12.345678, -0.5, 1e3]),
         level=0,
+        covariance=np.diag([0.01, 0.0, 0.04]),
         row=3,
         id=7,
         point=np.array([12.0, -0.5, 1e3]),
@@ -21,7 +22,7 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
         scalars={"temperature": 36.6123456789, "label": 4},
     )
     assert describe_pick(picked, "frame 3/25", "mm", 150.0) == [
-        "12.35, -0.50, 1000.00 mm",
+        "12.35, -0.50, 1000.00 ± 0.39 mm",
         "frame 3/25",
         "point 7, measured",
         "temperature 36.6123",

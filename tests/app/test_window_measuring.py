@@ -1,4 +1,7 @@
-"""Measuring in the window with real clicks and keys, against scans whose points are known."""
+"""Measuring in the window with real clicks and keys, against scans whose points are known.
+
+A click is right to the pixel: the places and distances that it gives are those of the points to about that.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,7 @@ from viewer.view import View
 
 FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates
 FACES = ((0, 1, 2), (1, 2, 3))
+CLICK = 0.3  # scan units, more than a pixel of the view that is started with
 _READ_CLIPBOARD = """
 import glfw, sys
 glfw.init()
@@ -60,15 +64,15 @@ def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) 
     app.see(is_under_way=True)
     click(app, pixel_of(app, points, other), times=2)
     measurement = app.see(lambda state: state.measurements).measurements[-1]
-    assert [(end["position"], end["id"], end["frame"]) for end in measurement["ends"]] == [
-        (points[number].tolist(), number, 0) for number in (one, other)
-    ]
+    for end, number in zip(measurement["ends"], (one, other), strict=True):
+        assert (end["id"], end["frame"]) == (number, 0)
+        assert math.dist(end["position"], points[number]) < CLICK
     return measurement["distance"], measurement["uncertainty"]
 
 
 def expect_reading(app: RunningApp, *distances: float, motion: str = "follows points") -> None:
     """Wait until the measurements read so."""
-    wanted = [(distance, motion) for distance in distances]
+    wanted = [(pytest.approx(distance, abs=2 * CLICK), motion) for distance in distances]
     app.see(lambda state: [(one["distance"], one["motion"]) for one in state.measurements] == wanted)
 
 
@@ -95,9 +99,7 @@ def keys_file(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("keys_file")
 @pytest.mark.slow
-def test_exact_distances_that_follow_their_points_are_undone_and_saved(
-    screen: Screen, tmp_path: Path
-) -> None:
+def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen, tmp_path: Path) -> None:
     frames = [grid(1.0) + FAR, grid(1.25) + FAR, grid(1.5) + FAR]
     np.savez(tmp_path / "scan.npz", positions=np.stack(frames), faces=np.array(FACES))
     distances = [math.dist(points[34], points[128]) for points in frames]
@@ -106,8 +108,7 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         app.see(clicking="measuring")
         name_unit(app, "cm")
         distance, uncertainty = measure(app, frames[0], 34, 128)
-        assert distance == distances[0]
-        assert uncertainty > 0
+        assert abs(distance - distances[0]) < uncertainty < 2 * CLICK
         expect_reading(app, distances[0])
 
         screen.do("key", "Right")
@@ -140,10 +141,10 @@ def test_exact_distances_that_follow_their_points_are_undone_and_saved(
         assert saved == copied
         for row, frame in zip(saved, (0, 1), strict=True):
             assert (row["scan"], row["unit"], row["motion"]) == ("scan.npz", "cm", "follows points")
-            assert float(row["distance"]) == distances[frame]
+            assert abs(float(row["distance"]) - distances[frame]) < 2 * CLICK
             assert (row["frame_1"], row["id_1"], row["id_2"]) == (str(frame + 1), "34", "128")
             place = [float(row[f"{axis}_2"]) for axis in "xyz"]
-            np.testing.assert_array_equal(place, frames[frame][128])
+            assert math.dist(place, frames[frame][128]) < 2 * CLICK
 
         ctrl(screen, "o")
         app.settle()

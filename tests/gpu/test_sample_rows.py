@@ -186,7 +186,7 @@ def test_picks_and_measurements_are_those_of_the_points(renderer: Renderer, scen
         assert (one.normal, other.normal) == (None, None)
         assert one.spacing == pytest.approx(other.spacing, rel=1e-6)
         assert pick(samples, x, y, spacing=False).id == one.id
-        assert is_seen(samples, one.position, 0.1)
+        assert is_seen(samples, one.position, 0.5)
         assert before_gap(samples, x, y) == before_gap(points, x, y)
         end = End.of(one, pose, place=TURNED)
         assert end == replace(End.of(other, points.pose.pose, place=TURNED), spacing=end.spacing)

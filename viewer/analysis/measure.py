@@ -1,8 +1,9 @@
 """Measurements: the distance between two places that were picked, how sure it is, and where it goes in time.
 
-An end snaps to the point of the scan that the picked pixel shows; where the pixel shows none, to the
-surface. It is as uncertain as the scan is coarse there. A measurement follows its points from frame to frame
-where the scan has one topology (`Timeline.one_topology`); else it stays where it was made.
+An end is the place that was picked, not the nearest point. Its uncertainty is a covariance: of what the
+points around leave open of the surface, of the pixel's size, and of what following the points adds. A
+measurement follows its points from frame to frame where the scan has one topology (`Timeline.one_topology`),
+each end as a rigid body with the points around it; else it stays where it was made.
 """
 
 from __future__ import annotations
@@ -16,26 +17,33 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import whole_file
-from ..geometry import Vector
+from ..geometry import Vector, vector
 from ..rigid import STILL, Rigid
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import nearest_row, spacing_at
-from .pick import Picked
+from .pick import SURE, Neighbor, Picked, largest_deviation
 
 _DECIMALS = (-6, 12)  # that a number is written out with
+_COVERED = "(95 %)"  # of cases in which the true distance is within what ± says
+_SAME = 1e-14  # share of coordinates that rounding changes
+_TURNING = 4  # points that tell how a place turns and how well they do
 
 
 @dataclass(frozen=True)
 class End:
     """One end of a measurement.
 
-    frame: the pose's index. time: the pose's, seconds. position: float64, scan units. snapped: to what.
-    id: of the point, None on the surface. spacing: distance between the points around it, scan units,
-    None where there are none: how uncertain `position` is as a place on the body. level: as of a `Picked`.
+    frame: the pose's index. time: the pose's, seconds. position: float64, scan units. snapped: "point" where
+    it is the very place of the point, as ends were once; else on the surface. id: of the point that is seen
+    there, None where none is. spacing: distance between the points around it, scan units, None where there
+    are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how the place that was meant may
+    lie off the position, squared scan units; None: unknown. neighbors: points around it that it follows, and
+    where they were when it was set.
     """
 
     frame: int
@@ -45,25 +53,57 @@ class End:
     id: int | None
     spacing: float | None
     level: int
+    covariance: tuple[float, float, float, float, float, float] | None = None
+    neighbors: tuple[Neighbor, ...] = ()
 
     @classmethod
     def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> End:
         """The end at a place that was picked, with its spacing, in the picture of a pose that is moved to a
         place.
 
-        filled: whether a place may be taken that no point shows. Such a place is at least as uncertain
-        as the nearest point is far. Raises InputError for one where it may not.
+        filled: whether a place may be taken that no point shows. Where the points around do not tell of a
+        surface, the end is as uncertain as they are apart, or as the nearest is far. Raises InputError for a
+        filled place where it may not be taken.
         """
         if not (picked.measured or filled):
             hint = "Click where points are, or allow filled places"
             raise InputError("nothing was measured here, the hole is filled", hint=hint)
-        if picked.point is not None:
-            end, snapped, spacing = picked.point, "point", picked.spacing
-        else:
+        spacing, neighbors = picked.spacing, picked.neighbors
+        if picked.point is None:
             unmoved = place.inverse.points(picked.position)
-            end, snapped, spacing = picked.position, "surface", _spacing_near(pose.around(unmoved), unmoved)
-        x, y, z = (float(v) for v in end)
-        return cls(pose.index, float(pose.time), (x, y, z), snapped, picked.id, spacing, picked.level)  # type: ignore[arg-type]
+            spacing = _spacing_near(pose.around(unmoved), unmoved)
+        elif not neighbors:
+            assert picked.id is not None
+            neighbors = (Neighbor(picked.id, vector(picked.point - picked.position)),)
+        covariance = picked.covariance
+        if covariance is None and spacing is not None:
+            beside = 0.0 if picked.point is None else float(np.linalg.norm(picked.point - picked.position))
+            covariance = max(spacing, beside) ** 2 * np.eye(3)
+        return cls(
+            frame=pose.index,
+            time=float(pose.time),
+            position=picked.place,
+            snapped="surface",
+            id=picked.id,
+            spacing=spacing,
+            level=picked.level,
+            covariance=None if covariance is None else _six(covariance),
+            neighbors=neighbors,
+        )
+
+    @property
+    def spread(self) -> NDArray[np.float64] | None:
+        """The covariance as a matrix, (3, 3)."""
+        if self.covariance is None:
+            return None
+        xx, xy, xz, yy, yz, zz = self.covariance
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    @property
+    def uncertainty(self) -> float | None:
+        """How far off the position the place that was meant is at most, along any one line, with 95 %; scan
+        units. None where it is unknown."""
+        return None if (spread := self.spread) is None else largest_deviation(spread)
 
 
 @dataclass(frozen=True)
@@ -85,16 +125,22 @@ class Measurement:
 
     @property
     def uncertainty(self) -> float | None:
-        """Uncertainty of the distance, scan units; None where an end's is unknown.
+        """Expanded uncertainty of the distance, scan units: it covers the true one in 95 % (k = 1.96). None
+        where an end's is unknown, as of ends that an earlier version has set.
 
-        Nothing is known between two points, so each end stands for the place that was meant up to the
-        spacing there, in any direction. To first order, only what lies along the line changes the
-        distance; the ends err independently, and independent errors add in squares: sqrt(s1^2 + s2^2).
-        It speaks of the scan's sampling alone, not of the scanner's noise and calibration. A spacing is
-        a cautious measure: a place anywhere in the cell of one point deviates by 0.28 spacings (1 sigma).
+        To first order, only what lies along the line changes the distance; the ends err independently, so
+        that their covariances add: k sqrt(u (C1 + C2) u), u the line's direction. Where the ends are not told
+        apart, the direction is not known either, and the widest counts. It speaks of the scan's sampling and
+        of the picture's pixels; a scanner's calibration comes on top.
         """
-        spacings = [end.spacing for end in self.ends]
-        return None if None in spacings else math.hypot(*(s for s in spacings if s is not None))
+        one, other = self.first.spread, self.second.spread
+        if one is None or other is None:
+            return None
+        spread, line = one + other, np.subtract(self.second.position, self.first.position)
+        widest = largest_deviation(spread)
+        if self.distance <= widest:
+            return widest
+        return SURE * math.sqrt(max(float(line @ spread @ line), 0.0)) / self.distance
 
 
 @dataclass(frozen=True)
@@ -116,10 +162,10 @@ class Reading:
 def reading_of(
     measurement: Measurement, pose: Pose, one_topology: bool | None, place: Rigid = STILL
 ) -> Reading:
-    """The measurement in a pose: its ends at the places of their points there, or where they were.
+    """The measurement in a pose: its ends where their points went, or where they were.
 
     place: that the pose is moved to. one_topology: as the `Timeline` says. Spacings stay those of the frame
-    in which it was made.
+    in which it was made; to the covariance comes what following leaves open.
     """
     moved = []
     for end in measurement.ends:
@@ -129,16 +175,64 @@ def reading_of(
             return Reading(measurement, "its ends are of two frames")
         if not one_topology:
             return Reading(measurement, "the scan does not tell which points are the same in other frames")
-        if (row := pose.cloud.row_of(end.id)) is None:
+        if (followed := _followed(end, pose, place)) is None:
             return Reading(measurement, f"point {end.id} is missing in this frame")
-        point = place.points(pose.cloud.world(row))
-        x, y, z = (float(v) for v in point)
-        moved.append(replace(end, frame=pose.index, time=float(pose.time), position=(x, y, z)))
+        moved.append(followed)
     return Reading(Measurement(*moved), None)
 
 
+def _followed(end: End, pose: Pose, place: Rigid) -> End | None:
+    """An end where its points are in a pose; None where the point that it was set at is missing."""
+    assert end.id is not None
+    neighbors = end.neighbors or (Neighbor(end.id, (0.0, 0.0, 0.0)),)
+    rows = [pose.cloud.row_of(neighbor.id) for neighbor in neighbors]
+    if pose.cloud.row_of(end.id) is None or all(row is None for row in rows):
+        return None
+    there = [(row, neighbor) for row, neighbor in zip(rows, neighbors, strict=True) if row is not None]
+    now = place.points(pose.cloud.world(np.array([row for row, _ in there])))
+    was = np.array(end.position) + np.array([neighbor.offset for _, neighbor in there])
+    if np.abs(now - was).max() <= _SAME * np.abs(now).max():
+        return replace(end, frame=pose.index, time=float(pose.time))
+    position, turned, error = _carried(np.array(end.position), was, now)
+    spread = end.spread
+    if spread is not None:
+        spread = turned @ spread @ turned.T + error**2 * np.eye(3)
+    return replace(
+        end,
+        frame=pose.index,
+        time=float(pose.time),
+        position=vector(position),
+        covariance=None if spread is None else _six(spread),
+        neighbors=end.neighbors
+        and tuple(
+            Neighbor(neighbor.id, vector(point - position))
+            for (_, neighbor), point in zip(there, now, strict=True)
+        ),
+    )
+
+
+def _carried(
+    position: NDArray[np.float64], was: NDArray[np.float64], now: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """A place that points (n, 3) carry with them as a rigid body would: where it is, how it is turned (3, 3),
+    and the standard deviation of each of its coordinates, by how far the points are off such a motion.
+
+    Fewer than four do not tell a turn and how good it is: the nearest alone is followed, at the same offset,
+    which may have turned any way.
+    """
+    if len(was) < _TURNING:
+        offset = position - was[0]
+        return now[0] + offset, np.eye(3), float(np.linalg.norm(offset)) / math.sqrt(3)
+    before, after = was.mean(axis=0), now.mean(axis=0)
+    left, _, right = np.linalg.svd((now - after).T @ (was - before))  # Kabsch 1976
+    turned = left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
+    off = (now - after) - (was - before) @ turned.T
+    free = 3 * len(was) - 6  # of the coordinates, six make the motion
+    return after + turned @ (position - before), turned, math.sqrt(float((off**2).sum()) / free)
+
+
 def distance_in_words(distance: float, uncertainty: float | None, unit: str) -> str:
-    """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm"."""
+    """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm (95 %)"."""
     if not uncertainty:
         return f"{distance:.6g} {unit}"
     power = math.floor(math.log10(uncertainty))
@@ -146,14 +240,14 @@ def distance_in_words(distance: float, uncertainty: float | None, unit: str) -> 
         -power if float(f"{uncertainty:.0e}") >= 2 * 10.0**power else 1 - power
     )  # two digits from 1.0 to 1.9
     if not _DECIMALS[0] <= decimals <= _DECIMALS[1]:
-        return f"{distance:.6g} ± {uncertainty:.1g} {unit}"
+        return f"{distance:.6g} ± {uncertainty:.1g} {unit} {_COVERED}"
     shown = (f"{round(value, decimals):.{max(decimals, 0)}f}" for value in (distance, uncertainty))
-    return f"{' ± '.join(shown)} {unit}"
+    return f"{' ± '.join(shown)} {unit} {_COVERED}"
 
 
 # --- as a table -----------------------------------------------------------------------------
 
-_OF_END = ("frame", "time", "id", "x", "y", "z", "snapped", "spacing", "level")
+_OF_END = ("frame", "time", "id", "x", "y", "z", "snapped", "spacing", "level", "uncertainty")
 COLUMNS = (
     "scan", "measurement", "distance", "uncertainty", "unit", "motion",
     *(f"{name}_{number}" for number in (1, 2) for name in _OF_END),
@@ -185,8 +279,22 @@ def _row(number: int, reading: Reading, scan: str, unit: str) -> list[object]:
     measurement = reading.measurement
     row = [scan, number, measurement.distance, measurement.uncertainty, unit, reading.motion]
     for end in measurement.ends:
-        row += [end.frame + 1, end.time, end.id, *end.position, end.snapped, end.spacing, end.level]
+        row += [
+            end.frame + 1,
+            end.time,
+            end.id,
+            *end.position,
+            end.snapped,
+            end.spacing,
+            end.level,
+            end.uncertainty,
+        ]
     return row
+
+
+def _six(spread: NDArray[np.float64]) -> tuple[float, float, float, float, float, float]:
+    xx, xy, xz, yy, yz, zz = spread[np.triu_indices(3)].tolist()
+    return xx, xy, xz, yy, yz, zz
 
 
 def _spacing_near(cloud: PointCloud, position: np.ndarray) -> float | None:

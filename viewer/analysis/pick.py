@@ -1,4 +1,8 @@
-"""Picking on what is seen: what one pixel of a Surface shows, never a point behind it."""
+"""Picking on what is seen: what one pixel of a Surface shows, never a point behind it.
+
+The renderer tells which surface is seen. Where it is, the points around tell (`local_surface`): the one that
+wins a pixel is the nearest of many, or lies beside it.
+"""
 
 from __future__ import annotations
 
@@ -8,34 +12,58 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..geometry import Vector
+from ..geometry import Vector, vector
 from ..gpu.constants import EMPTY, NOTHING
 from ..gpu.surface import Surface
-from ..scan.spacing import ENOUGH, spacing_at
+from ..scan.points import PointCloud
+from ..scan.spacing import ENOUGH, nearest_rows, spacing_at
+from .local_surface import LocalSurface, local_surface
 
-_REACH = 4  # pixels round one that are looked at: gaps that are wider are seen as such
-_BEHIND = 4.0, 4.0 * _REACH  # spacings and pixels that what is seen through a gap is behind it, at least
+SURE = 1.96  # standard deviations within which 95 % of a normal distribution lie
+_REACH = 4  # pixels from points to the middle of a gap, where spacings are less
+_GAP = 1.5  # spacings from points to the middle of a gap between them, at most
+_BEHIND = (
+    4.0,
+    4.0,
+)  # spacings and distances in the picture that what is seen through a gap is behind it, at least
 _WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
+_AROUND = 3, 64  # pixels, at least and at most, in which points are looked for
+_SPACINGS = 3.0  # in which they are looked for: two dozen points
+_FOLLOWED = 8  # of them are kept, to follow
+
+
+@dataclass(frozen=True)
+class Neighbor:
+    """A point near a place. id: its index in the file. offset: from the place to it, scan units."""
+
+    id: int
+    offset: Vector
 
 
 @dataclass(frozen=True, eq=False)
 class Picked:
-    """Content of a pixel: a place on the surface, and the point of the scan that gave it.
+    """Content of a pixel: a place on the surface, and the point of the scan that is seen there.
 
     position: (3,) float64, scan units: the surface at the pixel's centre. Places and normals are the world's,
     into which the layers of the picture may have moved the scan.
-    level: 0 measured, n filled from level n; the fields below are empty where it was filled.
+    level: 0 measured, n filled from level n.
+    covariance: (3, 3) float64, squared scan units: how the place that was meant may lie off the position, by
+    what the points leave open and by the size of the pixel, in which it may be anywhere. None: unknown.
+    neighbors: points of the surface around it, the nearest first; none where few are seen.
+    The fields below are empty where it was filled.
     row: the point's place in the cloud's arrays; the first of several that are shown as one. id: its index
     in the file.
     point: (3,) float64, scan units: the point itself. color: (4,) uint8, sRGB and alpha.
     normal: (3,) float32. These two are the scan's own, None where it has none.
     scalars: name -> number, of the scan, of layers, and the one that the backend found for the picture.
-    spacing: distance between the points around it, scan units: how uncertain `point` is as a
-    place on the body. None where it was not asked for or all points coincide.
+    spacing: distance between the points around it, scan units. None where it was not asked for or all points
+    coincide.
     """
 
     position: NDArray[np.float64]
     level: int
+    covariance: NDArray[np.float64] | None = None
+    neighbors: tuple[Neighbor, ...] = ()
     row: int | None = None
     id: int | None = None
     point: NDArray[np.float64] | None = None
@@ -51,43 +79,128 @@ class Picked:
         return x, y, z
 
     @property
+    def uncertainty(self) -> float | None:
+        """How far off the position the place that was meant is at most, along any one line, with 95 %; scan
+        units. None where it is unknown."""
+        return None if self.covariance is None else largest_deviation(self.covariance)
+
+    @property
     def measured(self) -> bool:
         """Whether a point of the scan is seen, rather than a filled hole."""
         return self.level == 0
 
 
-def pick(surface: Surface, x: int, y: int, *, spacing: bool = True) -> Picked | None:
+def largest_deviation(covariance: NDArray[np.float64]) -> float:
+    """The deviation that 95 % do not exceed, along the line on which it is largest. covariance: (3, 3)."""
+    return SURE * float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))
+
+
+def pick(
+    surface: Surface, x: int, y: int, *, shown: tuple[int, int] | None = None, spacing: bool = True
+) -> Picked | None:
     """Pick what pixel (x, y) shows, row 0 at the top; None where it shows nothing or is none of the picture.
 
-    Reads one pixel from the GPU. spacing: whether to find the spacing too, which looks at every point of the
-    cloud (see `spacing_at`), or of range views at the pixels around.
+    Reads a few lines of pixels around from the GPU. shown: the pixel that shows the surface which is meant,
+    where it is another one (`before_gap`). spacing: whether to find the spacing too, which looks at every
+    point of the cloud (see `spacing_at`), or of range views at the pixels around; where few points are seen,
+    those that it finds tell of the surface.
     """
-    if not _has(surface, x, y):
+    across, down = shown or (x, y)
+    if not (_has(surface, x, y) and _has(surface, across, down)):
         return None
-    depth, row, level = surface.texel(x, y)
+    depth, row, level = surface.texel(across, down)
     if level == EMPTY:
         return None
-    center = np.array([[x + 0.5, y + 0.5]])
-    place = surface.layers.place
-    position = place.points(surface.view.unproject(center, np.array([depth]))[0] + surface.view.origin)
+    view, place, pixel = surface.view, surface.layers.place, np.array([x + 0.5, y + 0.5])
+    ids, points = surface.points_around(across, down, _reach(surface, depth))
     if row == NOTHING:
-        return Picked(position, level)
+        found = local_surface(view, pixel, depth, points)
+        if found is not None:  # the renderer's word stands; how far the points disagree counts
+            found = found._replace(
+                depth=depth, deviation=float(np.hypot(found.deviation, found.depth - depth))
+            )
+        return Picked(_position(surface, pixel, depth), level, *_told(surface, pixel, found, ids, points))
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
-    found = surface.found_at(row)
+    id_ = at if cloud.ids is None else int(cloud.ids[at])
+    found = local_surface(view, pixel, depth, points, int(np.argmax(ids == id_)))
+    if found is None and spacing and len(ids) < ENOUGH:
+        ids, points = _nearest(surface, cloud, at)
+        found = local_surface(view, pixel, depth, points, int(np.argmax(ids == id_)))
+    if found is None:
+        pixel = np.array([across + 0.5, down + 0.5])
+    numbers = surface.found_at(row)
     row = surface.point_of(row)
     scalars = {name: values[at].item() for name, values in cloud.scalars.items()}
     scalars |= {name: values[row].item() for name, values in surface.layers.scalars.items()}
     return Picked(
-        position,
+        _position(surface, pixel, depth if found is None else found.depth),
         level,
-        row,
-        id=row if cloud.ids is None else int(cloud.ids[at]),
+        *_told(surface, pixel, found, ids, points),
+        row=row,
+        id=id_,
         point=place.points(cloud.world(at)),
         color=None if cloud.colors is None else cloud.colors[at].copy(),
         normal=None if cloud.normals is None else place.directions(cloud.normals[at].copy()),
-        scalars=scalars | found,
+        scalars=scalars | numbers,
         spacing=spacing_at(cloud, at) if spacing else None,
     )
+
+
+def _reach(surface: Surface, depth: float) -> int:
+    """How many pixels to each side have some rings of points at a depth."""
+    least, most = _AROUND
+    return int(np.clip(np.ceil(_SPACINGS * _pitch(surface, depth)), least, most))
+
+
+def _pitch(surface: Surface, depth: float) -> float:
+    """The usual distance between points at a depth, pixels."""
+    return surface.scanned.pose.spacing * surface.view.scale / (depth if surface.view.perspective else 1.0)
+
+
+def _nearest(surface: Surface, cloud: PointCloud, at: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The points nearest to one, each place once: indices in the file, positions as `points_around` has
+    them."""
+    rows = nearest_rows(cloud, at)
+    rows = rows[np.unique(cloud.positions[rows], axis=0, return_index=True)[1]]
+    points = cloud.world(rows) - surface.view.origin
+    ahead = surface.view.depths(points) > surface.view.near
+    ids = rows if cloud.ids is None else cloud.ids[rows].astype(np.intp)
+    return ids[ahead], points[ahead]
+
+
+def _position(surface: Surface, pixel: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+    """The place in the world, (3,), that a place of the picture (2,) shows at a depth."""
+    found = surface.view.unproject(pixel[None], np.array([depth]))[0]
+    return surface.layers.place.points(found + surface.view.origin)
+
+
+def _told(
+    surface: Surface,
+    pixel: NDArray[np.float64],
+    found: LocalSurface | None,
+    ids: NDArray[np.intp],
+    points: NDArray[np.float64],
+) -> tuple[NDArray[np.float64] | None, tuple[Neighbor, ...]]:
+    """Covariance and neighbours of a place on a local surface.
+
+    What was meant is anywhere in the pixel: along the surface, the variance of a uniform distribution. What
+    the points leave open is along the ray.
+    """
+    if found is None:
+        return None, ()
+    position = _position(surface, pixel, found.depth)
+    steps = np.array([[0.5, 0.0], [0.0, 0.5]])
+    aside = [
+        _position(surface, pixel + step, found.depth + step @ found.slope)
+        - _position(surface, pixel - step, found.depth - step @ found.slope)
+        for step in steps
+    ]
+    deeper = surface.layers.place.directions(surface.view.along(pixel)) * found.deviation
+    off = np.column_stack([*(side / np.sqrt(12) for side in aside), deeper])
+    kept = found.used[:_FOLLOWED]
+    offsets = surface.layers.place.points(points[kept] + surface.view.origin) - position
+    neighbors = (Neighbor(id, vector(offset)) for id, offset in zip(ids[kept].tolist(), offsets, strict=True))
+    return off @ off.T, tuple(neighbors)
 
 
 def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
@@ -98,14 +211,15 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     """
     if not _has(surface, x, y) or (texel := surface.texel(x, y)).level == EMPTY:
         return x, y
-    depths = surface.depth_around(x, y, _REACH)
-    ends = surface.view.unproject(np.array([[x, y], [x + 1, y]]), np.full(2, texel.depth))
-    spacings, pixels = _BEHIND
-    limit = texel.depth - pixels * np.linalg.norm(ends[1] - ends[0])
-    front = depths < limit
-    if front.any():
-        front &= depths < limit - spacings * surface.scanned.pose.spacing
-    down, across = np.argwhere(front).T - _REACH
+    reach = int(np.clip(np.ceil(_GAP * _pitch(surface, texel.depth)), _REACH, _AROUND[1]))
+    depths = surface.depth_around(x, y, reach)
+    spacings, steepness = _BEHIND
+    footprint = (texel.depth if surface.view.perspective else 1.0) / surface.view.scale
+    away = np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    behind = steepness * np.maximum(away, _REACH) * footprint + spacings * surface.scanned.pose.spacing
+    down, across = (
+        np.argwhere((away <= max(reach, np.sqrt(2) * _REACH)) & (depths < texel.depth - behind)).T - reach
+    )
     if not _lie_all_round(down, across):
         return x, y
     nearest = np.argmin(down**2 + across**2)

@@ -220,7 +220,7 @@ class Toolbox:
         if self._first is None or surface is None or request is None or not viewport.is_there:
             return
         meant = before_gap(surface, *pixel)
-        picked = pick(surface, *meant)
+        picked = pick(surface, *pixel, shown=meant)
         click = Click(picked, request.pose, meant != pixel, request.layers.place)
         self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
 

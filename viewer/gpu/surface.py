@@ -544,14 +544,30 @@ class Surface:
     def depth_around(self, x: int, y: int, reach: int) -> NDArray[np.float32]:
         """(2 reach + 1, 2 reach + 1) float32: `depth` round pixel (x, y), in terms of its view; +inf
         outside the picture."""
+        return self._around(self.depths.buffer, np.float32(np.inf), x, y, reach)
+
+    def points_around(self, x: int, y: int, reach: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """The points of the scan that are seen round pixel (x, y), each once: (n,) their indices in the file,
+        (n, 3) their positions relative to the view's origin. reach: pixels to each side."""
+        rows = np.unique(self._around(self.rows.buffer, np.uint32(NOTHING), x, y, reach))
+        rows = rows[rows != NOTHING].astype(np.intp)
+        if self.samples is not None:
+            away = self.samples.overview.origin - self.view.origin
+            return rows, self.samples.of_samples("positions", rows) + away
+        points, scan = self._points_of(rows), self.scan
+        ids = points if scan.ids is None else scan.ids[points]
+        return ids.astype(np.intp), scan.world(points) - self.view.origin
+
+    def _around(self, buffer: moderngl.Buffer, empty: np.generic, x: int, y: int, reach: int) -> NDArray:
+        """Words of the pixels round one, in one read; `empty` outside the picture."""
         self.gpu.activate()
         width, height = self.size
         top, bottom = max(y - reach, 0), min(y + reach + 1, height)
-        lines = self.depths.buffer.read(4 * width * (bottom - top), offset=4 * width * top)
+        lines = buffer.read(4 * width * (bottom - top), offset=4 * width * top)
         left, right = max(x - reach, 0), min(x + reach + 1, width)
-        around = np.full((2 * reach + 1, 2 * reach + 1), np.inf, np.float32)
+        around = np.full((2 * reach + 1, 2 * reach + 1), empty)
         rows, columns = slice(top - y + reach, bottom - y + reach), slice(left - x + reach, right - x + reach)
-        around[rows, columns] = np.frombuffer(lines, np.float32).reshape(-1, width)[:, left:right]
+        around[rows, columns] = np.frombuffer(lines, empty.dtype).reshape(-1, width)[:, left:right]
         return around
 
     @property

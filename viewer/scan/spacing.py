@@ -54,6 +54,11 @@ def spacing_at(cloud: PointCloud, row: int) -> float | None:
     return _spacings_at(cloud.positions, [row])[0]
 
 
+def nearest_rows(cloud: PointCloud, row: int, count: int = ENOUGH) -> NDArray[np.intp]:
+    """Rows of the points nearest to one, itself among them, in any order. It looks at every point once."""
+    return _nearest(cloud.positions, [row], count)[0]
+
+
 def nearest_row(cloud: PointCloud, position: NDArray[np.float64]) -> tuple[int, float]:
     """(row, distance) of the point nearest to a place, scan units. It looks at every point once."""
     place = (position - cloud.origin).astype(np.float32)

@@ -26,13 +26,13 @@ def end(id: int | None) -> End:
 @pytest.mark.parametrize(
     ("ids", "words"),
     [
-        ((3, 12), "points 3 and 12"),
-        ((None, 12), "point 12 and surface"),
-        ((0, None), "point 0 and surface"),
-        ((None, None), "surface"),
+        ((3, 12), "at points 3 and 12"),
+        ((None, 12), "at point 12 and on the surface"),
+        ((0, None), "at point 0 and on the surface"),
+        ((None, None), "on the surface"),
     ],
 )
-def test_it_says_what_the_ends_snapped_to(ids: tuple[int | None, int | None], words: str) -> None:
+def test_it_says_where_the_ends_are(ids: tuple[int | None, int | None], words: str) -> None:
     assert snap_words(Reading(Measurement(end(ids[0]), end(ids[1])), None)) == words
 
 

@@ -48,7 +48,8 @@ def describe_pick(picked: Picked, frame: str, unit: str, radius: float) -> list[
     radius: of the scan, scan units; positions get the digits that matter for its size.
     """
     decimals = min(max(_DIGITS - math.floor(math.log10(radius or 1.0)), 0), 9)
-    words = [f"{', '.join(f'{v:.{decimals}f}' for v in picked.position)} {unit}", frame]
+    sure = "" if picked.uncertainty is None else f" ± {picked.uncertainty:.2g}"
+    words = [f"{', '.join(f'{v:.{decimals}f}' for v in picked.position)}{sure} {unit}", frame]
     seen = "measured" if picked.measured else f"filled from level {picked.level}"
     words.append(seen if picked.id is None else f"point {picked.id}, {seen}")
     words += [f"{name} {_number(value)}" for name, value in picked.scalars.items()]

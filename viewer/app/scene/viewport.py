@@ -211,7 +211,8 @@ class Viewport:
                 math.floor((at + 0.5) * n / m)
                 for at, n, m in zip(pixel, self.surface.size, self.size, strict=True)
             )
-            self._picked = pixel, pick(self.surface, *before_gap(self.surface, across, down), spacing=False)
+            meant = before_gap(self.surface, across, down)
+            self._picked = pixel, pick(self.surface, across, down, shown=meant, spacing=False)
         return self._picked[1]
 
     def pick_in_full(self) -> Picked | None:

@@ -172,6 +172,7 @@ class Tool:
         if end not in known:
             spacings, share = _SLACK
             slack = spacings * (end.spacing or 0) + share * self.desk.viewport.bounds(shown.pose).radius
+            slack += end.uncertainty or 0
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
 
@@ -208,7 +209,7 @@ class Tool:
 
 
 def _place_words(end: End) -> tuple[str, str]:
-    return ", ".join(map(repr, end.position)), "surface" if end.id is None else f"point {end.id}"
+    return ", ".join(map(repr, end.position)), "surface" if end.id is None else f"at point {end.id}"
 
 
 def _learn_topology(timeline: Timeline, index: int) -> None:

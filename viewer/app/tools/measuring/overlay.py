@@ -53,6 +53,6 @@ def _draw_one(
 
 
 def _draw_end(end: End, place: ImVec2, alpha: float, canvas: Canvas) -> None:
-    """A disc at a point, a ring on the surface."""
-    draw_place = canvas.point if end.snapped == "point" else canvas.ring
+    """A disc where points are followed, a ring on the surface alone."""
+    draw_place = canvas.ring if end.id is None else canvas.point
     draw_place(place, _COLOR, alpha)

@@ -64,16 +64,19 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
 
 def _details(reading: Reading, unit: str) -> str:
     """A text that tells both ends in full."""
-    uncertain = "sampling alone: what the spacing of the points around the ends leaves open"
-    return "\n".join([*(_end_words(end, unit) for end in reading.measurement.ends), f"± is of {uncertain}"])
+    ends = [_end_words(end, unit) for end in reading.measurement.ends]
+    if reading.measurement.uncertainty is None:
+        return "\n".join([*ends, "How sure it is, is not known: measure anew"])
+    return "\n".join([*ends, "± covers the true distance in 95 % of cases: points around, pixels, following"])
 
 
 def _end_words(end: End, unit: str) -> str:
-    what = "surface" if end.id is None else f"point {end.id}"
+    what = "surface" if end.id is None else f"at point {end.id}"
     place = ", ".join(f"{v:.9g}" for v in end.position)
     spacing = "unknown" if end.spacing is None else f"{end.spacing:.3g} {unit}"
     seen = f", filled from level {end.level}" if end.level else ""
-    return f"{what}, frame {end.frame + 1}: {place} {unit}, spacing {spacing}{seen}"
+    sure = "" if end.uncertainty is None else f" ± {end.uncertainty:.2g}"
+    return f"{what}, frame {end.frame + 1}: {place}{sure} {unit}, spacing {spacing}{seen}"
 
 
 def _draw_outlets(measuring: Tool, ui: Ui) -> None:

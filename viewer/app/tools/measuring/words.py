@@ -11,8 +11,8 @@ def distance_words(reading: Reading, unit: str) -> str:
 
 
 def snap_words(reading: Reading) -> str:
-    """The points or surfaces that the ends snapped to, such as "points 12 and 345"."""
+    """The points that the ends are at, or the surface, such as "at points 12 and 345"."""
     ids = [end.id for end in reading.measurement.ends if end.id is not None]
     if len(ids) == 2:
-        return f"points {ids[0]} and {ids[1]}"
-    return f"point {ids[0]} and surface" if ids else "surface"
+        return f"at points {ids[0]} and {ids[1]}"
+    return f"at point {ids[0]} and on the surface" if ids else "on the surface"
