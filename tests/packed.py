@@ -112,8 +112,7 @@ def looks(cloud: PointCloud, normals: NDArray) -> NDArray[np.uint32]:
     if cloud.colors is not None:
         roots = roots_from_bytes(cloud.colors).astype(np.uint32)
         words[:, 0] = roots[:, 0] | roots[:, 1] << 10 | roots[:, 2] << 20
-    n = np.rint(normals.astype(np.float32) * 511 + 512).astype(np.uint32)
-    words[:, 1] = n[:, 0] | n[:, 1] << 10 | n[:, 2] << 20
+    words[:, 1] = pack(normals, np.ones(len(normals)))[:, 0]
     return words
 
 

@@ -173,8 +173,7 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     uvec3 roots = uvec3(to_roots(texelFetch(colors, int(row)).rgb));
     looks[2u * row] = roots.x | roots.y << 10 | roots.z << 20;
 #endif
-    uvec3 steps = uvec3(roundEven(normal * 511.0 + 512.0));
-    looks[2u * row + 1u] = steps.x | steps.y << 10 | steps.z << 20;
+    looks[2u * row + 1u] = pack_normal(normal);
     found[n] = vec4(radius, outlier ? -extent.count : extent.count,
                     sum > 0.0 ? values.x / sum : 0.0, usual_radius);
 }

@@ -14,7 +14,8 @@ layout(location = 0) out uint out_row;
 layout(location = 1) out float out_depth;
 
 void main() {
-    float depth = linear_depth(gl_FragCoord.z * DIVISOR);
+    // Where the near plane cuts a splat, rounding may take fragments before it.
+    float depth = max(linear_depth(gl_FragCoord.z * DIVISOR), view_near);
     if (dot(local, local) > mask_limit || depth > view_far) discard;
     out_row = row;
     out_depth = SIGN * depth;

@@ -438,6 +438,29 @@ def test_a_scan_without_colours_keeps_the_looks_colour(draw: Draw) -> None:
     assert not surface.is_own("color")
 
 
+@every_feed
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_nothing_is_shown_before_the_near_plane(draw: Draw, instancing: str, projection: str) -> None:
+    """The plane cuts a sphere's front, and splats with it: rounding took some pixels before it."""
+    cloud, before = sphere(3000), 0
+    for step in range(6):
+        near = 0.6 + 0.002 * step
+        camera = Camera(
+            (0.0, 0.0, 1.6),
+            (0.02 * step, 0, 0),
+            fov_y=60,
+            near=near,
+            far=10,
+            projection=projection,
+            height=2.0 if projection == "orthographic" else None,
+        )
+        for passes, enlarge in (("one", 1.0), ("two", 1.0), ("two", 2.0)):
+            surface = surfels(draw, cloud, camera, instancing=instancing, passes=passes, enlarge=enlarge)
+            assert np.isfinite(surface.depth).sum() > 10_000
+            before += np.count_nonzero(surface.depth < np.float32(near))
+    assert before == 0
+
+
 @pytest.mark.parametrize("passes", ["two", "sorted", "one_blended", "visibility"])
 @every_feed
 def test_empty_poses_and_previews(renderer: Renderer, draw: Draw, instancing: str, passes: str) -> None:

@@ -183,7 +183,7 @@ def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(
         assert np.quantile(steps, 0.999) <= 1
         found, expected = one.arrays(), other.arrays()
         covered = same & (one.row != NOTHING)
-        # Normals that a backend finds go by one neighbor more or less, and are blended in steps of 1/511.
+        # Normals that a backend finds go by one neighbor more or less, and are blended in steps.
         estimated = find_backend(backend).finds_normals
         most = 0.995 if estimated else 1.0
         depth_step = np.abs(found["depth"][covered] / expected["depth"][covered] - 1)

@@ -61,6 +61,9 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
+    AWAY = auto()  # discs that face away
+    AWAY_STARTS = auto()  # of discs that face away
+    AWAY_LISTED = auto()
     DISCS = auto()  # of each row of a pose
     # Neighborhoods, beside splats.
     SLOTS = auto()  # participants in the order of their cells
@@ -125,6 +128,7 @@ class Storage(IntEnum):
     REACH = 4
     LARGE = 5
     AGAIN = 6
+    AWAY = 6
     FARTHEST = 7
     # Neighborhoods and their splats, beside a list.
     SPLATS = 0

@@ -1,8 +1,9 @@
 // What a splat gives where splats are blended: linear light, normal, and how much it counts, all of
 // them whole numbers, so that sums do not depend on the order as long as they stay below 2^24.
 #include "common/color.glsl"
+#include "common/octahedron.glsl"
 
-layout(binding = TEXTURE_LOOKS) uniform usamplerBuffer looks;  // roots of light, 3 x 10 bits; normal, 3 x 10 bits
+layout(binding = TEXTURE_LOOKS) uniform usamplerBuffer looks;  // roots of light, 3 x 10 bits; normal, 2 x 16 bits
 
 const float FULL = 31.0;  // what the centre of a splat counts
 
@@ -13,11 +14,11 @@ float weight_at(float x) {
     return roundEven(FULL * (e * e));
 }
 
-vec3 steps_of(uint word) { return vec3(word & 1023u, word >> 10 & 1023u, word >> 20 & 1023u); }
+const float NORMAL_STEPS = 2047.0;  // of a unit vector
 
-vec3 light_of(uvec2 look) { return light_of(steps_of(look.x)); }
+vec3 light_of(uvec2 look) { return light_of(vec3(look.x & 1023u, look.x >> 10 & 1023u, look.x >> 20 & 1023u)); }
 
-vec3 normal_of(uvec2 look) { return steps_of(look.y) - 512.0; }
+vec3 normal_of(uvec2 look) { return roundEven(unpack_normal(look.y) * NORMAL_STEPS); }
 
 // The weight of a normal. A scan's normals need not agree in sign, and would cancel: they count as turned
 // like the visible splat's.

@@ -31,7 +31,7 @@ void main() {
     own_colors[cell] = packUnorm4x8(vec4(srgb_of_light(mix(light_of(look), light, mean), 1.0), 1.0));
 #endif
     vec3 sum = vec3(sum_of(cell, 1u), sum_of(cell, 2u), sum_of(cell, 3u));
-    sum = mix(normal_of(look) / 511.0, sum / max(length(sum), 1e-6), mean);
+    sum = mix(normal_of(look) / NORMAL_STEPS, sum / max(length(sum), 1e-6), mean);
     for (uint k = 0u; k < 3u; ++k) own_normals[3u * cell + k] = sum[k];
 #endif
 }

@@ -1,6 +1,7 @@
 // The second of two passes (Slomp 2014, V-B): of the listed discs, enlarged, those that pass at most
 // so far behind what is visible at a pixel, weighted by their masks. LARGE: on top of what the rasteriser
-// has added up of others.
+// has added up of others. TAKE: the nearest are found first, 1 of the lists, 2 of the lists of those that face
+// away (AWAY), beside what the Surface holds.
 #include "surfels/tiles/nearest.glsl"
 #include "surfels/passes/limit.glsl"
 #include "surfels/passes/look.glsl"
@@ -21,7 +22,7 @@ uvec3 light[ROWS];
 ivec3 normal[ROWS];
 vec3 visible[ROWS];  // normals
 
-void blend(int first, int last) {
+void blend_block(usamplerBuffer list, int first, int last) {
     float weight_sum[ROWS];
     vec3 light_sum[ROWS], normal_sum[ROWS];
     for (int k = 0; k < ROWS; ++k) {
@@ -29,7 +30,7 @@ void blend(int first, int last) {
         light_sum[k] = normal_sum[k] = vec3(0.0);
     }
     for (int i = first; i < last; ++i) {
-        uint disc = texelFetch(listed, i).r;
+        uint disc = texelFetch(list, i).r;
         Column c = column_of(disc);
         uvec2 look = texelFetch(looks, int(row_of(disc))).xy;
         vec3 rgb = light_of(look), n = normal_of(look);
@@ -51,18 +52,42 @@ void blend(int first, int last) {
     }
 }
 
+void blend(usamplerBuffer list, ivec2 part) {
+    for (int first = part.x; first < part.y; first += BLOCK) blend_block(list, first, min(first + BLOCK, part.y));
+}
+
 void main() {
     int tile = this_tile();
-    ivec2 part = part_of(tile);
+    ivec2 part = part_of(starts, tile);
+#if AWAY
+    ivec2 away_part = part_of(away_starts, tile);
+#endif
+#if TAKE
+    begin_pixels();
+#if TAKE == 1
+    take_nearest(listed, part);
+#else
+    take_nearest(away_listed, away_part);
+#endif
+    if (tile >= 0)
+        for (int k = 0; k < ROWS; ++k)
+            if (in_picture(k)) store_pixel(k);
+#endif
     for (int k = 0; k < ROWS; ++k) {
         limit[k] = 1.0;
         visible[k] = vec3(0.0);
         total[k] = 0;
         light[k] = uvec3(0u);
         normal[k] = ivec3(0);
+#if TAKE
+        if (!in_picture(k)) shown[k] = NOTHING;
+        float depth = uintBitsToFloat(depth_bits(k));
+#else
         shown[k] = in_picture(k) ? rows[index_of(k)] : NOTHING;
+        float depth = in_picture(k) ? abs(uintBitsToFloat(depths[index_of(k)])) : 0.0;
+#endif
         if (shown[k] != NOTHING) {
-            limit[k] = limit_behind(abs(uintBitsToFloat(depths[index_of(k)])), shown[k]);
+            limit[k] = limit_behind(depth, shown[k]);
             visible[k] = normal_of(texelFetch(looks, int(shown[k])).xy);
         }
 #if LARGE
@@ -72,7 +97,10 @@ void main() {
         normal[k] = ivec3(texelFetch(normal_sums, pixel + ivec2(0, k), 0).xyz);
 #endif
     }
-    for (int first = part.x; first < part.y; first += BLOCK) blend(first, min(first + BLOCK, part.y));
+    blend(listed, part);
+#if AWAY
+    blend(away_listed, away_part);
+#endif
     if (tile < 0) return;
     for (int k = 0; k < ROWS; ++k)
         if (shown[k] != NOTHING) {

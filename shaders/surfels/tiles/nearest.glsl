@@ -8,6 +8,11 @@ layout(binding = TEXTURE_PLACES) uniform samplerBuffer places;  // centre, pixel
 layout(binding = TEXTURE_FORMS) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;  // of each tile's part of the list
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // discs, in the order of the points drawn
+#if AWAY
+// Of those that face away, which a second filling listed.
+layout(binding = TEXTURE_AWAY_STARTS) uniform usamplerBuffer away_starts;
+layout(binding = TEXTURE_AWAY_LISTED) uniform usamplerBuffer away_listed;
+#endif
 #if SAMPLED
 layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
@@ -34,9 +39,9 @@ int this_tile() {
 }
 
 // A tile's part of the list: first, and the one after the last.
-ivec2 part_of(int tile) {
+ivec2 part_of(usamplerBuffer begins, int tile) {
     if (tile < 0) return ivec2(0);
-    return ivec2(texelFetch(starts, tile).r, texelFetch(starts, tile + 1).r);
+    return ivec2(texelFetch(begins, tile).r, texelFetch(begins, tile + 1).r);
 }
 
 uint row_of(uint disc) {
@@ -78,9 +83,9 @@ float form_at(Column c, float y) {
 bool is_inside(float form, float key) { return form <= (PERSPECTIVE != 0 ? key * key : 1.0); }
 
 // No `continue` in a loop over pixels: Mesa would not unroll it, arrays would go to memory, and each loop be slower.
-void take_nearest(ivec2 part) {
+void take_nearest(usamplerBuffer list, ivec2 part) {
     for (int i = part.x; i < part.y; ++i) {
-        uint disc = texelFetch(listed, i).r, row = row_of(disc);
+        uint disc = texelFetch(list, i).r, row = row_of(disc);
         Column c = column_of(disc);
         for (int k = 0; k < ROWS; ++k) {
             float y = down_at(c, k), here = key_at(c, y);

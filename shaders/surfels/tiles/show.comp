@@ -1,7 +1,11 @@
-// The nearest disc at each pixel of a tile. FARTHEST: also the farthest depth that the tile then shows.
+// The nearest disc at each pixel of a tile. FARTHEST 1: also the farthest depth that the tile then shows; 2: the farthest
+// at which a splat still counts there in a second pass.
 // FILL: only where nothing was shown; such pixels are listed for surfels/passes/close.comp, and
 // their depth is negative until then.
 #include "surfels/tiles/nearest.glsl"
+#if FARTHEST == 2
+#include "surfels/passes/limit.glsl"
+#endif
 
 #if FARTHEST
 layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };
@@ -12,13 +16,21 @@ layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };
 void main() {
     int tile = this_tile();
     begin_pixels();
-    ivec2 part = part_of(tile);
+#if AWAY
+    ivec2 part = part_of(away_starts, tile);
+#else
+    ivec2 part = part_of(starts, tile);
+#endif
 #if FILL
     bool all_closed = true;
     for (int k = 0; k < ROWS; ++k) all_closed = all_closed && best[k] == CLOSED;
     if (all_closed) part = ivec2(0);
 #endif
-    take_nearest(part);
+#if AWAY
+    take_nearest(away_listed, part);
+#else
+    take_nearest(listed, part);
+#endif
     if (tile < 0) return;
 #if FILL
     for (int k = 0; k < ROWS; ++k)
@@ -33,8 +45,16 @@ void main() {
 #endif
 #if FARTHEST
     uint most = 0u;
-    for (int k = 0; k < ROWS; ++k)
-        if (in_picture(k)) most = max(most, depth_bits(k));
+    for (int k = 0; k < ROWS; ++k) {
+        uint bits = depth_bits(k);
+#if FARTHEST == 2
+        float depth = uintBitsToFloat(bits);
+        bool is_shown = shown[k] != NOTHING;
+        float behind = depth + epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
+        bits = is_shown ? floatBitsToUint(behind) : bits;
+#endif
+        most = max(most, in_picture(k) ? bits : 0u);
+    }
     atomicMax(farthest[tile], most);
 #endif
 }

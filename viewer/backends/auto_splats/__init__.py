@@ -25,12 +25,10 @@ TITLE = "Auto splats"
 BLENDS = True
 FINDS_NORMALS = True
 
-_BY_STEPS = "normals are blended as whole numbers of 1/511, which turn with the scan"
 _HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
 _BY_PICTURE = "how large splats are goes by the points that the picture shows, and by those around them"
 _NO_SURFACE = "points on a line make no surface, and how wide it is goes by the last bit"
 LIMITS = {
-    "rotated by 37 degrees": Limit(0.0005, _BY_STEPS),
     "points x1000, one after the other": Limit(0.02, _HIDDEN_COPIES),
     "points x1000, all over again": Limit(0.02, _HIDDEN_COPIES),
     "1x1 pixels": Limit(0.001, _BY_PICTURE),

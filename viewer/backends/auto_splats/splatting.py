@@ -91,11 +91,11 @@ def _draw_by_tiles(
     if refine:
         points = _shrunk(points, surface, splats, lists)
         if large is None:
-            show_smaller(surface, lists)
+            show_smaller(surface, lists, splats)
             surface.stats.counted["refined tiles"] = lists.shown_again
         else:
             large = replace(large, buffers=points.buffers)
-            show_with(large, surface, lists, splats)
+            show_with(points, large, surface, lists, splats)
     if two:
         blend_by_tiles(points, surface, lists, large, splats)
 

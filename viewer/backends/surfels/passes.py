@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...gpu import gl
 from ...gpu.amplify import Points, draw_shapes
-from ...gpu.bindings import Storage, Texture
+from ...gpu.bindings import Texture
 from ...gpu.constants import BEHIND
 from ...gpu.context import Gpu
 from ...gpu.pose import robust_range
@@ -24,8 +24,22 @@ from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from ...srgb import roots_from_bytes
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
-from .tiles import FALLBACK, NOT_HIDDEN, TILE, TileLists, run, show_all, splat, tile_lists
+from .tiles import (
+    ALL,
+    FALLBACK,
+    LIMIT,
+    NOT_HIDDEN,
+    TOWARDS,
+    TileLists,
+    fill_away,
+    run,
+    show,
+    show_all,
+    splat_first,
+    tile_lists,
+)
 
+FIRST, SECOND = 1, 2  # of which lists the nearest are found as they are blended: TAKE of blend.comp
 _CHUNK = 1 << 20  # points packed at a time
 
 
@@ -129,39 +143,69 @@ def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
 
 def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
     """Draw the picture of `two_passes` by tiles; splats that are too large for these are rasterised."""
-    lists = _first_by_tiles(points, surface, splats)
-    if lists is None:
+    by_tiles = _two_by_tiles if splats.enlarge == 1 else _enlarged_by_tiles
+    if not by_tiles(points, surface, splats):
         two_passes(points, surface, FALLBACK, splats)
-        return
-    large = lists.large_points(splats.larger(points)) if lists.large else None
-    if splats.enlarge > 1:
-        _fill_by_tiles(surface, lists, large, splats)
+
+
+def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
+    """Both passes over the same lists, at once where no disc is large. False where the rasteriser has to do
+    it all."""
+    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS)
+    if lists is None:
+        return False
+    if not lists.away and not lists.large:
+        surface.clear()
+        blend_by_tiles(points, surface, lists, None, splats, take=FIRST)
+        return True
+    large = show_all(points, surface, lists, splats, LIMIT if lists.away else 0)
+    if lists.away and not fill_away(points, surface, lists, splats, both=True):
+        return False
+    if lists.away and large is not None:
+        show(points, surface, lists, splats, found=True, away=True)
+    take = SECOND if lists.away and large is None else 0
+    blend_by_tiles(points, surface, lists, large, splats, take, lists.away)
+    return True
+
+
+def _enlarged_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
+    """The first pass, and the second with lists of its own: of the enlarged splats that are not all too far
+    behind what the first found. False where the rasteriser has to do it all."""
+    larger = splats.larger(points)
+    if not splat_first(points, surface, splats, LIMIT):
+        return False
+    lists = tile_lists(larger, surface, splats, NOT_HIDDEN)
+    if lists is None:
+        return False
+    large = lists.large_points(larger) if lists.large else None
+    _fill_by_tiles(surface, lists, large, splats)
     blend_by_tiles(points, surface, lists, large, splats)
-    if splats.enlarge > 1:
-        _close(points, surface, splats)
+    _close(points, surface, splats)
+    return True
 
 
 def blend_by_tiles(
-    points: Points, surface: Surface, lists: TileLists, large: Points | None, splats: Splats
+    points: Points,
+    surface: Surface,
+    lists: TileLists,
+    large: Points | None,
+    splats: Splats,
+    take: int = 0,
+    away: bool = False,
 ) -> None:
-    """The second pass, as `blend`, of the splats that are listed and of the large ones."""
+    """The second pass, as `blend`, of the splats that are listed and of the large ones.
+
+    take: whether the nearest of the FIRST or the SECOND lists, of what faces away, are still to be found.
+    away: whether there are such second lists.
+    """
     if large is not None:
         sums = _add(points, large, surface, FALLBACK, splats)
         sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)
-    defines = {"FOUND": 1, "FILL": 0, "LARGE": int(large is not None), **points.defines}
-    defines |= bind_looks(points, surface)
+    defines = {
+        **{"FOUND": int(take != FIRST), "FILL": 0, "LARGE": int(large is not None), "TAKE": take},
+        **{"AWAY": int(away), **points.defines, **bind_looks(points, surface)},
+    }
     run("blend", surface, lists, defines, points, splats)
-
-
-def _first_by_tiles(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
-    """Draw the first pass; the lists of the second. None where the rasteriser has to do it all."""
-    if splats.enlarge > 1 or not splats.cull_back:
-        splat(points, surface, splats)
-        return _lists_not_hidden(points, surface, splats)
-    lists = tile_lists(points, surface, splats)  # both passes have the same
-    if lists is not None:
-        show_all(points, surface, lists, splats)
-    return lists
 
 
 def _fill_by_tiles(surface: Surface, lists: TileLists, large: Points | None, splats: Splats) -> None:
@@ -174,22 +218,8 @@ def _fill_by_tiles(surface: Surface, lists: TileLists, large: Points | None, spl
         surface.raster().bind_images(Texture.LARGE_ROWS, Texture.LARGE_DEPTHS)
     surface.covered.clear()
     surface.covered.bind()
-    defines = {"FOUND": 1, "FARTHEST": 0, "FILL": 1, "LARGE": int(large is not None)}
-    run("show", surface, lists, defines)
-
-
-def _lists_not_hidden(points: Points, surface: Surface, splats: Splats) -> TileLists | None:
-    """The lists of the second pass, without the splats that all lie too far behind what the first found."""
-    gpu = surface.gpu
-    lists = surface.keep(TileLists)
-    program = gpu.compute("surfels/tiles/limits.comp", {"TILE": TILE, **points.defines}, params=splats)
-    with gpu.timers.measure("limits"):
-        gl.clear_words(lists.farthest, 0)
-        lists.farthest.bind_to_storage_buffer(Storage.FARTHEST)
-        bind_visible(points, program)
-        surface.bind_textures()
-        gpu.dispatch(program, surface.size[0] * lists.tiles[1])
-    return tile_lists(splats.larger(points), surface, splats, NOT_HIDDEN)
+    defines = {"FOUND": 1, "FARTHEST": 0, "FILL": 1, "LARGE": int(large is not None), "AWAY": 0}
+    run("show", surface, lists, defines, splats=splats)
 
 
 @contextmanager
@@ -273,27 +303,29 @@ def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
 
 
 def _pack_looks(cloud: PointCloud) -> NDArray[np.uint32]:
-    """Colour and normal of each point in two words, (N, 2): square roots of linear light and normals, 3 x 10
-    bits each."""
+    """Colour and normal of each point in two words, (N, 2): square roots of linear light, 3 x 10 bits, and
+    what common/octahedron.glsl makes of normals."""
     looks = np.zeros((len(cloud), 2), np.uint32)
     for first in range(0, len(cloud), _CHUNK):
         part = slice(first, first + _CHUNK)
         if cloud.colors is not None:
-            looks[part, 0] = _packed(roots_from_bytes(cloud.colors[part, :3]))
+            roots = roots_from_bytes(cloud.colors[part, :3]).astype(np.uint32)
+            looks[part, 0] = np.bitwise_or.reduce(roots << np.array([0, 10, 20], np.uint32), axis=1)
         if cloud.normals is not None:
-            looks[part, 1] = _packed(np.rint(_unit(cloud.normals[part]) * 511 + 512))
+            looks[part, 1] = _folded(cloud.normals[part])
     return looks
 
 
-def _packed(steps: NDArray) -> NDArray[np.uint32]:
-    """Three numbers below 1024 in a word, of (N, 3)."""
-    shifted = steps.astype(np.uint32) << np.array([0, 10, 20], np.uint32)
-    return np.bitwise_or.reduce(shifted, axis=1)
-
-
-def _unit(normals: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Normals of unit length, (N, 3); zero where one is missing."""
+def _folded(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """Words of normals of any length, (N, 3), as common/octahedron.glsl has them; 0 where one is missing."""
     with np.errstate(all="ignore"):
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        usable = np.isfinite(length) & (length > 0)
-        return np.where(usable, normals / length, np.float32(0))
+        # Of its largest, so that no sum of the three is beyond float32.
+        normals = normals / np.abs(normals).max(axis=1, keepdims=True)
+        normals /= np.abs(normals).sum(axis=1, keepdims=True)
+        usable = np.isfinite(normals.sum(axis=1))
+        x, y, z = np.where(usable[:, None], normals, 0).T
+    under = z < 0
+    turned_x, turned_y = (np.copysign(1 - np.abs(b), a) for a, b in ((x, y), (y, x)))
+    net = np.stack([np.where(under, turned_x, x), np.where(under, turned_y, y)], axis=1)
+    words = np.rint(net * 32767).astype("<i2").view("<u4")[:, 0].astype(np.uint32)
+    return np.where(usable, np.maximum(words, 1), np.uint32(0))

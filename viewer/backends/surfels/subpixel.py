@@ -24,7 +24,7 @@ from .splats import Splats, bind_visible
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
 _SAMPLE = 1 << 13
 # What a splat gives to a mean, as surfels/passes/averaged.glsl has it: one of it, its normal, its light.
-_LIMITS = (1.0, 512.0, 512.0, 512.0)
+_LIMITS = (1.0, 2047.0, 2047.0, 2047.0)
 _COLORED_LIMITS = (*_LIMITS, *[float(LIGHT_STEPS)] * 3)
 # Splats of a pixel whose sums of light fit into 32 bits. Of more, as of a scan far away, the nearest is shown
 # alone.

@@ -6,8 +6,8 @@ go on from what that found or added up; where any is large, all tiles are worked
 
 What faces away comes second: first the discs that face the eye are listed and shown, then those of the
 others that some tile they reach lets through, going by the farthest depth it shows. Of a closed surface
-that leaves the outline alone. The CPU waits once, for the length of the lists: it sizes them, and tells
-whether any splat is large.
+that leaves the outline alone. A second pass goes over both lists. The CPU waits once for each, for the length
+of the lists: it sizes them, and tells whether any splat is large.
 """
 
 from __future__ import annotations
@@ -35,13 +35,15 @@ _DISC_BYTES = 16  # of a point in each of two buffers
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
 # Entries of one tile's list: of more, sums of light could exceed 32 bits (31 x 4095 each); llvmpipe ends all
-# loops of an invocation after 65 535 turns, and a pass may go over its list twice; on hardware a pixel alone with
-# so many would be slow.
+# loops of an invocation after 65 535 turns, and a pass may go over its list twice; on hardware a pixel alone
+# with so many would be slow.
 _LONGEST = 30_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
 _LARGE_HEAD = 16  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
+DEPTH, LIMIT = 1, 2  # what is kept of each tile: FARTHEST of show.comp
+_SHOWN = {"FOUND": 0, "FARTHEST": 0, "FILL": 0, "LARGE": 0, "AWAY": 0}
 FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 
 
@@ -60,7 +62,7 @@ class TileLists:
         self.away = False
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
-        self._bins = Bins(gpu, words)
+        self._bins, self._away_bins = Bins(gpu, words), Bins(gpu, words)
         self._textures = {"farthest": self._texture(4 * words, gl.R32UI)}
         for name in ("work", "again"):
             self._textures[name] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
@@ -71,47 +73,56 @@ class TileLists:
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         textures = [*self._textures.values(), *([self._large_rows] if self._large_rows else [])]
-        return self._bins.nbytes + sum(texture.buffer.size for texture in textures)
+        bins = self._bins.nbytes + self._away_bins.nbytes
+        return bins + sum(texture.buffer.size for texture in textures)
 
-    def fill(self, points: Points, splats: Splats, side: int = ALL) -> bool:
+    def fill(self, points: Points, splats: Splats, side: int = ALL, both: bool = False) -> bool:
         """List the discs of points for the bound view; False where the lists would grow too long.
 
-        side: ALL; TOWARDS, those that face the eye; AWAY, the others, unless they are hidden by what
-        `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large ones are counted but
-        for AWAY.
+        side: ALL; TOWARDS, those that face the eye; AWAY, the others that it found, in lists beside, unless
+        they are hidden by what `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large
+        ones are counted but for AWAY. both: whether `run` goes over the tiles of both lists.
         """
-        gpu = self._gpu
-        self._reserve(max(points.count, 1))
-        self._rows = points.rows
-        self._buffer("large").write(bytes(_LARGE_HEAD))
+        gpu, second = self._gpu, side == AWAY
+        bins = self._away_bins if second else self._bins
+        if not second:
+            self._reserve(max(points.count, 1))
+            self._rows = points.rows
+        self._buffer("large").write(struct.pack("4I", self.large if both else 0, 0, 0, 0))
 
         def bind(program: Program) -> None:
-            points.bind(program)
+            if not second:
+                points.bind(program)
+                self._bind_storage("places", "forms", "reach", "large")
             self._textures["farthest"].bind(Texture.FARTHEST)
-            self._textures["reach"].bind(Texture.REACH)
-            self._bind_storage("places", "forms", "reach", "large")
+            for name in ("reach", "away"):
+                self._textures[name].bind(Texture[name.upper()])
+            self._bind_storage("away")
 
-        defines = {"SIDE": side, "TILE": TILE, **points.defines}
+        defines = {"SIDE": side, "TILE": TILE, **({} if second else points.defines)}
         visits = Visits("surfels/tiles/cells.glsl", points.count, bind, defines, splats)
-        self._bins.count(visits)
+        bins.count(visits)
         with gpu.timers.measure("work"):
-            self._find_work()
+            self._find_work(bins, second, both)
             words = self._buffer("large").read(_LARGE_HEAD)
-            self.large, self.length, self.away, longest = struct.unpack("2I?3xI", words)
+            large, self.length, away, longest = struct.unpack("2I?3xI", words)
+            if not second:
+                self.large, self.away = large, away
         if self.length > gpu.max_storage_bytes // 4 or longest > _LONGEST:
             return False
-        self._bins.fill(visits, self.length)
+        bins.fill(visits, self.length)
         return True
 
-    def _find_work(self) -> None:
+    def _find_work(self, bins: Bins, second: bool, both: bool) -> None:
         """List the tiles that discs reach."""
 
         def bind(_: Program) -> None:
-            self._bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
+            bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
+            self._bins.starts.bind(Texture.STARTS)
             self._bind_storage("large", "work", "farthest")
 
-        defines = {"TILES": f"{_mapping(self._gpu)[1]}u"}
-        scan_words(self._gpu, "surfels/tiles/work.glsl", self._bins.cells, bind, defines)
+        defines = {"TILES": f"{_mapping(self._gpu)[1]}u", "SECOND": int(second), "BOTH": int(both)}
+        scan_words(self._gpu, "surfels/tiles/work.glsl", bins.cells, bind, defines)
 
     def large_points(self, points: Points) -> Points:
         """The points that are left to the rasteriser."""
@@ -130,6 +141,8 @@ class TileLists:
         self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
         self._bins.items.bind(Texture.LISTED)
+        self._away_bins.starts.bind(Texture.AWAY_STARTS)
+        self._away_bins.items.bind(Texture.AWAY_LISTED)
         if self._rows is not None:
             self._rows.bind(Texture.DRAWN_ROWS)
         self._bind_storage("farthest")
@@ -154,7 +167,7 @@ class TileLists:
 
     def release(self) -> None:
         """Delete everything."""
-        self._gpu.discard(self._bins, *self._textures.values(), self._large_rows)
+        self._gpu.discard(self._bins, self._away_bins, *self._textures.values(), self._large_rows)
 
     @property
     def defines(self) -> dict[str, object]:
@@ -174,6 +187,7 @@ class TileLists:
         self._replace("places", _DISC_BYTES * count, gl.RGBA32F)
         self._replace("forms", _DISC_BYTES * count, gl.RGBA32F)
         self._replace("reach", 4 * count, gl.R32UI)
+        self._replace("away", 4 * count, gl.R32UI)
         self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
         self._bins.reserve(_ROOM * count)
 
@@ -193,24 +207,38 @@ class TileLists:
 
 
 def splat(points: Points, surface: Surface, splats: Splats) -> None:
-    """The nearest disc at each pixel: what `amplify` draws, up to rounding.
+    """The nearest disc at each pixel: what `amplify` draws, up to rounding."""
+    if not splat_first(points, surface, splats, DEPTH):
+        amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
+
+
+def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int) -> bool:
+    """The nearest disc at each pixel, by tiles; False where the rasteriser has to do it all.
 
     First come those that face the eye, then those of the others that the first do not hide: of a closed
-    surface next to none.
+    surface next to none. farthest: as in `show`; where it is LIMIT, it is told in any case.
     """
     lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS)
     if lists is None:
-        amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
-        return
+        return False
     away = lists.away
-    show_all(points, surface, lists, splats, farthest=away)
+    farthest = farthest if away or farthest == LIMIT else 0
+    show_all(points, surface, lists, splats, farthest)
     if not away:
         surface.stats.skipped["second lists"] = "no splat that is drawn faces away"
-    elif lists.fill(points, splats, AWAY):
-        show(surface, lists, found=True)
-    else:
+        return True
+    if not fill_away(points, surface, lists, splats):
+        return False
+    show(points, surface, lists, splats, found=True, farthest=farthest if farthest == LIMIT else 0, away=True)
+    return True
+
+
+def fill_away(points: Points, surface: Surface, lists: TileLists, splats: Splats, both: bool = False) -> bool:
+    """List what faces away; False where the rasteriser has to do it all. both: as in `TileLists.fill`."""
+    fits = lists.fill(points, splats, AWAY, both)
+    if not fits:
         surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"
-        amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
+    return fits
 
 
 def tile_lists(points: Points, surface: Surface, splats: Splats, side: int = ALL) -> TileLists | None:
@@ -233,40 +261,51 @@ def tile_lists(points: Points, surface: Surface, splats: Splats, side: int = ALL
 
 
 def show_all(
-    points: Points,
-    surface: Surface,
-    lists: TileLists,
-    splats: Splats,
-    farthest: bool = False,
+    points: Points, surface: Surface, lists: TileLists, splats: Splats, farthest: int = 0
 ) -> Points | None:
     """The nearest disc at each pixel of those listed and of the large ones, which it returns; None where
     there are none. farthest: as in `show`."""
     large = lists.large_points(points) if lists.large else None
-    if large is None:
-        show(surface, lists, farthest=farthest)
-    else:
-        show_with(large, surface, lists, splats, farthest)
+    show_with(points, large, surface, lists, splats, farthest)
     return large
 
 
 def show_with(
-    large: Points, surface: Surface, lists: TileLists, splats: Splats, farthest: bool = False
+    points: Points,
+    large: Points | None,
+    surface: Surface,
+    lists: TileLists,
+    splats: Splats,
+    farthest: int = 0,
 ) -> None:
-    """The nearest disc at each pixel of those listed and of others, which are rasterised. farthest: as in
+    """The nearest disc at each pixel of those listed and of large ones, which are rasterised. farthest: as in
     `show`."""
-    amplify(large, surface, FALLBACK, SURFEL, FRAGMENT, splats)
-    show(surface, lists, found=True, farthest=farthest)
+    if large is not None:
+        amplify(large, surface, FALLBACK, SURFEL, FRAGMENT, splats)
+    show(points, surface, lists, splats, found=large is not None, farthest=farthest)
 
 
-def show(surface: Surface, lists: TileLists, found: bool = False, farthest: bool = False) -> None:
+def show(
+    points: Points,
+    surface: Surface,
+    lists: TileLists,
+    splats: Splats,
+    found: bool = False,
+    farthest: int = 0,
+    away: bool = False,
+) -> None:
     """The nearest listed disc at each pixel.
 
-    found: over what the surface holds already. farthest: for a filling with AWAY that follows.
+    found: over what the surface holds already. farthest: what fillings that follow go by: DEPTH, what a tile
+    shows; LIMIT, how far behind that splats still count. away: of those that face away.
     """
     if not found:
         surface.clear()
-    defines = {"FOUND": int(found), "FARTHEST": int(farthest), "FILL": 0, "LARGE": 0}
-    run("show", surface, lists, defines)
+    defines = {**_SHOWN, "FOUND": int(found), "FARTHEST": farthest, "AWAY": int(away)}
+    if farthest == LIMIT:
+        run("show", surface, lists, {**defines, **points.defines}, points, splats)
+    else:
+        run("show", surface, lists, defines, splats=splats)
 
 
 def run(
@@ -293,12 +332,12 @@ def run(
         lists.run(program, again)
 
 
-def show_smaller(surface: Surface, lists: TileLists) -> None:
+def show_smaller(surface: Surface, lists: TileLists, splats: Splats) -> None:
     """Show the tiles again in which a pixel shows a disc that does not reach it any more, now that some have
     become smaller. `Texture.DISCS` is bound to the number of each row's."""
     lists.start_again()
-    run("again", surface, lists, {})
-    run("show", surface, lists, {"FOUND": 0, "FARTHEST": 0, "FILL": 0, "LARGE": 0}, again=True)
+    run("again", surface, lists, {"AWAY": 0})
+    run("show", surface, lists, _SHOWN, splats=splats, again=True)
 
 
 def _mapping(gpu: Gpu) -> tuple[int, int]:
