@@ -149,8 +149,8 @@ def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
 
 
 def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
-    """Both passes over the same lists, at once where no disc is large. False where the rasteriser has to do
-    it all."""
+    """Draw both passes by the same lists, at once where no disc is large. False where the rasteriser has to
+    do it all."""
     lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS)
     if lists is None:
         return False
