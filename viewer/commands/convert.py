@@ -26,6 +26,7 @@ from ._scans import (
     chosen_poses,
     frame_files,
     frame_outputs,
+    framing,
     open_timeline,
     read_poses,
 )
@@ -79,6 +80,7 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
     if is_pattern(out):
         raise InputError("has a place for a number, and one file holds all poses", out, "Leave it out")
     claim([out], scan_inputs(timeline), args.force)
+    around = framing(timeline, indices) if len(indices) > 1 else None
     with progress(len(indices)) as tick:
 
         def poses() -> Iterator[Pose]:
@@ -86,7 +88,7 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
                 yield pose
                 tick()
 
-        formats.write_poses(out, poses(), timeline.unit, stop=stop)
+        formats.write_poses(out, poses(), timeline.unit, stop=stop, around=around)
     try:
         formats.check(out)
     except InputError as problem:  # all is there, but not everybody can read it

@@ -18,10 +18,10 @@ from viewer.scan.octree.build import Stop, build
 from viewer.scan.octree.coding import MaskCoder, normal_bytes, normals_of
 from viewer.scan.octree.cube import Cube
 from viewer.scan.octree.octree import Attributes, Octree
-from viewer.scan.octree.storage import Header, Level, from_bytes, read_header, to_bytes
+from viewer.scan.octree.storage import Header, Level, Strays, from_bytes, read_header, read_strays, to_bytes
 from viewer.scan.points import PointCloud
 
-HEAD = 70  # bytes of a header before its unit
+HEAD = 90  # bytes of a header before its unit
 CUBE = Cube(np.array([-1.5, -1.5, -1.5]), 3.0)
 DEGREE = np.cos(np.radians(1))
 
@@ -115,7 +115,7 @@ def test_the_layout_is_the_stated_one() -> None:
     magic, version, flags, before, depth, unit_size, zero = struct.unpack_from("<4s6B", data)
     assert (magic, version, flags, before, depth, unit_size, zero) == (
         b"\x8dSVO",
-        1,
+        2,
         0,
         0,
         octree.depth,
@@ -126,6 +126,7 @@ def test_the_layout_is_the_stated_one() -> None:
     assert told == 0
     assert (time, low, edge) == (0.25, octree.low.tolist(), octree.edge)
     assert (points, distinct) == (octree.points, octree.distinct)
+    assert struct.unpack_from("<5I", data, 70) == (0, 0, 0, 0, 0)
     assert data[HEAD : HEAD + 2] == b"mm"
     at, ends = HEAD + 2, HEAD + 2 + 16 * (depth + 1)
     levels = [struct.unpack_from("<4I", data, at + 16 * level) for level in range(depth + 1)]
@@ -245,6 +246,90 @@ def test_the_tree_before_has_to_be_there() -> None:
             from_bytes(told, previous)
 
 
+@pytest.mark.parametrize("name", ["delta", "occupancy", "one point"])
+def test_files_of_the_first_version_are_read(name: str) -> None:
+    """Whose header lacks what the second has more: strays, and attributes told by the tree before."""
+    octree = TREES[name]
+    data = to_bytes(octree, time=2.0, unit="mm")
+    _, size = read_header(data)
+    ends = size - 4
+    first = bytearray(data[:70] + data[HEAD:ends])
+    first[4] = 1
+    old = bytes(first) + zlib.crc32(first).to_bytes(4, "little") + data[size:]
+    assert len(old) == len(data) - 20
+    back, told = from_bytes(old), read_header(old)[0]
+    assert_same_geometry(back, octree)
+    assert (told.time, told.unit, told.points) == (2.0, "mm", octree.points)
+    for mine, theirs in zip(back.attributes, from_bytes(data).attributes, strict=True):
+        np.testing.assert_array_equal(mine.colors, theirs.colors)
+        np.testing.assert_array_equal(mine.normals, theirs.normals)
+    assert len(read_strays(old)) == 0
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.002, 0.4])
+def test_attributes_are_told_by_the_pose_before(turn: float) -> None:
+    """Where octants are the same, and not where parents tell more; back come the same bytes."""
+    first, second = (build(ball(4000, turn=angle), cube=CUBE) for angle in (0.0, turn))
+    alone, told = to_bytes(second), to_bytes(second, from_bytes(to_bytes(first)))
+    assert told == to_bytes(second, first), "what is read tells the same as what was written"
+    back, plain = from_bytes(told, from_bytes(to_bytes(first))), from_bytes(alone)
+    for mine, theirs in zip(back.attributes, plain.attributes, strict=True):
+        assert np.array_equal(mine.colors, theirs.colors)
+        assert np.array_equal(mine.normals, theirs.normals)
+    sizes = [sum(each.attributes for each in read_header(data)[0].levels) for data in (told, alone)]
+    assert sizes[0] < {0.0: 0.02, 0.002: 0.6, 0.4: 1.001}[turn] * sizes[1]
+    assert bool(read_header(told)[0].told_attributes) == (turn < 0.4)
+    if turn < 0.4:
+        with pytest.raises(InputError, match="told by the octree before it"):
+            from_bytes(told, bare(first))
+        assert_same_geometry(from_bytes(told, bare(first), attributes=False), second)
+
+
+def test_only_octants_with_the_same_attributes_tell_them() -> None:
+    first, second = build(ball(), cube=CUBE), build(ball(turn=1e-4), cube=CUBE)
+    for kept in ("colors", "normals"):
+        of_one = replace(
+            first, attributes=tuple(Attributes(**{kept: getattr(a, kept)}) for a in first.attributes)
+        )
+        told = to_bytes(second, of_one)
+        assert not read_header(told)[0].told_attributes
+        assert_same_attributes(from_bytes(told, of_one), second)
+
+
+def test_strays_come_back_as_they_are() -> None:
+    far = np.array([[1e6, -3.3, 0.1], [-9999.0, 5.5, 1 / 3]]) + np.array([5e5, 5.4e6, 0])
+    near = ball().world() + np.array([5e5, 5.4e6, 0])
+    points = np.insert(near, [7, 900], far, axis=0)
+    normals = np.tile([[0.6, 0.0, 0.8]], (len(points), 1))
+    colors = np.random.default_rng(2).integers(0, 256, (len(points), 4), np.uint8)
+    cloud = PointCloud.from_arrays(points, normals=normals, colors=colors)
+    octree = build(cloud)
+    assert octree.strays.tolist() == [7, 901]
+    data = to_bytes(octree, strays=Strays.of(octree, cloud))
+    back = read_strays(data)
+    np.testing.assert_allclose(back.positions, far, rtol=1e-15)
+    assert np.array_equal(back.colors, colors[octree.strays])
+    assert (back.normals @ [0.6, 0.0, 0.8]).min() > DEGREE
+    assert_same_geometry(from_bytes(data), octree)
+    header, size = read_header(data)
+    assert header.strays.nodes == len(back) == 2
+    broken = bytearray(data)
+    broken[size] ^= 1
+    with pytest.raises(InputError, match="points outside an octree are damaged"):
+        read_strays(bytes(broken))
+    with pytest.raises(InputError, match="ends within the points outside"):
+        read_strays(data[: size + header.strays.masks - 1])
+
+
+def test_normals_are_kept_as_bytes_that_are_their_own() -> None:
+    """So that a tree that was read tells the next one as that which was written does."""
+    pairs = np.indices((256, 256), np.uint8).reshape(2, -1).T
+    once = normal_bytes(normals_of(pairs))
+    np.testing.assert_array_equal(normal_bytes(normals_of(once)), once)
+    assert (normals_of(once) * normals_of(pairs)).sum(axis=1)[1:].min() > 0.9999
+    assert len(np.unique(once, axis=0)) > 64_000
+
+
 # --- damage ---------------------------------------------------------------------------
 
 
@@ -279,8 +364,8 @@ def test_headers_that_contradict_themselves_are_refused() -> None:
 
 def test_other_versions_are_refused() -> None:
     data = bytearray(to_bytes(TREES["delta"]))
-    data[4] = 2
-    with pytest.raises(InputError, match=r"version 2\. This Scan4D reads version 1"):
+    data[4] = 3
+    with pytest.raises(InputError, match=r"version 3\. This Scan4D reads versions up to 2"):
         from_bytes(bytes(data))
 
 

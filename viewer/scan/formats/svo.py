@@ -1,7 +1,8 @@
 """SVO: octrees of all poses in one file, one after another; docs/octree-files.md has the layout.
 
-Each pose is its leaves: a point in the middle of each, with its colour and normal. Written are geometry,
-colours, normals, times and unit. A pose may be told by the one before it: then that is read too.
+Each pose is its leaves: a point in the middle of each, with its colour and normal; and the few points far
+outside, as they are. Written are geometry, colours, normals, times and unit. A pose may be told by the one
+before it: then that is read too.
 """
 
 from __future__ import annotations
@@ -17,13 +18,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bounds import Bounds
 from ...errors import InputError
 from ...task import checkpoint
 from ..octree.build import Stop, build
-from ..octree.cube import Cube, extremes
+from ..octree.cube import Cube
 from ..octree.leaves import leaf_points
 from ..octree.octree import Octree
-from ..octree.storage import LARGEST_HEADER, Header, from_bytes, read_header, to_bytes
+from ..octree.storage import (
+    LARGEST_HEADER,
+    CutShort,
+    Header,
+    Strays,
+    from_bytes,
+    read_header,
+    read_strays,
+    to_bytes,
+)
 from ..points import PointCloud
 from ..pose import Pose
 from ._admission import admit, check_count, opened, read_exactly, size_of
@@ -33,11 +44,14 @@ SUFFIXES = (".svo",)
 
 _MOST_POSES = 1 << 17  # an hour at 30 a second
 _LONGEST = 8  # octrees read for one pose
-_MARGIN = 1 / 8  # around the pose that a cube is made for, of its extent
+_MARGIN = 1 / 8  # around the poses that a cube is made for, of its edge
 _NODE_BYTES = 68  # that decoding takes for a node of the largest level, beside attributes
+_HELD_BYTES = 17  # of a node, its mask, colour and normal
+_STRAY_BYTES = 200  # that reading a point outside takes
 _LEAF_BYTES = 60  # that points take for a leaf
 _MOST_RATIO = 100  # of memory to the file: leaves of surfaces take 6 bits and more each
-_TOO_LARGE = 2.5  # a cube, for a pose of less extent by this factor
+_TOO_LARGE = 2.5  # a cube, for a pose whose own is smaller by this factor
+_FEW = 1 / 1024  # of a pose's points: what may be outside a cube that fits
 
 
 def frame_count(path: Path) -> int:
@@ -94,42 +108,77 @@ class Frames:
                 file.seek(self._places[index].offset)
                 admit(size_of(file), self._places[index].memory, _MOST_RATIO)
                 data = read_exactly(file, self._places[index].size)
-                previous = from_bytes(data, previous, attributes=index == frame, leaves_only=True)
+                previous = from_bytes(data, previous)
             assert previous is not None, "there is the one asked for"
             admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES, _MOST_RATIO)
-            self._last = frame, replace(previous, attributes=())
-        return leaf_points(previous)
+            self._last = frame, previous
+            strays = read_strays(data)
+        return _joined(leaf_points(previous), strays)
 
 
-def write_poses(path: Path, poses: Iterable[Pose], unit: str, stop: Stop | None = None) -> None:
-    """Write the octrees of all poses. stop: where their subdivision ends.
+def _joined(leaves: PointCloud, strays: Strays) -> PointCloud:
+    """Leaves, and behind them points outside, as large as half of the leaves are at most."""
+    if not len(strays):
+        return leaves
+    own = PointCloud.from_arrays(
+        strays.positions, colors=strays.colors, normals=strays.normals, origin=leaves.origin
+    )
+    assert leaves.radii is not None
+    own = replace(own, radii=np.full(len(own), np.median(leaves.radii), np.float32))
 
-    They share a cube for as long as it fits, since only then one tells of the next.
+    def both(first: NDArray | None, second: NDArray | None) -> NDArray | None:
+        return None if first is None or second is None else np.concatenate([first, second])
+
+    without = np.zeros_like(leaves.positions)
+    return replace(
+        leaves,
+        positions=np.concatenate([leaves.positions, own.positions]),
+        colors=both(leaves.colors, own.colors),
+        normals=both(leaves.normals, own.normals),
+        radii=both(leaves.radii, own.radii),
+        remainders=both(without, own.remainders),
+    )
+
+
+def write_poses(
+    path: Path,
+    poses: Iterable[Pose],
+    unit: str,
+    stop: Stop | None = None,
+    around: Bounds | None = None,
+) -> None:
+    """Write the octrees of all poses. stop: where their subdivision ends. around: the bounds of them, by all
+    that is known; None: of the first.
+
+    They share the cube around these, with a margin, for as long as it fits, since only then one tells of the
+    next.
     """
-    cube: Cube | None = None
+    cube = None if around is None else _with_margin(Cube.around(around.low, around.high))
     previous, chain = None, 0
     with open(path, "wb") as file:
         for pose in poses:
-            cube = _cube_for(pose.cloud, cube)
+            cube = _cube_for(pose.cloud, cube, is_of_all=around is not None)
             octree = build(pose.cloud, stop, cube)
-            told_by = previous if chain < _LONGEST else None
-            data = to_bytes(octree, told_by, chain=chain, time=pose.time, unit=unit)
+            told_by, strays = previous if chain < _LONGEST else None, Strays.of(octree, pose.cloud)
+            data = to_bytes(octree, told_by, chain=chain, time=pose.time, unit=unit, strays=strays)
             file.write(data)
             previous, chain = octree, read_header(data)[0].before + 1
 
 
-def _cube_for(cloud: PointCloud, cube: Cube | None) -> Cube:
-    """The cube of the pose before where it fits, else one with a margin; the first pose has one without."""
-    if cube is None:
-        return Cube.holding(cloud)
-    low, high = extremes(cloud.positions)
-    offset = cloud.origin - cube.low
-    extent = float((high - low).max())
-    holds = (low + offset >= 0).all() and (high + offset <= cube.edge).all()
-    if holds and cube.edge <= _TOO_LARGE * extent:
+def _cube_for(cloud: PointCloud, cube: Cube | None, is_of_all: bool) -> Cube:
+    """The cube of the pose before where it fits, else one with a margin. is_of_all: whether that before is of
+    all poses, and so not too large for this one."""
+    body = Cube.of(cloud)
+    may_be_outside = max(len(body.outside(cloud)), _FEW * len(cloud))
+    is_close = cube is not None and (is_of_all or cube.edge <= _TOO_LARGE * body.edge)
+    if cube is not None and is_close and len(cube.outside(cloud)) <= may_be_outside:
         return cube
-    margin = _MARGIN * extent
-    return Cube.around(low + cloud.origin - margin, high + cloud.origin + margin)
+    return _with_margin(body)
+
+
+def _with_margin(cube: Cube) -> Cube:
+    margin = _MARGIN * cube.edge
+    return Cube.around(cube.low - margin, cube.low + cube.edge + margin)
 
 
 class _Place(NamedTuple):
@@ -142,14 +191,24 @@ class _Place(NamedTuple):
     @property
     def memory(self) -> int:
         """Bytes that decoding it takes at most at a time."""
-        nodes = max(level.nodes for level in self.header.levels)
-        return nodes * (_NODE_BYTES + 4 * self.header.width)
+        nodes = [level.nodes for level in self.header.levels]
+        # Twice: with the tree of the pose before.
+        held = 2 * (_HELD_BYTES if self.header.width else 1) * sum(nodes)
+        outside = _STRAY_BYTES * self.header.strays.nodes
+        return max(nodes) * (_NODE_BYTES + 4 * self.header.width) + held + outside
 
 
 def _places(path: Path) -> list[_Place]:
     """All octrees of a file. Raises InputError where there is something else, or a chain has no beginning."""
     status = path.stat()
     return _found(path, status.st_size, status.st_mtime_ns)
+
+
+def _cut(places: list[_Place], offset: int, end: int) -> _Place:
+    """The place of an octree of which a file cut short has the beginning, at the time that it should have."""
+    last = places[-1].header
+    step = last.time - places[-2].header.time if len(places) > 1 else 1.0
+    return _Place(offset, end - offset, replace(last, before=0, time=last.time + step))
 
 
 @lru_cache(maxsize=2)  # opening a scan asks for them several times
@@ -162,6 +221,12 @@ def _found(path: Path, size: int, changed: int) -> list[_Place]:
             file.seek(offset)
             try:
                 header, taken = read_header(file.read(LARGEST_HEADER))
+            except CutShort as error:
+                if not places:
+                    error.what = f"octree 0, at byte 0: {error.what}"
+                    raise
+                places.append(_cut(places, offset, end))  # told when it is read
+                break
             except InputError as error:
                 error.what = f"octree {len(places)}, at byte {offset}: {error.what}"
                 raise

@@ -3,19 +3,21 @@
 Whoever reads a level knows all levels above it and, of a sequence, the whole tree of the pose before. For
 masks that tells two things of each node: the mask that the same octant has in the tree before, and which of
 the octants beside its six faces are there. Nodes of which the same is known have similar masks; they are
-stored together, each mask XOR the one before. Attributes are stored as differences from the parent's.
+stored together, each mask XOR the one before. Attributes are stored as differences from the parent's, or from
+those of the same octant in the tree before.
 """
 
 from __future__ import annotations
 
 import lzma
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from .neighbors import Bytes, Children, Neighbors
+from .neighbors import Bytes, Children, Neighbors, Nodes
 
 MOST_RATIO = 64  # of unpacked to packed: what packs better stays as it is, so that a file cannot promise more
 _LZMA = {
@@ -26,18 +28,18 @@ _LZMA = {
 }
 
 
-def pack(values: Bytes) -> bytes:
-    """Pack bytes as LZMA without a header; as they are where that is not shorter, or beyond `MOST_RATIO`."""
+def pack(values: Bytes, most: int = MOST_RATIO) -> bytes:
+    """Pack bytes as LZMA without a header; as they are where that is not shorter, or beyond a ratio."""
     plain = values.tobytes()
     packed = lzma.compress(plain, format=lzma.FORMAT_RAW, filters=[_LZMA])
-    return packed if len(plain) <= MOST_RATIO * len(packed) and len(packed) < len(plain) else plain
+    return packed if len(plain) <= most * len(packed) and len(packed) < len(plain) else plain
 
 
-def unpack(block: bytes, size: int) -> Bytes:
+def unpack(block: bytes, size: int, most: int = MOST_RATIO) -> Bytes:
     """The bytes that `pack` was given, as many as there were. Raises InputError where they are others."""
     if len(block) == size:
         return np.frombuffer(block, np.uint8)
-    if size > MOST_RATIO * len(block):
+    if size > most * len(block):
         raise InputError(f"{len(block)} bytes would unpack to {size}")
     try:
         plain = lzma.LZMADecompressor(lzma.FORMAT_RAW, filters=[_LZMA]).decompress(block, size)
@@ -55,7 +57,7 @@ class MaskCoder:
         """root: how many nodes level 0 has. before: the masks of the tree before, on the same cube."""
         self._neighbors = Neighbors(root)
         self._before = before
-        self._counterparts = np.zeros(root, np.int32)  # the same octants in the tree before
+        self.counterparts = np.zeros(root, np.int32)  # the same octants in the tree before, -1: there is none
 
     def sort(self, masks: Bytes, told: bool) -> Bytes:
         """Order the masks of this level as they are stored, (n,). told: by the tree before."""
@@ -71,40 +73,63 @@ class MaskCoder:
 
     def _known(self, told: bool) -> tuple[Bytes, NDArray[np.intp]]:
         """The masks of the same octants in the tree before, 0 for none; the order of what is stored."""
-        known = np.zeros(len(self._counterparts), np.uint8)
+        known = np.zeros(len(self.counterparts), np.uint8)
         if told and self._before:
-            known = np.append(self._before[0], np.uint8(0))[self._counterparts]
+            known = np.append(self._before[0], np.uint8(0))[self.counterparts]
         key = known.astype(np.uint16) << np.uint16(6) | self._neighbors.around()
         return known, np.argsort(key, kind="stable")
 
-    def descend(self, masks: Bytes) -> None:
-        """Go on to the level below the one that has these masks."""
-        children = self._neighbors.descend(masks)
-        self._counterparts = self._counterparts[children.parents]
+    def descend(self, masks: Bytes, deepest: bool = False) -> None:
+        """Go on to the level below the one that has these masks. deepest: which has no masks of its own, so
+        that `counterparts` are all that is asked of it."""
+        children = Children(masks) if deepest else self._neighbors.descend(masks)
         if self._before:
-            self._counterparts = Children(self._before[0]).find(self._counterparts, children.octants)
+            above = self.counterparts[children.parents]
+            self.counterparts = Children(self._before[0]).find(above, children.octants)
             self._before = self._before[1:]
+        else:
+            self.counterparts = np.full(len(children.parents), -1, np.int32)
 
 
 # --- attributes -------------------------------------------------------------------------
 
 
-def differences(values: Bytes, above: Bytes, masks: Bytes) -> Bytes:
-    """Differences that are stored of (n, k) bytes of a level: of siblings from their parents, by columns.
+class Counterparts(NamedTuple):
+    """Attributes of a level as the tree before tells them. nodes: (n,) the same octants there, -1 for none.
+    values: the bytes of all octants there, (m, k)."""
+
+    nodes: Nodes
+    values: Bytes
+
+
+def differences(values: Bytes, above: Bytes, masks: Bytes, before: Counterparts | None = None) -> Bytes:
+    """Differences that are stored of (n, k) bytes of a level, by columns: of siblings from their parents; or
+    first of those with a counterpart from that, then of the others from their parents.
 
     above: (m, k), the parents'. masks: (m,). An only child has the points of its parent and so
     its values, which are not stored.
     """
-    parents, siblings = _families(masks)
-    return (values[siblings] - above[parents[siblings]]).T.ravel()
+    expected, stored = _expected(above, masks, before)
+    return (values[stored] - expected[stored]).T.ravel()
 
 
-def restored(stored: Bytes, above: Bytes, masks: Bytes) -> Bytes:
+def restored(stored: Bytes, above: Bytes, masks: Bytes, before: Counterparts | None = None) -> Bytes:
     """(n, k) bytes of a level from their `differences`."""
-    parents, siblings = _families(masks)
-    values = above[parents]
-    values[siblings] += stored.reshape(above.shape[1], -1).T
+    values, rows = _expected(above, masks, before)
+    values[rows] += stored.reshape(above.shape[1], -1).T
     return values
+
+
+def _expected(above: Bytes, masks: Bytes, before: Counterparts | None) -> tuple[Bytes, NDArray[np.intp]]:
+    """Bytes expected of a level, (n, k), and the nodes of which differences are stored, in their order."""
+    parents, siblings = _families(masks)
+    expected = above[parents]
+    if before is None:
+        return expected, siblings
+    known = before.nodes[siblings] >= 0
+    told = siblings[known]
+    expected[told] = before.values[before.nodes[told]]
+    return expected, np.concatenate([told, siblings[~known]])
 
 
 def sibling_count(masks: Bytes) -> int:
@@ -135,9 +160,15 @@ def colors_of(stored: Bytes) -> Bytes:
 def normal_bytes(normals: NDArray[np.float32]) -> Bytes:
     """(n, 2): unit normals on the octahedron unfolded into a square of 255 x 255 cells, to a degree.
 
-    1..255 along each side; 0, 0 stands for no normal. Cigolle et al. 2014, A Survey of Efficient
-    Representations for Independent Unit Vectors.
+    1..255 along each side; 0, 0 stands for no normal. Of cells at the rim that stand for one direction, one
+    is taken, so that these are the bytes of their own `normals_of`. Cigolle et al. 2014, A Survey of
+    Efficient Representations for Independent Unit Vectors.
     """
+    cells = _cells(normals).astype(np.uint16)
+    return _one_of_each()[cells[:, 0] << np.uint16(8) | cells[:, 1]]
+
+
+def _cells(normals: NDArray[np.float32]) -> Bytes:
     length = np.abs(normals).sum(axis=1, keepdims=True)
     flat = normals / np.where(length > 0, length, np.float32(1))
     x, y = flat[:, 0], flat[:, 1]
@@ -155,6 +186,15 @@ def normal_bytes(normals: NDArray[np.float32]) -> Bytes:
 def normals_of(stored: Bytes) -> NDArray[np.float32]:
     """(n, 3) float32 normals of their `normal_bytes`; 0 where there is none."""
     return _normals()[stored[:, 0].astype(np.uint16) << np.uint16(8) | stored[:, 1]]
+
+
+@cache
+def _one_of_each() -> Bytes:
+    """(65536, 2): of each pair of bytes those that stand for its direction, which are their own."""
+    ones = _cells(_normals()).astype(np.uint16)
+    for _ in range(2):
+        ones = _cells(_normals()[ones[:, 0] << np.uint16(8) | ones[:, 1]]).astype(np.uint16)
+    return ones.astype(np.uint8)
 
 
 @cache

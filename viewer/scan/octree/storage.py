@@ -1,45 +1,54 @@
-"""Octrees as bytes: a header that says what follows, then the levels, the coarsest first.
+"""Octrees as bytes: a header that says what follows, points outside, then the levels, the coarsest first.
 
 Whatever ends behind a level is the coarser tree. docs/octree-files.md has the layout.
 """
 
 from __future__ import annotations
 
+import itertools
 import struct
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..points import UNKNOWN_UNIT
+from ..points import UNKNOWN_UNIT, PointCloud
 from . import coding
-from .coding import Bytes, MaskCoder
+from .coding import Bytes, Counterparts, MaskCoder
+from .neighbors import Nodes
 from .octree import DEEPEST, Attributes, Octree
 
 MAGIC = b"\x8dSVO"
-VERSION = 1
+VERSION = 2
+_VERSIONS = (
+    1,
+    VERSION,
+)  # that can be read: the first has no strays, and attributes are told by parents alone
 _FREE = 1 << 22  # nodes of any tree: some 300 MB as points
 MOST_BEFORE = 255  # trees that have to be read before one
 
 _PACKED, _COLORS, _NORMALS = 1, 2, 4  # bits of `Header.flags`
 _FIXED = struct.Struct("<4s6BI5d2Q")  # magic, version, flags, before, depth, size of the unit, 0; numbers
 _LEVEL = struct.Struct("<4I")  # see `Level`
+_SECOND = struct.Struct("<5I")  # what version 2 adds: `told_attributes`, and the strays as a `Level`
 _CHECK = struct.Struct("<I")  # CRC-32 of the header before it
 _MOST_UNIT = 255  # bytes
 _WORTH = 31 / 32  # of the bytes of masks that stand alone: what takes more is not told by another tree
+_OF_ATTRIBUTES = 1 << 12  # of unpacked to packed: how many nodes there are is bounded by their masks
 _LARGEST = 1e18  # coordinates that a cloud may have
-LARGEST_HEADER = _FIXED.size + _MOST_UNIT + (DEEPEST + 1) * _LEVEL.size + _CHECK.size  # bytes
+LARGEST_HEADER = _FIXED.size + _SECOND.size + _MOST_UNIT + (DEEPEST + 1) * _LEVEL.size + _CHECK.size  # bytes
 
 
 @dataclass(frozen=True)
 class Level:
     """The entry of a level in a header: its nodes, bytes of masks and of attributes, CRC-32 of both.
 
-    The masks are those of the level above, which tell where these nodes are.
+    The masks are those of the level above, which tell where these nodes are. Of strays, positions stand in
+    the place of masks.
     """
 
     nodes: int
@@ -48,13 +57,44 @@ class Level:
     check: int
 
 
+_NO_STRAYS = Level(0, 0, 0, 0)
+
+
+class CutShort(InputError):
+    """Bytes that end within the header of an octree."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strays:
+    """Points outside an octree's cube. positions: (s, 3) float64, absolute; colors: (s, 4) uint8, normals:
+    (s, 3) float32, or None, as those of the octree."""
+
+    positions: NDArray[np.float64]
+    colors: Bytes | None = None
+    normals: NDArray[np.float32] | None = None
+
+    @classmethod
+    def of(cls, octree: Octree, cloud: PointCloud) -> Strays:
+        """The strays of the octree of a cloud."""
+        rows = octree.strays
+        of_nodes = octree.attributes[0] if octree.attributes else Attributes()
+        return cls(
+            cloud.world(rows),
+            None if of_nodes.colors is None or cloud.colors is None else cloud.colors[rows],
+            None if of_nodes.normals is None or cloud.normals is None else cloud.normals[rows],
+        )
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+
 @dataclass(frozen=True, eq=False)
 class Header:
     """The header of a tree, which stands before its levels.
 
     flags: 1: packed, 2: with colours, 4: with normals. before: how many trees have to be read before this
     one, each told by the one before it; 0: it stands alone. told: bit n: the masks of level n are told by the
-    tree before. time: seconds. Others: see `Octree`.
+    tree before, told_attributes: its attributes. time: seconds. strays: their entry. Others: see `Octree`.
     """
 
     flags: int
@@ -67,11 +107,13 @@ class Header:
     distinct: int
     unit: str
     levels: tuple[Level, ...]
+    told_attributes: int = 0
+    strays: Level = _NO_STRAYS
 
     @property
     def stored(self) -> int:
-        """How many bytes the levels take."""
-        return sum(level.masks + level.attributes for level in self.levels)
+        """How many bytes the strays and the levels take."""
+        return sum(level.masks + level.attributes for level in (self.strays, *self.levels))
 
     @property
     def width(self) -> int:
@@ -83,8 +125,9 @@ class Header:
         unit = self.unit.encode()
         kind = (MAGIC, VERSION, self.flags, self.before, len(self.levels) - 1, len(unit), 0)
         place = (self.told, self.time, *self.low.tolist(), self.edge, self.points, self.distinct)
-        levels = (_LEVEL.pack(each.nodes, each.masks, each.attributes, each.check) for each in self.levels)
-        data = _FIXED.pack(*kind, *place) + unit + b"".join(levels)
+        second = _SECOND.pack(self.told_attributes, *astuple(self.strays))
+        levels = (_LEVEL.pack(*astuple(each)) for each in self.levels)
+        data = _FIXED.pack(*kind, *place) + second + unit + b"".join(levels)
         return data + _CHECK.pack(zlib.crc32(data))
 
 
@@ -96,13 +139,15 @@ def to_bytes(
     time: float = 0.0,
     unit: str = UNKNOWN_UNIT,
     packed: bool = True,
+    strays: Strays | None = None,
 ) -> bytes:
     """A tree with its colours and normals; also what a file of one pose holds.
 
     Geometry and colours come back bit for bit, normals to a degree, cones and rows not at all.
     previous: the tree of the pose before. Where it has the same cube, and that saves more than a 32nd of the
-    masks, those of the levels that get shorter are told by it, and it is needed to read them. chain: how many
-    trees have to be read for it, itself included. packed: False stores the masks as they are, breadth-first.
+    bytes, masks and attributes of the levels that get shorter are told by it, and it is needed to read them.
+    chain: how many trees have to be read for it, itself included. packed: False stores the masks as they are,
+    breadth-first. strays: the points outside, which are left out where they are not given.
     Raises InputError where the name of the unit or the tree is larger than the header can say.
     """
     if len(unit.encode()) > _MOST_UNIT or octree.counts.max() >> 31:
@@ -110,74 +155,115 @@ def to_bytes(
             f"an octree is stored with a unit of {_MOST_UNIT} bytes and 2^31 nodes a level at most"
         )
     can_tell = packed and previous is not None and chain <= MOST_BEFORE and _same_cube(octree, previous)
-    masks, told = _store_masks(octree, previous if can_tell else None, packed)
-    blocks = list(zip([b"", *masks], _store_attributes(octree), strict=True))
+    blocks = _store(octree, previous if can_tell else None, packed)
     levels = tuple(
-        Level(int(nodes), len(above), len(own), zlib.crc32(above + own))
-        for nodes, (above, own) in zip(octree.counts, blocks, strict=True)
+        Level(int(nodes), *_sizes_and_check(above, own))
+        for nodes, above, own in zip(octree.counts, blocks.masks, blocks.attributes, strict=True)
     )
-    kind = (_PACKED * packed | _kinds(octree), chain if told else 0, told)
-    cube = (octree.low, octree.edge)
-    header = Header(*kind, time, *cube, octree.points, octree.distinct, unit, levels)
+    outside = _store_strays(strays)
+    header = Header(
+        flags=_PACKED * packed | _kinds(octree),
+        before=chain if blocks.told or blocks.told_attributes else 0,
+        told=blocks.told,
+        time=time,
+        low=octree.low,
+        edge=octree.edge,
+        points=octree.points,
+        distinct=octree.distinct,
+        unit=unit,
+        levels=levels,
+        told_attributes=blocks.told_attributes,
+        strays=Level(len(strays or ()), *_sizes_and_check(*outside)),
+    )
     if packed and _are_too_many(int(octree.counts.sum()), header.stored):
-        return to_bytes(octree, time=time, unit=unit, packed=False)
-    return header.to_bytes() + b"".join(above + own for above, own in blocks)
+        return to_bytes(octree, time=time, unit=unit, packed=False, strays=strays)
+    stored = itertools.chain.from_iterable(zip(blocks.masks, blocks.attributes, strict=True))
+    return b"".join([header.to_bytes(), *outside, *stored])
 
 
-def from_bytes(
-    data: bytes, previous: Octree | None = None, attributes: bool = True, leaves_only: bool = False
-) -> Octree:
-    """The tree of `to_bytes`; the coarser one where the bytes end behind one of its levels.
+def _sizes_and_check(first: bytes, second: bytes) -> tuple[int, int, int]:
+    """The rest of a `Level` that these two blocks are of."""
+    return len(first), len(second), zlib.crc32(first + second)
 
-    previous: the tree before, where the header says that it takes one. attributes: False leaves them out.
-    leaves_only: those of levels without a leaf are empty arrays.
+
+def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = True) -> Octree:
+    """The tree of `to_bytes`, without strays; the coarser one where the bytes end behind one of its levels.
+
+    previous: the tree before, where the header says that it takes one, with its attributes. attributes: False
+    leaves them out.
     Raises InputError where bytes are missing or damaged.
     """
     header, size = read_header(data)
-    whole = [level.nodes for level, _ in zip(header.levels, _whole_levels(header, data[size:]), strict=False)]
+    behind = data[size + header.strays.masks + header.strays.attributes :]
+    whole = [level.nodes for level, _ in zip(header.levels, _whole_levels(header, behind), strict=False)]
     if _are_too_many(sum(whole), len(data)):
         raise InputError(f"says that {len(data):,} bytes hold {sum(whole):,} octants, which is too many")
-    if header.before and (previous is None or not _same_cube(header, previous)):
+    if header.before and (previous is None or not _can_tell(header, previous, attributes)):
         raise InputError("is told by the octree before it, which is missing")
-    told = previous.masks if header.before and previous is not None else ()
-    coder = MaskCoder(header.levels[0].nodes, told)
+    before = previous if header.before else None
+    coder = MaskCoder(header.levels[0].nodes, before.masks if before else ())
     masks: list[Bytes] = []
     found: list[Attributes] = []
     values: Bytes | None = None
-    for level, (above, own) in zip(header.levels, _whole_levels(header, data[size:]), strict=False):
-        if level is not header.levels[0]:
+    for number, (above, own) in enumerate(_whole_levels(header, behind)):
+        if number:
             masks.append(_read_masks(above, header, coder, len(masks)))
+            if header.flags & _PACKED:
+                coder.descend(masks[-1], deepest=number == len(whole) - 1)
         if attributes and header.width:
-            below = _read_attributes(own, header.width, masks, values)
-            if values is not None:
-                shown = not leaves_only or (masks[-1] == 0).any()
-                found.append(_attributes(values if shown else values[:0], header.flags))
-            values = below
-    if values is not None:
-        found.append(_attributes(values, header.flags))
+            told = before is not None and header.told_attributes >> number & 1
+            known = _counterparts(before, coder.counterparts, number) if before and told else None
+            values = _read_attributes(own, header.width, masks, values, known)
+            found.append(_attributes(values, header.flags))
     return Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, tuple(found))
+
+
+def read_strays(data: bytes) -> Strays:
+    """The points outside the cube of a tree of `to_bytes`. Raises InputError where bytes are missing or
+    damaged."""
+    header, size = read_header(data)
+    entry = header.strays
+    middle, end = size + entry.masks, size + entry.masks + entry.attributes
+    if end > len(data):
+        raise InputError("ends within the points outside an octree")
+    if zlib.crc32(data[size:end]) != entry.check:
+        raise InputError("the points outside an octree are damaged")
+    places = coding.unpack(data[size:middle], 24 * entry.nodes).reshape(24, -1).T
+    positions = np.ascontiguousarray(places).view("<f8").astype(np.float64)
+    if not (np.abs(positions) < _LARGEST).all():
+        raise InputError("the points outside an octree are nowhere")
+    found = Attributes()
+    if header.width:
+        values = coding.unpack(data[middle:end], header.width * entry.nodes)
+        found = _attributes(values.reshape(header.width, -1).T, header.flags)
+    return Strays(positions.reshape(-1, 3), found.colors, found.normals)
 
 
 def read_header(data: bytes) -> tuple[Header, int]:
     """The header at the beginning of the bytes, and its size. Raises InputError where it is none."""
     if not data.startswith(MAGIC):
         raise InputError("an octree is missing where one should begin")
-    if len(data) < _FIXED.size:
-        raise InputError("ends within the header of an octree")
+    if len(data) < _FIXED.size + _SECOND.size:
+        raise CutShort("ends within the header of an octree")
     _, version, flags, before, depth, unit_size, _, *place = _FIXED.unpack_from(data)
-    if version != VERSION:
-        raise InputError(f"holds octrees of version {version}", hint=f"This Scan4D reads version {VERSION}")
-    start = _FIXED.size + unit_size
+    if version not in _VERSIONS:
+        raise InputError(
+            f"holds octrees of version {version}", hint=f"This Scan4D reads versions up to {VERSION}"
+        )
+    told_attributes, *strays = _SECOND.unpack_from(data, _FIXED.size) if version > 1 else [0] * 5
+    named = _FIXED.size + (_SECOND.size if version > 1 else 0)
+    start = named + unit_size
     end = start + (depth + 1) * _LEVEL.size
     if len(data) < end + _CHECK.size:
-        raise InputError("ends within the header of an octree")
+        raise CutShort("ends within the header of an octree")
     if _CHECK.unpack_from(data, end)[0] != zlib.crc32(data[:end]):
         raise InputError("the header of an octree is damaged")
     levels = tuple(Level(*values) for values in _LEVEL.iter_unpack(data[start:end]))
     told, time, x, y, z, edge, points, distinct = place
-    unit = data[_FIXED.size : start].decode(errors="replace")
+    unit = data[named:start].decode(errors="replace")
     low = np.array([x, y, z])
-    header = Header(flags, before, told, time, low, edge, points, distinct, unit, levels)
+    kind = flags, before, told
+    header = Header(*kind, time, low, edge, points, distinct, unit, levels, told_attributes, Level(*strays))
     if not _is_possible(header):
         raise InputError("the header of an octree contradicts itself")
     return header, end + _CHECK.size
@@ -192,9 +278,11 @@ def _is_possible(header: Header) -> bool:
         and 0 < header.edge < _LARGEST
         and max(nodes) <= header.distinct <= header.points
         and nodes[0] == min(header.points, 1)
-        and all(0 < below <= 8 * above for above, below in pairwise(nodes))
+        and all(0 < below <= 8 * above for above, below in itertools.pairwise(nodes))
         and header.levels[0].masks == 0
-        and (header.before > 0) == (header.told > 0)
+        and (header.before > 0) == (header.told > 0 or header.told_attributes > 0)
+        and (header.width or not header.told_attributes)
+        and (header.flags & _PACKED or not header.before)
     )
 
 
@@ -202,6 +290,12 @@ def _are_too_many(nodes: int, stored: int) -> bool:
     """Whether nodes would take far more memory than what is stored of them: such trees are stored as they
     are, and bytes that promise one are refused."""
     return nodes > max(_FREE, coding.MOST_RATIO * stored)
+
+
+def _can_tell(header: Header, previous: Octree, attributes: bool) -> bool:
+    """Whether the tree before is the one that a header needs. attributes: of which they are asked for."""
+    missing = attributes and header.told_attributes and _kinds(previous) != header.flags & ~_PACKED
+    return _same_cube(header, previous) and not missing
 
 
 def _same_cube(one: Octree | Header, other: Octree) -> bool:
@@ -223,24 +317,62 @@ def _whole_levels(header: Header, data: bytes) -> Iterator[tuple[bytes, bytes]]:
         at = end
 
 
+# --- strays ---------------------------------------------------------------------------
+
+
+def _store_strays(strays: Strays | None) -> tuple[bytes, bytes]:
+    """Stored positions and attributes, by columns of bytes."""
+    if not strays:
+        return b"", b""
+    places = np.ascontiguousarray(strays.positions, "<f8").view(np.uint8)
+    values = _bytes(Attributes(strays.colors, strays.normals), len(strays))
+    return coding.pack(places.T.ravel()), coding.pack(values.T.ravel())
+
+
 # --- masks ----------------------------------------------------------------------------
 
 
-def _store_masks(octree: Octree, previous: Octree | None, packed: bool) -> tuple[list[bytes], int]:
-    """Stored masks of each level above the deepest; bit n: level n is told by the tree before."""
+class _Blocks(NamedTuple):
+    """Stored masks and attributes of each level. told, told_attributes: as in a `Header`."""
+
+    masks: list[bytes]
+    attributes: list[bytes]
+    told: int = 0
+    told_attributes: int = 0
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, [*self.masks, *self.attributes]))
+
+
+def _store(octree: Octree, previous: Octree | None, packed: bool) -> _Blocks:
+    """Blocks of each level, of which the shorter ones are told by the tree before, if that is worth it."""
     if not packed:
-        return [masks.tobytes() for masks in octree.masks], 0
+        return _Blocks([b"", *(masks.tobytes() for masks in octree.masks)], _store_attributes(octree))
     coder = MaskCoder(int(octree.counts[0]), previous.masks if previous else ())
-    alone, shorter = [], []
-    for masks in octree.masks:
+    alone, told, places = [b""], [b""], [coder.counterparts]
+    for number, masks in enumerate(octree.masks, 1):
         alone.append(coding.pack(coder.sort(masks, told=False)))
-        other = coding.pack(coder.sort(masks, told=True)) if previous else alone[-1]
-        shorter.append(min(alone[-1], other, key=len))
-        coder.descend(masks)
-    if sum(map(len, shorter)) > _WORTH * sum(map(len, alone)):
-        return alone, 0
-    told = [len(one) < len(other) for one, other in zip(shorter, alone, strict=True)]
-    return shorter, sum(1 << level for level, is_told in enumerate(told) if is_told)
+        told.append(coding.pack(coder.sort(masks, told=True)) if previous else alone[-1])
+        coder.descend(masks, deepest=number == octree.depth)
+        places.append(coder.counterparts)
+    by_itself = _Blocks(alone, _store_attributes(octree))
+    if previous is None:
+        return by_itself
+    of_masks, of_attributes = told, _store_attributes(octree, previous, places)
+    shorter = _Blocks(
+        [min(pair, key=len) for pair in zip(by_itself.masks, of_masks, strict=True)],
+        [min(pair, key=len) for pair in zip(by_itself.attributes, of_attributes, strict=True)],
+        _shorter(of_masks[1:], by_itself.masks[1:]),
+        _shorter(of_attributes, by_itself.attributes),
+    )
+    return shorter if shorter.size <= _WORTH * by_itself.size else by_itself
+
+
+def _shorter(told: list[bytes], alone: list[bytes]) -> int:
+    """Bit n: the block of level n is shorter where it is told by the tree before."""
+    is_shorter = (len(one) < len(other) for one, other in zip(told, alone, strict=True))
+    return sum(1 << level for level, yes in enumerate(is_shorter) if yes)
 
 
 def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> Bytes:
@@ -248,8 +380,6 @@ def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> 
     masks = coding.unpack(stored, header.levels[level].nodes)
     if header.flags & _PACKED:
         masks = coder.restore(masks, told=bool(header.told >> level & 1))
-        if level + 2 < len(header.levels):
-            coder.descend(masks)
     if np.bitwise_count(masks).sum(dtype=np.int64) != header.levels[level + 1].nodes:
         raise InputError(f"level {level + 1} of an octree has not as many nodes as its header says")
     return masks
@@ -266,31 +396,49 @@ def _kinds(octree: Octree) -> int:
     return _COLORS * (root.colors is not None) | _NORMALS * (root.normals is not None)
 
 
-def _store_attributes(octree: Octree) -> list[bytes]:
+def _store_attributes(
+    octree: Octree, previous: Octree | None = None, places: Sequence[Nodes] = ()
+) -> list[bytes]:
+    """Stored attributes of each level. previous: the tree that tells them. places: the counterparts there of
+    the nodes of each level."""
     if not _kinds(octree):
         return [b""] * (octree.depth + 1)
+    if previous is not None and _kinds(previous) != _kinds(octree):
+        previous = None
     values = [_bytes(each) for each in octree.attributes]
-    told = [coding.differences(below, above, masks)
-            for above, below, masks in zip(values, values[1:], octree.masks, strict=False)]  # fmt: skip
-    return [coding.pack(each) for each in (values[0].ravel(), *told)]
+    stored = [coding.pack(values[0].ravel(), _OF_ATTRIBUTES)]
+    for level, (above, below, masks) in enumerate(zip(values, values[1:], octree.masks, strict=False), 1):
+        known = _counterparts(previous, places[level], level) if previous else None
+        stored.append(coding.pack(coding.differences(below, above, masks, known), _OF_ATTRIBUTES))
+    return stored
 
 
-def _bytes(attributes: Attributes) -> Bytes:
-    """(n, k) bytes of a level's colours and normals."""
+def _counterparts(previous: Octree, nodes: Nodes, level: int) -> Counterparts | None:
+    """Counterparts of a level's nodes in the tree before, and their bytes; None where it lacks the level."""
+    if level >= len(previous.attributes):
+        return None
+    return Counterparts(nodes, _bytes(previous.attributes[level]))
+
+
+def _bytes(attributes: Attributes, count: int = 0) -> Bytes:
+    """(n, k) bytes of colours and normals. count: n where there is neither."""
     parts = []
     if attributes.colors is not None:
         parts.append(coding.color_bytes(attributes.colors))
     if attributes.normals is not None:
         parts.append(coding.normal_bytes(attributes.normals))
-    return np.concatenate(parts, axis=1)
+    return np.concatenate(parts, axis=1) if parts else np.zeros((count, 0), np.uint8)
 
 
-def _read_attributes(stored: bytes, width: int, masks: list[Bytes], above: Bytes | None) -> Bytes:
-    """(n, k) bytes of the next level. masks: of the levels above. above: the bytes of the last of them."""
+def _read_attributes(
+    stored: bytes, width: int, masks: list[Bytes], above: Bytes | None, known: Counterparts | None
+) -> Bytes:
+    """(n, k) bytes of the next level. masks: of the levels above. above: the bytes of the last of them.
+    known: what the tree before tells."""
     if above is None:
-        return coding.unpack(stored, width).reshape(1, -1)
+        return coding.unpack(stored, width, _OF_ATTRIBUTES).reshape(1, -1)
     size = width * coding.sibling_count(masks[-1])
-    return coding.restored(coding.unpack(stored, size), above, masks[-1])
+    return coding.restored(coding.unpack(stored, size, _OF_ATTRIBUTES), above, masks[-1], known)
 
 
 def _attributes(values: Bytes, flags: int) -> Attributes:
