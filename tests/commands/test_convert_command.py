@@ -8,10 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
+from scenes import sphere
 from small_scans import cloud_at, names
 
+from viewer.frame import backend_for
 from viewer.scan import formats
+from viewer.scan.estimate import estimate
 from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 
 
 @pytest.mark.parametrize("suffix", formats.writable_suffixes())
@@ -83,3 +88,57 @@ def test_convert_refuses_what_it_cannot_write(
     message = refused("convert", scans / "ball.npz", tmp_path / "a.obj")
     assert all(suffix in message for suffix in formats.writable_suffixes())
     assert "Create it" in refused("convert", scans / "ball.npz", tmp_path / "missing" / "a.ply")
+
+
+def bare_at(index: int) -> PointCloud:
+    """A sphere of positions alone."""
+    return PointCloud.from_arrays(sphere(400 + index).positions)
+
+
+@pytest.mark.parametrize("suffix", formats.writable_suffixes())
+def test_convert_stores_what_it_estimates(suffix: str, run: Run, tmp_path: Path) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    for folder in (before, after):
+        folder.mkdir()
+    for number in range(2):
+        formats.write(before / f"{number}.npz", bare_at(number))
+    assert run("convert", before, after / f"%d{suffix}", "--normals", "--radii").code == 0
+    with open_scan(after) as timeline:
+        for number in range(2):
+            pose = timeline.pose(number)
+            expected = estimate(Pose(0, 0.0, "x", bare_at(number)), ("normals", "radii"))
+            for name, values in expected.items():
+                np.testing.assert_array_equal(getattr(pose.cloud, name), values, err_msg=name)
+            assert backend_for(pose)[0] == "surfels", "it opens with what needs them"
+
+
+def test_convert_estimates_no_more_than_is_asked_for_and_lacking(
+    run: Run, scans: Path, tmp_path: Path
+) -> None:
+    formats.write(tmp_path / "bare.npz", bare_at(0))
+    assert run("convert", tmp_path / "bare.npz", tmp_path / "a.ply", "--radii").code == 0
+    assert formats.read_points(tmp_path / "a.ply").normals is None
+    assert run("convert", scans / "ball.npz", tmp_path / "b.npz", "--normals", "--radii").code == 0
+    kept, had = formats.read_points(tmp_path / "b.npz"), formats.read_points(scans / "ball.npz")
+    np.testing.assert_array_equal(kept.normals, had.normals)
+    np.testing.assert_array_equal(kept.radii, had.radii)
+
+
+def test_convert_puts_estimated_normals_into_octrees(run: Run, tmp_path: Path) -> None:
+    formats.write(tmp_path / "bare.npz", bare_at(0))
+    assert run("convert", tmp_path / "bare.npz", tmp_path / "a.svo", "--normals").code == 0
+    with open_scan(tmp_path / "a.svo") as timeline:
+        leaves = timeline.pose(0).cloud
+    assert leaves.normals is not None
+    outward = (leaves.normals * leaves.world()).sum(axis=1) / np.linalg.norm(leaves.world(), axis=1)
+    assert np.median(np.abs(outward)) > 0.95
+
+
+@pytest.mark.parametrize(("out", "flag"), [("a.svo", "radii"), ("a.exr", "normals"), ("a.exr", "radii")])
+def test_convert_refuses_estimates_that_a_format_does_not_hold(
+    out: str, flag: str, refused: Callable[..., str], scans: Path, tmp_path: Path
+) -> None:
+    message = refused("convert", tmp_path / "not-even-there.ply", tmp_path / out, f"--{flag}")
+    assert f"'{out[1:]}' files hold no {flag}" in message
+    assert f"or leave out --{flag}" in message
+    assert not names(tmp_path)

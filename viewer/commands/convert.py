@@ -1,19 +1,22 @@
 """Write poses as PLY, PCD or NPZ, range views also as EXR, and all poses as octrees in one SVO.
 
 OUT is a file for one pose, or for a sequence a numbered pattern such as out%04d.ply, with
-the times beside it in times.csv; a .svo holds all poses and their times.
+the times beside it in times.csv; a .svo holds all poses and their times. What the scan lacks of
+normals and radii can be estimated and stored, so that nobody waits for it when the scan is shown.
 """
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 from ..output.export import check_output, is_pattern
 from ..scan import formats
+from ..scan.estimate import estimate
 from ..scan.inputs import scan_inputs
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
@@ -31,6 +34,8 @@ from ._scans import (
     read_poses,
 )
 
+_ESTIMATES = ("normals", "radii")
+
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d convert`."""
@@ -39,6 +44,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("out", metavar="OUT", type=Path, help=f"{suffixes}, or a pattern with %%04d")
     add_force_argument(parser)
     add_pose_arguments(parser)
+    for name in _ESTIMATES:
+        parser.add_argument(
+            f"--{name}", action="store_true", help=f"estimate and store {name}, where it has none"
+        )
     group = parser.add_argument_group("octrees (.svo)").add_mutually_exclusive_group()
     group.add_argument(
         "--delta",
@@ -52,6 +61,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Write the chosen poses, by default all; broken frames among several are left out."""
     stop = _stop(args)
+    _check_holds(args)
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
         if args.out.suffix.lower() in formats.scan_suffixes():
@@ -60,6 +70,32 @@ def run(args: Namespace) -> int:
             _write_frames(args, timeline, indices)
     tell(args.out)
     return 0
+
+
+def _check_holds(args: Namespace) -> None:
+    """Raise InputError where the format of the output holds none of what is to be estimated."""
+    suffix = args.out.suffix.lower()
+    if suffix in formats.writable_suffixes():
+        return
+    for name in _wanted(args):
+        if name == "radii" or suffix not in formats.scan_suffixes():
+            hint = f"Write {', '.join(formats.writable_suffixes())}, or leave out --{name}"
+            raise InputError(f"'{suffix}' files hold no {name}", args.out, hint)
+
+
+def _wanted(args: Namespace) -> list[str]:
+    return [name for name in _ESTIMATES if getattr(args, name)]
+
+
+def _poses(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
+    """The poses, with what is asked for and they lack estimated."""
+    for pose in read_poses(timeline, indices):
+        missing = [name for name in _wanted(args) if getattr(pose.overview, name) is None]
+        if missing:
+            estimates: dict[str, Any] = {**estimate(pose, missing)}
+            yield pose.with_cloud(replace(pose.cloud, **estimates))
+        else:
+            yield pose
 
 
 def _stop(args: Namespace) -> Stop | None:
@@ -84,7 +120,7 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
     with progress(len(indices)) as tick:
 
         def poses() -> Iterator[Pose]:
-            for pose in read_poses(timeline, indices):
+            for pose in _poses(args, timeline, indices):
                 yield pose
                 tick()
 
@@ -101,7 +137,7 @@ def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -
     claim(frame_outputs(args.out, indices, timeline), scan_inputs(timeline), args.force)
     with frame_files(args.out) as file_of, progress(len(indices)) as tick:
         remarks = set()
-        for pose in read_poses(timeline, indices):
+        for pose in _poses(args, timeline, indices):
             remarks.add(formats.write(file_of(pose), pose.cloud, pose.views))
             tick()
     for remark in remarks - {None}:
