@@ -19,7 +19,7 @@ from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.params import param
-from viewer.renderer import Renderer
+from viewer.renderer import Renderer, Want
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -174,8 +174,8 @@ def test_what_is_derived_by_camera_is_kept_for_the_last_views(renderer: Renderer
     assert len({one.array.tobytes() for one in first}) == 4
     assert derived(_view(0)) is first[0], "an equal view"
     assert own.nbytes == 4 * 12 * 500
-    assert own.is_prepared(pose, deriving, _Params(), Look(), views[1])
-    assert not own.is_prepared(pose, deriving, _Params(), Look(), _view(0, size=(65, 48)))
+    assert own.is_prepared(Want(pose, deriving, _Params(), Look(), views[1]))
+    assert not own.is_prepared(Want(pose, deriving, _Params(), Look(), _view(0, size=(65, 48))))
     derived(views[4])
     assert [one.released for one in first] == [False, True, False, False], "the one that was used longest ago"
     other = derived(views[0], step=5)
@@ -297,7 +297,7 @@ def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancell
     own = Renderer(renderer.gpu)
     pose = Pose(0, 0.0, "x", sphere(1000))
     resident = own.resident(pose)
-    assert not own.is_prepared(pose, deriving, _Params(), Look(), VIEW)
+    assert not own.is_prepared(Want(pose, deriving, _Params(), Look(), VIEW))
     assert own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW) is None
     task = own.preparing
     assert task is not None
@@ -309,7 +309,7 @@ def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancell
         time.sleep(0.001)
     assert prepared.derived.process != os.getpid()
     np.testing.assert_array_equal(prepared.derived.array, pose.cloud.positions[::2])
-    assert own.is_prepared(pose, deriving, _Params(), Look(), VIEW)
+    assert own.is_prepared(Want(pose, deriving, _Params(), Look(), VIEW))
     assert own.preparing is None
     own.release()
 
@@ -324,7 +324,7 @@ def test_what_a_thread_does_is_prepared_there_and_may_be_done_in_time(
     while prepared is None:  # a busy machine
         prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
     assert prepared.derived.process == os.getpid()
-    assert own.is_prepared(pose, deriving, _Params(), Look(), VIEW)
+    assert own.is_prepared(Want(pose, deriving, _Params(), Look(), VIEW))
     own.release()
 
 

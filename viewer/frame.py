@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -16,7 +16,7 @@ from .gpu.pose import drawn_bounds
 from .gpu.shade import shade
 from .gpu.surface import Surface
 from .look import Look, drawable
-from .renderer import Renderer
+from .renderer import Renderer, Want
 from .scan.layers import NO_LAYERS, Layers
 from .scan.pods import first_camera
 from .scan.points import PointCloud
@@ -119,11 +119,25 @@ def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms
     return pose.upload(pose.names_of(backend.needs(request.pose, params)), budget_ms)
 
 
-def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int]) -> bool:
-    """Whether nothing has to be estimated or derived for a picture of this size, pixels."""
-    backend, params = _chosen(request)
+def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int] | None = None) -> bool:
+    """Whether nothing has to be merged, estimated or derived for a picture of this size, pixels; or what has
+    to be cannot, which drawing it will tell. size: None leaves out what is derived for one view alone."""
+    by_camera = size is not None and _chosen(request)[0].derived_by_camera
+    return renderer.is_prepared(_want(request, _view(request, size) if by_camera and size else None))
+
+
+def prepare(renderer: Renderer, request: Request, size: tuple[int, int]) -> bool:
+    """Have workers make what a picture of this size needs, before anything else; whether it is there. Raises
+    what that has failed with."""
+    pose, (backend, params) = renderer.resident(request.pose), _chosen(request)
     view = _view(request, size)
-    return renderer.is_prepared(request.pose, backend, params, request.look, view)
+    return renderer.prepare(pose, backend, params, request.look, wait=False, view=view) is not None
+
+
+def prepare_ahead(renderer: Renderer, requests: Iterable[Request], afresh: bool = False) -> None:
+    """Have workers make what pictures of these will need, the first before others; all but what depends on
+    the view. A window calls it again and again, see `Renderer.prepare_ahead`."""
+    renderer.prepare_ahead((_want(request, None) for request in requests), afresh)
 
 
 def fallback(request: Request) -> Request:
@@ -145,6 +159,10 @@ def _view(request: Request, size: tuple[int, int]) -> View:
     origin = origin_near(camera, size, pose.origin, place)
     bounds = drawn_bounds(pose, camera)
     return View.of(camera, size, origin, bounds, place).straightened(bounds)
+
+
+def _want(request: Request, view: View | None) -> Want:
+    return Want(request.pose, *_chosen(request), request.look, view)
 
 
 def _chosen(request: Request) -> tuple[Backend, Any]:

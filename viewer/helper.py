@@ -1,4 +1,4 @@
-"""A process beside this one for heavy work on points.
+"""Threads and processes beside this one for heavy work on points.
 
 Native libraries hold the interpreter's lock while they work (open3d for seconds), which would stop
 the window whatever thread they run on; and what runs in a process can be ended at any moment.
@@ -14,7 +14,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import dataclass
+from queue import LifoQueue
 from typing import IO, Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
@@ -25,6 +28,7 @@ from .task import Task
 P = ParamSpec("P")
 R = TypeVar("R")
 _NICE = 10  # the window's own work goes first
+_MOST = 4  # workers: each has a process with libraries of its own, some 100 MB
 _WATCH = 0.5  # seconds between looks at who started this process
 _NO_CONSOLE = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows it would open a window of its own
 
@@ -100,6 +104,76 @@ class Helper:
             if self._process is not None:
                 _end(self._process)
             self._process = None
+
+
+@dataclass(frozen=True)
+class Job:
+    """Work that `Workers` do or will do. future: (its result, the milliseconds that it took)."""
+
+    task: Task
+    future: Future[tuple[Any, float]]
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it has not begun."""
+        return not (self.future.running() or self.future.done())
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether its result is an error, and not since it was cancelled."""
+        return self.future.done() and not self.task.cancelled and self.future.exception() is not None
+
+    def drop(self) -> bool:
+        """Take it out of the queue; False where it had begun, and goes on."""
+        return self.future.cancel()
+
+    def cancel(self) -> None:
+        """Stop it, now or at its next step."""
+        self.task.cancel()
+        self.future.cancel()
+
+
+class Workers:
+    """Threads that do jobs in the order they come in, each with a `Helper` for what needs a process.
+
+    count: of them, as many as there are processors, but no more than four. A process starts when all that
+    have started are at work.
+    """
+
+    def __init__(self) -> None:
+        self.count = min(os.cpu_count() or 1, _MOST)
+        self._threads = ThreadPoolExecutor(self.count, thread_name_prefix="prepare")
+        self._helpers: LifoQueue[Helper] = LifoQueue()  # that are free; those with a process are on top
+        for _ in range(self.count):
+            self._helpers.put(Helper())
+
+    def begin(self, name: str, function: Callable[..., Any], args: Any, on_thread: bool = False) -> Job:
+        """Have a function called. name: of its task. on_thread: here rather than in another process."""
+        task = Task(name)
+        return Job(task, self._threads.submit(self._timed, task, function, args, on_thread))
+
+    def _timed(
+        self, task: Task, function: Callable[..., Any], args: Any, on_thread: bool
+    ) -> tuple[Any, float]:
+        start = time.perf_counter()
+        task.begin()
+        if on_thread:
+            with task.current():
+                task.check()
+                result = function(*args)
+        else:
+            helper = self._helpers.get()
+            try:
+                result = helper.call(task, function, *args)
+            finally:
+                self._helpers.put(helper)
+        return result, (time.perf_counter() - start) * 1e3
+
+    def close(self) -> None:
+        """End threads and processes. Cancel the jobs before, and it waits for those that have begun."""
+        self._threads.shutdown(wait=True, cancel_futures=True)
+        while not self._helpers.empty():
+            self._helpers.get().close()
 
 
 def _start() -> subprocess.Popen[bytes]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 import weakref
-from collections import OrderedDict
-from collections.abc import Callable
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterable
 from concurrent import futures
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -15,8 +15,9 @@ from .backends import Backend, Derived
 from .errors import InputError
 from .gpu.context import Gpu, headless
 from .gpu.pose import GpuPose
-from .helper import Helper
+from .helper import Job, Workers
 from .look import Look, wants_normals
+from .scan.cache import default_budget
 from .scan.estimate import estimate
 from .scan.points import PointCloud
 from .scan.pose import Pose
@@ -24,10 +25,14 @@ from .scan.spacing import spacings
 from .task import Task
 from .view import View
 
-_MEGABYTE = 1 << 20
+_GIGABYTE = 1 << 30
 _VIEWS = 4  # of a pose that what is derived by camera is kept for
+_WAYS = 4  # of a pose that what is derived is kept for: backends and parameters
 _START = 0.4  # seconds that a process takes to start
 _PATIENCE = 0.05  # seconds: a picture late is better than one of points among others
+_QUEUED = 3  # jobs for each worker, so that none waits for a turn of the window's loop
+_TAKE_SECONDS = 0.01  # that taking in what is ready ahead may take in one turn
+_LATELY = 8  # poses that tell how long preparing one takes
 
 
 @dataclass
@@ -44,17 +49,37 @@ class DerivedKey(NamedTuple):
     view: tuple[object, ...] | None
 
 
-@dataclass
-class _Job:
-    """Job that the worker prepares: (result, milliseconds)."""
+class Want(NamedTuple):
+    """A pose and how it is to be drawn. view: None leaves out what is derived for one view alone."""
 
-    task: Task
-    future: Future[tuple[Any, float]]
+    pose: Pose
+    backend: Backend
+    params: Any
+    look: Look
+    view: View | None
 
-    def cancel(self) -> bool:
-        """Stop it, now or at its next step; True where it had not begun."""
-        self.task.cancel()
-        return self.future.cancel()
+
+class _Step(NamedTuple):
+    """Work to be done next of all that a picture needs.
+
+    key: of the job, within its pose. name: as users read it. args: made when it begins. take: takes the
+    result in, on the GL thread. on_thread: see `Workers.begin`.
+    """
+
+    key: Any
+    name: str
+    function: Callable[..., Any]
+    args: Callable[[], tuple[Any, ...]]
+    take: Callable[[Any], object]
+    on_thread: bool = False
+
+
+class _Begun(NamedTuple):
+    """A job, what takes its result in, and when it was asked for, by the clock."""
+
+    job: Job
+    take: Callable[[Any], object]
+    at: float
 
 
 @dataclass
@@ -64,23 +89,36 @@ class _Resident:
     pose: weakref.ref[Pose]
     gpu_pose: GpuPose
     derived: OrderedDict[DerivedKey, Prepared] = field(default_factory=OrderedDict)  # last used last
-    jobs: dict[Any, _Job] = field(default_factory=dict)
+    jobs: dict[Any, _Begun] = field(default_factory=dict)
+    began: float = math.nan  # by the clock, when the first of the jobs did that are not taken in
 
     def keep(self, key: DerivedKey, prepared: Prepared) -> None:
-        """Keep what was derived, in place of what was for the view that was seen longest ago."""
+        """Keep what was derived, in place of what was for the view and with the parameters that were used
+        longest ago."""
         self.derived[key] = prepared
         of_views = [other for other in self.derived if other.what == key.what and other.view is not None]
-        for old in of_views[:-_VIEWS]:
+        ways = list(dict.fromkeys(other.what for other in reversed(self.derived)))
+        of_ways = [other for other in self.derived if other.what in ways[_WAYS:]]
+        for old in of_views[:-_VIEWS] + of_ways:
             _release(self.derived.pop(old))
 
     def drop_passed(self, view: object) -> None:
         """Drop the jobs of all other views, finished ones too. What has just begun is let finish first, since
         cancelling ends a process."""
-        for key, job in list(self.jobs.items()):
+        for key, (job, *_) in list(self.jobs.items()):
             passed = isinstance(key, DerivedKey) and key.view not in (None, view)
-            if passed and (job.future.done() or job.future.cancel() or job.task.seconds > _START):
+            if passed and (job.future.done() or job.drop() or job.task.seconds > _START):
                 job.cancel()
                 del self.jobs[key]
+
+    def drop_waiting(self) -> None:
+        """Take what has not begun out of the queue."""
+        self.jobs = {key: begun for key, begun in self.jobs.items() if not begun.job.drop()}
+
+    @property
+    def unfinished(self) -> list[Job]:
+        """The jobs whose results are not there yet."""
+        return [job for job, *_ in self.jobs.values() if not (job.task.cancelled or job.future.done())]
 
     @property
     def nbytes(self) -> int:
@@ -99,29 +137,33 @@ class _Resident:
         return self.gpu_pose.pose.with_cloud(self.gpu_pose.cloud)
 
     def release(self) -> None:
-        for job in self.jobs.values():
+        for job, *_ in self.jobs.values():
             job.cancel()
         for prepared in self.derived.values():
             _release(prepared)
 
 
 class Renderer:
-    """Keeps poses on the GPU, least recently used out first, within `budget_bytes`.
+    """Keeps poses on the GPU within `budget_bytes`, with what was estimated and derived of them.
 
     The pose being drawn always stays; one that nobody else holds any more goes with the next
     frame, so that a timeline's cache bounds what is kept here too.
 
-    gpu: None opens a headless context (raises NoOpenGLError). budget_bytes: None takes 1 GiB
-    on hardware and 128 MiB on software drivers, where it is the same memory that the
-    timeline's cache lives in.
+    gpu: None opens a headless context (raises NoOpenGLError). budget_bytes: None takes 1 GiB on hardware, and
+    on software drivers, where it is the same memory that the timeline's cache lives in, half as much as that.
+    steps_to: how many poses are drawn before one, as far as known: the farthest one goes first, and of those
+    as far the one that was drawn longest ago.
     """
 
     def __init__(self, gpu: Gpu | None = None, budget_bytes: int | None = None) -> None:
         self.gpu = gpu or headless()
-        self.budget_bytes = budget_bytes or (128 if self.gpu.software else 1024) * _MEGABYTE
+        self.budget_bytes = budget_bytes or (default_budget() // 2 if self.gpu.software else _GIGABYTE)
+        self.steps_to: Callable[[Pose], int] = lambda pose: 0
         self._resident: OrderedDict[int, _Resident] = OrderedDict()
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="prepare")
-        self._helper = Helper()
+        self._drawn = 0  # key of the pose that was asked for last
+        self._workers = Workers()
+        self._latencies: deque[float] = deque(maxlen=_LATELY)
+        self._turned = -math.inf  # by the clock, when other pictures were asked for ahead
 
     @property
     def nbytes(self) -> int:
@@ -129,7 +171,8 @@ class Renderer:
         return sum(r.nbytes for r in self._resident.values())
 
     @property
-    def _held_bytes(self) -> int:
+    def held_bytes(self) -> int:
+        """Bytes that poses hold on the GPU, and of the estimates that are kept on the CPU."""
         return sum(r.held_bytes for r in self._resident.values())
 
     def bytes_of(self, pose: Pose) -> int:
@@ -139,22 +182,40 @@ class Renderer:
     def resident(self, pose: Pose) -> GpuPose:
         """The pose on the GPU; its arrays are uploaded when something first reads them."""
         self.gpu.collect()
-        key = id(pose)
+        entry = self._find(pose)
+        self._hold(pose, entry)
+        self._drawn = id(pose)
+        self._resident.move_to_end(self._drawn)
+        self._make_room()
+        return entry.gpu_pose
+
+    def _hold(self, pose: Pose, entry: _Resident) -> None:
+        """Keep what there is of a pose from now on, and let go of those that nobody else holds."""
         for gone in [k for k, r in self._resident.items() if r.pose() is None]:
             self._resident.pop(gone).release()
-        if key not in self._resident:
-            self._resident[key] = _Resident(weakref.ref(pose), GpuPose(self.gpu, replace(pose)))
-        self._resident.move_to_end(key)
-        while len(self._resident) > 1 and self._held_bytes > self.budget_bytes:
-            self._resident.popitem(last=False)[1].release()
-        return self._resident[key].gpu_pose
+        self._resident[id(pose)] = entry
+
+    def _find(self, pose: Pose) -> _Resident:
+        """The entry of a pose, else one without anything."""
+        entry = self._resident.get(id(pose))
+        if entry is None or entry.pose() is not pose:
+            entry = _Resident(weakref.ref(pose), GpuPose(self.gpu, replace(pose)))
+        return entry
+
+    def _make_room(self) -> None:
+        """Let go of what is drawn last of all until the rest is within the budget."""
+        while len(self._resident) > 1 and self.held_bytes > self.budget_bytes:
+            others = [key for key in self._resident if key != self._drawn]
+            farthest = max(others, key=lambda key: self._steps_to(self._resident[key]))
+            self._resident.pop(farthest).release()
+
+    def _steps_to(self, entry: _Resident) -> float:
+        pose = entry.pose()
+        return math.inf if pose is None else self.steps_to(pose)
 
     def merge(self, gpu_pose: GpuPose) -> bool:
         """Have a worker merge the points of range views; whether they are there."""
-        if gpu_pose.pose.is_merged:
-            return True
-        entry, args = self._entry(gpu_pose), (gpu_pose,)
-        return bool(self._run(entry, _merge, "Merging range views", _merge, args, wait=False, on_thread=True))
+        return gpu_pose.pose.is_merged or self._do(self._entry(gpu_pose), _merging(gpu_pose), wait=False)
 
     def prepare(
         self, gpu_pose: GpuPose, backend: Backend, params: Any, look: Look, wait: bool, view: View
@@ -162,100 +223,195 @@ class Renderer:
         """Make what a backend and a look need of a pose; None while a worker is still at it.
 
         First the attributes that the scan does not have are estimated, then the backend's
-        derive function runs; only uploads happen on this thread. Without `wait`, both are done by a
-        `Helper`, so that nothing stops this thread. What was cancelled begins anew. Raises InputError where
-        the pose has no range views and the backend needs them.
+        derive function runs; only uploads happen on this thread. Without `wait`, both are done by
+        `Workers`, before all that was asked of them ahead, so that nothing stops this thread. What was
+        cancelled begins anew. Raises InputError where the pose has no range views and the backend needs them.
         """
-        entry = self._entry(gpu_pose)
-        missing = _missing(gpu_pose, backend, params, look)
-        if missing:
-            name = f"Estimating {' and '.join(missing)}"
-            result = self._run(entry, missing, name, estimate, (_bare(entry.current), missing), wait)
-            if result is None:
-                return None
-            gpu_pose.add_estimates(result)
-        if backend.derive is None:
-            return Prepared(None)
+        entry, want = self._entry(gpu_pose), Want(gpu_pose.pose, backend, params, look, view)
         key = _derived_key(backend, params, view)
         entry.drop_passed(key.view)
-        if key not in entry.derived:
-            name = f"Preparing {backend.title}"
-            pose = gpu_pose.pose if backend.draws_samples(gpu_pose.pose, params) else entry.current
-            args = (pose, params, *([view] if backend.derived_by_camera else []))
-            result = self._run(entry, key, name, backend.derive, args, wait, backend.derives_on_thread)
-            if result is None:
+        while (step := self._step(entry, want)) is not None:
+            if not self._do(entry, step, wait):
                 return None
-            with gpu_pose.preparing("upload"):
-                entry.keep(key, Prepared(backend.upload(self.gpu, result)))
+        if backend.derive is None:
+            return Prepared(None)
         entry.derived.move_to_end(key)
         return entry.derived[key]
 
-    def is_prepared(self, pose: Pose, backend: Backend, params: Any, look: Look, view: View) -> bool:
-        """Whether `prepare` would have nothing to merge, estimate or derive."""
-        if not (pose.is_merged or backend.draws_samples(pose, params)):
-            return False
-        entry = self._entry(self.resident(pose))
-        if _missing(entry.gpu_pose, backend, params, look):
-            return False
-        return backend.derive is None or _derived_key(backend, params, view) in entry.derived
+    def is_prepared(self, want: Want) -> bool:
+        """Whether nothing has to be merged, estimated or derived before a picture, or that has failed, as
+        drawing it will tell."""
+        entry = self._find(want.pose)
+        try:
+            step = self._step(entry, want)
+        except InputError:
+            return True
+        begun = entry.jobs.get(step.key) if step is not None else None
+        return step is None or (begun is not None and begun.job.has_failed)
+
+    def prepare_ahead(self, wants: Iterable[Want], afresh: bool = False) -> None:
+        """Have workers make what pictures of these poses need, those named first before others, and take in
+        what they have made of any pose.
+
+        A few jobs at a time, and no more than the budget holds beside what is drawn sooner. What waits for
+        other pictures is dropped; what a worker is at is let finish and kept. afresh: the pictures are others
+        than those of the call before, so that what a worker is at is cancelled where it keeps these waiting.
+        """
+        if afresh:
+            self._turned = time.monotonic()
+        self._take_finished()
+        wanted: set[int] = set()
+        for want in wants:
+            entry = self._find(want.pose)
+            try:
+                step = self._step(entry, want)
+            except InputError:  # which drawing it will tell
+                continue
+            if step is None:
+                self._note_prepared(entry)
+                continue
+            begun = entry.jobs.get(step.key)
+            if begun is None or begun.job.task.cancelled:
+                if len(self._unfinished) >= _QUEUED * self._workers.count or not self._has_room(want.pose):
+                    break
+                self._hold(want.pose, entry)
+                begun = self._begin(entry, step)
+            wanted.add(id(begun.job))
+        self._drop_others(wanted)
+
+    def _take_finished(self) -> None:
+        """Take in what workers have made of any pose, for as long as a turn of a window's loop may take."""
+        end = time.perf_counter() + _TAKE_SECONDS
+        for entry in self._resident.values():
+            for key, (job, take, _) in list(entry.jobs.items()):
+                if time.perf_counter() > end:
+                    return
+                if job.future.done() and not (job.task.cancelled or job.has_failed):
+                    self._take(entry, key, job, take)
+        self._make_room()
+
+    def _take(self, entry: _Resident, key: Any, job: Job, take: Callable[[Any], object]) -> None:
+        """Take in what a job has made. Raises what it failed with."""
+        del entry.jobs[key]
+        result, ms = job.future.result()
+        entry.gpu_pose.add_ms("derive", ms)
+        take(result)
+
+    def _note_prepared(self, entry: _Resident) -> None:
+        if not (entry.jobs or math.isnan(entry.began)):
+            self._latencies.append(time.monotonic() - entry.began)
+            entry.began = math.nan
+
+    @property
+    def latency(self) -> float:
+        """Seconds from when work on a pose is begun until it is prepared, the least of late; 0 at first."""
+        return min(self._latencies, default=0.0)
+
+    def _has_room(self, pose: Pose) -> bool:
+        """Whether the budget holds another pose beside those that are drawn sooner than this one."""
+        entries, steps = self._resident.values(), self.steps_to(pose)
+        sooner = [r.held_bytes for r in entries if r.pose() is not pose and self._steps_to(r) <= steps]
+        largest = max((r.held_bytes for r in entries), default=0)
+        return sum(sooner) + largest <= self.budget_bytes
+
+    def _drop_others(self, wanted: set[int]) -> None:
+        """Drop the jobs that are not among these: those that wait, and what keeps these waiting where other
+        pictures were to be drawn when it was asked for."""
+        is_urgent = any(job.is_waiting for job in self._unfinished if id(job) in wanted)
+        for entry in self._resident.values():
+            for key, (job, _, at) in list(entry.jobs.items()):
+                if id(job) in wanted or job.future.done():
+                    continue
+                if job.drop() or (is_urgent and at < self._turned and job.task.seconds > _START):
+                    job.cancel()
+                    del entry.jobs[key]
+                    entry.began = math.nan
+
+    @property
+    def _unfinished(self) -> list[Job]:
+        return [job for entry in self._resident.values() for job in entry.unfinished]
+
+    @property
+    def unfinished(self) -> int:
+        """Number of jobs that workers do or will do."""
+        return len(self._unfinished)
 
     @property
     def preparing(self) -> Task | None:
-        """Task that is being prepared without anybody waiting for it, None where nothing is."""
-        jobs = [job for entry in self._resident.values() for job in entry.jobs.values()]
-        return next((job.task for job in jobs if not job.task.cancelled and not job.future.done()), None)
+        """The task that a worker has been at for longest, else one that waits; None where there is none."""
+        jobs = sorted(self._unfinished, key=lambda job: (job.is_waiting, -job.task.seconds))
+        return jobs[0].task if jobs else None
 
     def _entry(self, gpu_pose: GpuPose) -> _Resident:
         return next(r for r in self._resident.values() if r.gpu_pose is gpu_pose)
 
-    def _run(
-        self,
-        entry: _Resident,
-        key: Any,
-        name: str,
-        function: Callable[..., Any],
-        args: Any,
-        wait: bool,
-        on_thread: bool = False,
-    ) -> Any:
-        """Result of the function; None while the worker is at it. on_thread: rather than by the helper."""
-        job = entry.jobs.get(key)
-        if job is not None and job.task.cancelled:
-            job = None
+    def _step(self, entry: _Resident, want: Want) -> _Step | None:
+        """The work to be done next for a picture; None where all is there."""
+        gpu_pose, (_, backend, params, look, view) = entry.gpu_pose, want
+        draws_samples = backend.draws_samples(gpu_pose.pose, params)
+        if not (gpu_pose.pose.is_merged or draws_samples):
+            return _merging(gpu_pose)
+        missing = _missing(gpu_pose, backend, params, look)
+        if missing:
+            name = f"Estimating {' and '.join(missing)}"
+            args = lambda: (_bare(entry.current), missing)  # noqa: E731
+            return _Step(missing, name, estimate, args, gpu_pose.add_estimates)
+        if backend.derive is None or (backend.derived_by_camera and view is None):
+            return None
+        key = _derived_key(backend, params, view)
+        if key in entry.derived:
+            return None
+
+        def derive_args() -> tuple[Any, ...]:
+            pose = gpu_pose.pose if draws_samples else entry.current
+            return (pose, params, *([view] if backend.derived_by_camera else []))
+
+        def take(result: Any) -> None:
+            with gpu_pose.preparing("upload"):
+                entry.keep(key, Prepared(backend.upload(self.gpu, result)))
+
+        name, on_thread = f"Preparing {backend.title}", backend.derives_on_thread
+        return _Step(key, name, backend.derive, derive_args, take, on_thread)
+
+    def _do(self, entry: _Resident, step: _Step, wait: bool) -> bool:
+        """Do a step, or have the workers do it before all that waits; whether it is done."""
+        begun = entry.jobs.get(step.key)
+        job = None if begun is None or begun.job.task.cancelled else begun.job
         if job is None and wait:
-            result, ms = _timed(lambda: function(*args))
-        else:
-            if job is None:
-                self._drop_waiting_jobs()  # for poses that were passed meanwhile
-                task = Task(name)
+            entry.jobs.pop(step.key, None)
+            with entry.gpu_pose.preparing("derive"):
+                result = step.function(*step.args())
+            step.take(result)
+            return True
+        if job is None:
+            for other in self._resident.values():
+                other.drop_waiting()
+            job = self._begin(entry, step).job
+            if step.on_thread:  # it may be done in time for this picture
+                futures.wait([job.future], _PATIENCE)
+        if not (wait or job.future.done()):
+            return False
+        self._take(entry, step.key, job, step.take)
+        return True
 
-                def call() -> Any:
-                    if not on_thread:
-                        return self._helper.call(task, function, *args)
-                    with task.current():
-                        return function(*args)
-
-                job = entry.jobs[key] = _Job(task, self._worker.submit(_timed, call))
-                if on_thread:  # it may be done in time for this picture
-                    futures.wait([job.future], _PATIENCE)
-            if not (wait or job.future.done()):
-                return None
-            del entry.jobs[key]
-            result, ms = job.future.result()
-        entry.gpu_pose.add_ms("derive", ms)
-        return result
-
-    def _drop_waiting_jobs(self) -> None:
-        for entry in self._resident.values():
-            entry.jobs = {key: job for key, job in entry.jobs.items() if not job.future.cancel()}
+    def _begin(self, entry: _Resident, step: _Step) -> _Begun:
+        now = time.monotonic()
+        job = self._workers.begin(step.name, step.function, step.args(), step.on_thread)
+        if math.isnan(entry.began):
+            entry.began = now
+        entry.jobs[step.key] = begun = _Begun(job, step.take, now)
+        return begun
 
     def release(self) -> None:
-        """Delete every pose and stop the worker. The context stays open."""
+        """Delete every pose and stop the workers. The context stays open."""
         while self._resident:
             self._resident.popitem()[1].release()
-        self._worker.shutdown(wait=True, cancel_futures=True)
-        self._helper.close()
+        self._workers.close()
         self.gpu.collect()
+
+
+def _merging(pose: GpuPose) -> _Step:
+    return _Step(_merge, "Merging range views", _merge, lambda: (pose,), lambda _: None, on_thread=True)
 
 
 def _merge(pose: GpuPose) -> bool:
@@ -289,18 +445,11 @@ def _bare_cloud(cloud: PointCloud) -> PointCloud:
     return PointCloud(cloud.positions, cloud.origin, ids=cloud.ids, viewpoint=cloud.viewpoint)
 
 
-def _derived_key(backend: Backend, params: Any, view: View) -> DerivedKey:
-    return DerivedKey(
-        (backend.name, *backend.derive_key(params)), view.key if backend.derived_by_camera else None
-    )
+def _derived_key(backend: Backend, params: Any, view: View | None) -> DerivedKey:
+    seen = view.key if backend.derived_by_camera and view is not None else None
+    return DerivedKey((backend.name, *backend.derive_key(params)), seen)
 
 
 def _release(prepared: Prepared) -> None:
     if prepared.derived is not None:
         prepared.derived.release()
-
-
-def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """Do the work: its result, and the milliseconds that it took."""
-    start = time.perf_counter()
-    return work(), (time.perf_counter() - start) * 1e3

@@ -33,6 +33,10 @@ class Task:
         self._cancelled = False
         self._stops: list[Callable[[], object]] = []
 
+    def begin(self) -> None:
+        """Count from now, where it had to wait for its turn."""
+        self._began = time.monotonic()
+
     @property
     def seconds(self) -> float:
         """How long ago it began."""

@@ -41,6 +41,7 @@ from .notices import Notices
 from .output.capture import Capture
 from .output.exporting import Exporting
 from .output.replaying import Replayer
+from .playing.ahead import Ahead
 from .playing.playback import Playback
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
@@ -62,9 +63,10 @@ log = logging.getLogger(__name__)
 class App:
     """All that the window shows and can do. Panels read it and call its commands.
 
-    session: what the user has chosen. playback: the scan. renderer: what is on the GPU. viewport: the 3D
-    view. marks: what lies over it. rendering: which backend draws it. steering: what moves its camera.
-    pointer: what the mouse points at in it. bookmarks: cameras to go back to. full_view: whether it is alone.
+    session: what the user has chosen. playback: the scan. ahead: has its poses prepared. renderer: what is on
+    the GPU. viewport: the 3D view. marks: what lies over it. rendering: which backend draws it.
+    steering: what moves its camera. pointer: what the mouse points at in it. bookmarks: cameras to go
+    back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
     keeping: keeps what is to come back at the next start.
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
@@ -101,6 +103,7 @@ class App:
         self.playback: Playback = Playback(timeline, self.session, opened.first)
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
+        self.ahead: Ahead = Ahead(self.session, self.playback, self.renderer)
         self.commands = Commands()
         self.tools: Toolbox = Toolbox(
             self.session, self.playback, self.viewport, self.failures, self.note, window.touch,

@@ -96,6 +96,7 @@ class Loop:
             ("Exporting", app.exporting.advance),
             ("Saving", app.capture.advance),
             ("Replaying", lambda: app.replayer.advance(now)),
+            ("Preparing", app.ahead.advance),
             ("Playing", lambda: app.playback.advance(now)),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .scene.steering import Steering
     from .session import Session
 
-_STATISTICS_ROWS = 7  # without the passes
+_STATISTICS_ROWS = 8  # without the passes
 _STATISTICS_SHARE = 0.4  # of the panel's height at most
 
 
@@ -148,6 +148,9 @@ def _draw_statistics(app: App) -> None:
     for name, choice in surface.stats.chosen.items():
         _row(name.capitalize(), choice)
     _row("Time", _times(surface.stats) + (f", {app.viewport.rate:.0f} fps" if app.moving else ""))
+    if app.playback.player.playing:
+        held = f"{app.renderer.held_bytes / 1e6:,.0f} MB"
+        _row("Ahead", f"{app.ahead.ready} ready, {app.renderer.unfinished} begun, {held}")
     for name, milliseconds in surface.stats.passes:
         _row(f"  {name}", f"{milliseconds:.2f} ms")
 

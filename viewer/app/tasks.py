@@ -16,7 +16,8 @@ from .scene.viewport import Viewport
 from .session import Session
 from .toolbox import Toolbox
 
-_PATIENCE = 0.3  # seconds that work may take before it is shown
+_PATIENCE = 0.3  # seconds that work may take before it is shown,
+_PLAYING_PATIENCE = 2.0  # and on a pose while others are shown
 _WIDTH = 28.0  # in heights of the font
 _TICK = 0.1  # seconds between changes of what is shown
 _FLAGS = (
@@ -53,7 +54,12 @@ class Tasks:
     @property
     def shown(self) -> list[Task]:
         """The work to show, the latest last."""
-        return [task for task in self.all if task.seconds > _PATIENCE]
+        patience = {self._viewport.renderer.preparing: _PLAYING_PATIENCE} if self._is_playing else {}
+        return [task for task in self.all if task.seconds > patience.get(task, _PATIENCE)]
+
+    @property
+    def _is_playing(self) -> bool:
+        return self._playback.player.playing
 
     @property
     def report(self) -> list[tuple[str, int]]:
@@ -88,7 +94,8 @@ class Tasks:
         """Go back to what was drawn before, or to plain points."""
         if self._viewport.request is not None:
             drawn, chosen = self._viewport.request.look, self._session.document.look
-            request = self._viewport.without_preparing(self._viewport.request)
+            pose = self._playback.timeline.ready(self._session.index) or self._viewport.request.pose
+            request = self._viewport.without_preparing(replace(self._viewport.request, pose=pose))
             look = request.look
             if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
                 look = replace(look, color_by=chosen.color_by)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,14 +20,18 @@ _RATE_FRAMES = 4
 class Playback:
     """Moves `session.index` along the timeline of the open scan and finds the pose to show.
 
-    pose: the one that is shown, None before the first. Where reading is slower than
+    pose: the one that is shown, None before the first. Where reading or preparing is slower than
     playing, it is the latest one that is there. dropped: readable frames that were not there
-    at their time, since playing began; none where every frame is shown.
+    at their time, since playing began; none where every frame is shown. jumps: how often it went elsewhere
+    than playing would. is_prepared: whether a pose can be drawn as it is to be; until then the one before
+    stays.
     """
 
     def __init__(self, timeline: Timeline, session: Session, first: int = 0) -> None:
         """first: the frame to begin with."""
         self.session = session
+        self.jumps = 0
+        self.is_prepared: Callable[[Pose], bool] = lambda pose: True
         self.begin(timeline, first)
 
     def begin(self, timeline: Timeline, first: int = 0) -> None:
@@ -37,6 +42,7 @@ class Playback:
         self.dropped = 0
         self._shown: deque[float] = deque()  # when poses were, lately
         self.session.index = first
+        self.jumps += 1
         timeline.request(first)
 
     @property
@@ -51,7 +57,7 @@ class Playback:
 
     @property
     def waiting(self) -> bool:
-        """Whether the current frame is still being read."""
+        """Whether the current frame is still being read or prepared."""
         return (self.pose is None or self.pose.index != self.session.index) and self.problem is None
 
     def toggle(self, now: float) -> None:
@@ -77,6 +83,7 @@ class Playback:
         if index == self.session.index:
             return
         self.session.index = index
+        self.jumps += 1
         self.timeline.request(index)
         self.player.enter(index, now)
 
@@ -113,13 +120,18 @@ class Playback:
         self.timeline.prefetch(self.session.index, self.session.pace.direction)
 
     def _best_pose(self) -> Pose | None:
-        wanted, pace = self.session.index, self.session.pace
-        pose = self.timeline.ready(wanted)
-        if pose is not None or self.pose is None or pace.every_frame or not self.player.playing:
-            return pose
-        held = [self.pose.index, *(index for run in self.timeline.cached() for index in run)]
-        nearest = min(held, key=lambda index: (wanted - index) * pace.direction % len(self.timeline))
-        return self.timeline.ready(nearest)
+        """The pose of the current frame, or while playing in real time the latest one since the one that is
+        shown; None where none can be shown yet. The first of a scan is shown as it is."""
+        wanted, pace, shown = self.session.index, self.session.pace, self.pose
+        if shown is None:
+            return self.timeline.ready(wanted)
+        in_time = self.player.playing and not pace.every_frame
+        late = (wanted - shown.index) * pace.direction % len(self.timeline) if in_time else 1
+        for steps in range(max(late, 1)):
+            pose = self.timeline.ready((wanted - steps * pace.direction) % len(self.timeline))
+            if pose is not None and (pose is shown or self.is_prepared(pose)):
+                return pose
+        return None
 
     def close(self) -> None:
         """Stop reading."""

@@ -158,7 +158,8 @@ def _note(app: App) -> str | None:
         return None
     if playback.problem:
         return f"{playback.problem}\n{playback.pose.label} is shown instead."
-    return f"Loading {playback.timeline.label(app.session.index)} ..."
+    doing = "Loading" if playback.timeline.ready(app.session.index) is None else "Preparing"
+    return f"{doing} {playback.timeline.label(app.session.index)} ..."
 
 
 def _draw_note(text: str, size: ImVec2) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 from ...analysis.pick import Picked, before_gap, pick
 from ...bounds import Bounds
 from ...errors import Scan4DError
-from ...frame import Request, bring, colorable, fallback, is_prepared, render_frame
+from ...frame import Request, bring, colorable, fallback, is_prepared, prepare, render_frame
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
 from ...renderer import Renderer
@@ -71,6 +71,9 @@ class Viewport:
     def draw(self, request: Request, *, playing: bool = False, held: bool = False) -> bool:
         """Draw a request, unless the picture already shows it; whether it did.
 
+        Nothing is waited for: while workers prepare what it needs, the picture before stays where it shows
+        another pose, and plain points are drawn where there is none.
+
         playing: other poses will follow in time. held: the camera is dragged or turns.
         """
         size = self.place[2:]
@@ -83,13 +86,15 @@ class Viewport:
             self._motion.change(now, playing or held)
         elif now < self.better_at(playing):
             return False
-        elif self.renderer.preparing is not None and not self.is_preview:
-            self._prepared_at = now + _PREPARED_LATER  # the same again would be the same
-            return False
         try:
             if not bring(self.renderer, request, size, _UPLOAD_MS):
                 later = 0.0 if self.renderer.preparing is None else _PREPARED_LATER
                 self._prepared_at = now + later  # until then the picture before stays
+                return False
+            drawn = self._to_draw(request, size)
+            is_there = drawn is request and is_prepared(self.renderer, request, size)
+            if drawn is None or not (is_there or wanted != self._drawn or self.is_preview):
+                self._prepared_at = now + _PREPARED_LATER  # the same again would be the same
                 return False
             self._drawn, self.request, self._picked = wanted, request, None
             self.problem, self._prepared_at = None, math.inf
@@ -98,38 +103,53 @@ class Viewport:
             self._quality = self._detail(request).quality if moving else Quality()
             self.surface = surface = self._surface_of(self._quality)
             share = self._quality.share
-            refinable = render_frame(self.renderer, request, surface, wait=False, share=share, moving=moving)
+            refinable = render_frame(self.renderer, drawn, surface, wait=False, share=share, moving=moving)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
             return True
         if moving:
             self._simplifies[surface.stats.backend] = surface.stats.simplified
-        self._note_drawn(request, surface, refinable)
+        self._note_drawn(request, surface, drawn is request, refinable)
         return True
 
-    def _note_drawn(self, request: Request, surface: Surface, refinable: bool) -> None:
-        if surface.stats.backend == str(request.backend):
-            self._asked_for = request
+    def _to_draw(self, request: Request, size: tuple[int, int]) -> Request | None:
+        """The request, where all is there but what its view alone needs. Else, for as long as workers are at
+        it, the pose as the one before was drawn, or None where that needs work too and the picture before
+        stays; plain points where there is none."""
+        if is_prepared(self.renderer, request) or prepare(self.renderer, request, size):
+            return request
+        before = self._as_before(request)
+        is_other = self.is_there and self.request is not None and self.request.pose is not request.pose
+        return None if before is None and is_other else before or fallback(request)
+
+    def _note_drawn(self, request: Request, surface: Surface, as_asked: bool, refinable: bool) -> None:
         drew, count = surface.stats.backend, request.pose.count - surface.stats.left_out
+        as_asked &= drew == str(request.backend)
+        if as_asked:
+            self._asked_for = request
         now = self.shown_at = time.monotonic()
         self.number += 1
         self._times.append(now)
         self._motion.show(now)
-        if refinable and not self.is_preview:
-            self._prepared_at = now + (0 if drew == request.backend else _PREPARED_LATER)
+        if not as_asked:
+            self._prepared_at = now + _PREPARED_LATER
+        elif refinable and not self.is_preview:
+            self._prepared_at = now
         pixels = surface.size
         log.debug("drew frame %d with %s, %dx%d pixels, %d points", request.pose.index, drew, *pixels, count)
 
     def without_preparing(self, request: Request) -> Request:
         """A request to show instead, for which nothing has to be prepared: as before, or plain points."""
-        if self._asked_for is not None:
-            before = colorable(
-                replace(self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers)
-            )
-            if is_prepared(self.renderer, before, self.size):
-                return before
-        return fallback(request)
+        return self._as_before(request) or fallback(request)
+
+    def _as_before(self, request: Request) -> Request | None:
+        """The request, drawn as the last one was that got what it asked for; None where that needs work."""
+        if self._asked_for is None:
+            return None
+        before = replace(self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers)
+        before = colorable(before)
+        return before if is_prepared(self.renderer, before, self.size) else None
 
     def finish(self) -> None:
         """Draw the picture in full, where it is a preview."""
@@ -223,7 +243,7 @@ class Viewport:
 
     def clear(self) -> None:
         """Forget what is shown, whose image stays until the next request is drawn."""
-        self._drawn = self.request = self.problem = self._bounded = self._picked = None
+        self._drawn = self.request = self.problem = self._bounded = self._picked = self._asked_for = None
         self._prepared_at = math.inf
 
     def bounds(self, pose: Pose) -> Bounds:

@@ -1,0 +1,223 @@
+"""Poses are prepared before they are due, those first that are due first and in time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import sphere
+
+from viewer.app.playing.ahead import Ahead
+from viewer.app.playing.playback import Playback
+from viewer.app.playing.player import Pace
+from viewer.app.session import Session
+from viewer.camera import Camera
+from viewer.document.document import Document
+from viewer.frame import prepare_ahead
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.timeline import Timeline
+
+COUNT = 12
+CAMERA = Camera.orbit(sphere(100).bounds())
+
+
+class Spheres:
+    """A source of spheres without normals."""
+
+    name = "spheres"
+
+    def __len__(self) -> int:
+        return COUNT
+
+    def label(self, index: int) -> str:
+        return f"sphere {index}"
+
+    def load(self, index: int) -> PointCloud:
+        return PointCloud.from_arrays(sphere(300 + index).positions)
+
+
+class Noting(Renderer):
+    """A renderer that notes what it is asked for, and takes as long as it is told."""
+
+    def __init__(self, gpu: Any) -> None:
+        super().__init__(gpu)
+        self.asked: list[list[int]] = []
+        self.afresh: list[bool] = []
+        self.seconds = 0.0
+
+    def prepare_ahead(self, wants: Any, afresh: bool = False) -> None:
+        wants = list(wants)
+        self.asked.append([want.pose.index for want in wants])
+        self.afresh.append(afresh)
+        super().prepare_ahead(wants, afresh)
+
+    @property
+    def latency(self) -> float:
+        return self.seconds
+
+
+@pytest.fixture
+def renderer(renderer: Renderer) -> Iterator[Noting]:
+    own = Noting(renderer.gpu)
+    yield own
+    own.release()
+
+
+@pytest.fixture
+def start(renderer: Noting) -> Iterator[Callable[..., tuple[Playback, Ahead]]]:
+    opened: list[Playback] = []
+
+    def start(backend: str = "surfels", **pace: Any) -> tuple[Playback, Ahead]:
+        timeline = Timeline(Spheres(), np.arange(COUNT) / 10)
+        session = Session("scan", Document(backend=backend, camera=CAMERA), Pace(**pace))
+        playback = Playback(timeline, session)
+        ahead = Ahead(session, playback, renderer)
+        opened.append(playback)
+        timeline.prefetch(0)
+        until(lambda: sum(map(len, timeline.cached())) == COUNT)
+        playback.advance(0.0)
+        return playback, ahead
+
+    yield start
+    for playback in opened:
+        playback.close()
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Wait for workers; a minute without it is a failure."""
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def test_frames_are_asked_for_as_they_are_due_and_none_at_rest(renderer: Noting, start: Callable) -> None:
+    playback, ahead = start()
+    ahead.advance()
+    assert set(renderer.asked[-1]) == {0}, "at rest the one that is shown"
+    playback.toggle(0.0)
+    ahead.advance()
+    assert list(dict.fromkeys(renderer.asked[-1])) == [*range(COUNT)]
+    playback.change(0.0, reverse=True)
+    ahead.advance()
+    assert list(dict.fromkeys(renderer.asked[-1])) == [0, *reversed(range(1, COUNT))]
+    playback.change(0.0, reverse=False, loop=False)
+    playback.seek(9, 0.0)
+    ahead.advance()
+    assert [index for index in renderer.asked[-1] if index] == [9, 10, 11]
+
+
+def test_what_would_be_late_comes_last_but_for_every_frame(renderer: Noting, start: Callable) -> None:
+    playback, ahead = start()
+    renderer.seconds = 0.25
+    playback.toggle(0.0)
+    ahead.advance()
+    shown, *asked = renderer.asked[-1]
+    assert shown == 0
+    assert asked == [*range(3, COUNT), 2, 1, 0]
+    playback.change(0.0, every_frame=True)
+    ahead.advance()
+    assert renderer.asked[-1][1:] == [*range(COUNT)]
+
+
+def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Callable) -> None:
+    playback, ahead = start()
+
+    def is_afresh() -> bool:
+        ahead.advance()
+        return renderer.afresh[-1]
+
+    assert is_afresh()
+    playback.toggle(0.0)
+    assert not is_afresh()
+    playback.advance(0.11)
+    assert not is_afresh(), "it plays on"
+    playback.seek(8, 0.2)
+    assert is_afresh()
+    assert not is_afresh()
+    playback.session.change("Choose", backend="voxels")
+    assert is_afresh()
+    assert not is_afresh()
+    playback.session.change("Turn", camera=CAMERA.orbited(10, 0))
+    assert not is_afresh(), "nothing that is prepared goes by the camera"
+
+
+@pytest.mark.parametrize("backend", ["surfels", "voxels"])
+def test_a_second_lap_needs_no_work(renderer: Noting, start: Callable, backend: str) -> None:
+    playback, ahead = start(backend)
+    playback.toggle(0.0)
+    until(lambda: (ahead.advance(), ahead.ready == COUNT - 1 and renderer.unfinished == 0)[1])
+    shown = []
+    for frame in range(1, 2 * COUNT):
+        now = frame / 10 + 0.01
+        ahead.advance()
+        assert renderer.unfinished == 0
+        playback.advance(now)
+        assert playback.pose is not None
+        shown.append(playback.pose.index)
+    assert shown == [frame % COUNT for frame in range(1, 2 * COUNT)]
+    assert playback.dropped == 0
+
+
+def test_a_frame_that_is_not_prepared_leaves_the_one_before_and_counts_as_dropped(
+    renderer: Noting, start: Callable
+) -> None:
+    playback, ahead = start()
+    playback.toggle(0.0)
+    for frame in range(1, 5):
+        playback.advance(frame / 10 + 0.01)  # nobody has anything prepared
+        assert playback.pose.index == 0
+        assert playback.waiting
+    assert playback.dropped == 3, "the one that is due may still come"
+    timeline, session = playback.timeline, playback.session
+    third = session.document.request(timeline.ready(3))
+
+    def third_is_there() -> bool:
+        prepare_ahead(renderer, [third])
+        return ahead.is_prepared(third.pose)
+
+    until(third_is_there)
+    playback.advance(0.45)
+    assert playback.pose.index == 3, "the latest one that is there"
+    playback.advance(0.55)
+    assert playback.pose.index == 3
+
+
+def test_every_frame_waits_until_it_is_prepared(renderer: Noting, start: Callable) -> None:
+    playback, ahead = start(every_frame=True)
+    playback.toggle(0.0)
+    shown, now = [0], 0.0
+    deadline = time.monotonic() + 60
+    while len(shown) < 2 * COUNT:
+        assert time.monotonic() < deadline
+        now += 0.01
+        ahead.advance()
+        playback.advance(now)
+        if playback.pose.index != shown[-1]:
+            shown.append(playback.pose.index)
+        time.sleep(0.001)
+    assert shown == [frame % COUNT for frame in range(2 * COUNT)]
+    assert playback.dropped == 0
+
+
+def test_a_scan_is_shown_before_anything_is_prepared(renderer: Noting, start: Callable) -> None:
+    playback, ahead = start("voxels")
+    assert playback.pose is not None
+    assert not ahead.is_prepared(playback.pose)
+    playback.seek(5, 0.0)
+    playback.advance(0.1)
+    assert playback.pose.index == 0, "the picture before stays"
+    until(lambda: (ahead.advance(), playback.advance(0.2), playback.pose.index == 5)[2])
+
+
+def test_nothing_is_asked_for_before_there_is_a_camera(renderer: Noting, start: Callable) -> None:
+    playback, ahead = start()
+    playback.session.amend(camera=None)
+    playback.toggle(0.0)
+    ahead.advance()
+    assert renderer.asked[-1] == []
+    assert ahead.is_prepared(playback.pose)

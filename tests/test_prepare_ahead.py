@@ -1,0 +1,214 @@
+"""What pictures will need is made by workers before: bounded, in order, and dropped when it is not needed."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+import pytest
+from scenes import sphere
+
+from viewer.backends import Backend
+from viewer.backends import backend as find_backend
+from viewer.errors import InputError
+from viewer.look import Look
+from viewer.params import param
+from viewer.renderer import Renderer, Want
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.task import checkpoint
+
+BYTES = 12_000  # of what is derived of a pose
+BARE = PointCloud.from_arrays(sphere(1500).positions)
+
+
+@dataclass(frozen=True)
+class _Params:
+    step: int = param(1, "Every how many points", low=1, affects="derive")
+
+
+class _Uploaded:
+    def __init__(self, arrays: tuple[np.ndarray, int]) -> None:
+        self.array, self.process = arrays
+        self.nbytes = self.array.nbytes
+
+    def release(self) -> None:
+        pass
+
+
+def every_nth(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
+    """Every n-th position, and the process that looked for them."""
+    return pose.cloud.positions[:: params.step], os.getpid()
+
+
+def slowly(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
+    """Tells its process and takes longer than a test waits, but for those of an odd frame."""
+    checkpoint(float(os.getpid()))
+    while pose.index % 2 == 0:
+        checkpoint()
+        time.sleep(0.01)
+    return every_nth(pose, params)
+
+
+def failing(pose: Pose, params: _Params) -> None:
+    """Fails."""
+    raise InputError("is no good", pose.label)
+
+
+def deriving(derive: Callable, on_thread: bool = True) -> Backend:
+    module = ModuleType("deriving")
+    vars(module).update(
+        TITLE="Deriving",
+        Params=_Params,
+        needs=lambda pose, params: (),
+        derive=derive,
+        upload=lambda gpu, arrays: _Uploaded(arrays),
+        DERIVES_ON_THREAD=on_thread,
+    )
+    return Backend("deriving", module)
+
+
+def want(pose: Pose, backend: Backend, **params: int) -> Want:
+    return Want(pose, backend, backend.params(params), Look(), None)
+
+
+@pytest.fixture
+def own(renderer: Renderer) -> Iterator[Renderer]:
+    own = Renderer(renderer.gpu)
+    yield own
+    own.release()
+
+
+@pytest.fixture
+def poses() -> list[Pose]:
+    return [Pose(number, float(number), f"frame {number}", sphere(1000)) for number in range(20)]
+
+
+def prepare_all(own: Renderer, wants: list[Want], goal: Callable[[], bool], afresh: bool = False) -> None:
+    """As a window does, until something has come about."""
+    deadline = time.monotonic() + 60
+    own.prepare_ahead(wants, afresh)
+    while not goal():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+        own.prepare_ahead(wants)
+
+
+def test_poses_are_prepared_a_few_at_a_time_and_kept(own: Renderer, poses: list[Pose]) -> None:
+    backend, most = deriving(every_nth), 0
+    wants = [want(pose, backend) for pose in poses]
+
+    def all_there() -> bool:
+        nonlocal most
+        most = max(most, own.unfinished)
+        return all(own.is_prepared(one) for one in wants)
+
+    prepare_all(own, wants, all_there)
+    assert 1 <= most <= 3 * (os.cpu_count() or 1)
+    assert own.unfinished == 0
+    assert own.nbytes == len(poses) * BYTES
+    own.prepare_ahead([])
+    assert all(own.is_prepared(one) for one in wants), "they are kept though nobody wants them now"
+    assert own.latency > 0
+
+
+def test_estimates_come_first_and_what_is_derived_goes_by_them(own: Renderer) -> None:
+    voxels, pose = find_backend("voxels"), Pose(0, 0.0, "x", BARE)
+    smooth = want(pose, voxels, normals="smooth")  # type: ignore[arg-type]
+    prepare_all(own, [smooth], lambda: own.is_prepared(smooth))
+    assert own.is_prepared(want(pose, find_backend("surfels"), radius="uniform"))  # type: ignore[arg-type]
+    assert pose.cloud.normals is None, "the scan itself is left as it was"
+    assert own.resident(pose).cloud.normals is not None
+
+
+def test_what_waits_is_dropped_when_other_poses_are_wanted(own: Renderer, poses: list[Pose]) -> None:
+    backend = deriving(slowly)
+    slow, quick = ([want(pose, backend) for pose in poses if pose.index % 2 == odd] for odd in (0, 1))
+    own.prepare_ahead(slow)
+    assert own.unfinished > 1
+    prepare_all(own, quick[:1], lambda: own.is_prepared(quick[0]), afresh=True)
+    assert not any(own.is_prepared(one) for one in slow)
+
+
+def test_work_in_processes_is_ended_where_it_keeps_others_waiting(own: Renderer, poses: list[Pose]) -> None:
+    backend = deriving(slowly, on_thread=False)
+    slow, quick = ([want(pose, backend) for pose in poses if pose.index % 2 == odd] for odd in (0, 1))
+    prepare_all(own, slow, lambda: own.preparing is not None and own.preparing.progress is not None)
+    process = own.preparing.progress if own.preparing else None
+    assert process is not None
+    prepare_all(own, quick[:4], lambda: all(own.is_prepared(one) for one in quick[:4]), afresh=True)
+    assert not any(own.is_prepared(one) for one in slow)
+
+
+def test_what_a_worker_is_at_is_let_finish_while_playing_goes_on(own: Renderer, poses: list[Pose]) -> None:
+    began: list[int] = []
+
+    def derive(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
+        began.append(pose.index)
+        time.sleep(0.6)
+        return every_nth(pose, params)
+
+    backend = deriving(derive)
+    first, *later = (want(pose, backend) for pose in poses[:6])
+    prepare_all(own, [first], lambda: bool(began))
+    prepare_all(own, later, lambda: own.is_prepared(first))
+    assert began.count(0) == 1
+
+
+def test_the_budget_holds_what_is_drawn_soonest(own: Renderer, poses: list[Pose]) -> None:
+    backend = deriving(every_nth)
+    own.budget_bytes = 5 * BYTES
+    wants = [want(pose, backend) for pose in poses]
+
+    def step_to(playhead: int) -> list[int]:
+        own.steps_to = lambda pose: (pose.index - playhead) % len(poses)
+        ahead = wants[playhead:] + wants[:playhead]
+        prepare_all(own, ahead, lambda: own.is_prepared(ahead[3]) and own.unfinished == 0)
+        assert own.held_bytes <= own.budget_bytes
+        return [number for number, one in enumerate(wants) if own.is_prepared(one)]
+
+    assert step_to(0) == [0, 1, 2, 3, 4]
+    assert step_to(3) == [3, 4, 5, 6, 7]
+    assert step_to(18) == [0, 1, 2, 18, 19]
+
+
+def test_a_failure_is_told_when_it_is_drawn_and_holds_up_nothing(own: Renderer, poses: list[Pose]) -> None:
+    one, other = (want(pose, deriving(failing)) for pose in poses[:2])
+    prepare_all(own, [one, other], lambda: own.is_prepared(one) and own.is_prepared(other))
+    good = want(poses[2], deriving(every_nth))
+    prepare_all(own, [one, good], lambda: own.is_prepared(good))
+    with pytest.raises(InputError, match="frame 0: is no good"):
+        own.prepare(own.resident(poses[0]), one.backend, one.params, Look(), False, None)  # type: ignore[arg-type]
+
+
+def test_what_cannot_be_drawn_is_passed_over(own: Renderer, poses: list[Pose]) -> None:
+    pyramidal = find_backend("pyramidal")
+    refused = Want(poses[0], pyramidal, pyramidal.params(), Look(), None)
+    good = want(poses[1], deriving(every_nth))
+    prepare_all(own, [refused, good], lambda: own.is_prepared(good))
+    assert own.is_prepared(refused), "drawing it tells why"
+
+
+def test_the_last_few_ways_of_drawing_a_pose_are_kept(own: Renderer, poses: list[Pose]) -> None:
+    backend = deriving(every_nth)
+    ways = [want(poses[0], backend, step=step) for step in range(1, 8)]
+    for way in ways:
+        prepare_all(own, [way], lambda way=way: own.is_prepared(way))  # type: ignore[misc]
+    assert [own.is_prepared(way) for way in ways] == [False] * 3 + [True] * 4
+
+
+def test_releasing_ends_all_processes_at_work(renderer: Renderer, poses: list[Pose]) -> None:
+    own = Renderer(renderer.gpu)
+    slow = [want(pose, deriving(slowly, on_thread=False)) for pose in poses if pose.index % 2 == 0]
+    own.prepare_ahead(slow)
+    tasks = [job.task for job in own._unfinished]
+    while own.preparing is None or own.preparing.progress is None:
+        time.sleep(0.002)
+    own.release()
+    for process in {int(task.progress) for task in tasks if task.progress}:
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)

@@ -1,0 +1,89 @@
+"""Poses prepared before they are due: estimates and octrees ahead of the playhead, as reading is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ...document.document import Document
+from ...frame import Request, is_prepared, prepare_ahead
+from ...renderer import Renderer
+from ...scan.pose import Pose
+from ..session import Session
+from .playback import Playback
+
+_REACH = 24  # frames looked at beyond those that would be late
+
+
+class Ahead:
+    """Has the renderer's workers prepare the poses that are shown next, as the document draws them.
+
+    ready: how many of the next frames can be drawn, up to the first that cannot, no more than are looked at.
+    """
+
+    def __init__(self, session: Session, playback: Playback, renderer: Renderer) -> None:
+        self._session, self._playback, self._renderer = session, playback, renderer
+        self._asked: Any = None
+        self.ready = 0
+        playback.is_prepared = self.is_prepared
+        renderer.steps_to = self._steps_to
+
+    def is_prepared(self, pose: Pose) -> bool:
+        """Whether a pose can be drawn as the document has it, but for what its view alone needs."""
+        request = self._request(pose)
+        return request is None or is_prepared(self._renderer, request)
+
+    def advance(self) -> None:
+        """Take in what was prepared, and ask for what is shown next; what is not any more is dropped."""
+        playback, document = self._playback, self._session.document
+        asked = (playback.jumps, playback.timeline, *_how(document))
+        ahead = [playback.timeline.ready(index) for index in reversed(self._next())]  # the next one used last
+        requests = [self._request(pose) for pose in (playback.pose, *reversed(ahead)) if pose is not None]
+        prepare_ahead(self._renderer, [r for r in requests if r is not None], afresh=asked != self._asked)
+        self._asked = asked
+        self.ready = self._count_ready()
+
+    def _next(self) -> list[int]:
+        """The frames to prepare, the most urgent first; while playing in real time those that would be late
+        come after all others, the latest last."""
+        playback, session = self._playback, self._session
+        player, count, index = playback.player, len(playback.timeline), session.index
+        if not player.playing:
+            return [index]
+        late = 0
+        if not session.pace.every_frame:
+            late = min(math.ceil(self._renderer.latency * player.rate), count - 1)
+        steps = [*range(late, min(late + _REACH, count)), *reversed(range(late))]
+        frames = [index + step * session.pace.direction for step in steps]
+        if not session.pace.loop:
+            return [frame for frame in frames if 0 <= frame < count]
+        return [frame % count for frame in frames]
+
+    def _count_ready(self) -> int:
+        playback = self._playback
+        if not playback.player.playing:
+            return 0
+        for step in range(1, min(_REACH, len(playback.timeline))):
+            index = (self._session.index + step * self._session.pace.direction) % len(playback.timeline)
+            pose = playback.timeline.ready(index)
+            if pose is None or not self.is_prepared(pose):
+                return step - 1
+        return min(_REACH, len(playback.timeline)) - 1
+
+    def _request(self, pose: Pose) -> Request | None:
+        """The picture to draw of a pose; None before there is a camera."""
+        if self._session.document.camera is None:
+            return None
+        return self._session.document.request(pose, self._session.laid.layers(pose))
+
+    def _steps_to(self, pose: Pose) -> int:
+        """How many frames playing shows before a pose; 0 for all while it does not play."""
+        if not self._playback.player.playing:
+            return 0
+        steps = (pose.index - self._session.index) * self._session.pace.direction
+        return steps % len(self._playback.timeline)
+
+
+def _how(document: Document) -> tuple[Any, ...]:
+    """The fields of a document that decide what is prepared."""
+    return document.backend, document.params, document.look
