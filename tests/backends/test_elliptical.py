@@ -48,7 +48,7 @@ def surfels(draw: Draw) -> Draw:
     """surfels(cloud, camera, size, instancing=..., ...): one finished Surface."""
 
     def surfels(cloud: PointCloud, camera: Camera, size: tuple[int, int] = SIZE, **params: object) -> Surface:
-        return draw(cloud, camera, size, "surfels", params=params)
+        return draw(cloud, camera, size, "surfels", params={"passes": "one", **params})
 
     return surfels
 

@@ -30,7 +30,7 @@ def camera(projection: str = "perspective", azimuth: float = 30) -> Camera:
 
 
 def surfels(draw: Draw, cloud: PointCloud, camera: Camera, **params: object) -> Surface:
-    return draw(cloud, camera, SIZE, "surfels", Look(light="flat"), params)
+    return draw(cloud, camera, SIZE, "surfels", Look(light="flat"), {"passes": "one", **params})
 
 
 def in_one_pixel(depths: list[float], colors: list[list[int]], normals: list[list[float]]) -> PointCloud:
@@ -80,7 +80,7 @@ def test_larger_splats_are_averaged_less_and_less(draw: Draw, radii: float, shar
     pair = in_one_pixel([1.0, 1.0], [[200, 0, 0], [0, 100, 0]], [[0, 0, 1], [0, 0.6, 0.8]])
     scale = draw(pair, view, size, "surfels").view.scale
     cloud = replace(pair, radii=np.full(2, radii * 0.7072 / scale, np.float32))
-    surface = draw(cloud, view, size, "surfels", Look(light="flat"))
+    surface = draw(cloud, view, size, "surfels", Look(light="flat"), {"passes": "one"})
     light = linear_from_bytes(cloud.colors[:, :3])
     shown = bytes_from_linear(share * light.mean(axis=0) + (1 - share) * light[0])
     np.testing.assert_allclose(surface.image()[4, 4, :3], shown, atol=1)
@@ -137,7 +137,11 @@ def test_they_do_not_flicker(draw: Draw) -> None:
     walk = Walk([Judge.of(gpu, truth, one, SIZE, look, CLOUD, None) for one in cameras], [None] * 2)
     nearest, mean = (
         walk.flicker(
-            (draw(CLOUD, one, SIZE, "surfels", look, {"epsilon": epsilon}) for one in cameras), "orbit"
+            (
+                draw(CLOUD, one, SIZE, "surfels", look, {"passes": "one", "epsilon": epsilon})
+                for one in cameras
+            ),
+            "orbit",
         )
         for epsilon in (0.0, 1.0)
     )

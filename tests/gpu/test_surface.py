@@ -40,7 +40,8 @@ def test_a_picture_too_long_for_the_rasteriser_is_refused(draw: Draw) -> None:
 
 
 def test_a_flat_picture_holds_the_colours_of_the_points(draw: Draw) -> None:
-    surface = draw(CLOUD, CAMERA, (80, 60), "surfels", Look(light="flat", background="#0a141e28"))
+    look = Look(light="flat", background="#0a141e28")
+    surface = draw(CLOUD, CAMERA, (80, 60), "surfels", look, {"passes": "one"})
     image, row = surface.image(), surface.row
     covered = row != NOTHING
     np.testing.assert_array_equal(image[covered][:, :3], CLOUD.colors[row[covered]][:, :3])
@@ -109,7 +110,7 @@ def test_numbers_are_coloured_by_the_map(draw: Draw, source: str) -> None:
 
 
 def test_a_look_can_be_changed_afterwards(draw: Draw) -> None:
-    surface = draw(CLOUD, CAMERA, (40, 30), "surfels", Look(light="flat"))
+    surface = draw(CLOUD, CAMERA, (40, 30), "surfels", Look(light="flat"), {"passes": "one"})
     red = draw(CLOUD, CAMERA, (40, 30), "surfels", Look(light="flat", color_by="plain", plain="#ff0000"))
     np.testing.assert_array_equal(
         surface.image(Look(light="flat", color_by="plain", plain="#ff0000")), red.image()
@@ -265,7 +266,8 @@ def test_more_pixels_than_one_dimension_of_a_dispatch_takes(renderer: Renderer) 
 
 
 def test_normals_are_shown_in_the_fake_colour_of_the_paper(draw: Draw) -> None:
-    surface = draw(CLOUD, CAMERA, (80, 60), "surfels", Look(light="flat", color_by="normal"))
+    look = Look(light="flat", color_by="normal")
+    surface = draw(CLOUD, CAMERA, (80, 60), "surfels", look, {"passes": "one"})
     covered = surface.row != NOTHING
     expected = fake_color(CLOUD.normals)[surface.row[covered]].astype(int)
     assert np.abs(surface.image()[covered].astype(int) - expected).max() <= 1

@@ -37,6 +37,14 @@ class Resource(Protocol):
         """Delete it."""
 
 
+class Workspace(Resource, Protocol):
+    """Things that a backend keeps with a surface or a pose."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+
+
 @dataclass
 class Attempts:
     """Attempts to get a context: (how, what came of it)."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import moderngl
 import numpy as np
@@ -23,7 +23,7 @@ from ..scan.pose import Pose
 from ..scan.range_points import RangePoints
 from ..scan.range_view import RangeView
 from . import gl
-from .context import Gpu
+from .context import Gpu, Workspace
 from .range_samples import RangeSamples
 
 # What one texel of each array is.
@@ -37,6 +37,8 @@ FORMATS = {
 }
 _RANGES = "samples"  # the name that samples of range views are uploaded by
 _TELEPHOTO = 0.5  # degrees from bottom to top, below which rays may be as good as parallel
+M = TypeVar("M", bound=Workspace)
+
 _SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
 
 
@@ -59,6 +61,7 @@ class GpuPose:
         self._uploaded_bytes = 0
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._layers: dict[int, Layer] = {}
+        self._made: dict[Callable[..., Any], Workspace] = {}
         self._origin = pose.origin
 
     @cached_property
@@ -129,7 +132,8 @@ class GpuPose:
     def uploaded_bytes(self) -> int:
         """Bytes that it holds on the GPU."""
         samples = self._samples
-        return self._uploaded_bytes + (samples.nbytes if samples is not None and samples.complete else 0)
+        made = sum(each.nbytes for each in self._made.values())
+        return self._uploaded_bytes + made + (samples.nbytes if samples and samples.complete else 0)
 
     @property
     def bounds(self) -> Bounds:
@@ -184,6 +188,13 @@ class GpuPose:
                 upload.go_on(np.inf)
                 self._keep_array(key, upload, texel_format)
         return self._arrays[key]
+
+    def keep(self, make: Callable[[GpuPose], M]) -> M:
+        """Make, once, what a backend finds of this pose's points on the GPU. Counted, kept and deleted with
+        the arrays."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return self._made[make]  # type: ignore[return-value]
 
     def _upload(self, name: str, end: float) -> bool:
         """Go on with an array or the samples until that time of the performance counter; whether it is
@@ -304,7 +315,7 @@ class GpuPose:
     def __del__(self) -> None:
         begun = (upload.target for upload in self._uploads.values())
         layers = (texels for layer in self._layers.values() for texels in layer.texels.values())
-        self.gpu.discard(*self._arrays.values(), *layers, *begun, self._samples)
+        self.gpu.discard(*self._arrays.values(), *self._made.values(), *layers, *begun, self._samples)
 
 
 def drawn_bounds(pose: Pose, camera: Camera | None = None) -> Bounds:

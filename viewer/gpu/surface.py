@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import moderngl
 import numpy as np
@@ -24,7 +24,7 @@ from .bindings import Storage, Texture, UniformBlock
 from .blocks import BlockBuffer
 from .compact import IndexList, list_covered
 from .constants import EMPTY, NO_DEPTH, NOTHING
-from .context import Gpu, Resource
+from .context import Gpu, Resource, Workspace
 from .counts import count_points
 from .pose import GpuPose, as_float32, robust_range
 from .sample import sample_of
@@ -64,14 +64,6 @@ class Stats:
     share: float = 1.0
     left_out: int = 0
     simplified: bool = False
-
-
-class Workspace(Resource, Protocol):
-    """Things that a backend keeps with a surface."""
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes held on the GPU."""
 
 
 W = TypeVar("W", bound=Workspace)

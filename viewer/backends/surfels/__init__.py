@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...gpu.amplify import FEEDS, Points, amplify
 from ...gpu.constants import LEAST_RADIUS, UNKNOWN
@@ -22,8 +23,9 @@ from ...params import param
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
-from .. import FrameView, Suited
+from .. import FrameView, Limit, Suited
 from . import passes
+from .gaps import GapRadii
 from .splats import FRAGMENT, SURFEL, Splats
 from .subpixel import average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, splat
@@ -31,9 +33,15 @@ from .tiles import FALLBACK, splat
 TITLE = "Surfels"
 BLENDS = FILLS = True
 
+_BY_SUMS = "a mean of a thousand times as many is rounded another way where it is halfway between two levels"
+LIMITS = {
+    "points x1000, one after the other": Limit(0.0, _BY_SUMS),
+    "points x1000, all over again": Limit(0.0, _BY_SUMS),
+}
+
 _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
-# A uniform radius of 1.5 times the spacing closes the surface.
+# A uniform radius of 1.5 times the spacing closes a surface that is evenly covered.
 _RADIUS_PER_SPACING = 1.5
 
 
@@ -42,14 +50,15 @@ class Params:
     """Parameters of the surfels backend."""
 
     passes: str = param(
-        "one",
+        "auto",
         "How splats that overlap become one surface. one: the nearest is seen, and where all are about a "
-        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it. "
+        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it; "
+        "auto: two, without enlarging any, but one where that is too slow for a picture that moves. "
         "The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); one_no_depth (b); visibility, "
         "the first of two alone (c); two_large, the first enlarged as well (e); sorted, each over those "
         "behind it",
-        choices=("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
-        sweep=("one", "two"),
+        choices=("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
+        sweep=("auto", "one", "two"),
         group="Surface",
     )
     enlarge: float = param(
@@ -70,7 +79,8 @@ class Params:
     )
     radius: str = param(
         "auto",
-        "auto: the scan's own, else uniform; own: estimated where the scan has none; uniform: one for all",
+        "auto: the scan's own, else as large as the gaps round each point; own: estimated where the scan has "
+        "none; uniform: one for all",
         choices=("auto", "own", "uniform"),
         group="Splats",
     )
@@ -110,19 +120,47 @@ def suits(pose: Pose) -> Suited | None:
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Splat in as many passes as are asked for; complete where all points shall be drawn."""
+    """Splat in as many passes as are asked for; complete where all points shall be drawn in their size."""
     params: Params = frame.params
     if not len(pose.cloud):
         surface.clear()
         return False
-    own = {"auto": pose.stored.radii is not None, "own": True, "uniform": False}[params.radius]
-    # The spacing takes longer to find than many a pose takes to draw.
-    suffices = own and pose.cloud.remember(_radii_suffice)
-    points = Points.of(pose, surface, frame.share, use_radii=own)
+    points, uniform_radius, known = _points(pose, frame, surface)
+    params = _with_passes(params, frame, surface)
     instancing = _instancing(params, surface)
     surface.stats.faces_away = params.cull_back
-    _splat(points, surface, params, instancing, uniform_radius=0.0 if suffices else _uniform_radius(pose))
-    return points.rows is not None
+    _splat(points, surface, params, instancing, uniform_radius)
+    return points.rows is not None or not known
+
+
+def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, float, bool]:
+    """The points to draw, the radius of those without one of their own, and whether those are all known
+    that they shall have: else one is for all, meanwhile."""
+    setting = frame.params.radius
+    if setting == "auto" and not pose.stored.remember(_has_radii):
+        gaps = pose.keep(GapRadii)
+        known = gaps.find(pose, wait=frame.budget_ms is None)
+        if gaps.texels is not None:
+            points = Points.of(pose, surface, frame.share, use_radii=True)
+            buffers = {**points.buffers, "radii": gaps.texels}
+            return replace(points, buffers=buffers), gaps.usual, True
+        return Points.of(pose, surface, frame.share, use_radii=False), _uniform_radius(pose), known
+    own = setting != "uniform"
+    # The spacing takes longer to find than many a pose takes to draw.
+    suffices = own and pose.cloud.remember(_has_radii, np.all)
+    points = Points.of(pose, surface, frame.share, use_radii=own)
+    return points, 0.0 if suffices else _uniform_radius(pose), True
+
+
+def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:
+    """The parameters with the passes that "auto" stands for."""
+    if params.passes != "auto":
+        return params
+    stats = surface.stats
+    # Where the CPU computes all, or not all points are drawn in time, what moves gets one pass.
+    stats.simplified = frame.moving and (surface.gpu.software or frame.share < 1)
+    stats.chosen["passes"] = "one" if stats.simplified else "two"
+    return replace(params, passes=stats.chosen["passes"], enlarge=1.0)
 
 
 def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
@@ -211,10 +249,9 @@ def _instancing(params: Params, surface: Surface) -> str:
     return instancing_for(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
 
 
-def _radii_suffice(cloud: PointCloud) -> bool:
-    """Whether each point has a radius that the shader takes."""
-    radii = cloud.radii
-    return radii is not None and bool(((radii > 0) & (radii < np.float32(UNKNOWN))).all())
+def _has_radii(cloud: PointCloud, of: Callable[[NDArray], bool] = np.any) -> bool:
+    """Whether any point, or all, has a radius that the shader takes."""
+    return cloud.radii is not None and bool(of((cloud.radii > 0) & (cloud.radii < np.float32(UNKNOWN))))
 
 
 def _uniform_radius(pose: GpuPose) -> float:

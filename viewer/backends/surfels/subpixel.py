@@ -18,6 +18,7 @@ from ...gpu.scatter import CellSums, FixedPoint, Visits, scatter
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from ...srgb import LIGHT_STEPS
+from .gaps import GapRadii
 from .passes import bind_looks
 from .splats import Splats, bind_visible
 
@@ -44,7 +45,11 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
         return 0.0
     usual = largest = splats.uniform_radius
     if points.use_radii:
-        own = pose.cloud.remember(_radii_up_to)
+        if "radii" in points.buffers:
+            gaps = pose.keep(GapRadii)
+            own = gaps.usual, gaps.largest
+        else:
+            own = pose.cloud.remember(_radii_up_to)
         usual, largest = max(usual, own[0]), max(largest, own[1])
     pixels = splats.radius_scale * math.sqrt(splats.mask_limit) * points.enlarged * view.scale
     if view.perspective:

@@ -1,0 +1,202 @@
+"""Radii that close the gaps round points: as plainly computed, whatever the order, place and density."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scenes import sphere
+
+from viewer.backends import backend
+from viewer.backends.surfels.gaps import GapRadii
+from viewer.bench import metrics
+from viewer.bench.judge import Judge
+from viewer.bench.scenes.samples import line, on_mesh, on_torus, wall
+from viewer.bench.scenes.subjects import with_rows
+from viewer.bench.scenes.viewpoints import viewpoints
+from viewer.bench.truth import tessellation
+from viewer.camera import Camera
+from viewer.frame import Request, render_frame
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+pytestmark = pytest.mark.backend("surfels")
+Draw = Callable[..., Surface]
+CAMERA = Camera((2.9, 3.4, 4.0))
+TURNS = np.arange(8) * np.pi / 4
+
+
+def found(renderer: Renderer, cloud: PointCloud, *, steps: bool = False) -> NDArray[np.float32]:
+    """The radii (N,), 0 where a point has none."""
+    pose = renderer.resident(Pose(0, 0.0, "gaps", cloud))
+    gaps = pose.keep(GapRadii)
+    while not gaps.find(pose, wait=not steps):
+        assert gaps.texels is None
+    if gaps.texels is None:
+        return np.zeros(len(cloud), np.float32)
+    return np.frombuffer(gaps.texels.buffer.read(), np.float32)
+
+
+def plain(cloud: PointCloud) -> NDArray[np.float64]:
+    """The same, point by point, from the distances to all others."""
+    assert cloud.normals is not None
+    positions = np.unique(cloud.positions.astype(np.float64), axis=0)
+    radii = np.zeros(len(cloud))
+    for row, (place, normal) in enumerate(zip(cloud.positions, cloud.normals, strict=True)):
+        d = positions - place
+        d = d[d.any(axis=1)]
+        across = np.cross((0, 1, 0), normal)
+        if across @ across < 1e-8:
+            across = np.cross((0, 0, -1), normal)
+        across /= np.linalg.norm(across)
+        sides = np.outer(np.cos(TURNS), across) + np.outer(np.sin(TURNS), np.cross(normal, across))
+        # Where a place in direction w is as far from a neighbour as from the point.
+        nearer = np.maximum(2 * d @ sides.T / np.square(d).sum(axis=1)[:, None], 1e-30)
+        reach = np.sort(1 / nearer.max(axis=0))
+        radii[row] = min(reach[-1], 2.0 * reach[4])
+    return 1.2 * radii
+
+
+def torus(count: int, seed: int = 0) -> PointCloud:
+    """At random places, and so of very different gaps."""
+    rng = np.random.default_rng(seed)
+    arrays = on_torus(4 * count)
+    rows = np.sort(rng.choice(4 * count, count, replace=False))
+    return PointCloud.from_arrays(arrays["positions"][rows], normals=arrays["normals"][rows])
+
+
+def ramp(cloud: PointCloud, least: float = 0.1, seed: int = 0) -> PointCloud:
+    """Thinned out from one end to the other, to a tenth."""
+    x = cloud.positions[:, 0].astype(np.float64)
+    place = (x - x.min()) / np.ptp(x)
+    return with_rows(cloud, np.flatnonzero(np.random.default_rng(seed).random(len(x)) < least**place))
+
+
+def assert_plain(radii: NDArray[np.float32], cloud: PointCloud) -> None:
+    """Radii are those of `plain`: but one in 2000 may be unknown, and a few are larger, at gaps as large as a
+    cell."""
+    error = radii / plain(cloud) - 1
+    assert (radii == 0).sum() * 2000 <= len(cloud)
+    assert (np.abs(error[radii > 0]) > 1e-3).mean() < 0.003
+    assert error[radii > 0].min() > -1e-3
+
+
+def test_they_are_those_that_are_plainly_computed(renderer: Renderer) -> None:
+    cloud = torus(3000)
+    assert_plain(found(renderer, cloud), cloud)
+
+
+def test_where_density_varies_they_are_so_too(renderer: Renderer) -> None:
+    cloud = ramp(ramp(torus(6000)))  # a hundredfold
+    radii = found(renderer, cloud)
+    assert np.quantile(radii, 0.98) > 5 * np.quantile(radii, 0.02), "the same everywhere"
+    assert_plain(radii, cloud)
+
+
+def test_order_and_copies_change_no_bit(renderer: Renderer) -> None:
+    cloud = torus(4000)
+    radii = found(renderer, cloud)
+    order = np.random.default_rng(1).permutation(len(cloud))
+    np.testing.assert_array_equal(found(renderer, with_rows(cloud, order)), radii[order])
+    np.testing.assert_array_equal(found(renderer, cloud, steps=True), radii)
+    twice = np.concatenate([order, order[:700]])
+    copied = found(renderer, with_rows(cloud, twice))  # in cells of another size
+    assert (np.abs(copied - radii[twice]) > 1e-5 * radii[twice]).mean() < 0.005
+
+
+def test_a_thousand_copies_of_each_point(renderer: Renderer) -> None:
+    arrays = wall(20, 15, spacing=0.12)
+    cloud = PointCloud.from_arrays(arrays["positions"], normals=arrays["normals"])
+    copies = np.repeat(np.arange(len(cloud)), 1000)
+    np.testing.assert_allclose(
+        found(renderer, with_rows(cloud, copies)), found(renderer, cloud)[copies], rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize(("shift", "scale"), [(1e7, 1.0), (0.0, 1e-6), (0.0, 1e9)])
+def test_moved_and_scaled(renderer: Renderer, shift: float, scale: float) -> None:
+    cloud = torus(3000)
+    moved = PointCloud.from_arrays(
+        cloud.world() * scale + shift * np.array([1, -0.37, 0.61]), normals=cloud.normals
+    )
+    # Of 1e7, float64 leaves 2e-9 units, of which float32 leaves 1e-7.
+    error = found(renderer, moved) / (scale * found(renderer, cloud)) - 1
+    assert (np.abs(error) > 1e-4).mean() < 0.005
+
+
+def test_points_that_make_no_surface(renderer: Renderer, draw: Draw) -> None:
+    """One, two, all in one place, an outlier: what has no gaps is as large as splats are in general."""
+    one, two = np.zeros((1, 3)), np.array([[0.0, 0, 0], [1, 0, 0]])
+    for positions in (one, two, np.zeros((5000, 3))):
+        cloud = PointCloud.from_arrays(positions, normals=np.tile([0.0, 0, 1], (len(positions), 1)))
+        assert not found(renderer, cloud).any()
+        surface = draw(cloud, Camera((0, 0, 9)), (80, 60), "surfels")
+        assert (surface.coverage > 0).any()
+    thread = line(500, (1.0, 0.5, 0.3))
+    assert np.isfinite(
+        found(renderer, PointCloud.from_arrays(thread["positions"], normals=thread["normals"]))
+    ).all()
+    body = torus(3000)
+    outlier = PointCloud.from_arrays(
+        np.concatenate([body.world(), [[1e6, 0, 0]]]), normals=np.concatenate([body.normals, [[0, 1, 0]]])
+    )
+    radii = found(renderer, outlier)
+    assert radii[-1] == 0
+    assert (np.abs(radii[:-1] / found(renderer, body) - 1) > 1e-4).mean() < 0.005
+
+
+def test_without_usable_normals_they_are_of_that_size(renderer: Renderer) -> None:
+    cloud = torus(3000)
+    assert cloud.normals is not None
+    spoilt = replace(cloud, normals=np.where(np.arange(3000)[:, None] % 2, cloud.normals, np.nan))
+    ratio = found(renderer, spoilt) / found(renderer, cloud)
+    np.testing.assert_array_equal(ratio[1::2], 1)
+    known = ratio[::2][ratio[::2] > 0]
+    assert len(known) > 0.99 * 1500
+    assert known.min() > 0.3
+    assert known.max() < 5
+
+
+def test_discs_close_a_body_of_uneven_density(renderer: Renderer, draw: Draw) -> None:
+    """At most 0.3 % of the true silhouette is empty or shows what is behind; of one radius for all, more."""
+    mesh = tessellation.torus_mesh()
+    cloud = ramp(replace(on_mesh(mesh, 20_000), radii=None))
+    size, look = (400, 300), Look(light="head", color_by="plain")
+    errors: dict[str, list[metrics.Errors]] = {"auto": [], "uniform": []}
+    for camera in viewpoints(mesh, 3, size):
+        judge = Judge.of(renderer.gpu, mesh, camera, size, look, cloud, None)
+        for radius, told in errors.items():
+            told.append(judge.errors(draw(cloud, camera, size, "surfels", look, {"radius": radius})))
+
+    def mean(radius: str, *names: str) -> float:
+        return float(np.mean([sum(each[name] for name in names) for each in errors[radius]]))
+
+    assert mean("auto", "hole_percent", "through_percent") < 0.3
+    assert mean("uniform", "hole_percent", "through_percent") > 1
+    assert mean("auto", "normal_median") < 2.5
+
+
+def test_blended_at_rest_and_the_nearest_in_motion(renderer: Renderer) -> None:
+    cloud = sphere(3000)
+    request = Request(Pose(0, 0.0, "sphere", cloud), CAMERA, "surfels", None, Look(light="head"))
+    surface = Surface(renderer.gpu, (160, 120))
+    assert not render_frame(renderer, request, surface)
+    assert surface.stats.chosen["passes"] == "two"
+    assert not surface.stats.simplified
+    at_rest = surface.image()
+    assert not render_frame(renderer, request, surface, moving=True)
+    if renderer.gpu.software:
+        assert surface.stats.simplified
+        assert surface.stats.chosen["passes"] == "one"
+        one = replace(request, params=backend("surfels").params({"passes": "one"}))
+        moving = surface.image()
+        render_frame(renderer, one, surface)
+        np.testing.assert_array_equal(moving, surface.image())
+    assert not render_frame(renderer, request, surface)
+    np.testing.assert_array_equal(surface.image(), at_rest)
