@@ -14,6 +14,13 @@ layout(location = 3) in vec4 in_axes;
 const vec4 in_axes = vec4(0.0);
 #endif
 
+#ifdef FED_COLOR
+layout(location = 4) in vec4 in_color;
+#endif
+
 Point attribute_point(int i) {
+#ifdef FED_COLOR
+    fed_color = in_color.rgb;
+#endif
     return Point(in_position, in_normal, in_radius, in_axes, uint(i));
 }

@@ -7,11 +7,17 @@
 #include <shape>
 
 flat out uint row;
+#ifdef FED_COLOR
+flat out vec3 color;
+#endif
 out vec2 local;
 
 void main() {
     Point point = fetch_point();
     row = point.row;
+#ifdef FED_COLOR
+    color = fed_color;
+#endif
     local = vec2(0.0);
     gl_Position = vec4(0.0, 0.0, -1.0, 1.0);  // nowhere: in front of the near plane
     if (!begin_shape(point)) return;

@@ -8,9 +8,17 @@
 layout(points) in;
 layout(triangle_strip, max_vertices = CORNERS) out;
 
-in Forwarded { Point point; } forwarded[];
+in Forwarded {
+    Point point;
+#ifdef FED_COLOR
+    vec3 color;
+#endif
+} forwarded[];
 
 flat out uint row;
+#ifdef FED_COLOR
+flat out vec3 color;
+#endif
 out vec2 local;
 
 void main() {
@@ -20,6 +28,9 @@ void main() {
         gl_Position = to_clip(c.view);
         local = c.local;
         row = forwarded[0].point.row;
+#ifdef FED_COLOR
+        color = forwarded[0].color;
+#endif
         EmitVertex();
     }
     EndPrimitive();

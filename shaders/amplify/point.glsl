@@ -7,6 +7,10 @@ struct Point {
     uint row;
 };
 
+#ifdef FED_COLOR
+vec3 fed_color;  // sRGB, of the point that was fetched
+#endif
+
 // What a shape's size is multiplied by, so that the points drawn make up for those left out.
 uniform float enlarged;
 

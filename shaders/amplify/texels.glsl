@@ -9,6 +9,9 @@ layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 layout(binding = TEXTURE_AXES) uniform samplerBuffer axes;
 #endif
 #endif
+#ifdef FED_COLOR
+layout(binding = TEXTURE_COLORS) uniform samplerBuffer fed_colors;
+#endif
 #if SAMPLED
 layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
@@ -25,6 +28,9 @@ int drawn_row(int i) {
 Point texel_point(int at) {
     vec3 position = texelFetch(positions, at).xyz;
     float radius = stored_radius(at);
+#ifdef FED_COLOR
+    fed_color = texelFetch(fed_colors, at).rgb;
+#endif
 #if PACKED
     uvec3 words = texelFetch(splats, at).xyz;
     vec3 normal = packed_normal(words);

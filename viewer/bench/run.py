@@ -35,6 +35,7 @@ from . import baselines, numerics
 from .baselines import CEILING, FLOOR, PLANE_POINTS, PRECOMPUTED, RANGE_MESH
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
+from .papers.slomp_2014 import literal
 from .plan import Contender, Group
 from .report.pictures import picture_path, side_by_side
 from .report.results import SPREADS, Row, spread
@@ -341,6 +342,9 @@ class Bench:
             points = baselines.with_planes(moment.pose.cloud, camera, PLANE_POINTS)
             pose = replace(moment.pose, points=points)
             return Request(pose, camera, "surfels", contender.params, LOOK)
+        if contender.backend == literal.NAME:
+            pose = replace(moment.pose, points=literal.colored(moment.pose.cloud))
+            return Request(pose, camera, literal.paper_splats(), contender.params, LOOK)
         drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
         return Request(moment.pose, camera, drawn, contender.params, LOOK)
 

@@ -41,6 +41,7 @@ _ATTRIBUTES = (
     ("radii", "in_radius", 1),
     ("axes", "in_axes", 4),
 )
+_COLOR = ("colors", "in_color", 4)  # bytes, where the feed brings colours as well
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,8 @@ class Points:
     "splats", normal, radius and half-axes of each row in three words, as amplify/packed.glsl reads them,
     in place of all three, but for the radii where these are given as well; "looks", colour and normal as
     surfels/passes/look.glsl reads them. elliptical: whether the half-axes of "splats" count; else they
-    are round, of the shorter one.
+    are round, of the shorter one. colored: whether the feed brings their colours as well, to fragments as
+    `color`.
     """
 
     pose: GpuPose
@@ -71,6 +73,7 @@ class Points:
     enlarged: float = 1.0
     buffers: Mapping[str, gl.BufferTexture] = field(default_factory=dict)
     elliptical: bool = True
+    colored: bool = False
 
     @classmethod
     def of(cls, pose: GpuPose, surface: Surface, share: float, use_radii: bool) -> Points:
@@ -97,12 +100,13 @@ class Points:
 
     @property
     def attributes(self) -> Attributes:
-        """Attributes that are read of each: (name of the pose's array, of the vertex attribute, floats)."""
-        return _ATTRIBUTES[: 4 if self.use_axes else 3 if self.use_radii else 2]
+        """Attributes that are read of each: (name of the pose's array, of the vertex attribute, numbers)."""
+        read = _ATTRIBUTES[: 4 if self.use_axes else 3 if self.use_radii else 2]
+        return (*read, _COLOR) if self.colored else read
 
     @property
     def stride(self) -> int:
-        """Floats of a point."""
+        """Numbers of a point."""
         return sum(floats for _, _, floats in self.attributes)
 
     @property
@@ -114,6 +118,7 @@ class Points:
             "PACKED": int(self.packed),
             "RADII_APART": int(self.use_radii and (not self.packed or "radii" in self.buffers)),
             "SAMPLED": int(self.rows is not None),
+            **({"FED_COLOR": 1} if self.colored else {}),
         }
 
     def bind(self, program: Program) -> None:
@@ -174,8 +179,17 @@ def _restore(surface: Surface) -> None:
         triangle.render(moderngl.TRIANGLES, vertices=3)
 
 
-def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: Values | None = None) -> None:
+def draw_shapes(
+    points: Points,
+    feed: str,
+    shape: Shape,
+    fragment: str,
+    params: Values | None = None,
+    macros: Mapping[str, object] | None = None,
+) -> None:
     """Draw points as shapes into the bound framebuffer, with the depth test and blending that are set.
+
+    macros: of the fragment shader.
 
     Where a feed cannot bring them, `tbo` does in its place, which gives the same picture: `ubo` and `vbo`
     where only some are drawn, all that bring attributes where these are packed.
@@ -185,7 +199,7 @@ def draw_shapes(points: Points, feed: str, shape: Shape, fragment: str, params: 
     if feed in replaced or (points.buffers and feed == "ubo"):
         feed = "tbo"
     stages, parts = _FEEDS[feed]
-    defines = {**points.defines, "CORNERS": shape.corners}
+    defines = {**points.defines, **(macros or {}), "CORNERS": shape.corners}
     if feed == "ubo":
         defines |= {"STRIDE": points.stride, "POINTS": _block_points(points)}
     program = gpu.program((*stages, fragment), defines, {**parts, "shape": shape.file}, params)
@@ -215,8 +229,8 @@ def _attributes(
 ) -> list[tuple[moderngl.Buffer, str, str]]:
     """Contents of a vertex array. advance: "/i" for the next value with each instance."""
     return [
-        (points.array(name).buffer, f"{floats}f{advance}", attribute)
-        for name, attribute, floats in points.attributes
+        (points.array(name).buffer, f"{numbers}f{'1' if name == 'colors' else ''}{advance}", attribute)
+        for name, attribute, numbers in points.attributes
         if attribute in program
     ]
 

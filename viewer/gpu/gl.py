@@ -115,6 +115,11 @@ def write_depth(on: bool) -> None:
     GL_1_0.glDepthMask(on)
 
 
+def write_colors(on: bool) -> None:
+    """Whether what is drawn from now on changes images."""
+    GL_1_0.glColorMask(on, on, on, on)
+
+
 def divide_depth(divisor: float) -> None:
     """Divide what reaches the depth buffer from now on; 1: as it is."""
     GL_1_0.glDepthRange(0.0, 1.0 / divisor)

@@ -21,6 +21,10 @@ Point fetch_point() {
 #else
     const vec4 axes = vec4(0.0);
 #endif
+#ifdef FED_COLOR
+    int color_at = at + 6 + HAS_RADIUS + 4 * HAS_AXES;
+    fed_color = vec3(number(color_at), number(color_at + 1), number(color_at + 2)) / 255.0;
+#endif
     return Point(position, normal, radius, axes, uint(first + gl_InstanceID));
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,17 +59,17 @@ class FeedTable:
             times = {feed: np.array([ms]) for feed, ms in theirs.items() if feed != "depth"}
             yield _Line(scan.points, _COVERED, "2014", times, "{:#.4g}".format)
         for each in measurements:
-            rows = of_scan(each["rows"], scan)
-            if not rows:
-                continue
-            points = rows[0]["n"]
-            covered = [percent for row in rows if row["feed"] != FLOOR for percent in row["covered"]]
-            seen = (min(covered), max(covered))
-            times = {row["feed"]: np.array(row["gpu_ms"]) for row in rows}
-            yield _Line(points, seen, each["device"], times)
-            if each["timer"] == "finish":
-                busy = {row["feed"]: np.array(row["busy_ms"]) / each["processors"] for row in rows}
-                yield _Line(points, seen, "its processors", busy)
+            found = of_scan(each["rows"], scan)
+            for form in dict.fromkeys(row.get("form", "") for row in found):
+                rows = [row for row in found if row.get("form", "") == form]
+                points = rows[0]["n"]
+                covered = [percent for row in rows if row["feed"] != FLOOR for percent in row["covered"]]
+                seen, suffix = (min(covered), max(covered)), f", {form}" if form else ""
+                times = {row["feed"]: np.array(row["gpu_ms"]) for row in rows}
+                yield _Line(points, seen, each["device"] + suffix, times)
+                if each["timer"] == "finish":
+                    busy = {row["feed"]: np.array(row["busy_ms"]) / each["processors"] for row in rows}
+                    yield _Line(points, seen, "its processors" + suffix, busy)
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,13 @@ def of_scan(rows: Sequence[dict[str, Any]], scan: Scan) -> list[dict[str, Any]]:
     return [row for row in rows if row["scene"] == scan.scene and scan.points in (None, row["n"])]
 
 
-def digest(rows: Sequence[Row], backend: str, suite: str) -> Measurement:
+def digest(
+    rows: Sequence[Row], backend: str, suite: str, forms: Mapping[str, str] | None = None
+) -> Measurement:
     """The part of a run that the tables need: how it was measured, and the times of each view.
 
-    Raises InputError where the rows are of another suite.
+    forms: what lines of other backends are called, by their names. Raises InputError where the rows are of
+    another suite.
     """
     own = [row for row in rows if row["sweep"] == FEED]
     timed = [
@@ -107,6 +110,7 @@ def digest(rows: Sequence[Row], backend: str, suite: str) -> Measurement:
             "scene": row["scene"],
             "n": row["n"],
             "feed": row["params"].get(FEED, FLOOR),
+            **({"form": forms[row["backend"]]} if forms and row["backend"] in forms else {}),
             "covered": [round(percent, 1) for percent in row["covered_by_view"]],
             **rounded_times(row),
         }

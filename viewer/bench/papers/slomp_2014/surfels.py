@@ -7,15 +7,17 @@ a pose (Table I); size, coverage and method are the paper's (VII).
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from ....backends import backend
+from ....gpu.amplify import FEEDS
 from ....resources import resource_path
 from ...baselines import FLOOR
 from ...plan import Contender, Group
+from . import literal
 
 BACKEND, FEED = "surfels", "instancing"  # the parameter is called alike wherever there are feeds
 # As theirs: two passes, twice the splat in the second, back faces left out.
@@ -60,16 +62,17 @@ def feeds(name: str) -> list[str]:
     return [feed for feed in declared.choices if feed != "auto"]
 
 
-def by_feed(scan: Scan, name: str, method: Mapping[str, Any]) -> Group:
+def by_feed(scan: Scan, name: str, method: Mapping[str, Any], beside: Sequence[Contender] = ()) -> Group:
     """All feeds of a backend, which take turns on a scan, and plain GL_POINTS as everywhere; timed alone.
 
-    method: the backend's other parameters.
+    method: the backend's other parameters. beside: what else takes turns with them.
     """
     params = (backend(name).params({**method, FEED: feed}) for feed in feeds(name))
-    drawn = (Contender(FLOOR), *(Contender(name, each, FEED) for each in params))
+    drawn = (Contender(FLOOR), *(Contender(name, each, FEED) for each in params), *beside)
     return Group(scan.scene, drawn, count=scan.points, sweep=FEED, judged=False)
 
 
 def groups() -> list[Group]:
-    """A group for each scan of Table II, and for the demo."""
-    return [by_feed(scan, BACKEND, _METHOD) for scan in scans()]
+    """A group for each scan of Table II, and for the demo: the backend's feeds, the paper's own splats."""
+    paper_feeds = [Contender(literal.NAME, literal.PaperParams(feed), FEED) for feed in FEEDS]
+    return [by_feed(scan, BACKEND, _METHOD, paper_feeds) for scan in scans()]
