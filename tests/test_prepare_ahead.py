@@ -185,6 +185,25 @@ def test_a_failure_is_told_when_it_is_drawn_and_holds_up_nothing(own: Renderer, 
         own.prepare(own.resident(poses[0]), one.backend, one.params, Look(), False, None)  # type: ignore[arg-type]
 
 
+def test_an_upload_that_fails_is_tried_once_and_told_when_it_is_drawn(
+    own: Renderer, poses: list[Pose]
+) -> None:
+    tried: list[int] = []
+
+    def upload(gpu: object, arrays: tuple[np.ndarray, int]) -> None:
+        tried.append(len(arrays[0]))
+        raise InputError("does not fit")
+
+    backend = deriving(every_nth)
+    vars(backend.module)["upload"] = upload
+    bad, good = want(poses[0], backend), want(poses[1], deriving(every_nth))
+    prepare_all(own, [bad, good], lambda: own.is_prepared(bad) and own.is_prepared(good))
+    own.prepare_ahead([bad])
+    assert len(tried) == 1
+    with pytest.raises(InputError, match="does not fit"):
+        own.prepare(own.resident(poses[0]), backend, bad.params, Look(), False, None)  # type: ignore[arg-type]
+
+
 def test_what_cannot_be_drawn_is_passed_over(own: Renderer, poses: list[Pose]) -> None:
     pyramidal = find_backend("pyramidal")
     refused = Want(poses[0], pyramidal, pyramidal.params(), Look(), None)

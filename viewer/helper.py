@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from queue import LifoQueue
 from typing import IO, Any, NamedTuple, ParamSpec, TypeVar
 
@@ -122,6 +122,12 @@ class Job:
     def has_failed(self) -> bool:
         """Whether its result is an error, and not since it was cancelled."""
         return self.future.done() and not self.task.cancelled and self.future.exception() is not None
+
+    def failed(self, error: Exception) -> Job:
+        """The same job as one that has ended with an error."""
+        future: Future[tuple[Any, float]] = Future()
+        future.set_exception(error)
+        return replace(self, future=future)
 
     def drop(self) -> bool:
         """Take it out of the queue; False where it had begun, and goes on."""

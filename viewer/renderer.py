@@ -283,11 +283,14 @@ class Renderer:
         """Take in what workers have made of any pose, for as long as a turn of a window's loop may take."""
         end = time.perf_counter() + _TAKE_SECONDS
         for entry in self._resident.values():
-            for key, (job, take, _) in list(entry.jobs.items()):
+            for key, (job, take, at) in list(entry.jobs.items()):
                 if time.perf_counter() > end:
                     return
                 if job.future.done() and not (job.task.cancelled or job.has_failed):
-                    self._take(entry, key, job, take)
+                    try:
+                        self._take(entry, key, job, take)
+                    except Exception as error:  # which drawing it will tell
+                        entry.jobs[key] = _Begun(job.failed(error), take, at)
         self._make_room()
 
     def _take(self, entry: _Resident, key: Any, job: Job, take: Callable[[Any], object]) -> None:

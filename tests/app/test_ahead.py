@@ -18,7 +18,9 @@ from viewer.camera import Camera
 from viewer.document.document import Document
 from viewer.frame import prepare_ahead
 from viewer.renderer import Renderer
+from viewer.rigid import STILL
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 from viewer.scan.timeline import Timeline
 
 COUNT = 12
@@ -212,6 +214,25 @@ def test_a_scan_is_shown_before_anything_is_prepared(renderer: Noting, start: Ca
     playback.advance(0.1)
     assert playback.pose.index == 0, "the picture before stays"
     until(lambda: (ahead.advance(), playback.advance(0.2), playback.pose.index == 5)[2])
+
+
+def test_layers_are_found_for_no_other_pose_than_the_one_that_is_shown(
+    renderer: Noting, start: Callable
+) -> None:
+    playback, ahead = start()
+    laid, looked = playback.session.laid, []
+
+    def numbers(pose: Pose) -> dict[str, np.ndarray]:
+        looked.append(pose.index)
+        return {"height": np.zeros(pose.count)}
+
+    laid.lay("tool", numbers, lambda index: STILL)
+    shown = laid.layers(playback.pose)
+    playback.toggle(0.0)
+    ahead.advance()
+    assert ahead.ready >= 0
+    assert looked == [0]
+    assert laid.layers(playback.pose) is shown
 
 
 def test_nothing_is_asked_for_before_there_is_a_camera(renderer: Noting, start: Callable) -> None:

@@ -145,12 +145,12 @@ def _draw_statistics(app: App) -> None:
         _row(name, number)
     _row("Extent", f"{x:.4g} x {y:.4g} x {z:.4g} {app.playback.unit}")
     _row("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
-    for name, choice in surface.stats.chosen.items():
-        _row(name.capitalize(), choice)
-    _row("Time", _times(surface.stats) + (f", {app.viewport.rate:.0f} fps" if app.moving else ""))
     if app.playback.player.playing:
         held = f"{app.renderer.held_bytes / 1e6:,.0f} MB"
         _row("Ahead", f"{app.ahead.ready} ready, {app.renderer.unfinished} begun, {held}")
+    for name, choice in surface.stats.chosen.items():
+        _row(name.capitalize(), choice)
+    _row("Time", _times(surface.stats) + (f", {app.viewport.rate:.0f} fps" if app.moving else ""))
     for name, milliseconds in surface.stats.passes:
         _row(f"  {name}", f"{milliseconds:.2f} ms")
 

@@ -16,15 +16,11 @@ _REACH = 24  # frames looked at beyond those that would be late
 
 
 class Ahead:
-    """Has the renderer's workers prepare the poses that are shown next, as the document draws them.
-
-    ready: how many of the next frames can be drawn, up to the first that cannot, no more than are looked at.
-    """
+    """Has the renderer's workers prepare the poses that are shown next, as the document draws them."""
 
     def __init__(self, session: Session, playback: Playback, renderer: Renderer) -> None:
         self._session, self._playback, self._renderer = session, playback, renderer
         self._asked: Any = None
-        self.ready = 0
         playback.is_prepared = self.is_prepared
         renderer.steps_to = self._steps_to
 
@@ -41,7 +37,6 @@ class Ahead:
         requests = [self._request(pose) for pose in (playback.pose, *reversed(ahead)) if pose is not None]
         prepare_ahead(self._renderer, [r for r in requests if r is not None], afresh=asked != self._asked)
         self._asked = asked
-        self.ready = self._count_ready()
 
     def _next(self) -> list[int]:
         """The frames to prepare, the most urgent first; while playing in real time those that would be late
@@ -59,7 +54,9 @@ class Ahead:
             return [frame for frame in frames if 0 <= frame < count]
         return [frame % count for frame in frames]
 
-    def _count_ready(self) -> int:
+    @property
+    def ready(self) -> int:
+        """How many of the next frames can be drawn, up to the first that cannot; 0 while none follows."""
         playback = self._playback
         if not playback.player.playing:
             return 0
@@ -71,10 +68,9 @@ class Ahead:
         return min(_REACH, len(playback.timeline)) - 1
 
     def _request(self, pose: Pose) -> Request | None:
-        """The picture to draw of a pose; None before there is a camera."""
-        if self._session.document.camera is None:
-            return None
-        return self._session.document.request(pose, self._session.laid.layers(pose))
+        """The picture to draw of a pose, without layers: nothing is prepared of them, and they are found for
+        the pose that is shown alone. None before there is a camera."""
+        return None if self._session.document.camera is None else self._session.document.request(pose)
 
     def _steps_to(self, pose: Pose) -> int:
         """How many frames playing shows before a pose; 0 for all while it does not play."""
