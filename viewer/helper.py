@@ -124,7 +124,7 @@ class Job:
         return self.future.done() and not self.task.cancelled and self.future.exception() is not None
 
     def failed(self, error: Exception) -> Job:
-        """The same job as one that has ended with an error."""
+        """Make a job of it that has ended with an error."""
         future: Future[tuple[Any, float]] = Future()
         future.set_exception(error)
         return replace(self, future=future)

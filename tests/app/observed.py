@@ -111,6 +111,7 @@ def shown(app: App) -> dict[str, Any]:
         "jobs": app.renderer.unfinished,
         "held_bytes": app.renderer.held_bytes,
         "ready_ahead": app.ahead.ready,
+        "is_preview": viewport.is_preview,
         "dropped": app.playback.dropped,
         "counted": app.counting.counts is not None,
         "is_playing": app.playback.player.playing,
