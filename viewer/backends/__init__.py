@@ -31,7 +31,7 @@ It may declare
                          name -> `ValueKind`; see `Surface.wanted`
     suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
     KEPT                 parameter -> why its default stays where a benchmark finds a value that beats it
-    LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`
+    LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`, or several
 
 Names that begin with an underscore are no backends. No list of backends exists anywhere else.
 """
@@ -41,7 +41,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, NamedTuple, Protocol
 
@@ -71,11 +71,21 @@ class Limit:
     """Looser bound of a row of the stability suite whose own cannot be held in principle.
 
     pixels: the share of the pixels that may be apart by more than the suite's coarse steps. reason: why
-    finer ones cannot be held.
+    finer ones cannot be held; the same words for the same principle. when: parameters -> the values of them
+    with which it cannot be held; empty: any.
     """
 
     pixels: float
     reason: str
+    when: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+
+    def applies(self, params: object) -> bool:
+        """Whether it does with these parameters of the backend."""
+        return all(getattr(params, name) in values for name, values in self.when.items())
+
+
+# Reasons of limits that several backends have.
+ON_A_LINE = "points on a line make no surface: how wide it is drawn goes by the last bit"
 
 
 class Derived(Protocol):
@@ -165,9 +175,12 @@ class Backend:
         return self.module.suits(pose) if hasattr(self.module, "suits") else None
 
     @property
-    def limits(self) -> Mapping[str, Limit]:
+    def limits(self) -> Mapping[str, tuple[Limit, ...]]:
         """Limits of the backend in the stability suite, by the suite's rows."""
-        return getattr(self.module, "LIMITS", {})
+        declared = getattr(self.module, "LIMITS", {})
+        return {
+            row: (found,) if isinstance(found, Limit) else tuple(found) for row, found in declared.items()
+        }
 
     @property
     def kept(self) -> Mapping[str, str]:

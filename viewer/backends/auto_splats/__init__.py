@@ -15,7 +15,7 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import FrameView, Limit, Suited
+from .. import ON_A_LINE, FrameView, Limit, Suited
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
@@ -27,14 +27,13 @@ FINDS_NORMALS = True
 
 _HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
 _BY_PICTURE = "how large splats are goes by the points that the picture shows, and by those around them"
-_NO_SURFACE = "points on a line make no surface, and how wide it is goes by the last bit"
 LIMITS = {
     "points x1000, one after the other": Limit(0.02, _HIDDEN_COPIES),
     "points x1000, all over again": Limit(0.02, _HIDDEN_COPIES),
     "1x1 pixels": Limit(0.001, _BY_PICTURE),
     "8192x1 pixels": Limit(0.001, _BY_PICTURE),
-    "collinear points end on, perspective": Limit(0.04, _NO_SURFACE),
-    "collinear points end on, orthographic": Limit(0.04, _NO_SURFACE),
+    "collinear points end on, perspective": Limit(0.04, ON_A_LINE),
+    "collinear points end on, orthographic": Limit(0.04, ON_A_LINE),
 }
 
 _FEW = 1000  # points

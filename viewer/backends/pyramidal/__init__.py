@@ -22,7 +22,7 @@ from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import sparse_spacing
 from ...view import View
-from .. import FrameView, Limit, Suited
+from .. import ON_A_LINE, FrameView, Limit, Suited
 from .sources import PointSource, SampleSource
 from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
@@ -33,15 +33,14 @@ FILLS = True
 BLENDS = True
 
 _BY_CELLS = "a pixel is filled by whole cells; at their edges the last bit tells which, and what encloses it"
-_NO_SURFACE = "how far apart points of a surface are is not to be told from a line of them"
 LIMITS = {
     "eye inside the cloud": Limit(0.02, _BY_CELLS),
     "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
     "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
     "coplanar points": Limit(0.02, _BY_CELLS),
     "collinear points": Limit(0.04, _BY_CELLS),
-    "collinear points end on, perspective": Limit(0.1, _NO_SURFACE),
-    "collinear points end on, orthographic": Limit(0.1, _NO_SURFACE),
+    "collinear points end on, perspective": Limit(0.1, ON_A_LINE),
+    "collinear points end on, orthographic": Limit(0.1, ON_A_LINE),
 }
 
 _FILLING = {"fill": (True,)}

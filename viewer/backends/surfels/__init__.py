@@ -33,10 +33,23 @@ from .tiles import FALLBACK, splat
 TITLE = "Surfels"
 BLENDS = FILLS = True
 
-_BY_SUMS = "a mean of a thousand times as many is rounded another way where it is halfway between two levels"
+_SORTED = {"passes": ("sorted",)}
+_SEEN_THROUGH = (
+    "splats drawn over each other let some of what is behind them through: how much goes by their radii, by "
+    "how often a point is there, and of two at one depth by the last bit"
+)
 LIMITS = {
-    "points x1000, one after the other": Limit(0.0, _BY_SUMS),
-    "points x1000, all over again": Limit(0.0, _BY_SUMS),
+    "zoomed in on 10^-6 of the scan": Limit(0.01, _SEEN_THROUGH, _SORTED),
+    "zoomed in on 10^-3 of a splat": Limit(0.01, _SEEN_THROUGH, _SORTED),
+    "points x1000, one after the other": Limit(0.2, _SEEN_THROUGH, _SORTED),
+    "points x1000, all over again": Limit(0.2, _SEEN_THROUGH, _SORTED),
+    "points x1000 without radii": Limit(0.15, _SEEN_THROUGH, _SORTED),
+    "one point x1000": Limit(0.05, _SEEN_THROUGH, _SORTED),
+    "collinear points end on, perspective": Limit(0.005, _SEEN_THROUGH, _SORTED),
+    "collinear points end on, orthographic": Limit(0.005, _SEEN_THROUGH, _SORTED),
+    "zero radii": Limit(0.001, _SEEN_THROUGH, _SORTED),
+    "negative radii": Limit(0.001, _SEEN_THROUGH, _SORTED),
+    "NaN radii": Limit(0.001, _SEEN_THROUGH, _SORTED),
 }
 
 _WAYS = ("tiles", *FEEDS)

@@ -233,7 +233,8 @@ def stability(lines: Sequence[Row]) -> dict[str, Any]:
                 reasons.setdefault(f"limit: {line['limit']}")
         table.append((name, [cells.get((name, backend), Cell(_DASH)) for backend in backends], list(reasons)))
     counts = {kind: sum(cell.kind == kind for cell in cells.values()) for kind in ("held", "failed", "limit")}
-    return {"backends": backends, "rows": table, "counts": counts}
+    limits = {line["limit"] for line in lines if line.get("limit")}
+    return {"backends": backends, "rows": table, "counts": counts, "limits": len(limits)}
 
 
 def _outcome(line: Row) -> Cell:
