@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import NOTHING, looking_down_z, sphere
+from scenes import NOTHING, looking_down_z, sphere, sphere_hits
+from scipy import ndimage
 from scipy.ndimage import distance_transform_edt
 from test_instancing import assert_agree
 
@@ -71,17 +72,18 @@ def exact(surface: Surface) -> tuple[NDArray, NDArray]:
     return depth, row
 
 
-@pytest.mark.parametrize("least", [0.0, 0.4])
+@pytest.mark.parametrize("least", [0.0, 0.25])
 @pytest.mark.parametrize("depth", [3, 5, 21])
 @every_camera
 def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, least: float) -> None:
-    surface = voxels(draw, CLOUD, camera, max_depth=depth, least=least, pixel_threshold=0.25)
+    fixed = {"shape": "cubes", "max_depth": depth, "least": least, "pixel_threshold": 0.25}
+    surface = voxels(draw, CLOUD, camera, **fixed)
     expected, row = exact(surface)
     seen = surface.row != NOTHING
     assert (seen != np.isfinite(expected)).mean() <= 2e-4
     both = seen & np.isfinite(expected)
     same = both & (surface.row == row)
-    np.testing.assert_allclose(surface.depth[same], expected[same], rtol=1e-4)
+    np.testing.assert_allclose(surface.depth[same], expected[same], rtol=2e-4)
     others = both & ~same
     along_axis = camera is CAMERAS["near plane"]  # in x: rays of one column run within faces
     assert others.mean() <= (0.03 if along_axis else 2e-3)
@@ -89,49 +91,83 @@ def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, 
     assert np.count_nonzero(error > 1e-5) <= (2e-3 if along_axis else 1e-3) * both.sum()
 
 
+@pytest.mark.parametrize("shape", ["discs", "cubes"])
 @every_camera
-def test_feeds_from_buffers_give_the_same_bits_and_the_others_agree(draw: Draw, camera: Camera) -> None:
-    fixed = {"max_depth": 5, "least": 0.0}
+def test_feeds_from_buffers_give_the_same_bits_and_the_others_agree(
+    draw: Draw, camera: Camera, shape: str
+) -> None:
+    fixed = {"max_depth": 5, "least": 0.0, "shape": shape}
     feeds = {feed: voxels(draw, CLOUD, camera, (400, 300), instancing=feed, **fixed) for feed in FEEDS}
-    assert "splat" not in feeds["gs"].stats.skipped, "cubes are large enough to be drawn as such"
+    for feed in FEEDS:
+        assert "splat" not in feeds[feed].stats.skipped, "all are drawn as such"
+        assert "instancing" not in feeds[feed].stats.chosen, "by the feed that was asked for"
     for feed in ("ubo", "vbo", "pull"):
         np.testing.assert_array_equal(feeds["tbo"].row, feeds[feed].row)
         np.testing.assert_array_equal(feeds["tbo"].depth, feeds[feed].depth)
     assert_agree(feeds["gs"], feeds["tbo"], 0.003)
+    chosen = voxels(draw, CLOUD, camera, (400, 300), **fixed)
+    assert chosen.stats.chosen["instancing"] in ("scatter", "scatter, gs", "tiles", "gs")
+    assert (chosen.row != feeds["tbo"].row).mean() < 0.02
 
 
 def test_no_octant_of_the_picture_is_missing(draw: Draw) -> None:
-    """Each point of the front shows its octant, or one before it."""
+    """Each point that faces the eye shows its octant, or one before it."""
     surface = voxels(draw, CLOUD, CAMERAS["perspective"])
-    pixels, depths = surface.view.project(CLOUD.positions.astype(float))
+    to_eye = np.array(CAMERAS["perspective"].eye) - CLOUD.world()
+    facing = (CLOUD.normals * to_eye).sum(axis=1) > 0.3 * np.linalg.norm(to_eye, axis=1)
+    assert facing.sum() > 300
+    pixels, depths = surface.view.project(CLOUD.positions[facing].astype(float))
     x, y = pixels.astype(int).T
-    edge = 2 * float(surface.pose.cloud.radii.max())  # type: ignore[union-attr]
-    assert (surface.depth[y, x] <= depths + edge).all()
+    radius = float(surface.pose.cloud.radii.max())  # type: ignore[union-attr]
+    assert (surface.depth[y, x] <= depths + radius).all()
 
 
-@pytest.mark.parametrize("level", [4, 5, 6, 7])
-def test_what_is_seen_lies_within_a_cube_of_the_surface(draw: Draw, level: int) -> None:
-    """Depth and silhouette of a sphere, each within one voxel everywhere; the picture is closed."""
+def before_surface(surface: Surface, true_depth: NDArray[np.floating]) -> NDArray[np.float64]:
+    """How far what is seen lies behind the surface, signed, along the rays of pixels that see both; (N,), in
+    edges of leaves."""
+    both = (surface.row != NOTHING) & np.isfinite(true_depth)
+    octree = derive(Pose(0, 0.0, "", surface.scan), Params())
+    _, along = rays(surface)
+    behind = surface.depth[both] - true_depth[both]
+    return behind * np.linalg.norm(along, axis=-1)[both] / octree.size(octree.depth)
+
+
+@pytest.mark.parametrize(
+    ("shape", "middle", "bounds"),
+    [("discs", (-0.1, 0.05), (-1.2, 0.8)), ("cubes", (-3.0, -0.3), (-8.0, 0.3))],
+)
+def test_what_is_seen_is_the_surface(
+    draw: Draw, shape: str, middle: tuple[float, float], bounds: tuple[float, float]
+) -> None:
+    """Of a sphere, each pixel along its ray: the median, and all that do not look along the surface."""
     cloud = sphere(40_000)
     camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
-    surface = voxels(draw, cloud, camera, max_depth=level, pixel_threshold=0.25)
-    near, along = rays(surface)
-    seen = surface.row != NOTHING
-    half = surface.pose.cloud.radii[surface.row[seen]]  # type: ignore[index]
-    edge = 2 * np.maximum(half, 0.75 * surface.depth[seen] / surface.view.scale)  # no less than a pixel
-    places = (near + along * np.where(seen, surface.depth, 0)[..., None])[seen]
-    away = np.abs(np.linalg.norm(places + cloud.origin, axis=1) - 1)
-    assert (away <= np.sqrt(3) * edge).all()
-    middle = -(near * along).sum(axis=-1) / (along**2).sum(axis=-1)  # of each ray, nearest to the sphere
-    beside = np.linalg.norm(near + along * middle[..., None] + cloud.origin, axis=-1)
-    assert seen[beside < 1].all(), "a hole"
-    assert (beside[seen] <= 1 + np.sqrt(3) * edge).all()
+    surface = voxels(draw, cloud, camera, (160, 120), shape=shape, pixel_threshold=0.25)
+    true_depth, normal = sphere_hits(camera, (160, 120))
+    assert (surface.row != NOTHING)[np.isfinite(true_depth)].all(), "a hole"
+    _, along = rays(surface)
+    facing = -np.einsum("ijk,ijk->ij", normal, along) / np.linalg.norm(along, axis=-1)
+    away = before_surface(surface, np.where(facing > 0.3, true_depth, np.inf))
+    assert middle[0] <= np.median(away) <= middle[1]
+    assert bounds[0] <= away.min()
+    assert away.max() <= bounds[1]
+
+
+def test_discs_are_nearer_to_the_surface_than_faces_of_cubes_are(draw: Draw) -> None:
+    camera = CAMERAS["perspective"]
+    true_depth, _ = sphere_hits(camera, SIZE)
+    discs, cubes = (
+        np.abs(before_surface(voxels(draw, CLOUD, camera, shape=shape), true_depth))
+        for shape in ("discs", "cubes")
+    )
+    assert np.median(discs) < 0.2 * np.median(cubes)
 
 
 def test_an_octant_is_as_large_as_the_picture_asks(draw: Draw) -> None:
     for threshold in (1.0, 6.0):
-        surface = voxels(draw, CLOUD, CAMERAS["perspective"], least=0.0, pixel_threshold=threshold)
-        cubes, (octree, _) = surface.pose.cloud, derive(Pose(0, 0.0, "", CLOUD), Params())
+        fixed = {"shape": "cubes", "least": 0.0, "pixel_threshold": threshold}
+        surface = voxels(draw, CLOUD, CAMERAS["perspective"], **fixed)
+        cubes, octree = surface.pose.cloud, derive(Pose(0, 0.0, "", CLOUD), Params())
         size = 2 * cubes.radii * surface.view.scale / surface.view.depths(cubes.positions)  # type: ignore[operator]
         inner = cubes.radii > 0.75 * octree.size(octree.depth)  # type: ignore[operator]
         assert inner.any() == (threshold > 1)
@@ -142,7 +178,9 @@ def test_an_octant_is_as_large_as_the_picture_asks(draw: Draw) -> None:
 
 def test_normals_are_those_of_the_points_or_of_the_faces(draw: Draw) -> None:
     camera = CAMERAS["perspective"]
-    smooth, flat = (voxels(draw, CLOUD, camera, max_depth=5, normals=normals) for normals in ("auto", "flat"))
+    smooth, flat = (
+        voxels(draw, CLOUD, camera, max_depth=5, shape=shape) for shape in ("cubes", "flat_cubes")
+    )
     seen = smooth.row != NOTHING
     np.testing.assert_array_equal(smooth.depth, flat.depth)
     direction = smooth.pose.cloud.positions[smooth.row[seen]] + CLOUD.origin
@@ -161,19 +199,63 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
         CLOUD.world(), normals=CLOUD.normals, colors=colors, scalars={"row": np.arange(len(CLOUD))}
     )
     surface = voxels(draw, cloud, CAMERAS["perspective"], max_depth=4, look=Look(color_by="row"))
-    octree, _ = derive(Pose(0, 0.0, "", cloud), Params())
+    octree = derive(Pose(0, 0.0, "", cloud), Params())
     starts = np.cumsum(octree.counts) - octree.counts
-    shown = np.unique(surface.id[surface.id != NOTHING])
+    octants = surface.octant
+    assert octants is not None
+    shown = np.unique(octants[octants != NOTHING])
     assert shown.min() >= starts[4]
     assert shown.max() < starts[5]
-    ((y, x), *_) = np.argwhere(surface.id == shown[0])
+    ((y, x), *_) = np.argwhere(octants == shown[0])
     picked = pick(surface, int(x), int(y))
     assert picked is not None
     assert picked.row is not None
     assert picked.row == octree.attributes[4].rows[shown[0] - starts[4]]  # type: ignore[index]
+    assert surface.id[y, x] == picked.id == picked.row
     np.testing.assert_array_equal(picked.point, cloud.world(picked.row))
     assert picked.scalars == {"row": picked.row}
     assert surface.value[y, x] == pytest.approx(picked.row)
+    np.testing.assert_array_equal(surface.arrays()["octant"], octants)
+    assert "octant" not in draw(cloud, CAMERAS["perspective"], SIZE, "points", None).arrays()
+
+
+def test_ids_are_those_of_the_file(draw: Draw) -> None:
+    """Points that were dropped count."""
+    positions = np.concatenate([np.full((7, 3), np.nan), CLOUD.world()])
+    cloud = PointCloud.from_arrays(positions, normals=np.concatenate([np.zeros((7, 3)), CLOUD.normals]))  # type: ignore[list-item]
+    one, other = (voxels(draw, each, CAMERAS["perspective"]) for each in (CLOUD, cloud))
+    np.testing.assert_array_equal(one.octant, other.octant)
+    seen = one.id != NOTHING
+    np.testing.assert_array_equal(one.id[seen] + 7, other.id[seen])
+
+
+@pytest.mark.parametrize("shape", ["discs", "cubes", "flat_cubes"])
+@pytest.mark.parametrize("far", [30.0, -1000.0, 1e6])
+def test_a_stray_changes_nothing_but_where_it_is(draw: Draw, far: float, shape: str) -> None:
+    camera = CAMERAS["perspective"]
+    positions = np.concatenate([np.full((1, 3), far), CLOUD.world()])
+    normals = np.concatenate([[[0, 0, 1]], CLOUD.normals])  # type: ignore[list-item]
+    strayed = PointCloud.from_arrays(positions, normals=normals)
+    alone = PointCloud.from_arrays(CLOUD.world(), normals=CLOUD.normals)
+    one, other = (voxels(draw, each, camera, shape=shape) for each in (alone, strayed))
+    seen = one.id != NOTHING
+    np.testing.assert_array_equal(other.depth[seen], one.depth[seen])
+    np.testing.assert_array_equal(other.id[seen], one.id[seen] + 1)
+    assert np.count_nonzero((other.id != NOTHING) & ~seen) <= 9
+
+
+def test_a_stray_is_seen_where_it_is_and_is_no_octant(draw: Draw) -> None:
+    camera = Camera((0.0, 0.0, 200.0), (0.0, 0.0, 0.0), fov_y=30)
+    positions = np.concatenate([CLOUD.world(), [[30.0, 0.0, 0.0]]])
+    surface = voxels(draw, PointCloud.from_arrays(positions), camera)
+    shown = surface.id == len(CLOUD)
+    assert 1 <= np.count_nonzero(shown) <= 4
+    assert surface.octant is not None
+    assert (surface.octant[shown] == NOTHING).all()
+    ((y, x), *_) = np.argwhere(shown)
+    picked = pick(surface, int(x), int(y))
+    assert picked is not None
+    np.testing.assert_array_equal(picked.point, [30, 0, 0])
 
 
 @pytest.mark.parametrize("color_by", ["row", "height", "depth"])
@@ -209,7 +291,7 @@ def test_what_faces_away_is_left_out_where_it_is_asked_for(draw: Draw) -> None:
 
 
 def test_octants_out_of_view_cost_nothing(draw: Draw) -> None:
-    surface = voxels(draw, CLOUD, CAMERAS["close"], least=0.0)
+    surface = voxels(draw, CLOUD, CAMERAS["close"])
     assert "octants out of view" in surface.stats.skipped
     assert len(surface.pose.cloud) < len(CLOUD) / 3
 
@@ -218,10 +300,9 @@ def test_fig_5_leaves_of_few_points_are_of_all_sizes(draw: Draw) -> None:
     """Slomp 2014, VI-A: a stray point keeps a large octant where these stop by occupancy."""
     stray = np.concatenate([CLOUD.positions, [[0.0, 0.0, 1.6]]])
     cloud = PointCloud.from_arrays(stray, normals=np.concatenate([CLOUD.normals, [[0, 0, 1]]]))  # type: ignore[list-item]
+    fixed = {"shape": "cubes", "occupancy": 2, "least": 0.0, "pixel_threshold": 0.25}
     sizes = {
-        stop: voxels(
-            draw, cloud, CAMERAS["perspective"], stop=stop, occupancy=2, least=0.0, pixel_threshold=0.25
-        )
+        stop: voxels(draw, cloud, CAMERAS["perspective"], stop=stop, **fixed)
         for stop in ("delta", "occupancy")
     }
     delta, occupancy = (np.unique(one.pose.cloud.radii) for one in sizes.values())
@@ -231,29 +312,43 @@ def test_fig_5_leaves_of_few_points_are_of_all_sizes(draw: Draw) -> None:
 
 
 def test_a_budget_gives_coarser_pictures_that_get_finer_and_never_open(renderer: Renderer) -> None:
+    """No pixel loses what it showed, but for few at the outline, and none shows the far side in its place."""
     cloud = sphere(300_000)
     camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
     pose, surface = Pose(0, 0.0, "test", cloud), Surface(renderer.gpu, (640, 480))
-    finest = Params(least=0.0, depth=9, stop="depth", pixel_threshold=0.25)
-    request = Request(pose, camera, "voxels", finest)
+    request = Request(pose, camera, "voxels", Params(depth=9, stop="depth", pixel_threshold=0.25))
     render_frame(renderer, request, surface)  # prepared
-    seen, drawn = surface.row != NOTHING, []
-    whole = surface.depth.copy()
+    seen, whole = surface.row != NOTHING, surface.depth.copy()
     turned = replace(request, camera=Camera.orbit(cloud.bounds(), 40, 20, aspect=4 / 3))
-    refinable = True
-    covered = None
+    refinable, drawn, depths = True, [], []
     while refinable:
         refinable = render_frame(renderer, turned, surface, wait=False)
         drawn.append(len(surface.pose.cloud))
-        covered = surface.row != NOTHING if covered is None else covered
-        if len(drawn) == 1:
-            first = covered.mean()
+        depths.append(surface.depth.copy())
     assert drawn == sorted(drawn)
-    assert first >= (surface.row != NOTHING).mean() * 0.999
+    finest = depths[-1]
+    for depth in depths:
+        assert not np.isinf(depth)[ndimage.binary_erosion(np.isfinite(finest))].any()
+        assert (depth <= finest + 0.5)[np.isfinite(finest) & np.isfinite(depth)].all(), "the far side"
     again = replace(request, pose=pose)
     render_frame(renderer, again, surface)
     np.testing.assert_array_equal(surface.depth, whole)
     np.testing.assert_array_equal(surface.row != NOTHING, seen)
+
+
+@pytest.mark.parametrize("level", [4, 5, 6, 7])
+def test_coarser_levels_stay_closed(draw: Draw, level: int) -> None:
+    """A node's disc covers those below: per pixel, nothing of the finest picture is open in a coarser one."""
+    cloud = sphere(40_000)
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
+    finest, coarse = (
+        voxels(draw, cloud, camera, (240, 180), max_depth=deep, pixel_threshold=0.25) for deep in (21, level)
+    )
+    if level < 6:
+        assert coarse.octant.min() < finest.octant.min(), "others are shown"  # type: ignore[union-attr]
+    inside = ndimage.binary_erosion(finest.row != NOTHING)
+    assert np.isfinite(coarse.depth)[inside].all()
+    assert (coarse.depth <= finest.depth + 0.5)[inside].all()
 
 
 def test_the_same_view_is_not_cut_again(renderer: Renderer) -> None:
@@ -270,19 +365,21 @@ def test_the_same_view_is_not_cut_again(renderer: Renderer) -> None:
 def test_without_colours_normals_and_radii(draw: Draw) -> None:
     bare = PointCloud.from_arrays(CLOUD.world())
     surface = voxels(draw, bare, CAMERAS["perspective"])
-    assert surface.is_own("normal"), "faces are lit"
-    covered = (surface.row != NOTHING).mean()
-    smooth = voxels(draw, bare, CAMERAS["perspective"], normals="smooth")
-    assert not smooth.is_own("normal")
-    assert (smooth.row != NOTHING).mean() == covered
-    assert np.linalg.norm(smooth.normal[smooth.row != NOTHING], axis=1).min() > 0.99
+    seen = surface.row != NOTHING
+    assert not surface.is_own("normal"), "they are estimated"
+    assert np.linalg.norm(surface.normal[seen], axis=1).min() > 0.99
+    given = voxels(draw, CLOUD, CAMERAS["perspective"])
+    assert (seen != (given.row != NOTHING)).mean() < 0.01
+    flat = voxels(draw, bare, CAMERAS["perspective"], shape="flat_cubes")
+    assert flat.is_own("normal"), "faces are lit"
+    assert backend("voxels").needs(Pose(0, 0.0, "", bare), Params(shape="flat_cubes")) == ()
 
 
-@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf, 2e38])
-def test_radii_that_cannot_be_count_as_unknown(draw: Draw, radius: float) -> None:
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf, 2e38, 5.0])
+def test_radii_of_the_scan_change_nothing(draw: Draw, radius: float) -> None:
     odd = replace(CLOUD, radii=np.full(len(CLOUD), radius, np.float32))
     bare = replace(CLOUD, radii=None)
-    shown, expected = (voxels(draw, cloud, CAMERAS["perspective"], least=10.0) for cloud in (odd, bare))
+    shown, expected = (voxels(draw, cloud, CAMERAS["perspective"]) for cloud in (odd, bare))
     np.testing.assert_array_equal(shown.depth, expected.depth)
 
 
@@ -310,12 +407,16 @@ def test_it_is_a_backend_like_others() -> None:
     }
 
 
-@pytest.mark.parametrize("fixed", [{}, {"max_depth": 7}, {"max_depth": 6, "least": 0.0}], ids=str)
-def test_the_demo_scan_is_closed_and_within_a_voxel(draw: Draw, fixed: dict[str, object]) -> None:
-    """Against the exact surface: no more than 0.1 % holes; each place and the outline within the diagonal of
-    the voxel that shows it, which is as far as a point of the octant may be."""
-    import open3d
-
+@pytest.mark.parametrize(
+    ("fixed", "median", "through"),
+    [({}, 0.4, 2e-3), ({"max_depth": 7}, 0.5, 2e-3), ({"max_depth": 6}, 0.8, 4e-3)],
+    ids=str,
+)
+def test_the_demo_scan_is_closed_and_shows_the_surface(
+    draw: Draw, fixed: dict[str, object], median: float, through: float
+) -> None:
+    """Each pixel against the exact surface, along its ray: nothing is open, nor open to the far side, and
+    half of the pixels are within so many edges of leaves."""
     moment = subject("demo", None).moment(0)
     mesh, size = moment.mesh, (320, 240)
     camera = Camera.orbit(mesh.bounds, 140, 20, aspect=4 / 3)
@@ -323,13 +424,9 @@ def test_the_demo_scan_is_closed_and_within_a_voxel(draw: Draw, fixed: dict[str,
     surface = voxels(draw, moment.pose.cloud, camera, size, pixel_threshold=0.25, **fixed)
     seen = surface.row != NOTHING
     assert (truth.covered & ~seen).sum() <= 1e-3 * truth.covered.sum()
-    pixel = surface.depth[seen] / surface.view.scale
-    edge = 2 * np.maximum(surface.pose.cloud.radii[surface.row[seen]], 0.7072 * pixel)  # type: ignore[index]
-    centers = np.argwhere(seen)[:, ::-1] + 0.5
-    places = surface.view.unproject(centers, surface.depth[seen]) + moment.pose.cloud.origin - mesh.origin
-    faces = open3d.t.geometry.RaycastingScene()
-    faces.add_triangles(open3d.core.Tensor(mesh.points.positions), open3d.core.Tensor(mesh.faces))
-    away = faces.compute_distance(open3d.core.Tensor(places.astype(np.float32))).numpy()
-    assert (away <= np.sqrt(3) * edge).all()
+    away = before_surface(surface, truth.depth)
+    assert np.median(np.abs(away)) <= median
+    assert (away > 10).sum() <= through * len(away)
+    pixel = truth.depth[truth.covered].mean() / surface.view.scale
     beside = distance_transform_edt(~truth.covered)[seen] * pixel
-    assert (beside <= np.sqrt(3) * edge + pixel).all()
+    assert np.quantile(beside, 0.99) <= 2 * np.median(surface.pose.cloud.radii)  # type: ignore[arg-type]

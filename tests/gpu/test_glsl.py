@@ -127,8 +127,9 @@ def draw_all(renderer: Renderer) -> None:
         draw(cloud, "surfels", radius="uniform", radius_scale=0.01)  # of about a pixel
         for size, share in product((1, 3), (1.0, 0.5)):
             draw(cloud, "points", share=share, point_size=size)
-        for scatter, instancing, normals in product((True, False), FEEDS, ("smooth", "flat")):
-            draw(cloud, "voxels", scatter=scatter, instancing=instancing, normals=normals)
+        for instancing, shape in product(("auto", *FEEDS), ("discs", "cubes", "flat_cubes")):
+            draw(cloud, "voxels", instancing=instancing, shape=shape)
+        draw(cloud, "voxels", shape="cubes", least=1.4)  # of all sizes
         for look in LOOKS:
             draw(cloud, "points", look)
             draw(cloud, "surfels", look, passes="two")

@@ -156,9 +156,15 @@ def amplify(
     """Draw points as shapes, in id order with a strict depth test.
 
     feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth. params: what
-    both find in `<params>`. over: draw over what the surface holds.
+    both find in `<params>`. over: draw over what the surface holds. Statistics tell where another feed has to
+    bring them (`fitting_feed`).
     """
     gpu = surface.gpu
+    if (fitting := fitting_feed(points, feed)) != feed:
+        surface.stats.chosen["instancing"] = (
+            f"{fitting}, in place of {feed}, which brings whole poses as stored"
+        )
+        feed = fitting
     with gpu.timers.measure("splat"):
         surface.raster().clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -187,17 +193,12 @@ def draw_shapes(
     params: Values | None = None,
     macros: Mapping[str, object] | None = None,
 ) -> None:
-    """Draw points as shapes into the bound framebuffer, with the depth test and blending that are set.
+    """Draw points as shapes into the bound framebuffer, with the depth test and blending that are set, by the
+    `fitting_feed`.
 
     macros: of the fragment shader.
-
-    Where a feed cannot bring them, `tbo` does in its place, which gives the same picture: `ubo` and `vbo`
-    where only some are drawn, all that bring attributes where these are packed.
     """
-    gpu = points.pose.gpu
-    replaced = _ATTRIBUTE_FEEDS if points.packed else _WHOLE if points.rows is not None else ()
-    if feed in replaced or (points.buffers and feed == "ubo"):
-        feed = "tbo"
+    gpu, feed = points.pose.gpu, fitting_feed(points, feed)
     stages, parts = _FEEDS[feed]
     defines = {**points.defines, **(macros or {}), "CORNERS": shape.corners}
     if feed == "ubo":
@@ -222,6 +223,13 @@ def draw_shapes(
             vertices.render(moderngl.TRIANGLES, vertices=3 * (shape.corners - 2) * points.count)
         else:
             vertices.render(moderngl.TRIANGLE_STRIP, vertices=shape.corners, instances=points.count)
+
+
+def fitting_feed(points: Points, feed: str) -> str:
+    """The feed itself where it can bring these points, else `tbo`, which gives the same picture: in place of
+    `ubo` and `vbo` where only some are drawn, of all that bring attributes where these are packed."""
+    replaced = _ATTRIBUTE_FEEDS if points.packed else _WHOLE if points.rows is not None else ()
+    return "tbo" if feed in replaced or (points.buffers and feed == "ubo") else feed
 
 
 def _attributes(

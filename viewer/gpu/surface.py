@@ -115,6 +115,7 @@ class Surface:
         self._block = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._shown: tuple[GpuPose, View] | None = None
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
+        self._octants: NDArray[np.uint32] | None = None
         self.samples: RangePoints | None = None
         self.look = Look()
         self.layers = NO_LAYERS
@@ -142,6 +143,7 @@ class Surface:
     ) -> None:
         """Begin a frame: what backends and shading read from now on."""
         self._shown, self._stood_for, self.samples = (pose, view), None, None
+        self._octants = None
         self.look, self.layers = look or Look(), layers
         scalars = layers.names(pose.overview.scalars)
         self.finds = {name: kind for name, kind in (finds or {}).items() if name not in scalars}
@@ -174,10 +176,12 @@ class Surface:
         self.depths.buffer.bind_to_storage_buffer(Storage.DEPTHS)
         self.rows.buffer.bind_to_storage_buffer(Storage.ROWS)
 
-    def show(self, pose: GpuPose, points: NDArray[np.uint32]) -> None:
-        """Say that rows are those of another pose with the same origin: for a backend that shows something
-        made of the points in place of these. points: the row of the point that each of them stands for."""
+    def show(self, pose: GpuPose, points: NDArray[np.uint32], octants: NDArray[np.uint32]) -> None:
+        """Say that rows are those of another pose with the same origin: for a backend that shows octants in
+        place of the points. points: the row of the point that each of them stands for, by whose index in the
+        file it is known. octants: the number of each, 0xFFFFFFFF where it is none."""
         self._shown, self._stood_for = (pose, self.view), (self.pose, points)
+        self._octants = octants
 
     def show_samples(self) -> None:
         """Say that rows are samples of the pose's range views: pixels, numbered view after view and row after
@@ -487,6 +491,13 @@ class Surface:
         return self.row if ids is None else self._fetch(ids, np.uint32(NOTHING))
 
     @property
+    def octant(self) -> NDArray[np.uint32] | None:
+        """(H, W) uint32, the number of the octant, breadth-first; 0xFFFFFFFF where none. None where points
+        are drawn."""
+        octants = self._octants
+        return None if octants is None else self._fetch(octants.__getitem__, np.uint32(NOTHING))
+
+    @property
     def color(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, linear; the look's plain colour where the scan has none; 0 where nothing is."""
         if self.is_own("color"):
@@ -587,9 +598,9 @@ class Surface:
         return self._read(self.picture, np.uint8).reshape(*self.size[::-1], 4)
 
     def arrays(self) -> dict[str, NDArray]:
-        """All channels by name, as `.npz` files hold them."""
-        names = ("color", "normal", "depth", "coverage", "value", "id", "level")
-        return {name: getattr(self, name) for name in names}
+        """All channels by name, as `.npz` files hold them; "octant" where octants are drawn."""
+        names = ("color", "normal", "depth", "coverage", "value", "id", "level", "octant")
+        return {name: channel for name in names if (channel := getattr(self, name)) is not None}
 
     def point_counts(self) -> dict[str, int]:
         """Counts of what became of the points of the file; see `count_points`."""

@@ -176,7 +176,8 @@ def _write_png(image: NDArray[np.uint8], path: Path, description: str | None = N
 
 
 def _write_exr(surface: Surface, path: Path, description: str | None = None) -> None:
-    """R, G, B: linear colour, A: coverage, Z: depth; normal.X .Y .Z, value; id, level as integers."""
+    """R, G, B: linear colour, A: coverage, Z: depth; normal.X .Y .Z, value; id, level as integers,
+    and octant where octants are drawn."""
     import OpenEXR
 
     arrays = surface.arrays()
@@ -189,6 +190,8 @@ def _write_exr(surface: Surface, path: Path, description: str | None = None) -> 
         "id": arrays["id"],
         "level": arrays["level"].astype(np.uint32),
     }
+    if "octant" in arrays:
+        channels["octant"] = arrays["octant"]
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     if description is not None:
         header[_DESCRIPTION] = description

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from viewer.bench.scenes.samples import on_sphere
 from viewer.scan.octree.build import Stop, build
 from viewer.scan.octree.leaves import leaf_points
 from viewer.scan.octree.neighbors import Neighbors
 from viewer.scan.octree.octree import Octree
 from viewer.scan.points import PointCloud
-
-HALF_DIAGONAL = np.sqrt(3) / 2
 
 
 def leaf_edges(octree: Octree) -> NDArray[np.float64]:
@@ -34,17 +35,19 @@ def sphere(count: int, seed: int = 3) -> PointCloud:
 
 @pytest.mark.parametrize("stop", [Stop(), Stop(rule="occupancy", occupancy=5), Stop(rule="depth", depth=0)])
 @pytest.mark.parametrize("offset", [0.0, 5.6e6])
-def test_every_point_is_in_one_leaf_and_within_its_radius(stop: Stop, offset: float) -> None:
+def test_a_leaf_lies_at_the_mean_of_its_points(stop: Stop, offset: float) -> None:
     cloud = PointCloud.from_arrays(np.random.default_rng(5).random((400, 3)) ** 2 + offset)
     octree = build(cloud, stop)
-    leaves = leaf_points(octree)
+    leaves, edges = leaf_points(octree), leaf_edges(octree)
+    centers = leaf_points(replace(octree, attributes=()))
     assert len(leaves) == octree.leaves
-    rows = inside(cloud, leaves, octree)
+    rows = inside(cloud, centers, octree)
     assert (rows.sum(axis=1) == 1).all()
     assert rows.any(axis=0).all()
-    assert (leaves.radii >= np.float32(HALF_DIAGONAL) * leaf_edges(octree) * (1 - 1e-6)).all()
-    distances = np.linalg.norm(cloud.world() - leaves.world()[rows.argmax(axis=1)], axis=1)
-    assert (distances <= leaves.radii[rows.argmax(axis=1)] * (1 + 1e-6)).all()
+    means = (rows.T @ (cloud.world() - offset)) / rows.sum(axis=0)[:, None]
+    away = np.abs(leaves.world() - offset - means).max(axis=1)
+    assert (away <= 2e-5 * edges + 1e-9 * offset).all()
+    assert (leaves.radii > 0).all() == (len(leaves) > 1), "one alone tells no spacing"
 
 
 def test_each_leaf_has_its_own_attributes() -> None:
@@ -58,48 +61,65 @@ def test_each_leaf_has_its_own_attributes() -> None:
     leaves = leaf_points(octree)
     assert len(leaves) == len(cloud)
     assert len({*leaf_edges(octree)}) > 1
-    leaf_of = inside(cloud, leaves, octree).argmax(axis=1)
+    leaf_of = inside(cloud, leaf_points(replace(octree, attributes=())), octree).argmax(axis=1)
     assert np.array_equal(leaves.colors[leaf_of], cloud.colors)
     assert np.allclose(leaves.normals[leaf_of], cloud.normals, atol=1e-3)
 
 
-def test_radii_are_of_the_smallest_octant_around_that_touches_three_others() -> None:
-    """Found again by climbing from each leaf; but one level coarser than half of the leaves at most."""
-    octree = build(sphere(1500), Stop(rule="depth", depth=7))
-    there = [{*map(tuple, octree.cells(level).tolist())} for level in range(octree.depth + 1)]
-
-    def touches(level: int, cell: tuple[int, ...]) -> bool:
-        sides = (np.add(cell, step) for step in [*np.eye(3, dtype=int), *-np.eye(3, dtype=int)])
-        return sum(tuple(side.tolist()) in there[level] for side in sides) >= 3
-
-    found = []
-    for cell in map(tuple, octree.cells(octree.depth).tolist()):
-        level = octree.depth
-        while level and not touches(level, cell):
-            level, cell = level - 1, tuple(each >> 1 for each in cell)
-        found.append(level)
-    found = np.maximum(found, np.median(found).astype(int) - 1)
-    assert len({*found}) > 1
-    expected = HALF_DIAGONAL * octree.edge / 2.0**found
-    assert np.allclose(leaf_points(octree).radii, expected)
-
-
+@pytest.mark.parametrize("attributes", [True, False])
 @pytest.mark.parametrize("stop", [Stop(), Stop(delta=0.0), Stop(rule="depth", depth=5)])
-def test_discs_close_a_surface_however_small_its_leaves_are(stop: Stop) -> None:
-    octree = build(sphere(6000), stop)
+def test_discs_close_a_surface_however_small_its_leaves_are(stop: Stop, attributes: bool) -> None:
+    octree = build(PointCloud.from_arrays(**on_sphere(6000)), stop, attributes=attributes)
     leaves = leaf_points(octree)
-    places = sphere(1000, seed=9).world()
+    places = sphere(2000, seed=9).world()
     distances = np.linalg.norm(places[:, None] - leaves.world(), axis=2)
-    covered = (distances < leaves.radii).any(axis=1).mean()
-    assert covered > 0.995  # points at random leave some places bare
-    alone = (distances < HALF_DIAGONAL * octree.size(octree.depth)).any(axis=1).mean()
-    assert (alone < 0.8) == (stop.rule == "delta")
+    assert (distances < leaves.radii).any(axis=1).mean() > 0.999
+    assert (distances < 0.4 * leaves.radii).any(axis=1).mean() < 0.9, "no larger than need be"
+
+
+def test_the_disc_of_a_node_covers_those_below() -> None:
+    octree = build(sphere(3000), Stop(rule="occupancy", occupancy=2))
+    found = octree.attributes
+    places = [
+        octree.centers(level) + (own.offsets - 32767.5) / 65536 * octree.size(level)
+        for level, own in enumerate(found)
+    ]
+    for level, masks in enumerate(octree.masks):
+        children = np.repeat(np.arange(len(masks)), np.bitwise_count(masks))
+        apart = np.linalg.norm(places[level + 1] - places[level][children], axis=1)
+        reach = apart + found[level + 1].radii
+        assert (found[level].radii[children] >= reach - 1e-4 * octree.size(level)).all()
+        largest = np.zeros(len(masks), np.float32)
+        np.maximum.at(largest, children, reach)
+        inner = masks > 0
+        np.testing.assert_allclose(found[level].radii[inner], largest[inner], rtol=1e-3)
+
+
+def test_discs_are_as_large_as_points_lie_apart_there() -> None:
+    """A sheet of which one half has ten times the points of the other; apart from the border."""
+    rng = np.random.default_rng(1)
+
+    def sheet(count: int) -> NDArray[np.float64]:
+        grid = np.stack(np.meshgrid(*[(np.arange(count) + 0.5) / count] * 2), axis=-1).reshape(-1, 2)
+        return grid + rng.uniform(-0.1, 0.1, grid.shape) / count
+
+    dense, sparse = sheet(95), np.add(sheet(30), [1, 0])
+    points = np.concatenate([dense, sparse])
+    leaves = leaf_points(build(PointCloud.from_arrays(np.c_[points, 0 * points[:, 0]])))
+    x = leaves.world()[:, 0]
+    for there, spacing in ((x < 0.9, 1 / 95), (x > 1.1, 1 / 30)):
+        shares = leaves.radii[there] / spacing
+        assert 1.1 < np.median(shares) < 1.5
+        assert shares.min() > 0.7
+        assert np.quantile(shares, 0.99) < 2
 
 
 def test_what_lies_apart_does_not_become_a_large_disc() -> None:
-    points = np.concatenate([sphere(5000).world(), [[9, 9, 9]]])
-    radii = leaf_points(build(PointCloud.from_arrays(points))).radii
-    assert radii.max() <= 2 * np.median(radii)
+    points = np.concatenate([sphere(5000).world(), [[1.4, 1.4, 1.4], [0, 0, 0]]])
+    octree = build(PointCloud.from_arrays(points))
+    assert not len(octree.strays)
+    radii = leaf_points(octree).radii
+    assert radii.max() <= 5 * np.median(radii)
 
 
 def test_a_tree_without_points_has_no_leaves() -> None:

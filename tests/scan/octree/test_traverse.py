@@ -105,7 +105,7 @@ def test_every_point_in_the_picture_lies_in_one_node(
     assert cut.facing_away == 0
     assert held.max() <= 1
     planes, eye = planes_of(camera)
-    centers = cut.centers + cloud.origin - eye
+    centers = cut.positions + cloud.origin - eye
     reach = cut.halves * 3**0.5 * (1 + 1e-6) + 1e-6
     assert (centers @ planes[:, :3].T + planes[:, 3] >= -reach[:, None]).all()
     seen = view_of(camera, cloud).contains(cloud.positions)
@@ -125,7 +125,7 @@ def test_nodes_end_at_leaves_or_below_the_threshold(name: str) -> None:
     traversal.advance()
     cut = traversal.cut(cloud.origin)
     for level in np.unique(cut.level).tolist():
-        centers = cut.centers[cut.level == level] + cloud.origin
+        centers = cut.positions[cut.level == level] + cloud.origin
         leaf = is_leaf(tree, level, cut.index[cut.level == level])
         nearest = (sight.eye - centers) @ sight.axes[2] - tree.size(level) * 3**0.5 / 2
         depth = np.maximum(nearest, sight.near) if sight.perspective else np.ones(len(centers))
@@ -144,7 +144,7 @@ def test_numbers_centres_and_halves_are_those_of_the_tree() -> None:
     traversal.advance()
     cut = traversal.cut(cloud.origin)
     centers = np.concatenate([tree.centers(level) for level in range(tree.depth + 1)])
-    np.testing.assert_allclose(centers[cut.numbers(tree)] - cloud.origin, cut.centers, atol=1e-6)
+    np.testing.assert_allclose(centers[cut.numbers(tree)] - cloud.origin, cut.positions, atol=1e-6)
     for name in ("normals", "cones", "rows"):
         values = np.concatenate([getattr(found, name) for found in tree.attributes])
         np.testing.assert_array_equal(cut.gather(tree, name), values[cut.numbers(tree)])
@@ -230,15 +230,15 @@ def test_nearer_nodes_come_first_within_a_level() -> None:
         traversal = Traversal(tree, sight, pixel_threshold=0.0, cull_cones=False)
         traversal.advance()
         cut = traversal.cut(np.zeros(3))
-        depth = (sight.eye - cut.centers) @ sight.axes[2]
+        depth = (sight.eye - cut.positions) @ sight.axes[2]
         rank = np.argsort(np.argsort(depth))
         assert np.corrcoef(rank, np.arange(len(rank)))[0, 1] > 0.5
-        occluding = cut.centers - sight.eye if sight.perspective else -np.tile(sight.axes[2], (len(cut), 1))
+        occluding = cut.positions - sight.eye if sight.perspective else -np.tile(sight.axes[2], (len(cut), 1))
         for axis in range(3):  # of two siblings along an axis, the one on the eye's side is first
-            parents = np.floor((cut.centers - tree.low) / tree.size(4)).astype(int)
+            parents = np.floor((cut.positions - tree.low) / tree.size(4)).astype(int)
             same = (parents[1:] == parents[:-1]).all(axis=1)
-            only = np.delete(np.abs(np.diff(cut.centers, axis=0)) < 1e-6, axis, axis=1).all(axis=1)
-            step = np.diff(cut.centers[:, axis])[same & only]
+            only = np.delete(np.abs(np.diff(cut.positions, axis=0)) < 1e-6, axis, axis=1).all(axis=1)
+            step = np.diff(cut.positions[:, axis])[same & only]
             towards = np.sign(occluding[:-1, axis][same & only])
             beside = np.abs(occluding[:-1, axis][same & only]) > 2 * tree.size(4)
             assert (np.sign(step) == towards)[beside].all()
@@ -263,7 +263,9 @@ def test_a_margin_keeps_what_reaches_into_the_picture() -> None:
     view = view_of(camera, cloud)
     centers = []
     for margin in (0.0, 0.05):
-        traversal = Traversal(tree, sight_of(camera), pixel_threshold=0.0, cull_cones=False, margin=margin)
+        traversal = Traversal(
+            tree, sight_of(camera), pixel_threshold=0.0, cull_cones=False, margins=[margin] * (tree.depth + 1)
+        )
         traversal.advance()
         cut = traversal.cut(cloud.origin)
         held = holders(cloud, tree, cut) > 0
@@ -282,14 +284,14 @@ def test_looking_again_from_elsewhere_equals_a_new_traversal() -> None:
     used = Traversal(tree, sight_of(views["a part"]))
     used.advance()
     kept = used.cut(cloud.origin)
-    numbers, centers = kept.numbers(tree), kept.centers.copy()
+    numbers, centers = kept.numbers(tree), kept.positions.copy()
     used.look(sight_of(views["whole"]))
     used.advance()
     fresh = Traversal(tree, sight_of(views["whole"]))
     fresh.advance()
     np.testing.assert_array_equal(used.cut(cloud.origin).numbers(tree), fresh.cut(cloud.origin).numbers(tree))
     np.testing.assert_array_equal(kept.numbers(tree), numbers)
-    np.testing.assert_array_equal(kept.centers, centers)
+    np.testing.assert_array_equal(kept.positions, centers)
 
 
 @pytest.mark.parametrize("points", [np.empty((0, 3)), np.ones((1, 3))])
@@ -301,4 +303,4 @@ def test_trees_of_no_and_of_one_point(points: NDArray) -> None:
     cut = traversal.cut(cloud.origin)
     assert cut.complete
     assert len(cut) == len(points)
-    np.testing.assert_allclose(cut.centers + cloud.origin, points, atol=1e-6)
+    np.testing.assert_allclose(cut.positions + cloud.origin, points, atol=1e-6)

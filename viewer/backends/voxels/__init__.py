@@ -1,4 +1,4 @@
-"""A sparse octree of the points, drawn as cubes as coarse as the picture allows.
+"""A sparse octree of the points, drawn as discs or cubes as coarse as the picture allows.
 
 Slomp 2014, VI: octants are divided as long as that tells points apart, and drawn from where
 they are no larger than a pixel.
@@ -7,52 +7,53 @@ they are no larger than a pixel.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu.amplify import FEEDS, Points
 from ...gpu.context import Gpu
-from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Stats, Surface
 from ...params import param
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
-from ...scan.octree.leaves import closing_levels
+from ...scan.octree.discs import usual_radius
 from ...scan.octree.traverse import Cut, Sight, Traversal
-from ...scan.points import PointCloud
+from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...view import View
 from .. import FrameView, Limit
-from .cubes import draw_voxels, shade_flat
+from .cubes import draw_cubes, shade_flat
+from .discs import draw_discs
 
 TITLE = "Voxels"
 ROWS = "octants"
 DERIVES_ON_THREAD = True
 
-_UPRIGHT = "cubes are upright: turned points lie in other ones"
-_AROUND_ALL = "octants divide the cube around all points: other points make other octants"
-_ALONG_A_LINE = "octants along a line touch too few others: each is drawn as large as the line is long"
-# Rows of the stability suite that cubes cannot hold in principle.
+_AROUND_ALL = (
+    "octants divide the cube around the points, upright: others, or turned ones, lie in other octants"
+)
+_FEW_LEVELS = "an octree has 21 levels: a millionth of its cube is one octant"
+_SPACING = "discs are as large as points lie apart, which one alone does not tell"
+_ALONG_A_LINE = "a line has a circle of normals, of which any may be estimated"
+# Rows of the stability suite that octants cannot hold in principle.
 LIMITS = {
-    "rotated by a quarter turn": Limit(0.01, _UPRIGHT),
-    "rotated by 37 degrees": Limit(0.015, _UPRIGHT),
-    "normals parallel to y": Limit(0.1, _UPRIGHT),
-    "near plane inside the cloud": Limit(0.015, _AROUND_ALL),
-    "eye inside the cloud": Limit(0.12, _AROUND_ALL),
-    "zoomed in on 10^-3 of the scan": Limit(0.025, _AROUND_ALL),
-    "zoomed in on 10^-6 of the scan": Limit(0.96, _AROUND_ALL),
-    "coplanar points without normals": Limit(0.04, "without normals, faces are lit"),
-    "collinear points": Limit(1.0, _ALONG_A_LINE),
-    "collinear points end on, perspective": Limit(1.0, _ALONG_A_LINE),
-    "collinear points end on, orthographic": Limit(0.93, _ALONG_A_LINE),
+    "rotated by 37 degrees": Limit(0.002, _AROUND_ALL),
+    "near plane inside the cloud": Limit(0.002, _AROUND_ALL),
+    "eye inside the cloud": Limit(0.015, _AROUND_ALL),
+    "zoomed in on 10^-3 of the scan": Limit(0.002, _AROUND_ALL),
+    "zoomed in on 10^-6 of the scan": Limit(0.7, _FEW_LEVELS),
+    "collinear points": Limit(0.02, _AROUND_ALL),
+    "collinear points without normals": Limit(0.02, _ALONG_A_LINE),
+    "collinear points end on, perspective": Limit(0.02, _SPACING),
+    "collinear points end on, orthographic": Limit(0.02, _SPACING),
 }
 
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
+_CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _ANYWHERE = Sight(np.zeros(3), np.eye(3), 1.0, (1, 1), 1.0, math.inf, perspective=True)
 _PRIMES = np.array([73856093, 19349663, 83492791], np.uint32)  # spatial hash (Teschner et al. 2003, 4.1)
 
@@ -97,8 +98,34 @@ class Params:
         group="Octree",
         when={"stop": ("occupancy",)},
     )
+    shape: str = param(
+        "discs",
+        "What octants look like. discs: a piece of the surface, at the mean position and along the mean "
+        "normal of what they hold; cubes: the octant, lit by the mean normal; flat_cubes: lit by its faces",
+        choices=("discs", *_CUBES),
+        affects="derive",
+        group="Octants",
+    )
+    radius_scale: float = param(
+        1.0,
+        "Factor on the radius of discs, which closes the surface at 1",
+        low=0.01,
+        high=100.0,
+        sweep=(0.8, 1.0),
+        group="Octants",
+        when={"shape": ("discs",)},
+    )
+    least: float = param(
+        0.75,
+        "Least half edge of a cube, in radii of its disc: what closes the surface where octants lie apart; "
+        "0: as large as octants",
+        low=0.0,
+        high=10.0,
+        group="Octants",
+        when={"shape": _CUBES},
+    )
     max_depth: int = param(
-        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11), group="Cubes"
+        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11), group="Octants"
     )
     pixel_threshold: float = param(
         1.0,
@@ -106,36 +133,13 @@ class Params:
         low=0.25,
         high=64.0,
         unit="px",
-        group="Cubes",
+        group="Octants",
     )
-    least: float = param(
-        1.25,
-        "Least edge of a cube, in edges of the smallest octant around it that touches others: what closes "
-        "the surface where octants lie apart; 0: as large as octants",
-        low=0.0,
-        high=10.0,
-        sweep=(0.0, 1.25),
-        group="Cubes",
-    )
-    normals: str = param(
-        "auto",
-        "What is lit. smooth: the mean of the points' normals; flat: the cubes' faces; auto: smooth where "
-        "the scan has normals",
-        choices=("auto", "smooth", "flat"),
-        affects="derive",
-        group="Cubes",
-    )
-    cull_back: bool = param(False, "Leave out octants whose normals all face away", group="Cubes")
-    scatter: bool = param(
-        True,
-        "Send cubes of a few pixels to their pixels one by one; off: all are made by `instancing`",
-        affects="speed",
-        group="Speed",
-    )
+    cull_back: bool = param(False, "Leave out octants whose normals all face away", group="Octants")
     instancing: str = param(
         "auto",
-        "How octants become cubes: a geometry shader, uniform blocks, buffer textures, vertex attributes or "
-        "pulled vertices; auto: what is fastest on this device",
+        "How octants become shapes: a geometry shader, uniform blocks, buffer textures, vertex attributes "
+        "or pulled vertices; auto: what is fastest on this device, without quads or faces where that is",
         choices=("auto", *FEEDS),
         affects="speed",
         group="Speed",
@@ -143,51 +147,47 @@ class Params:
 
 
 def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Normals where they are to be lit."""
-    return ("normals",) if params.normals == "smooth" else ()
+    """Normals, but for faces, which have their own."""
+    return () if params.shape == "flat_cubes" else ("normals",)
 
 
-def derive(pose: Pose, params: Params) -> tuple[Octree, list[NDArray[np.uint8]]]:
-    """The octree of a pose, and for each level how large its nodes are drawn to close the surface."""
+def derive(pose: Pose, params: Params) -> Octree:
+    """The octree of a pose."""
     stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
     octree = build(pose.cloud, stop)
     # The first cut of a process imports what it needs, of a machine compiles it: not while a window draws.
     traversal = Traversal(octree.prefix(1), _ANYWHERE)
     traversal.advance()
     traversal.cut(octree.low)
-    return octree, closing_levels(octree)
+    return octree
 
 
-def upload(gpu: Gpu, derived: tuple[Octree, list[NDArray[np.uint8]]]) -> Voxels:
+def upload(gpu: Gpu, octree: Octree) -> Voxels:
     """Nothing is uploaded until a view is known."""
-    return Voxels(gpu, *derived)
+    return Voxels(gpu, octree)
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Draw the nodes that the view tells apart; complete where all were found, and all shall be drawn."""
     params: Params = frame.params
     voxels: Voxels = frame.derived
-    if not voxels.octree.points:
+    if not len(pose.cloud):
         surface.clear()
         return False
-    flat = params.normals == "flat" or (params.normals == "auto" and pose.stored.normals is None)
-    shown = voxels.show(pose, frame, flat)
-    surface.show(shown.pose, shown.rows)
+    shown = voxels.show(pose, frame)
+    surface.show(shown.pose, shown.rows, shown.octants)
     coarse = frame.share < 1 and bool((shown.cut.level < min(params.max_depth, voxels.octree.depth)).any())
     _report(shown.cut, voxels.octree, params, surface.stats)
     if coarse:
         surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
     points = Points(shown.pose, use_radii=True, count=len(shown.rows))
-    feed = instancing_for(surface, params.instancing, "gs", "voxels", FEEDS, _ways)
-    draw_voxels(points, surface, feed, params.scatter)
-    if flat:
+    if params.shape == "discs":
+        draw_discs(points, surface, params.instancing, params.radius_scale)
+    else:
+        draw_cubes(points, surface, params.instancing)
+    if params.shape == "flat_cubes":
         shade_flat(points, surface)
     return coarse or not shown.cut.complete
-
-
-def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
-    points = Points.of(pose, surface, 1.0, use_radii=True)
-    return {feed: partial(draw_voxels, points, surface, feed, scattered=False) for feed in FEEDS}
 
 
 def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
@@ -201,20 +201,24 @@ def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """Nodes that a view shows. rows: (n,) the first point of each node."""
+    """Nodes that a view shows, and strays behind them. rows: (n,) the first point of each. octants: (n,) the
+    number of each among all of the tree, NOTHING of strays."""
 
     cut: Cut
     pose: GpuPose
     rows: NDArray[np.uint32]
+    octants: NDArray[np.uint32]
 
 
 class Voxels:
     """An octree, and the nodes of it that the last view showed."""
 
-    def __init__(self, gpu: Gpu, octree: Octree, closing: list[NDArray[np.uint8]]) -> None:
+    def __init__(self, gpu: Gpu, octree: Octree) -> None:
         self.octree = octree
-        self._closing = closing
         self._gpu = gpu
+        radii = [each.radii for each in octree.attributes if each.radii is not None]
+        self._largest = [float(each.max()) for each in radii]
+        self._usual = usual_radius(octree.masks, radii) if radii else 0.0
         self._traversal: Traversal | None = None
         self._asked: tuple[object, ...] = ()
         self._seen: tuple[object, ...] = ()
@@ -225,70 +229,77 @@ class Voxels:
         """Bytes held: the octree on the CPU, what the last view showed on both sides."""
         shown = self._shown.pose.uploaded_bytes + self._shown.pose.cloud.nbytes if self._shown else 0
         looking = self._traversal.nbytes if self._traversal else 0
-        return self.octree.nbytes + sum(levels.nbytes for levels in self._closing) + looking + shown
+        return self.octree.nbytes + looking + shown
 
     def release(self) -> None:
         """Let go of what the last view showed."""
         self._traversal = self._shown = None
 
-    def show(self, pose: GpuPose, frame: FrameView, flat: bool) -> _Shown:
+    def show(self, pose: GpuPose, frame: FrameView) -> _Shown:
         """The nodes for a view, found anew where it or the parameters changed, else found further."""
         params: Params = frame.params
         threshold = params.pixel_threshold / math.sqrt(frame.share)  # four times the nodes at half the edge
-        asked = (threshold, params.max_depth, params.least, params.cull_back, flat)
+        scale = params.radius_scale if params.shape == "discs" else params.least
+        asked = (threshold, params.max_depth, params.shape, scale, params.cull_back)
         seen = (asked, frame.view.key)
         if self._shown is not None and self._seen == seen and self._shown.cut.complete:
             return self._shown
         sight = sight_of(frame.view)
         if self._traversal is None or self._asked != asked:
+            reach = scale if params.shape == "discs" else math.sqrt(3) * scale * (1 + _UNLIKE)
             self._traversal = Traversal(
                 self.octree,
                 sight,
                 pixel_threshold=threshold,
                 max_depth=params.max_depth,
                 cull_cones=params.cull_back,
-                margin=self._margin(params.least),
+                margins=[reach * radius for radius in self._largest],
             )
         elif self._seen != seen:
             self._traversal.look(sight)
         self._asked, self._seen = asked, seen
         self._traversal.advance(frame.budget_ms)
-        self._shown = self._look_at(self._traversal.cut(pose.origin), pose, params, flat)
+        cut = self._traversal.cut(pose.origin, means=params.shape == "discs")
+        self._shown = self._look_at(cut, pose, params)
         return self._shown
 
-    def _margin(self, least: float) -> float:
-        """How far cubes reach beyond the balls around their octants at most, scan units."""
-        half = self.octree.edge / 2
-        levels = [(level, int(found.min())) for level, found in enumerate(self._closing) if len(found)]
-        beyond = (least * (1 + _UNLIKE) * half / 2**closing - half / 2**level for level, closing in levels)
-        return math.sqrt(3) * max(0.0, *beyond)
-
-    def _look_at(self, cut: Cut, pose: GpuPose, params: Params, flat: bool) -> _Shown:
-        """The nodes of a cut as points, their radii being half of the cubes' edges, and behind them the
-        strays as they are, in cubes of typical leaves."""
+    def _look_at(self, cut: Cut, pose: GpuPose, params: Params) -> _Shown:
+        """The nodes of a cut as points, their radii those of discs or half of the cubes' edges, and behind
+        them the strays as they are, as large as typical leaves."""
         cloud, strays = pose.cloud, self.octree.strays
         rows = np.concatenate([cut.gather(self.octree, "rows"), strays])
-        positions = np.concatenate([cut.centers, (cloud.world(strays) - pose.origin).astype(np.float32)])
-        unlike = _unlike(self.octree, cut, pose.origin)
-        closing = np.ldexp(np.float32(self.octree.edge / 2), -cut.pick(self._closing).astype(np.int32))
-        radii = np.maximum(cut.halves, params.least * unlike * closing)
-        typical = params.least * math.ldexp(self.octree.edge / 2, -int(np.median(self._closing[-1])))
-
-        def of_nodes(name: str) -> NDArray:
-            return np.concatenate([cut.gather(self.octree, name), getattr(cloud, name)[strays]])
+        apart = (cloud.world(strays) - pose.origin).astype(np.float32)
+        positions = np.concatenate([cut.positions, apart])
+        of_strays = np.full(len(strays), self._usual, np.float32)
+        radii = np.concatenate([cut.gather(self.octree, "radii"), of_strays])
+        if params.shape != "discs":
+            radii *= params.least
+            radii[: len(cut)] *= _unlike(self.octree, cut, pose.origin)
+            radii[: len(cut)] = np.maximum(cut.halves, radii[: len(cut)])
 
         shown = PointCloud(
             positions=positions,
             origin=pose.origin,
-            # Faces give their own normals to pixels.
-            normals=np.zeros_like(positions) if flat else of_nodes("normals"),
-            colors=None if cloud.colors is None else of_nodes("colors"),
-            radii=np.concatenate([radii, np.full(len(strays), typical, np.float32)]),
+            normals=self._normals(cut, pose, params),
+            colors=None
+            if cloud.colors is None
+            else np.concatenate([cut.gather(self.octree, "colors"), cloud.colors[strays]]),
+            radii=radii,
             scalars=_Scalars(cloud.scalars, rows),
-            # In the cut's order, near first: no row is looked for by them.
-            ids=np.concatenate([cut.numbers(self.octree), strays]),
+            ids=rows if cloud.ids is None else cloud.ids[rows],  # near first: no row is looked for by them
         )
-        return _Shown(cut, GpuPose(self._gpu, replace(pose.pose, points=shown)), rows)
+        octants = np.concatenate([cut.numbers(self.octree), np.full(len(strays), NOTHING, np.uint32)])
+        return _Shown(cut, GpuPose(self._gpu, replace(pose.pose, points=shown)), rows, octants)
+
+    def _normals(self, cut: Cut, pose: GpuPose, params: Params) -> NDArray[np.float32]:
+        """Normals of the nodes, and of the strays those that the scan has: around these, none can be
+        estimated, and without one they face the eye."""
+        strays = self.octree.strays
+        if params.shape == "flat_cubes":  # faces give their own normals to pixels
+            return np.zeros((len(cut) + len(strays), 3), np.float32)
+        stored = pose.stored.normals
+        own = np.zeros((len(strays), 3), np.float32) if stored is None else stored[strays]
+        return np.concatenate([cut.gather(self.octree, "normals"), own])
 
 
 def sight_of(view: View) -> Sight:
@@ -302,7 +313,7 @@ def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np
     of their faces, and rounding would say which of them is seen (in 7 % of the pixels of a scan that was
     moved by 1000 units; with them in less than 0.1 %)."""
     edges = 2 * cut.halves[:, None].astype(np.float64)
-    cells = ((cut.centers + (origin - octree.low)) / edges).astype(np.uint32)
+    cells = ((cut.positions + (origin - octree.low)) / edges).astype(np.uint32)
     mixed = (cells * _PRIMES).sum(axis=1, dtype=np.uint32) * _PRIMES[0] >> np.uint32(22)
     return 1 + mixed.astype(np.float32) * np.float32(_UNLIKE / 1024)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,29 +12,44 @@ from numpy.typing import NDArray
 from ...gpu import gl
 from ...gpu.amplify import Points, Shape, amplify
 from ...gpu.bindings import Texture
+from ...gpu.fastest import instancing_for
+from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
 
 CUBE = Shape("voxels/cube.glsl", corners=9)
 _FRAGMENT = "voxels/cube.frag"
 _SMALL = 3.0  # half of the edge, pixels: up to it, a ray for each pixel of a cube costs less than faces do
+_OF_SOME = ("gs", "tbo", "pull")  # feeds that bring some of the points
 
 
-def draw_voxels(points: Points, surface: Surface, feed: str, scattered: bool = True) -> None:
+def draw_cubes(points: Points, surface: Surface, instancing: str) -> None:
     """The nearest cube of each pixel. Points: their radii are half of the edges.
 
-    scattered: whether cubes of a few pixels are met with the ray of each pixel, which gives the same picture.
+    instancing: a feed, which then brings all of them; "auto": cubes of a few pixels are met with the ray of
+    each pixel, which gives the same picture, and the fastest feed brings the others.
     """
-    small, large = _by_size(points, surface) if scattered else (None, points)
+    if instancing != "auto":
+        amplify(points, surface, instancing, CUBE, _FRAGMENT)
+        return
+    small, large = _by_size(points, surface)
     if small is None:
         surface.stats.skipped["scatter"] = "no voxel is small"
     else:
         _scatter(small, surface)
+        surface.stats.chosen["instancing"] = "scatter"
     if large is None:
         surface.stats.skipped["splat"] = "all voxels are small: they are sent to their pixels one by one"
     else:
+        feed = instancing_for(surface, "auto", "gs", "voxels", _OF_SOME, _ways)
         amplify(large, surface, feed, CUBE, _FRAGMENT, over=small is not None)
+        surface.stats.chosen["instancing"] = feed if small is None else f"scatter, {feed}"
     surface.gpu.discard(*(part.rows for part in (small, large) if part is not None and part is not points))
+
+
+def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    points = Points.of(pose, surface, 1.0, use_radii=True)
+    return {feed: partial(amplify, points, surface, feed, CUBE, _FRAGMENT) for feed in _OF_SOME}
 
 
 def shade_flat(points: Points, surface: Surface) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -10,27 +10,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..points import PointCloud
+from .cube import Grid
+from .discs import discs_of
 from .octree import Attributes
 from .threads import together
 
 
 def attributes_of(
     cloud: PointCloud,
-    rows: NDArray[np.uint32],
-    levels: NDArray[np.uint8],
+    points: Sorted,
+    grid: Grid,
+    edge: float,
     ends: NDArray[np.uint8],
+    masks: Sequence[NDArray[np.uint8]],
     counts: NDArray[np.int64],
 ) -> tuple[Attributes, ...]:
-    """Attributes of each level of a tree, from its points in their order (`build.Sorted`).
+    """Attributes of each level of a tree, from its points in their order.
 
-    ends: (N,), the level of each point's leaf. counts: (depth + 1,), the nodes of each level. Colours are
-    means of the stored values, rounded half up; normals means of unit normals, summed in fixed point. Neither
-    depends on the order of the points.
+    grid, edge: of the cube. ends: (N,), the level of each point's leaf. masks: of the levels above the
+    deepest. counts: (depth + 1,), the nodes of each level. Colours are means of the stored values, rounded
+    half up; normals means of unit normals, summed in fixed point. None depends on the order of the points.
     """
     starts = np.cumsum(counts) - counts
-    order = _Order(rows, levels, ends, starts, int(counts.sum()))
+    order = _Order(points.rows, points.levels, ends, starts, int(counts.sum()))
     found: dict[str, NDArray] = {"rows": np.empty(order.nodes, np.uint32)}
     works: list[Callable[[], object]] = [partial(_rows, order, found["rows"])]
+    found["offsets"] = np.empty((order.nodes, 3), np.uint16)
+    found["radii"] = np.empty(order.nodes, np.float32)
+    works.append(partial(_discs, order, cloud, points, grid, edge, masks, found["offsets"], found["radii"]))
     if cloud.colors is not None:
         found["colors"] = np.empty((order.nodes, 4), np.uint8)
         works.append(partial(_colors, order, cloud.colors, found["colors"]))
@@ -38,9 +45,24 @@ def attributes_of(
         found["normals"] = np.empty((order.nodes, 3), np.float32)
         found["cones"] = np.empty(order.nodes, np.float32)
         works.append(partial(_normals, order, cloud.normals, found["normals"], found["cones"]))
-    together(len(rows), reversed(works))  # the longest first
+    together(len(order.rows), reversed(works))  # the longest first
     ranges = zip(starts.tolist(), (starts + counts).tolist(), strict=True)
     return tuple(Attributes(**{name: values[a:b] for name, values in found.items()}) for a, b in ranges)
+
+
+class Sorted(NamedTuple):
+    """The points by ascending Morton code of level 21; equal ones by row.
+
+    codes: (N,) uint64. rows: (N,) uint32. levels: (N,) uint8: the first level at which each point is in
+    another node than the one before, 0 for the first, 22 where there is none. counts: (22,) int64: the nodes
+    of each level, were all divided. distinct: how many different positions there are.
+    """
+
+    codes: NDArray[np.uint64]
+    rows: NDArray[np.uint32]
+    levels: NDArray[np.uint8]
+    counts: NDArray[np.int64]
+    distinct: int
 
 
 class _Order(NamedTuple):
@@ -51,6 +73,28 @@ class _Order(NamedTuple):
     ends: NDArray[np.uint8]
     starts: NDArray[np.int64]
     nodes: int
+
+    def by_level(self, values: NDArray) -> list[NDArray]:
+        """Values of all nodes, level by level, in the same memory."""
+        return np.split(values, self.starts[1:])
+
+
+def _discs(
+    order: _Order,
+    cloud: PointCloud,
+    points: Sorted,
+    grid: Grid,
+    edge: float,
+    masks: Sequence[NDArray[np.uint8]],
+    offsets: NDArray[np.uint16],
+    radii: NDArray[np.float32],
+) -> None:
+    from . import disc_kernels
+
+    positions = np.ascontiguousarray(cloud.positions)
+    in_order = (points.rows, points.codes, points.levels, order.ends)
+    disc_kernels.leaf_offsets(positions, *in_order, *grid, order.starts, offsets)
+    discs_of(masks, edge, order.by_level(offsets), order.by_level(radii))
 
 
 def _rows(order: _Order, rows: NDArray[np.uint32]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from ...params import describe, param
 from ...task import checkpoint
 from ..points import PointCloud
-from .attributes import attributes_of
+from .attributes import Sorted, attributes_of
 from .cube import Cube, Grid
 from .octree import DEEPEST, Octree
 from .threads import ranges, shares, together
@@ -48,21 +47,6 @@ class Stop:
         return next((level for level in range(DEEPEST, 0, -1) if edge / 2**level >= self.least), 0)
 
 
-class Sorted(NamedTuple):
-    """The points by ascending Morton code of level 21; equal ones by row.
-
-    codes: (N,) uint64. rows: (N,) uint32. levels: (N,) uint8: the first level at which each point is in
-    another node than the one before, 0 for the first, 22 where there is none. counts: (22,) int64: the nodes
-    of each level, were all divided. distinct: how many different positions there are.
-    """
-
-    codes: NDArray[np.uint64]
-    rows: NDArray[np.uint32]
-    levels: NDArray[np.uint8]
-    counts: NDArray[np.int64]
-    distinct: int
-
-
 def build(
     cloud: PointCloud, stop: Stop | None = None, cube: Cube | None = None, attributes: bool = True
 ) -> Octree:
@@ -78,11 +62,12 @@ def build(
     count = len(cloud) - len(strays)
     if not count:
         return Octree(cube.low, cube.edge, (), 0, 0, strays=strays)
-    points = _sorted(cloud, strays, Grid.of(cube, cloud.origin))
+    grid = Grid.of(cube, cloud.origin)
+    points = _sorted(cloud, strays, grid)
     checkpoint()
     ends, counts = _ends(points, stop, stop.limit(cube.edge))
-    found = attributes_of(cloud, points.rows, points.levels, ends, counts) if attributes else ()
     masks = _masks(points, ends, counts)
+    found = attributes_of(cloud, points, grid, cube.edge, ends, masks, counts) if attributes else ()
     return Octree(cube.low, cube.edge, masks, count, points.distinct, found, strays)
 
 

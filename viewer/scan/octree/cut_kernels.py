@@ -154,10 +154,29 @@ def _faces_away(
 
 
 @compiled
-def find_centers(
-    places: NDArray[np.uint64], edge: float, low: NDArray[np.float64], centers: NDArray[np.float32]
+def find_positions(
+    places: NDArray[np.uint64],
+    indices: NDArray[np.uint32],
+    edge: float,
+    low: NDArray[np.float64],
+    offsets: NDArray[np.uint16],
+    positions: NDArray[np.float32],
 ) -> None:
-    """Centres (n, 3) of nodes (n,) of one level. low: (3,), the cube's corner, from where centres count."""
+    """Positions (n, 3) of nodes (n,) of one level. low: (3,), the cube's corner, from where positions count.
+    offsets: of all nodes of the level, as `Attributes` has them; (0, 3): centres are wanted."""
+    step, x, y, z = edge / 65536, 0.0, 0.0, 0.0
+    middle = edge / 2 - step / 2
     for i in range(len(places)):
-        x, y, z = _center(places[i], edge)
-        centers[i, 0], centers[i, 1], centers[i, 2] = x + low[0], y + low[1], z + low[2]
+        center_x, center_y, center_z = _center(places[i], edge)
+        if len(offsets):
+            at = indices[i]
+            x, y, z = (
+                offsets[at, 0] * step - middle,
+                offsets[at, 1] * step - middle,
+                offsets[at, 2] * step - middle,
+            )
+        positions[i, 0], positions[i, 1], positions[i, 2] = (
+            center_x + x + low[0],
+            center_y + y + low[1],
+            center_z + z + low[2],
+        )

@@ -1,8 +1,7 @@
-"""The leaves of an octree as points, and how large nodes have to be to close a surface."""
+"""The leaves of an octree as points."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -10,20 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..points import PointCloud, choose_origin
-from .neighbors import Bytes, Neighbors
+from .discs import MIDDLE, discs_of
 from .octree import Octree
 
 _SAMPLE = 1 << 13  # leaves that the origin is chosen by
-_TOUCHED = 3  # faces of a node, at least, within a surface; an octant cut by a plane has three to six
-_MOST_COARSER = 1  # levels, than those of half of the leaves: what lies apart does not become a large disc
 
 
 def leaf_points(octree: Octree) -> PointCloud:
-    """A point in the middle of each leaf, with its colour and normal, by level and then by Morton code.
+    """A point for each leaf, with its colour and normal, by level and then by Morton code.
 
-    Radii are half of the diagonal of the leaf, or of the smallest octant around it that is one of a surface.
-    A disc of that size covers whatever section a plane through the middle makes of the octant, so that there
-    are no gaps between octants that touch; leaves themselves may be too small to touch.
+    It lies where the surface is in the leaf, where the tree's attributes tell, else in its middle. Radii are
+    of discs there that close the surface, see `discs_of`.
     """
     leaves: dict[int, NDArray[np.bool_] | slice] = {
         level: masks == 0 for level, masks in enumerate(octree.masks) if not masks.all()
@@ -38,47 +34,38 @@ def leaf_points(octree: Octree) -> PointCloud:
             return None
         return joined(getattr(octree.attributes[level], name)[those] for level, those in leaves.items())
 
-    touching = _touching_levels(octree)
-    found = _not_much_coarser(joined(touching[level][those] for level, those in leaves.items())).astype(
-        np.int32
-    )
-    del touching
+    offsets, radii = of_leaves("offsets"), of_leaves("radii")
+    if radii is None:
+        found = _radii(octree)
+        radii = joined(found[level][those] for level, those in leaves.items())
     codes = {level: octree.codes(level)[those] for level, those in leaves.items()}
     step = max(1, sum(map(len, codes.values())) // _SAMPLE)
     origin = choose_origin(
         np.concatenate([octree.centers_of(some[::step], level) for level, some in codes.items()])
     )
+    positions = joined(octree.centers_of(some, level, origin) for level, some in codes.items())
+    if offsets is not None:
+        sizes = np.repeat([octree.size(level) for level in codes], [len(some) for some in codes.values()])
+        for axis in range(3):  # column by column: numpy is slow along the short axis
+            positions[:, axis] += (offsets[:, axis] - (MIDDLE - 0.5)) * (sizes / (2 * MIDDLE))
     cloud = PointCloud.from_arrays(
-        joined(octree.centers_of(some, level, origin) for level, some in codes.items()),
+        positions,
         normals=of_leaves("normals"),
         colors=of_leaves("colors"),
-        radii=np.ldexp(np.float32(math.sqrt(3) / 2 * octree.edge), -found),
+        radii=radii,
         origin=np.zeros(3),
         precise=False,
     )
     return replace(cloud, origin=origin)
 
 
-def closing_levels(octree: Octree) -> list[Bytes]:
-    """Levels for each level, (n,): of the octant around each node that is as large as the gaps beside it:
-    nodes that are drawn so large close the surface, however small they are themselves."""
-    return [_not_much_coarser(found) for found in _touching_levels(octree)]
-
-
-def _not_much_coarser(found: NDArray) -> NDArray:
-    return np.maximum(found, max(int(np.median(found)) - _MOST_COARSER, 0)) if len(found) else found
-
-
-def _touching_levels(octree: Octree) -> list[Bytes]:
-    """Levels for each level, (n,): the deepest at which a node, or one around it, touches enough others."""
-    neighbors = Neighbors(int(octree.counts[0]))
-    levels = [np.zeros(int(octree.counts[0]), np.uint8)]
-    for number, masks in enumerate(octree.masks, 1):
-        if number < octree.depth:
-            children = neighbors.descend(masks)
-            around = neighbors.around()
-        else:
-            children, around = neighbors.around_below(masks)
-        touches = np.bitwise_count(around) >= _TOUCHED
-        levels.append(np.where(touches, np.uint8(number), levels[-1][children.parents]))
-    return levels
+def _radii(octree: Octree) -> list[NDArray[np.float32]]:
+    """Radii of all nodes, level by level, of a tree that does not tell them."""
+    counts = octree.counts.tolist()
+    offsets = [np.full((count, 3), MIDDLE, np.uint16) for count in counts]
+    radii = [np.empty(count, np.float32) for count in counts]
+    for level, own in enumerate(octree.attributes):
+        if own.offsets is not None and len(own.offsets):
+            offsets[level][:] = own.offsets
+    discs_of(octree.masks, octree.edge, offsets, radii)
+    return radii

@@ -152,7 +152,7 @@ def mean_normals(
         sum_x, sum_y, sum_z, points = int(x * _FIXED), int(y * _FIXED), int(z * _FIXED), 1
         stay = levels[i + 1] if i + 1 < len(units) else 0
         for level in range(leaf, stay - 1, -1):
-            if held[level, 3]:
+            if held[level, 3] or level == leaf:  # also of one point, as of copies of it
                 sum_x, sum_y = sum_x + held[level, 0], sum_y + held[level, 1]
                 sum_z, points = sum_z + held[level, 2], points + held[level, 3]
                 for k in range(4):

@@ -27,12 +27,17 @@ class Attributes:
     cones:   (n,) float32, or None: the cosine of the half angle of the cone about the normal that
              holds all normals below, -1..1; -1 where there is no normal, or a point below has none
     rows:    (n,) uint32, or None: the lowest row below in the arrays of the cloud
+    offsets: (n, 3) uint16, or None: where the surface is in the node's cell: of a leaf the mean position of
+             its points, of others that of the leaves below, in 65536ths of the cell's edge
+    radii:   (n,) float32, scan units, or None: of discs there that close the surface
     """
 
     colors: NDArray[np.uint8] | None = None
     normals: NDArray[np.float32] | None = None
     cones: NDArray[np.float32] | None = None
     rows: NDArray[np.uint32] | None = None
+    offsets: NDArray[np.uint16] | None = None
+    radii: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False)

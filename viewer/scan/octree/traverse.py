@@ -54,7 +54,8 @@ class Cut:
 
     level:     (n,) uint8; the deepest first, and within a level the nearest first, parent by parent
     index:     (n,) uint32, which node of its level
-    centers:   (n, 3) float32, scan units, relative to the origin that was asked for
+    positions: (n, 3) float32, scan units, relative to the origin that was asked for: the centres of their
+               cells, or where the surface is in these
     halves:    (n,) float32, half of the edges
     complete:  whether every node is a leaf, at the greatest depth, or small enough
     outside, facing_away: how many nodes were left out with all below, by cause
@@ -62,7 +63,7 @@ class Cut:
 
     level: NDArray[np.uint8]
     index: NDArray[np.uint32]
-    centers: NDArray[np.float32]
+    positions: NDArray[np.float32]
     halves: NDArray[np.float32]
     complete: bool
     outside: int
@@ -120,8 +121,9 @@ class Traversal:
     One object serves all views of a tree, one after the other, in the same memory.
 
     pixel_threshold: nodes of a lesser edge, in pixels, are not divided. max_depth: nor are those of this
-    level. cull_cones: nodes whose normals all face away are left out, where the tree has normals. margin:
-    how far what is drawn of a node reaches beyond its sphere, scan units.
+    level. cull_cones: nodes whose normals all face away are left out, where the tree has normals. margins:
+    how far what is drawn of the nodes of each level, and of those below them, reaches beyond their spheres,
+    scan units; empty: not at all.
     """
 
     def __init__(
@@ -132,10 +134,10 @@ class Traversal:
         pixel_threshold: float = 1.0,
         max_depth: int = DEEPEST,
         cull_cones: bool = True,
-        margin: float = 0.0,
+        margins: Sequence[float] = (),
     ) -> None:
         self.octree = octree
-        self._margin = float(margin)
+        self._margins = margins or [0.0] * (octree.depth + 1)
         self._threshold = float(pixel_threshold)
         self._depth = max(0, min(max_depth, octree.depth))
         self._cones = cull_cones and bool(octree.attributes) and octree.attributes[0].cones is not None
@@ -179,8 +181,9 @@ class Traversal:
                 break
         return self.complete
 
-    def cut(self, origin: NDArray[np.float64]) -> Cut:
-        """The cut so far, its centres relative to this origin, (3,)."""
+    def cut(self, origin: NDArray[np.float64], means: bool = False) -> Cut:
+        """The cut so far, its positions relative to this origin, (3,). means: not the centres of the cells,
+        but where the surface is in them; the tree has attributes."""
         from . import cut_kernels
 
         parts = [*self._done, (self._level, self._nodes.part(self._at))]
@@ -188,18 +191,22 @@ class Traversal:
             parts.append((self._level + 1, self._children.part(0, self._followed)))
         parts.sort(key=lambda part: -part[0])
         lengths = [len(nodes) for _, nodes in parts]
-        centers = np.empty((sum(lengths), 3), np.float32)
+        positions = np.empty((sum(lengths), 3), np.float32)
         low, start = self.octree.low - origin, 0
         for level, nodes in parts:
             end = start + len(nodes)
-            cut_kernels.find_centers(nodes.places, self.octree.size(level), low, centers[start:end])
+            offsets = self.octree.attributes[level].offsets if means else None
+            offsets = _NO_OFFSETS if offsets is None else offsets
+            cut_kernels.find_positions(
+                nodes.places, nodes.indices, self.octree.size(level), low, offsets, positions[start:end]
+            )
             start = end
         levels = np.array([level for level, _ in parts], np.uint8)
         halves = np.array([self.octree.size(level) / 2 for level, _ in parts], np.float32)
         return Cut(
             level=np.repeat(levels, lengths),
             index=np.concatenate([nodes.indices for _, nodes in parts]),
-            centers=centers,
+            positions=positions,
             halves=np.repeat(halves, lengths),
             complete=self.complete,
             outside=self._outside,
@@ -259,7 +266,7 @@ class Traversal:
     def _lens(self) -> tuple[bool, float, float, float, float]:
         """The camera as `cut_kernels.descend` takes it; least size 0: no node is so small."""
         least = self._threshold if self.octree.size(self._level) < self._least else 0.0
-        return self._perspective, self._scale, self._near, least, self._margin
+        return self._perspective, self._scale, self._near, least, float(self._margins[self._level])
 
     def _attributes(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         found = self.octree.attributes[self._level] if self._cones else None
@@ -269,4 +276,5 @@ class Traversal:
 
 
 _NO_MASKS, _NO_CHILDREN = np.empty(0, np.uint8), np.empty(0, np.uint32)
+_NO_OFFSETS = np.empty((0, 3), np.uint16)
 _NO_NORMALS, _NO_CONES = np.empty((0, 3), np.float32), np.empty(0, np.float32)
