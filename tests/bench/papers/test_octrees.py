@@ -95,7 +95,7 @@ def test_each_scan_meets_every_feed_at_the_papers_level() -> None:
         assert [contender.params.instancing for contender in drawn] == slomp.feeds("voxels")
         for contender in drawn:
             whole = {"stop": "depth", "depth": level, "least": 0.0, "pixel_threshold": 0.25}
-            whole |= {"scatter": False}
+            whole |= {"shape": "cubes"}
             feed = {"instancing": contender.params.instancing}
             assert asdict(contender.params) == usual | whole | feed
 

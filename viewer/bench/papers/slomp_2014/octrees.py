@@ -38,15 +38,14 @@ WORKS = ("build", "attributes", "cut", "leaves", SORT)
 _ROUNDS = 5  # for each repeat of a draw, as these take less
 _DEPTH = 10  # of the demo in Table IV
 _LEVEL_SCENES = ("demo", "dragon")
-# All leaves, as large as they are.
-_LEAVES = {"stop": "depth", CUBE: 0.0, "pixel_threshold": 0.25}
+# All leaves, as cubes that are as large as they are.
+_LEAVES = {"stop": "depth", "shape": "cubes", CUBE: 0.0, "pixel_threshold": 0.25}
 
 
 def groups() -> list[Group]:
     """Table IV: a group for each of its scans and the demo. Then scenes at one level after the other."""
-    cubes = {**_LEAVES, "scatter": False}  # the small ones too, or feeds would have nothing to do
-    feeds = [slomp.by_feed(scan, BACKEND, {**cubes, "depth": depth_of(scan)}) for scan in slomp.scans()]
-    edges = (0.0, getattr(backend(BACKEND).params(), CUBE))  # octants, and as usual
+    feeds = [slomp.by_feed(scan, BACKEND, {**_LEAVES, "depth": depth_of(scan)}) for scan in slomp.scans()]
+    edges = (0.0, getattr(backend(BACKEND).params(), CUBE))  # octants, and what closes the surface
     params = (
         backend(BACKEND).params({**_LEAVES, "depth": max(LEVELS), CUBE: edge, LEVEL: level})
         for edge, level in product(edges, LEVELS)
