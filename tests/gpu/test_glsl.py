@@ -127,7 +127,7 @@ def draw_all(renderer: Renderer) -> None:
         draw(cloud, "surfels", radius="uniform", radius_scale=0.01)  # of about a pixel
         for size, share in product((1, 3), (1.0, 0.5)):
             draw(cloud, "points", share=share, point_size=size)
-        for instancing, shape in product(("auto", *FEEDS), ("discs", "cubes", "flat_cubes")):
+        for instancing, shape in product(("tiles", *FEEDS), ("discs", "cubes", "flat_cubes")):
             draw(cloud, "voxels", instancing=instancing, shape=shape)
         draw(cloud, "voxels", shape="cubes", least=1.4)  # of all sizes
         for look in LOOKS:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu.amplify import FEEDS, Points
+from ...gpu.amplify import Points
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Stats, Surface
@@ -27,7 +27,7 @@ from ...scan.pose import Pose
 from ...view import View
 from .. import FrameView, Limit
 from .cubes import draw_cubes, shade_flat
-from .discs import draw_discs
+from .discs import WAYS, draw_discs
 
 TITLE = "Voxels"
 ROWS = "octants"
@@ -138,9 +138,10 @@ class Params:
     cull_back: bool = param(False, "Leave out octants whose normals all face away", group="Octants")
     instancing: str = param(
         "auto",
-        "How octants become shapes: a geometry shader, uniform blocks, buffer textures, vertex attributes "
-        "or pulled vertices; auto: what is fastest on this device, without quads or faces where that is",
-        choices=("auto", *FEEDS),
+        "How octants become shapes. auto: what is fastest on this device; tiles: computed without quads, or "
+        "faces where cubes are small; the others: by a geometry shader, uniform blocks, buffer textures, "
+        "vertex attributes or pulled vertices",
+        choices=("auto", *WAYS),
         affects="speed",
         group="Speed",
     )
@@ -181,6 +182,9 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if coarse:
         surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
     points = Points(shown.pose, use_radii=True, count=len(shown.rows))
+    if not points.count:
+        surface.clear()
+        return not shown.cut.complete
     if params.shape == "discs":
         draw_discs(points, surface, params.instancing, params.radius_scale)
     else:

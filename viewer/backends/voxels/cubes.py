@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu import gl
-from ...gpu.amplify import Points, Shape, amplify
+from ...gpu.amplify import FEEDS, Points, Shape, amplify
 from ...gpu.bindings import Texture
 from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
@@ -26,10 +26,10 @@ _OF_SOME = ("gs", "tbo", "pull")  # feeds that bring some of the points
 def draw_cubes(points: Points, surface: Surface, instancing: str) -> None:
     """The nearest cube of each pixel. Points: their radii are half of the edges.
 
-    instancing: a feed, which then brings all of them; "auto": cubes of a few pixels are met with the ray of
-    each pixel, which gives the same picture, and the fastest feed brings the others.
+    instancing: a feed, which then brings all of them; else cubes of a few pixels are met with the ray of each
+    pixel, which gives the same picture, and the fastest feed brings the others.
     """
-    if instancing != "auto":
+    if instancing in FEEDS:
         amplify(points, surface, instancing, CUBE, _FRAGMENT)
         return
     small, large = _by_size(points, surface)

@@ -14,24 +14,24 @@ from ..surfels.splats import FRAGMENT, SURFEL, Splats
 from ..surfels.subpixel import average, splat_subpixel, subpixel_share
 from ..surfels.tiles import splat
 
-_WAYS = ("tiles", *FEEDS)
+TILES = "tiles"
+WAYS = (TILES, *FEEDS)
 
 
 def draw_discs(points: Points, surface: Surface, instancing: str, radius_scale: float) -> None:
     """The nearest disc of each pixel; where discs are about a pixel, the mean of those close behind it.
 
-    Points: with normals and radii. instancing: "auto" or a feed, which then brings all of them.
+    Points: with normals and radii. instancing: "auto", TILES, or a feed, which then brings all of them.
     """
     splats = _splats(radius_scale)
     share = subpixel_share(points, surface, splats)
     if share > 0:
         splats = _splats(radius_scale, share)
-    if share > 0 and instancing == "auto":
-        surface.stats.chosen["instancing"] = "scatter"
+    way = instancing_for(surface, instancing, TILES, "voxels as discs", WAYS, _ways)
+    if share > 0 and (way == TILES or instancing == "auto"):
         surface.stats.skipped["tiles"] = "discs are under a pixel: they are sent there one by one"
         splat_subpixel(points, surface, splats)
     else:
-        way = instancing_for(surface, instancing, "tiles", "voxels as discs", _WAYS, _ways)
         _draw(points, surface, splats, way)
     if share > 0:
         average(points, surface, splats)
@@ -52,7 +52,7 @@ def _splats(radius_scale: float, mean_share: float = 0.0) -> Splats:
 
 
 def _draw(points: Points, surface: Surface, splats: Splats, way: str) -> None:
-    if way == "tiles":
+    if way == TILES:
         splat(points, surface, splats)
     else:
         amplify(points, surface, way, SURFEL, FRAGMENT, splats)
@@ -60,4 +60,4 @@ def _draw(points: Points, surface: Surface, splats: Splats, way: str) -> None:
 
 def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
     points = Points.of(pose, surface, 1.0, use_radii=True)
-    return {way: partial(_draw, points, surface, _splats(1.0), way) for way in _WAYS}
+    return {way: partial(_draw, points, surface, _splats(1.0), way) for way in WAYS}
