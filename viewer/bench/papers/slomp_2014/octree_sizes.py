@@ -77,12 +77,12 @@ def d1_psnr(original: NDArray[np.float64], decoded: NDArray[np.float64]) -> floa
 
 def measure(data: Path | None) -> Iterator[Sizes]:
     """Every scene under every stop rule. data: the folder of real scans; None: the demo alone."""
-    for scene, before, pose in _pairs(data):
+    for scene, before, pose in pairs(data):
         for name, stop in STOPS.items():
             yield _sizes(scene, before, pose, name, stop)
 
 
-def _pairs(data: Path | None) -> Iterator[tuple[str, PointCloud, PointCloud]]:
+def pairs(data: Path | None) -> Iterator[tuple[str, PointCloud, PointCloud]]:
     """Scenes with two poses from their middle.
 
     The paper's stand-ins come as they are stored and with as many points as its scans have.
