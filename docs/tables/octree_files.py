@@ -72,6 +72,7 @@ def _written(clouds: list[PointCloud]) -> list[tuple[Header, int]]:
     """Header and bytes of each octree in the file that these poses become."""
     boxes = [cloud.bounds() for cloud in clouds]
     around = Bounds(np.min([box.low for box in boxes], axis=0), np.max([box.high for box in boxes], axis=0))
+    around = around.grown(float((around.high - around.low).max()) / 8)  # as `convert` does with several
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "poses.svo"
         poses = (Pose(number, number / 25, "", cloud) for number, cloud in enumerate(clouds))

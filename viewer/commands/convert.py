@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..bounds import Bounds
 from ..errors import InputError
 from ..output.export import check_output, is_pattern
 from ..scan import formats
@@ -35,6 +36,8 @@ from ._scans import (
 )
 
 _ESTIMATES = ("normals", "radii")
+
+_MARGIN = 1 / 8  # of the extent of some poses, around it, that others may need
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -116,7 +119,6 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
     if is_pattern(out):
         raise InputError("has a place for a number, and one file holds all poses", out, "Leave it out")
     claim([out], scan_inputs(timeline), args.force)
-    around = framing(timeline, indices) if len(indices) > 1 else None
     with progress(len(indices)) as tick:
 
         def poses() -> Iterator[Pose]:
@@ -124,11 +126,17 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
                 yield pose
                 tick()
 
-        formats.write_poses(out, poses(), timeline.unit, stop=stop, around=around)
+        formats.write_poses(out, poses(), timeline.unit, stop=stop, around=_around(timeline, indices))
     try:
         formats.check(out)
     except InputError as problem:  # all is there, but not everybody can read it
         warn(str(problem))
+
+
+def _around(timeline: Timeline, indices: Sequence[int]) -> Bounds:
+    """The bounds of these poses; of several with a margin, since not all are looked at."""
+    bounds = framing(timeline, indices)
+    return bounds if len(indices) == 1 else bounds.grown(_MARGIN * float((bounds.high - bounds.low).max()))
 
 
 def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> None:

@@ -147,13 +147,12 @@ def write_poses(
     stop: Stop | None = None,
     around: Bounds | None = None,
 ) -> None:
-    """Write the octrees of all poses. stop: where their subdivision ends. around: the bounds of them, by all
-    that is known; None: of the first.
+    """Write the octrees of all poses. stop: where their subdivision ends. around: the bounds of them all;
+    None: those of the first, with a margin.
 
-    They share the cube around these, with a margin, for as long as it fits, since only then one tells of the
-    next.
+    They share the cube around these for as long as it fits, since only then one tells of the next.
     """
-    cube = None if around is None else _with_margin(Cube.around(around.low, around.high))
+    cube = None if around is None else Cube.around(around.low, around.high)
     previous, chain = None, 0
     with open(path, "wb") as file:
         for pose in poses:
