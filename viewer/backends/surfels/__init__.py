@@ -108,7 +108,11 @@ class Params:
         group="Splats",
     )
     mask_cutoff: float = param(
-        0.0183, "Value of the Gaussian mask where the splat ends", low=0.0183, high=0.99, group="Splats"
+        0.0183,
+        "Value of the Gaussian mask where the splat ends; it ends at its radius at the latest",
+        low=0.0183,
+        high=0.99,
+        group="Splats",
     )
     cull_back: bool = param(False, "Leave out surfels that face away", group="Splats")
     instancing: str = param(

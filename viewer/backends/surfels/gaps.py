@@ -31,6 +31,7 @@ _KNOWN = 0.6  # cells: the 27 around tell all of a radius of 0.5, and nearly alw
 _BORDER = 2.0  # times as far as a point's cell reaches to most sides: where it has no end
 _ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out
 _SPARE = 1.2  # times the radii found: these go by eight directions, in a plane
+_STRAY = 4.0  # usual radii: what is farther from all others is beside the surface
 _FEW = 2000  # one in so many may be left without a radius of its own
 _AT_ONCE = 1 << 18  # points searched before something else may have its turn
 _SLOT = 16  # bytes
@@ -39,9 +40,9 @@ _SLOT = 16  # bytes
 class GapRadii:
     """The radii of a pose's points; see the module. Made with `GpuPose.keep`.
 
-    texels: a radius for each row, scan units, once all are found; 0 where a point is alone. None where no
-    point has any, or there are more points than the driver takes. usual, largest: the radius that nine of ten
-    do not exceed, and that none does.
+    texels: a radius for each row, scan units, once all are found; 0 where a point is far from all others: it
+    is to be as large as usual. None where no point has any, or there are more points than the driver takes.
+    usual, largest: the radius that nine of ten do not exceed, and that none does.
     """
 
     def __init__(self, pose: GpuPose) -> None:
@@ -94,8 +95,10 @@ class GapRadii:
             radii = radii[copies]
         known = radii[radii > 0]
         if known.size:
+            self.usual = float(np.quantile(known, 0.9))
+            radii = np.where(radii > _STRAY * self.usual, np.float32(0), radii)
+            self.largest = float(radii.max())
             self.texels = gl.BufferTexture(gpu.ctx.buffer(radii), gl.R32F)
-            self.usual, self.largest = float(np.quantile(known, 0.9)), float(known.max())
 
 
 @dataclass(frozen=True)
