@@ -9,11 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...srgb import LIGHT_STEPS, bytes_from_light, light_from_bytes
 from ..points import PointCloud
 from .cube import Grid
 from .discs import discs_of
 from .octree import Attributes
 from .threads import together
+
+_LIGHT = light_from_bytes(np.arange(256, dtype=np.uint8)).astype(np.int64)
+_ENCODED = bytes_from_light(np.arange(16 * LIGHT_STEPS + 1) / 16).astype(np.uint32)
 
 
 def attributes_of(
@@ -28,8 +32,8 @@ def attributes_of(
     """Attributes of each level of a tree, from its points in their order.
 
     grid, edge: of the cube. ends: (N,), the level of each point's leaf. masks: of the levels above the
-    deepest. counts: (depth + 1,), the nodes of each level. Colours are means of the stored values, rounded
-    half up; normals means of unit normals, summed in fixed point. None depends on the order of the points.
+    deepest. counts: (depth + 1,), the nodes of each level. Colours are means in linear light, normals means
+    of unit normals, both summed as whole numbers. None depends on the order of the points.
     """
     starts = np.cumsum(counts) - counts
     order = _Order(points.rows, points.levels, ends, starts, int(counts.sum()))
@@ -108,7 +112,8 @@ def _colors(order: _Order, colors: NDArray[np.uint8], means: NDArray[np.uint8]) 
 
     gathered = np.empty(len(order.rows), np.uint32)
     node_kernels.gather_colors(_words(np.ascontiguousarray(colors)), order.rows, gathered)
-    node_kernels.mean_colors(order.levels, order.ends, gathered, order.starts, _words(means))
+    walk = order.levels, order.ends, gathered, order.starts
+    node_kernels.mean_colors(*walk, _LIGHT, _ENCODED, _words(means))
 
 
 def _words(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:

@@ -36,15 +36,10 @@ class Stop:
     )
     depth: int = param(10, "Level of the leaves", low=0, high=DEEPEST, affects="derive")
     occupancy: int = param(8, "Points that are not divided any more", low=1, affects="derive")
-    least: float = param(0.0, "Edge that no leaf goes below, scan units", low=0, affects="derive")
 
     def __post_init__(self) -> None:
         for parameter in describe(type(self)):
             parameter.parse(getattr(self, parameter.name))
-
-    def limit(self, edge: float) -> int:
-        """The deepest level that `least` allows in a cube of this edge."""
-        return next((level for level in range(DEEPEST, 0, -1) if edge / 2**level >= self.least), 0)
 
 
 def build(
@@ -65,7 +60,7 @@ def build(
     grid = Grid.of(cube, cloud.origin)
     points = _sorted(cloud, strays, grid)
     checkpoint()
-    ends, counts = _ends(points, stop, stop.limit(cube.edge))
+    ends, counts = _ends(points, stop)
     masks = _masks(points, ends, counts)
     found = attributes_of(cloud, points, grid, cube.edge, ends, masks, counts) if attributes else ()
     return Octree(cube.low, cube.edge, masks, count, points.distinct, found, strays)
@@ -84,8 +79,7 @@ def shortfall(octree: Octree, stop: Stop) -> str | None:
     """Why a tree tells fewer positions apart than its rule asks for; None where it does not."""
     if stop.rule != "delta" or octree.loss <= stop.delta:
         return None
-    reason = "the last there is" if octree.depth == DEEPEST else "where leaves have their least edge"
-    return f"subdivision ended at level {octree.depth}, {reason}, with a loss of {octree.loss:.2%}"
+    return f"subdivision ended at level {octree.depth}, the last there is, with a loss of {octree.loss:.2%}"
 
 
 def sort_points(positions: NDArray[np.float32], grid: Grid) -> Sorted:
@@ -146,17 +140,17 @@ def _distinct(positions: NDArray[np.float32], rows: NDArray[np.uint32], levels: 
     return total
 
 
-def _ends(points: Sorted, stop: Stop, limit: int) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+def _ends(points: Sorted, stop: Stop) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """The level of each point's leaf, (N,), and how many nodes each level has down to the deepest."""
     if stop.rule == "occupancy":
-        ends = np.minimum(_occupied(points.codes, stop.occupancy), limit).astype(np.uint8)
+        ends = np.minimum(_occupied(points.codes, stop.occupancy), DEEPEST).astype(np.uint8)
         levels = np.arange(int(ends.max()) + 1, dtype=np.uint8)
         counts = [np.count_nonzero((points.levels <= level) & (level <= ends)) for level in levels]
         return ends, np.array(counts, np.int64)
-    depth = min(stop.depth, limit)
+    depth = stop.depth
     if stop.rule == "delta":
-        enough = np.flatnonzero(points.counts[:limit] >= (1 - stop.delta) * points.distinct)
-        depth = int(enough[0]) if len(enough) else limit
+        enough = np.flatnonzero(points.counts[:DEEPEST] >= (1 - stop.delta) * points.distinct)
+        depth = int(enough[0]) if len(enough) else DEEPEST
     return np.full(len(points.codes), depth, np.uint8), points.counts[: depth + 1]
 
 

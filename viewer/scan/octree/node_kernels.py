@@ -103,14 +103,19 @@ def mean_colors(
     ends: NDArray[np.uint8],
     colors: NDArray[np.uint32],
     starts: NDArray[np.int64],
+    light: NDArray[np.int64],
+    encoded: NDArray[np.uint32],
     node_colors: NDArray[np.uint32],
 ) -> None:
-    """Mean colours (nodes,) of colours (N,), four bytes each, rounded half up."""
+    """Mean colours (nodes,) of colours (N,), four bytes each: of their light, and of alpha.
+
+    light: (256,), of each byte. encoded: the byte of each 16th of a step of light.
+    """
     held, node = np.zeros((len(starts), 5), np.int64), starts.copy()
     for i in range(len(colors)):
         mean, leaf = colors[i], ends[i]
         a, b, c, d = mean & _BYTE, mean >> _8 & _BYTE, mean >> _16 & _BYTE, mean >> _24
-        sum_a, sum_b, sum_c, sum_d, points = int(a), int(b), int(c), int(d), 1
+        sum_a, sum_b, sum_c, sum_d, points = light[a], light[b], light[c], int(d), 1
         stay = levels[i + 1] if i + 1 < len(colors) else 0
         for level in range(leaf, stay - 1, -1):
             if held[level, 4]:
@@ -122,9 +127,9 @@ def mean_colors(
                 # A quarter is less than what is missing to the next whole number, and more than rounding.
                 half, share = 0.5 * points + 0.25, 1.0 / points
                 mean = (
-                    np.uint32(int((sum_a + half) * share))
-                    | np.uint32(int((sum_b + half) * share)) << _8
-                    | np.uint32(int((sum_c + half) * share)) << _16
+                    encoded[int((16 * sum_a + half) * share)]
+                    | encoded[int((16 * sum_b + half) * share)] << _8
+                    | encoded[int((16 * sum_c + half) * share)] << _16
                     | np.uint32(int((sum_d + half) * share)) << _24
                 )
             node_colors[node[level]] = mean

@@ -22,7 +22,7 @@ _TOGETHER = (  # shifts and masks that bring every third bit together
 class Attributes:
     """Attributes of the nodes of one level, means over all points below each.
 
-    colors:  (n, 4) uint8, sRGB and alpha, or None
+    colors:  (n, 4) uint8, sRGB and alpha, or None; means in linear light
     normals: (n, 3) float32, unit length, or None; 0 where normals cancel
     cones:   (n,) float32, or None: the cosine of the half angle of the cone about the normal that
              holds all normals below, -1..1; -1 where there is no normal, or a point below has none
