@@ -10,6 +10,9 @@ from .octree.compiled import compiled
 _SWEEPS = 12  # of Jacobi's rotations, at most; four or five are enough as a rule
 _SETTLED = 1e-30  # the square of what lies off the diagonal, of a matrix of trace 1
 _FLATTEST = 0.1  # of a squared width, what noise leaves of it at least
+# Few neighbours tell no surface where their normals disagree by so much more than those of more; nor where
+# they lie in lines, their squared widths in a ratio below this, and residuals grow faster than a curved surface's.
+_DISAGREEING, _MORE, _ROUND = 0.15, 3, 0.35
 _ROUNDS = 3  # in which a reference is found, as noise is better known from more neighbours
 
 
@@ -166,6 +169,21 @@ def _median(values: NDArray[np.float64], count: int) -> float:
 
 
 @compiled
+def _agreement(normals: NDArray[np.float32], around: NDArray[np.int64], total: int, j: int) -> float:
+    """The mean square of the cosines between the normals of counts[j] of some places."""
+    xx = yy = zz = xy = yz = zx = 0.0
+    for i in range(total):
+        x, y, z = normals[around[i], j]
+        xx += x * x
+        yy += y * y
+        zz += z * z
+        xy += x * y
+        yz += y * z
+        zx += z * x
+    return (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + yz * yz + zx * zx)) / (total * total)
+
+
+@compiled
 def choose(
     rows: NDArray[np.integer],
     near: NDArray[np.int32],
@@ -184,7 +202,7 @@ def choose(
     The error of a number of neighbours is what noise leaves of it, and how far it turns normals from those of
     the least number that noise turns by less than `settled` (the mean square of the angle); less what noise
     tells of that turn (Mallows' C_p). All are means over the points around. Where noise turns those of
-    counts[0] by less than `quiet`, these are taken.
+    the fewest that tell a surface by less than `quiet`, these are taken.
 
     rows: (M,). near: (M, K), rows of the points around, of which those with a place count. places: (N,), by
     row, in normals (P, J, 3) and squared widths (P, J, 3), as `fit_nested` has them for counts (J,), J > 2;
@@ -201,25 +219,38 @@ def choose(
             if place >= 0:
                 around[total] = place
                 total += 1
-        reference, is_quiet = 0, False
+        for i in range(total):
+            noises[i] = _noise(widths[around[i]], counts, 0, 2)
+        least_round = _ROUND if _median(noises, total) < 0.0 else 0.0
+        agreeing = _agreement(normals, around, total, min(last, _MORE)) - _DISAGREEING
+        first = 0
+        while first < last - 2:
+            for i in range(total):
+                widest = widths[around[i], first, 2]
+                noises[i] = widths[around[i], first, 1] / widest if widest > 0.0 else 0.0
+            is_round = _median(noises, total) >= least_round
+            if is_round and _agreement(normals, around, total, first) >= agreeing:
+                break
+            first += 1
+        reference, is_quiet = first, False
         for _ in range(_ROUNDS):
             fewer = min(reference, last - 2)
             for i in range(total):
                 noises[i] = _noise(widths[around[i]], counts, fewer, fewer + 2)
             noise, before = _median(noises, total), reference
-            for j in range(last + 1):
+            for j in range(first, last + 1):
                 turned[j] = 0.0
                 for i in range(total):
                     turned[j] += _turned(noise, widths[around[i], j], counts[j]) / total
-                if j == 0 and turned[0] < quiet:
+                if turned[first] < quiet:
                     break
-            is_quiet = turned[0] < quiet
+            is_quiet = turned[first] < quiet
             while not is_quiet and reference < last and turned[reference] >= settled:
                 reference += 1
             if reference == before:
                 break
         best, least = reference, np.inf
-        for j in range(reference, 1 if is_quiet else last + 1):
+        for j in range(reference, first + 1 if is_quiet else last + 1):
             away = 0.0
             for i in range(total):
                 one, other = normals[around[i], j], normals[around[i], reference]
@@ -229,4 +260,4 @@ def choose(
             if error < least:
                 best, least = j, error
         chosen[m] = normals[places[rows[m]], best]
-        further[m] = not is_quiet and (reference > 0 or best >= last - 1)
+        further[m] = not is_quiet and (reference > first or best >= last - 1)

@@ -21,7 +21,7 @@ Vectors = NDArray[np.float64]  # (N, 3)
 
 AROUND = 20  # points that are judged together
 _COUNTS = (7, 10, 14, 20, 28, 40, 56, 80, 96)  # of neighbours, the point itself included
-_MOST = (20, 40, 96)  # of them that are looked at first, and where that is not enough
+_MOST = (20, 96)  # of them that are looked at first, and where noise asks for more
 _LEAST_TOLD = 3  # numbers of neighbours by which noise is known
 _QUIET = 0.003  # mean square of the angle by which noise turns a normal of the fewest: 3 degrees
 _SETTLED = 0.015  # of the normals that others are compared with: 7 degrees
