@@ -114,6 +114,8 @@ class _Resident:
     def drop_waiting(self) -> None:
         """Take what has not begun out of the queue."""
         self.jobs = {key: begun for key, begun in self.jobs.items() if not begun.job.drop()}
+        if not self.jobs:
+            self.began = math.nan
 
     @property
     def unfinished(self) -> list[Job]:
