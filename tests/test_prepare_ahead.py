@@ -118,8 +118,8 @@ def test_poses_are_prepared_a_few_at_a_time_and_kept(own: Renderer, poses: list[
 
 def test_estimates_come_first_and_what_is_derived_goes_by_them(own: Renderer) -> None:
     voxels, pose = find_backend("voxels"), Pose(0, 0.0, "x", BARE)
-    smooth = want(pose, voxels, normals="smooth")  # type: ignore[arg-type]
-    prepare_all(own, [smooth], lambda: own.is_prepared(smooth))
+    wanted = want(pose, voxels)
+    prepare_all(own, [wanted], lambda: own.is_prepared(wanted))
     assert own.is_prepared(want(pose, find_backend("surfels"), radius="uniform"))  # type: ignore[arg-type]
     assert pose.cloud.normals is None, "the scan itself is left as it was"
     assert own.resident(pose).cloud.normals is not None
