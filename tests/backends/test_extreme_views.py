@@ -13,9 +13,12 @@ import viewer
 from viewer.analysis.pick import is_seen, pick
 from viewer.camera import Camera
 from viewer.errors import InputError
+from viewer.frame import Request, bring, render_frame, shared_renderer
 from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 from viewer.view import View, origin_near
 
 SIZE = (160, 120)
@@ -154,3 +157,21 @@ def test_the_widest_view_shows_the_scan_and_nothing_else(name: str) -> None:
     assert len(seen)
     assert (seen + 1 >= pixels.min(axis=0) - 2).all()
     assert (seen <= pixels.max(axis=0) + 2).all()
+
+
+def test_a_window_brings_positions_that_count_from_the_view() -> None:
+    """Bit by bit before the picture, which then has nothing to wait for."""
+    own, cloud, camera = Renderer(shared_renderer().gpu), of_all_scales(1.0), at(PART, 1.0)
+    pose = Pose(0, 0.0, "x", cloud)
+    request = Request(pose, camera, "points")
+    while not bring(own, request, SIZE, budget_ms=0.01):
+        pass
+    resident = own.resident(pose)
+    assert (resident.origin == origin_near(camera, SIZE, cloud.origin)).all()
+    held, brought = own.bytes_of(pose), resident.array("positions")
+    surface = Surface(own.gpu, SIZE)
+    render_frame(own, request, surface)
+    assert resident.array("positions") is brought
+    assert own.bytes_of(pose) == held == 12 * len(cloud)
+    check_points(surface, camera, cloud)
+    own.release()
