@@ -11,7 +11,8 @@ _SWEEPS = 12  # of Jacobi's rotations, at most; four or five are enough as a rul
 _SETTLED = 1e-30  # the square of what lies off the diagonal, of a matrix of trace 1
 _FLATTEST = 0.1  # of a squared width, what noise leaves of it at least
 # Few neighbours tell no surface where their normals disagree by so much more than those of more; nor where
-# they lie in lines, their squared widths in a ratio below this, and residuals grow faster than a curved surface's.
+# they lie in lines, their squared widths in a ratio below this, and residuals grow faster than a curved
+# surface's.
 _DISAGREEING, _MORE, _ROUND = 0.15, 3, 0.35
 _ROUNDS = 3  # in which a reference is found, as noise is better known from more neighbours
 
