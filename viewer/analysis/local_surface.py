@@ -19,7 +19,8 @@ from ..view import View
 MOST = 24  # points that are looked at, the nearest: some three rings around the middle
 LEAST = 8  # two more than a parabola has unknowns
 _SURE = 12  # from so many points on, a parabola tells which belong together; a plane of fewer
-_ROUNDS = 2  # of looking for the points nearest to the place that was found
+_ROUNDS = 3  # of looking for the points nearest to the place that was found
+_BEHIND = 3  # surfaces that are looked for behind one that ends before the pixel
 _REWEIGHTED = 2  # times
 _CUT = 6.0  # median absolute residuals beyond which a point does not belong (Cleveland 1979)
 # Standard deviation across, in distances to the farthest point that is looked at, beyond which points fill
@@ -46,38 +47,65 @@ class LocalSurface(NamedTuple):
 
 
 def local_surface(
-    view: View, pixel: Float, depth: float, positions: Float, seen: int | None = None
+    view: View, pixel: Float, about: Float, positions: Float, seen: int | None = None
 ) -> LocalSurface | None:
     """The surface in the direction of a pixel; None where the points do not tell.
 
-    pixel: (2,) coordinates, the centre being at a half. depth: about where it is, scan units; points near
-    there count. positions: (N, 3) relative to the view's origin, which are in front of the eye. seen: the
-    number of the one that has to belong to it.
+    pixel: (2,) coordinates, the centre being at a half. about: (3,) a place of the surface near there, the
+    nearest points to which are looked at first. positions: (N, 3), in front of the eye; both relative to the
+    view's origin. seen: the number of the point that has to belong to it. Where that surface ends or bends
+    away before the pixel, which a splat beyond its edge shows, it is the one behind.
     """
     if len(positions) < LEAST:
         return None
     pixels, depths = view.project(positions)
-    offsets, start, is_seen = pixels - pixel, depth, seen is None
+    found, reach = _fitted(view, pixel, about, positions, pixels - pixel, depths, seen)
+    for _ in range(_BEHIND):
+        if found is not None or not reach:
+            break
+        # Of what lies farther back, what the picture has nearest to the pixel.
+        behind = depths > view.depths(about) + reach
+        if not behind.any():
+            break
+        seen = int(np.where(behind, np.hypot(*(pixels - pixel).T), np.inf).argmin())
+        about = positions[seen]
+        found, reach = _fitted(view, pixel, about, positions, pixels - pixel, depths, seen)
+    return found
+
+
+def _fitted(
+    view: View,
+    pixel: Float,
+    about: Float,
+    positions: Float,
+    offsets: Float,
+    depths: Float,
+    seen: int | None,
+) -> tuple[LocalSurface | None, float]:
+    """The surface about a place; and, where it is not met in the direction of the pixel, how far its points
+    reach, else 0."""
+    start, place, is_seen = float(view.depths(about)), about, seen is None
     for _ in range(_ROUNDS):
-        place = view.unproject(pixel[None], np.array([depth]))[0]
         distances = np.linalg.norm(positions - place, axis=1)
         near = np.argsort(distances, kind="stable")[: MOST + 1]
         reach = max(float(distances[near[-1]]), np.finfo(float).tiny)
         near = near[:MOST]
         closeness = (1 - np.minimum(distances[near] / reach, 1) ** 3) ** 3  # tricube
-        slope, off, belongs, depth = _parabola(offsets[near], depths[near] - start, closeness)
-        depth += start
+        slope, off, belongs, deeper = _parabola(offsets[near], depths[near] - start, closeness)
         is_seen |= seen in near[belongs]
-        if abs(depth - start) > reach:
-            return None
+        if view.perspective and start + deeper <= 0:
+            return None, 0.0
+        place = view.unproject(pixel[None], np.array([start + deeper]))[0]
+        if np.linalg.norm(place - about) > reach:
+            return None, reach
     used = near[belongs]
     if len(used) < LEAST or not is_seen:
-        return None
+        return None, 0.0
     # Across the surface rather than along the ray.
-    lean = np.hypot(1, np.linalg.norm(slope) / _footprint(view, depth))
+    lean = np.hypot(1, np.linalg.norm(slope) / _footprint(view, start))
     if np.sqrt(np.mean(off[belongs] ** 2)) / lean > _THICK * reach:
-        return None  # they fill space
-    return _plate(view, offsets[used], depths[used], start, slope, used)
+        return None, 0.0  # they fill space
+    return _plate(view, offsets[used], depths[used], start, slope, used), 0.0
 
 
 def _parabola(

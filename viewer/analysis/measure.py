@@ -40,10 +40,10 @@ class End:
 
     frame: the pose's index. time: the pose's, seconds. position: float64, scan units. snapped: "point" where
     it is the very place of the point, as ends were once; else on the surface. id: of the point that is seen
-    there, None where none is. spacing: distance between the points around it, scan units, None where there
-    are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how the place that was meant may
-    lie off the position, squared scan units; None: unknown. neighbors: points around it that it follows, and
-    where they were when it was set.
+    there, or of the nearest one, None where none is. spacing: distance between the points around it, scan
+    units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how the
+    place that was meant may lie off the position, squared scan units; None: unknown. neighbors: points around
+    it that it follows, and where they were when it was set.
     """
 
     frame: int
@@ -75,6 +75,9 @@ class End:
         elif not neighbors:
             assert picked.id is not None
             neighbors = (Neighbor(picked.id, vector(picked.point - picked.position)),)
+        point, around = picked.id, [neighbor.id for neighbor in neighbors]
+        if point is not None and point not in around:  # the place is on another surface, or beside the point
+            point = around[0]
         covariance = picked.covariance
         if covariance is None and spacing is not None:
             beside = 0.0 if picked.point is None else float(np.linalg.norm(picked.point - picked.position))
@@ -84,7 +87,7 @@ class End:
             time=float(pose.time),
             position=picked.place,
             snapped="surface",
-            id=picked.id,
+            id=point,
             spacing=spacing,
             level=picked.level,
             covariance=None if covariance is None else _six(covariance),

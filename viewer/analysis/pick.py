@@ -114,7 +114,7 @@ def pick(
     view, place, pixel = surface.view, surface.layers.place, np.array([x + 0.5, y + 0.5])
     ids, points = surface.points_around(across, down, _reach(surface, depth))
     if row == NOTHING:
-        found = local_surface(view, pixel, depth, points)
+        found = local_surface(view, pixel, view.unproject(pixel[None], np.array([depth]))[0], points)
         if found is not None:  # the renderer's word stands; how far the points disagree counts
             found = found._replace(
                 depth=depth, deviation=float(np.hypot(found.deviation, found.depth - depth))
@@ -122,10 +122,10 @@ def pick(
         return Picked(_position(surface, pixel, depth), level, *_told(surface, pixel, found, ids, points))
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
     id_ = at if cloud.ids is None else int(cloud.ids[at])
-    found = local_surface(view, pixel, depth, points, int(np.argmax(ids == id_)))
+    found = _through(surface, pixel, ids, points, id_)
     if found is None and spacing and len(ids) < ENOUGH:
         ids, points = _nearest(surface, cloud, at)
-        found = local_surface(view, pixel, depth, points, int(np.argmax(ids == id_)))
+        found = _through(surface, pixel, ids, points, id_)
     if found is None:
         pixel = np.array([across + 0.5, down + 0.5])
     numbers = surface.found_at(row)
@@ -144,6 +144,14 @@ def pick(
         scalars=scalars | numbers,
         spacing=spacing_at(cloud, at) if spacing else None,
     )
+
+
+def _through(
+    surface: Surface, pixel: NDArray[np.float64], ids: NDArray[np.intp], points: NDArray[np.float64], id_: int
+) -> LocalSurface | None:
+    """The surface of points that one belongs to, in the direction of a pixel."""
+    seen = int(np.argmax(ids == id_))
+    return local_surface(surface.view, pixel, points[seen], points, seen)
 
 
 def _reach(surface: Surface, depth: float) -> int:

@@ -21,6 +21,8 @@ from ..bench import numerics
 from ..bench.defaults import SCENES as DEFAULT_SCENES
 from ..bench.defaults import default_groups
 from ..bench.forecast import forecast
+from ..bench.measuring import NAME as MEASURING
+from ..bench.measuring import measure_distances, write_measuring
 from ..bench.papers.farooq_2013 import pyramids
 from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
 from ..bench.papers.farooq_2013.farooq import write_farooq
@@ -43,6 +45,7 @@ from ..bench.report.defaults_page import write_defaults
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
+    DISTANCES,
     FITS,
     LARGE_VIEWS,
     NOTES,
@@ -112,6 +115,13 @@ _WITH_PAGES = {
         DEFAULTS,
         DEFAULT_SCENES,
         usual=BenchSettings(size=(384, 256), views=4, frames=0),
+    ),
+    "measuring": _PageSuite(
+        lambda *_: [],
+        write_measuring,
+        MEASURING,
+        others={DISTANCES: measure_distances},
+        usual=BenchSettings(size=(400, 300), views=2, frames=0),
     ),
     "slomp": _PageSuite(lambda *_: slomp.groups(), write_table_two, TABLE_TWO),
     "octrees": _PageSuite(

@@ -99,6 +99,21 @@ def trace(scene: Scene, camera: Camera, size: tuple[int, int]) -> Reference:
     )
 
 
+def first_hits(
+    scene: Scene, camera: Camera, size: tuple[int, int], places: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """The surface that is first met at places of a picture, anywhere in its pixels: (N, 3), absolute; NaN
+    where nothing is. places: (N, 2), pixels from the left and from the top. size: (width, height), pixels."""
+    view = View.of(camera, size, scene.origin, scene.bounds)
+    across = (places - np.array(size) / 2) * np.array([1, -1]) / view.scale
+    starts, steps = _rays(view, across)
+    depth = _cast(scene, starts, steps, view.near, view.far).distance
+    there = np.isfinite(depth)
+    return np.where(
+        there[:, None], starts + np.where(there, depth, 0)[:, None] * steps + scene.origin, np.nan
+    )
+
+
 def visible(
     scene: Scene, positions: NDArray[np.floating], camera: Camera, tolerance: float | None = None
 ) -> NDArray[np.bool_]:

@@ -20,6 +20,7 @@ RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
 OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
 SEARCHES, FITS = "searches.jsonl", "fits.jsonl"
+DISTANCES = "distances.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -35,6 +36,7 @@ _NEEDED: dict[str, dict[str, Any]] = {
     LARGE_VIEWS: {"scenario": str, "levels": int, "primitive": str, "samples": int},
     PLAYING: {"scene": str, "poses": int, "primitive": str, "reading": dict, "playing": dict},
     SEARCHES: {"scene": str, "n": int, "visible": int, "params": dict, "first": dict, "later": dict},
+    DISTANCES: {"scene": str, "backend": str, "zoom": int | float, "pairs": int, "covered": int | float},
     FITS: {"scene": str, "noise": int | float, "params": dict, "found_inside": dict, "found_band": dict},
 }  # fmt: skip
 

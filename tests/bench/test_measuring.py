@@ -1,0 +1,117 @@
+"""What ± says of measured distances, against what is truly there; and the table of it."""
+
+from __future__ import annotations
+
+from functools import cache, reduce
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import sphere
+
+from viewer.bench.measuring import (
+    DRAWN,
+    SCENES,
+    ZOOMS,
+    Distances,
+    measured_in,
+    read_measurement,
+    tables,
+    write_measuring,
+    zoomed,
+)
+from viewer.bench.report.results import DISTANCES, write_row
+from viewer.bench.scenes import catalog
+from viewer.bench.scenes.subjects import Moment, Subject
+from viewer.bench.truth.shapes import AnalyticScene, Sphere
+from viewer.mesh.reference import first_hits, trace
+from viewer.renderer import Renderer
+from viewer.scan.pose import Pose
+
+SIZE = (400, 300)
+COUNT = 300_000
+
+
+# Scene and renderer -> what ± holds, percent, where that is not 93 to 98: surfaces behind others that
+# the picture's splats hide.
+MISSED: dict[tuple[str, str], float] = {}
+
+
+@cache
+def scanned(scene: str, data: Path) -> tuple[Subject, Moment]:
+    subject = catalog.subject(scene, data, count=COUNT)
+    return subject, subject.moment(0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_true_distance_is_within_what_is_said_in_95_percent(
+    renderer: Renderer, data_dir: Path, scene: str, name: str
+) -> None:
+    subject, moment = scanned(scene, data_dir)
+    parts = [
+        measured_in(
+            renderer,
+            moment.pose,
+            moment.truth,
+            zoomed(moment.truth, zoom, 2, SIZE, subject.up),
+            SIZE,
+            name,
+            DRAWN[name],
+        )
+        for zoom in ZOOMS
+    ]
+    found = reduce(Distances.with_others, parts)
+    assert np.isnan(found.uncertainty).mean() < 0.01
+    if (scene, name) in MISSED:
+        assert found.covered == pytest.approx(MISSED[scene, name], abs=1), "tell the new figure"
+    else:
+        assert 93 <= found.covered <= 98, [part.covered for part in parts]
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_of_a_sphere_it_is_held(renderer: Renderer, name: str) -> None:
+    cloud, truth = sphere(20_000), AnalyticScene((Sphere(),))
+    cameras = zoomed(truth, 2.0, 2, (160, 120))
+    found = measured_in(
+        renderer, Pose(0, 0.0, "", cloud), truth, cameras, (160, 120), name, DRAWN[name], pairs=100
+    )
+    assert 90 <= found.covered <= 100
+    assert np.nanmedian(found.uncertainty) < 2 * np.sqrt(4 * np.pi / 20_000)
+
+
+def test_hits_at_the_middles_of_pixels_are_those_of_the_reference() -> None:
+    truth = AnalyticScene((Sphere(),))
+    (camera,) = zoomed(truth, 1.0, 1, (40, 30))
+    reference = trace(truth, camera, (40, 30))
+    row, column = np.indices((30, 40))
+    hits = first_hits(truth, camera, (40, 30), np.stack([column.ravel(), row.ravel()], axis=1) + 0.5)
+    there = np.isfinite(hits).all(axis=1)
+    np.testing.assert_array_equal(there, reference.covered.ravel())
+    np.testing.assert_allclose(hits[there], reference.positions() + reference.origin, atol=1e-9)
+
+
+def test_what_nothing_is_said_of_does_not_count() -> None:
+    found = Distances(np.array([1.0, -3.0, 9.0, 0.1]), np.array([2.0, 2.0, np.nan, 0.1]), 1.0)
+    assert found.covered == pytest.approx(200 / 3)
+
+
+def test_rows_become_a_table(tmp_path: Path) -> None:
+    where = {
+        "device": "a", "driver": "b", "processors": 2, "timer": "finish", "version": "1",
+        "date": "2026-01-01", "size": [400, 300], "repeat": 1, "seed": 0,
+    }  # fmt: skip
+    with open(tmp_path / DISTANCES, "w", encoding="utf-8") as stream:
+        for zoom in (1.0, 4.0):
+            for name, values in DRAWN.items():
+                row = {
+                    "scene": "bunny", "backend": name, "params": values, "zoom": zoom, "pitch": 0.5,
+                    "pairs": 600, "untold": 0, "covered": 95.25, "uncertainty": 1.5, "views": 4, **where,
+                }  # fmt: skip
+                write_row(stream, row)
+    page = write_measuring(tmp_path)
+    made = tables([read_measurement(page.with_suffix(".json"))])
+    assert made["coverage"].count("`bunny`") == 2
+    assert made["coverage"].count("95.2") == 8
+    assert made["coverage"] in page.read_text(encoding="utf-8")
