@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from .compiled import compiled
 from .octree import DEEPEST
 
+_CHILDREN = np.bitwise_count(np.arange(256, dtype=np.uint8)).astype(np.int64)
+_ONLY = np.array([mask.bit_length() - 1 if mask.bit_count() == 1 else -1 for mask in range(256)])
 STEPS = 65536  # of a cell's edge
 _ENOUGH = 4.0  # leaves that tell how far apart they are
 _TOGETHER = (  # as in octree.py
@@ -92,6 +94,14 @@ def gather_leaves(
         mask = masks[i]
         if not mask:
             continue
+        only = _ONLY[mask]
+        if only >= 0:  # as most above the leaves of a scan
+            offsets[i, 0] = (STEPS * (only & 1) + below_offsets[child, 0]) >> 1
+            offsets[i, 1] = (STEPS * (only >> 1 & 1) + below_offsets[child, 1]) >> 1
+            offsets[i, 2] = (STEPS * (only >> 2) + below_offsets[child, 2]) >> 1
+            leaves[i], spread[i] = below_leaves[child], below_spread[child] / 4
+            child += 1
+            continue
         first, total, x, y, z = child, 0.0, 0.0, 0.0, 0.0
         for octant in range(8):
             if mask >> octant & 1:
@@ -150,15 +160,14 @@ def spread_spacing(
     """
     child = 0
     for i in range(len(masks)):
-        mask = masks[i]
-        for octant in range(8):
-            if mask >> octant & 1:
-                if leaves[child] >= _ENOUGH:
-                    found, above = _spacing(leaves[child], spread[child]), 2 * own[i]
-                    leaves[child], spread[child] = found, 2 * found * above / (found + above)
-                else:
-                    leaves[child], spread[child] = 2 * own[i], 2 * spacing[i]
-                child += 1
+        above, inherited = 2 * own[i], 2 * spacing[i]
+        for _ in range(_CHILDREN[masks[i]]):
+            if leaves[child] >= _ENOUGH:
+                found = _spacing(leaves[child], spread[child])
+                leaves[child], spread[child] = found, 2 * found * above / (found + above)
+            else:
+                leaves[child], spread[child] = above, inherited
+            child += 1
 
 
 @compiled
@@ -178,6 +187,10 @@ def cover(
     for i in range(len(masks)):
         mask = masks[i]
         if not mask:
+            continue
+        if _ONLY[mask] >= 0:
+            radii[i] = below_radii[child] + step
+            child += 1
             continue
         reach = 0.0
         for octant in range(8):
