@@ -68,7 +68,6 @@ def test_the_ways_of_surfels_are_among_them() -> None:
     assert {"one", "two", "sorted"} <= set(drawn) | ({"two"} if "auto" in drawn else set())
 
 
-@pytest.mark.xfail(reason="12 of 10: of voxels four", strict=True)
 def test_limits_are_of_few_principles() -> None:
     reasons = distinct_limits(backends().values())
     assert len(reasons) <= MOST, "\n".join([f"{len(reasons)} distinct limits", *reasons])

@@ -84,8 +84,10 @@ class Limit:
         return all(getattr(params, name) in values for name, values in self.when.items())
 
 
-# Reasons of limits that several backends have.
-ON_A_LINE = "points on a line make no surface: how wide it is drawn goes by the last bit"
+# A reason of limits that several backends have.
+NO_SPACING = (
+    "points are drawn as large as they lie apart, which a line of them end on, or one alone, does not tell"
+)
 
 
 class Derived(Protocol):

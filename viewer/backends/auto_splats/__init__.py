@@ -15,7 +15,7 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import ON_A_LINE, FrameView, Limit, Suited
+from .. import NO_SPACING, FrameView, Limit, Suited
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
@@ -32,8 +32,8 @@ LIMITS = {
     "points x1000, all over again": Limit(0.02, _HIDDEN_COPIES),
     "1x1 pixels": Limit(0.001, _BY_PICTURE),
     "8192x1 pixels": Limit(0.001, _BY_PICTURE),
-    "collinear points end on, perspective": Limit(0.04, ON_A_LINE),
-    "collinear points end on, orthographic": Limit(0.04, ON_A_LINE),
+    "collinear points end on, perspective": Limit(0.04, NO_SPACING),
+    "collinear points end on, orthographic": Limit(0.04, NO_SPACING),
 }
 
 _FEW = 1000  # points

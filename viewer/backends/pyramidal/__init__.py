@@ -22,7 +22,7 @@ from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import sparse_spacing
 from ...view import View
-from .. import ON_A_LINE, FrameView, Limit, Suited
+from .. import NO_SPACING, FrameView, Limit, Suited
 from .sources import PointSource, SampleSource
 from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
@@ -39,8 +39,8 @@ LIMITS = {
     "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
     "coplanar points": Limit(0.02, _BY_CELLS),
     "collinear points": Limit(0.04, _BY_CELLS),
-    "collinear points end on, perspective": Limit(0.1, ON_A_LINE),
-    "collinear points end on, orthographic": Limit(0.1, ON_A_LINE),
+    "collinear points end on, perspective": Limit(0.1, NO_SPACING),
+    "collinear points end on, orthographic": Limit(0.1, NO_SPACING),
 }
 
 _FILLING = {"fill": (True,)}

@@ -25,7 +25,7 @@ from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...view import View
-from .. import FrameView, Limit
+from .. import NO_SPACING, FrameView, Limit
 from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
 
@@ -37,7 +37,6 @@ _AROUND_ALL = (
     "octants divide the cube around the points, upright: others, or turned ones, lie in other octants"
 )
 _FEW_LEVELS = "an octree has 21 levels: a millionth of its cube is one octant"
-_SPACING = "discs are as large as points lie apart, which one alone does not tell"
 _ALONG_A_LINE = "a line has a circle of normals, of which any may be estimated"
 # Rows of the stability suite that octants cannot hold in principle.
 LIMITS = {
@@ -48,8 +47,8 @@ LIMITS = {
     "zoomed in on 10^-6 of the scan": Limit(0.7, _FEW_LEVELS),
     "collinear points": Limit(0.02, _AROUND_ALL),
     "collinear points without normals": Limit(0.02, _ALONG_A_LINE),
-    "collinear points end on, perspective": Limit(0.02, _SPACING),
-    "collinear points end on, orthographic": Limit(0.02, _SPACING),
+    "collinear points end on, perspective": Limit(0.02, NO_SPACING),
+    "collinear points end on, orthographic": Limit(0.02, NO_SPACING),
 }
 
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
