@@ -12,6 +12,7 @@ from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.estimate import cloud_normals, cloud_radii, fake_color
 from viewer.scan.open import open_scan
+from viewer.scan.planes import NeighborSearch
 from viewer.scan.points import PointCloud
 from viewer.scan.spacing import typical_spacing
 from viewer.task import Cancelled, Task
@@ -220,6 +221,17 @@ def test_duplicates_change_nothing() -> None:
     for estimate in (cloud_normals, cloud_radii):
         once, often = estimate(PointCloud.from_arrays(points)), estimate(PointCloud.from_arrays(many))
         assert often == pytest.approx(np.repeat(once, 20, axis=0), abs=1e-6)
+
+
+def test_radii_close_a_surface_of_uneven_density() -> None:
+    """A sphere thinned to a tenth towards one pole: nearly all that was left out lies in a splat."""
+    points, rng = sphere(30_000), np.random.default_rng(4)
+    kept = points[rng.random(len(points)) < 10 ** (-(points[:, 2] + 1) / 2)]
+    radii = cloud_radii(PointCloud.from_arrays(kept))
+    rows, squared = NeighborSearch(kept).of(points, 8)
+    assert np.mean((np.sqrt(squared) <= radii[rows]).any(axis=1)) > 0.9995
+    dense, sparse = (np.median(radii[np.abs(kept[:, 2] - z) < 0.1]) for z in (-0.9, 0.9))
+    assert 2 < sparse / dense < np.sqrt(10)
 
 
 def test_a_stray_point_gets_no_huge_splat() -> None:
