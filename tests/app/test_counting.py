@@ -11,12 +11,15 @@ from scenes import sphere
 
 from viewer.app.scene.counting import Counting, words
 from viewer.app.scene.viewport import Viewport
+from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.frame import Request, shared_renderer
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "sphere", sphere(30_000))
-REQUEST = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "surfels")
+# As motion shows it, so that the second of two pictures is no preview.
+PARAMS = find_backend("surfels").params({"passes": "one"})
+REQUEST = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "surfels", PARAMS)
 SIZE = (60, 40)
 LATER = 60.0  # seconds
 
@@ -55,7 +58,7 @@ def test_a_picture_at_rest_is_counted_once(viewport: Viewport) -> None:
 
 @pytest.mark.parametrize("backend", ["points", "voxels"])
 def test_a_preview_says_how_many_of_the_points_are_drawn(viewport: Viewport, backend: str) -> None:
-    request = replace(REQUEST, backend=backend)
+    request = replace(REQUEST, backend=backend, params=None)
     while not viewport.is_complete:
         viewport.draw(request)
     viewport.took(1000.0, goal_ms=10.0)

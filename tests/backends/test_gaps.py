@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from viewer.backends import backend
 from viewer.backends.surfels.gaps import GapRadii
 from viewer.bench import metrics
 from viewer.bench.judge import Judge
+from viewer.bench.scenes import catalog
 from viewer.bench.scenes.samples import line, on_mesh, on_torus, wall
 from viewer.bench.scenes.subjects import with_rows
 from viewer.bench.scenes.viewpoints import viewpoints
@@ -200,3 +202,44 @@ def test_blended_at_rest_and_the_nearest_in_motion(renderer: Renderer) -> None:
         np.testing.assert_array_equal(moving, surface.image())
     assert not render_frame(renderer, request, surface)
     np.testing.assert_array_equal(surface.image(), at_rest)
+
+
+def _errors(
+    renderer: Renderer, draw: Draw, scene: str, data: Path, thinned: bool, *settings: dict
+) -> list[dict]:
+    """Means over three views of a scene's errors with each of some parameters."""
+    subject = catalog.subject(scene, data)
+    moment = subject.moment(0)
+    cloud = replace(moment.pose.cloud, radii=None)
+    if thinned:
+        cloud = ramp(cloud)
+    size, look = (320, 240), Look(light="head", color_by="plain")
+    told: list[list[metrics.Errors]] = [[] for _ in settings]
+    for camera in viewpoints(moment.mesh, 3, size, up=subject.up):
+        judge = Judge.of(renderer.gpu, moment.truth, camera, size, look, cloud, subject.tolerance)
+        for errors, params in zip(told, settings, strict=True):
+            errors.append(judge.errors(draw(cloud, camera, size, "surfels", look, params)))
+    return [{name: float(np.mean([e[name] for e in errors])) for name in errors[0]} for errors in told]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["bunny", "armadillo", "horse", "igea", "crane"])
+def test_pictures_of_real_scans(renderer: Renderer, draw: Draw, scene: str, data_dir: Path) -> None:
+    """Vertices of meshes: closed, normals within 2.5 degrees, and less beside them than one radius gives."""
+    usual, now, nearest = _errors(
+        renderer, draw, scene, data_dir, False, {"radius": "uniform", "passes": "one"}, {}, {"passes": "one"}
+    )
+    assert now["hole_percent"] + now["through_percent"] < 0.3
+    assert now["normal_median"] < 2.5
+    assert now["normal_median"] < nearest["normal_median"] < 0.7 * usual["normal_median"]
+    assert now["spill_percent"] < 0.7 * usual["spill_percent"]
+    assert now["psnr"] > usual["psnr"] + 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["bunny", "armadillo", "horse", "igea", "crane"])
+def test_thinned_scans_close(renderer: Renderer, draw: Draw, scene: str, data_dir: Path) -> None:
+    """Thinned out to a tenth from one end to the other."""
+    usual, now = _errors(renderer, draw, scene, data_dir, True, {"radius": "uniform"}, {})
+    assert usual["hole_percent"] + usual["through_percent"] > 1
+    assert now["hole_percent"] + now["through_percent"] < 0.3
