@@ -14,6 +14,7 @@ from types import ModuleType
 import pytest
 
 from viewer.backends import backends
+from viewer.bench import measuring
 from viewer.bench.papers.farooq_2013 import farooq
 from viewer.bench.papers.preiner_2012 import preiner
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
@@ -88,7 +89,7 @@ def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: boo
     assert page.read_text(encoding="utf-8") == made
 
 
-@pytest.mark.parametrize("made", [scene_table, defaults_page], ids=lambda made: made.NAME)
+@pytest.mark.parametrize("made", [scene_table, defaults_page, measuring], ids=lambda made: made.NAME)
 def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
     page = ROOT / "docs" / made.PAGE
     files = sorted((ROOT / "docs" / "data").glob(f"{made.NAME}*.json"))

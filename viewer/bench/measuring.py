@@ -204,7 +204,7 @@ def tables(measurements: Sequence[measurement.Measurement]) -> dict[str, str]:
                 f"{zoom:g}",
                 three_digits(any_row["pitch"]),
                 *shares,
-                f"{three_digits(sizes[0])}–{three_digits(sizes[-1])}",
+                f"{three_digits(sizes[0])} to {three_digits(sizes[-1])}",
             ]
         )
     return {"coverage": markdown_table(head, lines, left=("scene",))}

@@ -263,7 +263,8 @@ def run(args: Namespace) -> int:
 
 def _report(args: Namespace) -> None:
     """Make the pages of the rows in the folder, and say what is there."""
-    tell(write_report(args.out))
+    if args.suite != MEASURING:  # which draws no results of scenes
+        tell(write_report(args.out))
     if args.suite in _WITH_PAGES:
         tell(_WITH_PAGES[args.suite].write_page(args.out))
 
