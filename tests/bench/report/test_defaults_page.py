@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from viewer.backends import backend
 from viewer.bench.defaults import default_groups
 from viewer.bench.report.defaults_page import beats, digest, read_measurement, tables, write_defaults
 from viewer.bench.report.measurement import put_tables
@@ -89,6 +90,13 @@ def test_every_offered_value_of_the_default_backend_is_tried() -> None:
     assert len(tried) == len(others)
     assert {("k", 6), ("k", 20), ("elliptical", True), ("passes", "one"), ("instancing", "tbo")} <= tried
     assert all(getattr(usual.params, name) != value for name, value in tried)
+
+
+def test_each_default_that_is_beaten_has_a_reason_to_stay() -> None:
+    files = sorted((Path(__file__).parents[3] / "docs" / "data").glob("defaults*.json"))
+    beaten = [row for file in files for row in read_measurement(file)["rows"] if beats(row)]
+    assert files
+    assert [row for row in beaten if row["parameter"] not in backend(row["backend"]).kept] == []
 
 
 def test_tables_are_put_between_their_marks() -> None:

@@ -33,6 +33,7 @@ FILLS = True
 BLENDS = True
 
 _BY_CELLS = "a pixel is filled by whole cells; at their edges the last bit tells which, and what encloses it"
+KEPT = {"fill": "holes of clouds; polygons of dense range views leave few to fill"}
 LIMITS = {
     "eye inside the cloud": Limit(0.02, _BY_CELLS),
     "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),

@@ -23,7 +23,7 @@ _ERRORS = {
     "open_percent": 0.02, "spill_percent": 0.05, "wrong_layer_percent": 0.02, "depth_median_px": 0.01,
     "depth_p95_px": 0.02, "normal_median": 0.05, "normal_p95": 0.2, "rms": 0.2,
 }  # fmt: skip
-_BETTER, _SLOWER, _FASTER = 0.05, 1.05, 0.95  # parts of an error; times the time
+_BETTER, _SLOWER, _FASTER = 0.05, 1.05, 0.9  # parts of an error; times the time
 _PREPARE_MS = 5.0  # that tell nothing
 _SAME = 1e-3  # parts of an error by which values that affect speed alone may differ
 
@@ -94,7 +94,7 @@ def beats(row: dict[str, Any]) -> dict[str, tuple[float, float]]:
 
     It does where one error is less by more than 5 %, none is more by more than 5 %, and neither a picture nor
     its preparation takes more than 1.05 times as long. A value that affects speed alone beats it
-    with the same errors in less than 0.95 times the time, and then by "time".
+    with the same errors in less than 0.9 times the time, and then by "time".
     """
     before, after = row["prepare"]
     if row["time"] > _SLOWER or after > max(_SLOWER * before, before + _PREPARE_MS):
