@@ -441,4 +441,4 @@ def pointed(app: RunningApp) -> tuple[list[float], float]:
     """The place under the mouse, and the number of the layer there."""
     words = app.state.pointed
     (number,) = (float(word.split()[1]) for word in words if word.startswith("rising "))
-    return [float(part) for part in words[0].rpartition(" ")[0].split(",")], number
+    return [float(part) for part in words[0].partition(" ±")[0].split(",")], number

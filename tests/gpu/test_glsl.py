@@ -28,6 +28,7 @@ from test_range_samples import held, probe, seen_by, stepped_view
 from viewer.backends import Backend, backend, backends
 from viewer.backends.auto_splats.splatting import WAYS, draw_splats
 from viewer.bench import baselines
+from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS
@@ -150,6 +151,7 @@ def draw_all(renderer: Renderer) -> None:
     draw(sphere(1500), "surfels", radius_scale=0.01)
     mesh = sphere_mesh(16)
     draw(mesh.points, baselines.mesh(mesh))
+    draw(literal.colored(mesh.points), literal.paper_splats())
     Presenter(renderer.gpu).release()
 
 

@@ -183,13 +183,13 @@ def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(
         assert np.quantile(steps, 0.999) <= 1
         found, expected = one.arrays(), other.arrays()
         covered = same & (one.row != NOTHING)
-        # Normals that a backend finds go by one neighbor more or less, and are blended in steps.
-        estimated = find_backend(backend).finds_normals
+        # Normals that a backend finds go by one neighbor more or less; what is blended is so in steps.
+        estimated, blended = find_backend(backend).finds_normals, find_backend(backend).blends
         most = 0.995 if estimated else 1.0
         depth_step = np.abs(found["depth"][covered] / expected["depth"][covered] - 1)
         assert np.quantile(depth_step, most) <= (2e-5 if estimated else 5e-6)
         normal_step = np.abs(found["normal"][covered] - expected["normal"][covered])
-        assert np.quantile(normal_step, most) <= (0.01 if estimated else 3e-6)
+        assert np.quantile(normal_step, most) <= (0.01 if estimated else 2e-3 if blended else 3e-6)
         np.testing.assert_allclose(found["value"][covered], expected["value"][covered], atol=0.3)
         color_step = np.abs(found["color"][covered] - expected["color"][covered])
         assert np.quantile(color_step, most) == 0

@@ -173,11 +173,7 @@ def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:
     """The parameters with the passes that "auto" stands for."""
     if params.passes != "auto":
         return params
-    stats = surface.stats
-    # Where the CPU computes all, or not all points are drawn in time, what moves gets one pass.
-    stats.simplified = frame.moving and (surface.gpu.software or frame.share < 1)
-    stats.chosen["passes"] = "one" if stats.simplified else "two"
-    return replace(params, passes=stats.chosen["passes"], enlarge=1.0)
+    return replace(params, passes="two" if passes.blends(frame, surface) else "one", enlarge=1.0)
 
 
 def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:

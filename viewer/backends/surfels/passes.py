@@ -23,6 +23,7 @@ from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from ...srgb import roots_from_bytes
+from .. import FrameView
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import (
     ALL,
@@ -41,6 +42,15 @@ from .tiles import (
 
 FIRST, SECOND = 1, 2  # of which lists the nearest are found as they are blended: TAKE of blend.comp
 _CHUNK = 1 << 20  # points packed at a time
+
+
+def blends(frame: FrameView, surface: Surface) -> bool:
+    """Whether a picture gets two passes where nobody chose: what moves gets one, where the CPU computes all
+    or not all points are drawn in time. Tells the surface's statistics."""
+    stats = surface.stats
+    stats.simplified = frame.moving and (surface.gpu.software or frame.share < 1)
+    stats.chosen["passes"] = "one" if stats.simplified else "two"
+    return not stats.simplified
 
 
 def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> None:

@@ -26,11 +26,13 @@ from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...view import View
 from .. import NO_SPACING, FrameView, Limit
+from ..surfels.passes import blends
 from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
 
 TITLE = "Voxels"
 ROWS = "octants"
+BLENDS = True
 DERIVES_ON_THREAD = True
 
 _AROUND_ALL = (
@@ -114,6 +116,15 @@ class Params:
         group="Octants",
         when={"shape": ("discs",)},
     )
+    passes: str = param(
+        "auto",
+        "one: the nearest disc is seen; two: those close behind it are blended with it; auto: two, but one "
+        "where that is too slow for a picture that moves",
+        choices=("auto", "one", "two"),
+        sweep=("auto", "one"),
+        group="Octants",
+        when={"shape": ("discs",)},
+    )
     least: float = param(
         0.75,
         "Least half edge of a cube, in radii of its disc: what closes the surface where octants lie apart; "
@@ -185,7 +196,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.clear()
         return not shown.cut.complete
     if params.shape == "discs":
-        draw_discs(points, surface, params.instancing, params.radius_scale)
+        two = blends(frame, surface) if params.passes == "auto" else params.passes == "two"
+        draw_discs(points, surface, instancing=params.instancing, radius_scale=params.radius_scale, two=two)
     else:
         draw_cubes(points, surface, params.instancing)
     if params.shape == "flat_cubes":

@@ -10,6 +10,7 @@ from ...gpu.constants import LEAST_RADIUS
 from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
+from ..surfels.passes import tiled_two_passes, two_passes
 from ..surfels.splats import FRAGMENT, SURFEL, Splats
 from ..surfels.subpixel import average, splat_subpixel, subpixel_share
 from ..surfels.tiles import splat
@@ -18,21 +19,27 @@ TILES = "tiles"
 WAYS = (TILES, *FEEDS)
 
 
-def draw_discs(points: Points, surface: Surface, instancing: str, radius_scale: float) -> None:
+def draw_discs(
+    points: Points, surface: Surface, *, instancing: str, radius_scale: float, two: bool = False
+) -> None:
     """The nearest disc of each pixel; where discs are about a pixel, the mean of those close behind it.
 
-    Points: with normals and radii. instancing: "auto", TILES, or a feed, which then brings all of them.
+    Points: with normals and radii. instancing: "auto", TILES, or a feed, which then brings all of them. two:
+    whether larger discs are blended with those close behind them, too.
     """
     splats = _splats(radius_scale)
     share = subpixel_share(points, surface, splats)
+    way = _instancing(surface, instancing, two)
+    if two and share < 1:
+        _draw(points, surface, splats, way, two)
+        return
     if share > 0:
         splats = _splats(radius_scale, share)
-    way = instancing_for(surface, instancing, TILES, "voxels as discs", WAYS, _ways)
     if share > 0 and (way == TILES or instancing == "auto"):
         surface.stats.skipped["tiles"] = "discs are under a pixel: they are sent there one by one"
         splat_subpixel(points, surface, splats)
     else:
-        _draw(points, surface, splats, way)
+        _draw(points, surface, splats, way, two=False)
     if share > 0:
         average(points, surface, splats)
 
@@ -51,13 +58,20 @@ def _splats(radius_scale: float, mean_share: float = 0.0) -> Splats:
     )
 
 
-def _draw(points: Points, surface: Surface, splats: Splats, way: str) -> None:
+def _draw(points: Points, surface: Surface, splats: Splats, way: str, two: bool) -> None:
     if way == TILES:
-        splat(points, surface, splats)
+        (tiled_two_passes if two else splat)(points, surface, splats)
+    elif two:
+        two_passes(points, surface, way, splats)
     else:
         amplify(points, surface, way, SURFEL, FRAGMENT, splats)
 
 
-def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
-    points = Points.of(pose, surface, 1.0, use_radii=True)
-    return {way: partial(_draw, points, surface, _splats(1.0), way) for way in WAYS}
+def _instancing(surface: Surface, setting: str, two: bool) -> str:
+    """How octants become discs; in one pass and in two this need not be the same."""
+
+    def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+        points = Points.of(pose, surface, 1.0, use_radii=True)
+        return {way: partial(_draw, points, surface, _splats(1.0), way, two) for way in WAYS}
+
+    return instancing_for(surface, setting, TILES, f"voxels as discs, {1 + two} passes", WAYS, ways)
