@@ -149,7 +149,7 @@ def test_points_are_evenly_spread() -> None:
     rest = rest_points()
     points = rest.positions.T.astype(np.float64)
     pick = np.random.default_rng(3).choice(rest.skin, 800, replace=False)
-    spacing = rest.radii[pick] / 1.5
+    spacing = rest.radii[pick]
     apart = []
     for row in pick:
         squares = ((points - points[row]) ** 2).sum(axis=1)

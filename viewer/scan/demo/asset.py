@@ -17,7 +17,7 @@ class RestPoints:
     """Points on the head at rest, mm.
 
     positions: (3, N) float32. normals: (3, N) float32, unit length. colors: (N, 3) uint8, sRGB.
-    radii: (N,) float32, 1.5 times the local spacing. skin: the first so many points are of skin,
+    radii: (N,) float32, the local spacing. skin: the first so many points are of skin,
     hair and mouth, the others of the eyeballs.
     """
 

@@ -45,7 +45,7 @@ def sample(count: int = COUNT, seed: int = SEED) -> RestPoints:
         positions=points.astype(np.float32),
         normals=normals.astype(np.float32),
         colors=np.rint(255.0 * colors.albedo(points, normals, skin)).astype(np.uint8),
-        radii=(1.5 * distances).astype(np.float32),
+        radii=distances.astype(np.float32),
         skin=skin,
     )
 

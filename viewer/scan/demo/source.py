@@ -20,7 +20,7 @@ class DemoSource:
     """64 poses of a head in one loop of 2.56 s, computed when asked for.
 
     Point i is the same point of the subject in every pose. Each cloud has normals, colours,
-    radii (1.5 times the local spacing) and the scalar `displacement`, mm from the pose at rest.
+    radii (the local spacing) and the scalar `displacement`, mm from the pose at rest.
     """
 
     name = "demo"
