@@ -7,7 +7,6 @@ They give the same figures on any machine. All scenes but the demo need the data
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.bench.papers.slomp_2014 import octree_sizes
-from viewer.bench.report.measurement import markdown_table, put_tables, spaced
+from viewer.bench.report.measurement import markdown_table, remeasure_tables, spaced
 from viewer.bounds import Bounds
 from viewer.scan import formats
 from viewer.scan.octree.storage import Header, read_header
@@ -98,14 +97,5 @@ def _bits(size: int, header: Header) -> str:
     return f"{8 * size / (header.points + header.strays.nodes):.2f}"
 
 
-def main() -> None:
-    """Write the tables that the command line names, or else all."""
-    tables = {made.__name__: made for made in (written, geometry)}
-    for name in sys.argv[1:] or tables:
-        made = tables[name]()
-        PAGE.write_text(put_tables(PAGE.read_text(encoding="utf-8"), {name: made}), encoding="utf-8")
-        print(f"{name}\n{made}\n", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    remeasure_tables(PAGE, written, geometry)

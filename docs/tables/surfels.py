@@ -8,7 +8,6 @@ folder.
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import replace
 from functools import cache
@@ -23,7 +22,7 @@ from test_surfel_passes import seen_by
 from viewer.backends import FrameView, backend
 from viewer.bench import metrics
 from viewer.bench.judge import Judge, Walk
-from viewer.bench.report.measurement import markdown_table, put_tables, spaced
+from viewer.bench.report.measurement import markdown_table, remeasure_tables, spaced
 from viewer.bench.scenes import samples
 from viewer.bench.scenes.subjects import smooth
 from viewer.bench.truth.head_mesh import head_mesh
@@ -221,14 +220,5 @@ def _least(cloud: PointCloud, size: tuple[int, int], ways: list[dict], cull_back
     return least
 
 
-def main() -> None:
-    """Write the tables that the command line names, or else all."""
-    tables = {made.__name__: made for made in (pods, sphere, flicker, ellipses, speed)}
-    for name in sys.argv[1:] or tables:
-        made = tables[name]()
-        PAGE.write_text(put_tables(PAGE.read_text(encoding="utf-8"), {name: made}), encoding="utf-8")
-        print(f"{name}\n{made}\n", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    remeasure_tables(PAGE, pods, sphere, flicker, ellipses, speed)

@@ -8,7 +8,6 @@ need the data folder.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from functools import cache, partial
@@ -19,7 +18,7 @@ import numpy as np
 from viewer.backends import backend
 from viewer.backends.voxels import sight_of
 from viewer.bench.judge import Judge
-from viewer.bench.report.measurement import markdown_table, put_tables, spaced
+from viewer.bench.report.measurement import markdown_table, remeasure_tables, spaced
 from viewer.bench.scenes.catalog import subject
 from viewer.bench.scenes.subjects import Moment
 from viewer.camera import Camera
@@ -156,14 +155,5 @@ def _ms(work: Callable[[], object], rounds: int = ROUNDS) -> float:
     return min(times)
 
 
-def main() -> None:
-    """Write the tables that the command line names, or else all."""
-    tables = {made.__name__: made for made in (costs, errors)}
-    for name in sys.argv[1:] or tables:
-        made = tables[name]()
-        PAGE.write_text(put_tables(PAGE.read_text(encoding="utf-8"), {name: made}), encoding="utf-8")
-        print(f"{name}\n{made}\n", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    remeasure_tables(PAGE, costs, errors)

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -149,6 +150,15 @@ def put_tables(text: str, tables: Mapping[str, str]) -> str:
             raise ValueError(f"no {start.strip()} and {end} in the page")
         text = f"{before}{start}{table}\n{end}{after}"
     return text
+
+
+def remeasure_tables(page: Path, *tables: Callable[[], str]) -> None:
+    """Make the tables that the command line names, or else all, and put each into the page by its name."""
+    made_by = {table.__name__: table for table in tables}
+    for name in sys.argv[1:] or made_by:
+        made = made_by[name]()
+        page.write_text(put_tables(page.read_text(encoding="utf-8"), {name: made}), encoding="utf-8")
+        print(f"{name}\n{made}\n", flush=True)
 
 
 def spaced(number: float) -> str:
