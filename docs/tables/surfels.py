@@ -1,41 +1,48 @@
 """The tables of docs/surfels.md, measured anew.
 
-    PYTHONPATH=tests:tests/backends python docs/tables/surfels.py [NAME ...]
+    python docs/tables/surfels.py [NAME ...]
 
-All but `speed` give the same figures on any machine with the same driver. `flicker` and `speed` need the data
-folder.
+All but `costs` and `speed` give the same figures on any machine with the same driver. `pods`, `sphere` and
+`ellipses` need no data folder.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scenes import sphere as even_sphere
-from test_elliptical_surfaces import cylinder, holes_and_spill
-from test_surfel_passes import seen_by
+from pictures import (
+    DATA,
+    DOCS,
+    ERROR_NAMES,
+    SHADING,
+    draw,
+    drawn,
+    error_cells,
+    errors_of,
+    processor_ms,
+    renderer,
+    request,
+)
 
 from viewer.backends import FrameView, backend
 from viewer.bench import metrics
 from viewer.bench.judge import Judge, Walk
 from viewer.bench.report.measurement import markdown_table, remeasure_tables, spaced
-from viewer.bench.scenes import samples
-from viewer.bench.scenes.subjects import smooth
+from viewer.bench.scenes import catalog, samples
+from viewer.bench.scenes.defects import changed, thinned
+from viewer.bench.scenes.subjects import Subject, smooth
 from viewer.bench.truth.head_mesh import head_mesh
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.look import Look
-from viewer.mesh.reference import trace
-from viewer.mesh.triangles import read_mesh
-from viewer.renderer import Renderer
+from viewer.mesh.reference import trace, visible_pixels
+from viewer.mesh.triangles import Mesh, read_mesh
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -43,33 +50,48 @@ from viewer.scan.spacing import typical_spacing
 from viewer.simulate.scanner import Faults, around, capture, rig
 from viewer.view import View
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "surfels.md"
-DATA = ROOT.parent / "shared" / "data" / "models"
+PAGE = DOCS / "surfels.md"
 SURFELS = backend("surfels")
-SHADING = Look(light="head", color_by="plain")
+THINNED = "-ramp"
+SCANS = ("armadillo", "bunny", "horse", "igea", "crane")
+UNEVEN = ("armadillo", "horse", "igea", "crane")
 
 
-@cache
-def renderer() -> Renderer:
-    """The one that all pictures are drawn by."""
-    return Renderer()
-
-
-def drawn(
-    cloud: PointCloud, camera: Camera, size: tuple[int, int], look: Look | None = None, **params: object
+def picture(
+    cloud: PointCloud, camera: Camera, size: tuple[int, int], look: Look = SHADING, **params: object
 ) -> Surface:
     """One finished picture."""
-    surface = Surface(renderer().gpu, size)
-    request = Request(Pose(0, 0.0, "", cloud), camera, "surfels", SURFELS.params(params), look or Look())
-    while render_frame(renderer(), request, surface):
-        pass
-    return surface
+    return drawn(request(Pose(0, 0.0, "", cloud), camera, "surfels", params, look), size)
 
 
 def covered(surface: Surface) -> NDArray[np.bool_]:
     """Which pixels (H, W) show something."""
     return np.isfinite(surface.depth)
+
+
+def scan(name: str) -> Subject:
+    """A scan of the benchmark; with the name of another and `THINNED`, that thinned from end to end."""
+    whole = catalog.subject(name.removesuffix(THINNED), DATA)
+    return changed(whole, name, [thinned]) if name.endswith(THINNED) else whole
+
+
+def even_sphere(count: int, radius: float = 1.0) -> PointCloud:
+    """Discs on a sphere about the origin, of 1.5 spacings."""
+    arrays = samples.on_sphere(count)
+    scaled = {name: radius * arrays[name] for name in ("positions", "radii")}
+    return PointCloud.from_arrays(**{**arrays, **scaled})
+
+
+def defaults() -> str:
+    """Errors of one radius for all and the nearest disc, then of the defaults."""
+    settings: list[dict[str, object]] = [{"radius": "uniform", "passes": "one"}, {}]
+    rows = []
+    for name in (*SCANS, *(name + THINNED for name in UNEVEN)):
+        subject = scan(name)
+        told = errors_of(subject, "surfels", settings, 4, (400, 300))
+        title = f"{name.replace(THINNED, ', thinned')}, {spaced(len(subject.moment(0).pose.cloud))}"
+        rows.append([title, *(cell for errors in told for cell in error_cells(errors))])
+    return markdown_table(["scan", *ERROR_NAMES, *ERROR_NAMES], rows, left=("scan",))
 
 
 def pods() -> str:
@@ -87,10 +109,10 @@ def pods() -> str:
     ):
         camera = Camera.orbit(mesh.bounds, azimuth, elevation, aspect=1.5)
         truth = trace(mesh, camera, size)
-        seen, outline = seen_by(mesh, truth, seers), np.count_nonzero(metrics._outline(truth.covered))
+        seen, outline = visible_pixels(mesh, truth, seers), np.count_nonzero(metrics._outline(truth.covered))
         holes, spill, apart = [], [], []
         for enlarge in (1.0, 2.0):
-            shown = covered(drawn(cloud, camera, size, passes="two", enlarge=enlarge))
+            shown = covered(picture(cloud, camera, size, passes="two", enlarge=enlarge))
             holes.append(f"{100 * np.count_nonzero(seen & ~shown) / np.count_nonzero(seen):.3f} %")
             spill.append(f"{np.count_nonzero(shown & ~truth.covered) / outline:.2f} px")
             apart.append(f"{metrics.coverage(shown, truth.covered)['boundary_mean']:.2f} px")
@@ -114,7 +136,7 @@ def sphere() -> str:
         truth = trace(AnalyticScene((Sphere(),)), camera, size)
         found = []
         for passes, enlarge in ways.values():
-            surface = drawn(cloud, camera, size, SHADING, passes=passes, enlarge=enlarge)
+            surface = picture(cloud, camera, size, SHADING, passes=passes, enlarge=enlarge)
             reference = reference_surface(truth, surface.gpu, SHADING).image()
             found.append(f"{metrics.color(surface.image(), reference, truth.covered)['psnr']:.1f}")
         rows.append([spaced(count), *found])
@@ -122,29 +144,53 @@ def sphere() -> str:
 
 
 def ellipses() -> str:
-    """Pixels that stay open of a cylinder, and pixels beside it."""
-    ellipse = cylinder(8, 60)
+    """Pixels that stay open of a cylinder, but for its ends, and pixels beside it."""
+    camera, size = Camera((0.0, 0.0, 6.0), (0, 0, 0), fov_y=45), (320, 240)
+    truth = trace(tall_cylinder(), camera, size)
+    body = truth.covered.copy()
+    body[truth.covered] = np.abs(truth.positions()[:, 1]) < 1.5
+    ellipse = PointCloud.from_arrays(**samples.rings(8, 60))
     along, across = ellipse.axes[0, 1], ellipse.axes[0, 3]  # type: ignore[index]
 
     def circles(cloud: PointCloud, radius: float) -> PointCloud:
         return replace(cloud, axes=None, radii=np.full(len(cloud), radius, np.float32))
 
+    def in_rings(count: int) -> PointCloud:
+        return circles(PointCloud.from_arrays(**samples.rings(count, 60)), 0.75 * 4 / count)
+
     splats = {
         "ellipses": ellipse,
         "circles of their area": circles(ellipse, np.sqrt(along * across)),
         "circles as large as they are long": circles(ellipse, along),
-        **{f"such circles in {n} rings": circles(cylinder(n, 60), 0.75 * 4 / n) for n in (20, 40)},
+        **{f"such circles in {count} rings": in_rings(count) for count in (20, 40)},
     }
-    draw = lambda cloud, camera, size, **params: drawn(cloud, camera, size, **params)  # noqa: E731
-    rows = [
-        [name, str(len(cloud)), *map(str, holes_and_spill(draw, cloud))] for name, cloud in splats.items()
-    ]
+    rows = []
+    for name, cloud in splats.items():
+        shown = covered(picture(cloud, camera, size, cull_back=True))
+        counts = np.count_nonzero(body & ~shown), np.count_nonzero(shown & ~truth.covered)
+        rows.append([name, str(len(cloud)), *map(str, counts)])
     return markdown_table(["splats", "points", "open", "beside"], rows, left=("splats",))
+
+
+def tall_cylinder(around: int = 2000) -> Mesh:
+    """About the y axis, one in radius, to a millionth, and higher than any picture of it."""
+    turn = np.arange(around) * 2 * np.pi / around
+    ends = [np.column_stack([np.cos(turn), np.full(around, y), np.sin(turn)]) for y in (-50.0, 50.0)]
+    low = np.arange(around)
+    after = (low + 1) % around
+    faces = [
+        np.column_stack(corners)
+        for corners in ((low, low + around, after), (after, low + around, after + around))
+    ]
+    return Mesh(
+        PointCloud.from_arrays(np.concatenate(ends), origin=np.zeros(3)),
+        np.concatenate(faces).astype(np.uint32),
+    )
 
 
 def flicker() -> str:
     """Flicker of normals and PSNR of shading of Igea, by how large splats are."""
-    mesh = smooth(read_mesh(DATA / "cyberware_igea_134345.ply"))
+    mesh = smooth(read_mesh(DATA / "models" / "cyberware_igea_134345.ply"))
     cameras = [Camera.orbit(mesh.bounds, 10 + 2 * step, 10, aspect=1.5) for step in range(4)]
     ways = {
         "nearest": {"passes": "one", "epsilon": 0.0},
@@ -163,7 +209,7 @@ def flicker() -> str:
         pixels = radius * view.scale / cameras[0].distance
         found = []
         for params in ways.values():
-            frames = [drawn(cloud, camera, size, SHADING, **params) for camera in cameras]
+            frames = [picture(cloud, camera, size, SHADING, **params) for camera in cameras]
             more = walk.flicker(iter(frames), "orbit")["flicker_orbit_normal"]
             inside = judges[0].reference.covered
             psnr = metrics.color(frames[0].image(SHADING), judges[0].image, inside)["psnr"]
@@ -182,7 +228,7 @@ def speed() -> str:
         "`one` by `gs`": {"passes": "one", "instancing": "gs"},
         "`two`, 2 by `gs`": {"passes": "two", "enlarge": 2.0, "instancing": "gs"},
     }
-    dragon = smooth(read_mesh(DATA / "stanford_dragon_100250.ply")).points
+    dragon = smooth(read_mesh(DATA / "models" / "stanford_dragon_100250.ply")).points
     shells = [even_sphere(20_000, radius) for radius in (1.0, 0.9, 0.8, 0.7, 0.6)]
     clouds = {
         "demo, 86 361 points": open_scan("demo").pose(0).cloud,
@@ -202,6 +248,30 @@ def speed() -> str:
     return markdown_table(["scene", "back faces", *ways], rows, left=("scene", "back faces"))
 
 
+def costs() -> str:
+    """Processor time of the first picture of a pose and of those that follow, the least of five, in turns."""
+    size = (960, 640)
+    ways: dict[str, tuple[dict[str, object], bool]] = {
+        "one for all, nearest": ({"radius": "uniform", "passes": "one"}, False),
+        "at rest": ({}, False),
+        "in motion": ({}, True),
+    }
+    rows = []
+    for name in ("armadillo", "igea"):
+        pose = scan(name).moment(0).pose
+        camera = Camera.orbit(pose.bounds, 30, 15, aspect=1.5)
+        least = np.full((len(ways), 2), np.inf)
+        for turn in range(6):
+            for number, (params, moving) in enumerate(ways.values()):
+                unseen = request(replace(pose), camera, "surfels", params)  # by the renderer
+                work = partial(draw, unseen, Surface(renderer().gpu, size), moving=moving)
+                times = [processor_ms(work) / 2 for _ in range(2)]
+                least[number] = np.minimum(least[number], times) if turn else np.inf
+        title = f"{name}, {spaced(len(pose.cloud))}"
+        rows.append([title, *(f"{first:.0f}, {later:.0f} ms" for first, later in least)])
+    return markdown_table(["scan", *ways], rows, left=("scan",))
+
+
 def _least(cloud: PointCloud, size: tuple[int, int], ways: list[dict], cull_back: bool) -> list[float]:
     gpu = renderer().gpu
     pose, surface = GpuPose(gpu, Pose(0, 0.0, "", cloud)), Surface(gpu, size)
@@ -211,14 +281,11 @@ def _least(cloud: PointCloud, size: tuple[int, int], ways: list[dict], cull_back
     for turn in range(4):
         for number, params in enumerate(ways):
             chosen = SURFELS.params({"instancing": "tiles", "cull_back": cull_back, **params})
-            gpu.ctx.finish()
-            start = time.process_time()
-            SURFELS.draw(pose, FrameView(surface.view, chosen), surface)
-            gpu.ctx.finish()
-            if turn:
-                least[number] = min(least[number], (time.process_time() - start) * 500)
+            work = partial(SURFELS.draw, pose, FrameView(surface.view, chosen), surface)
+            ms = processor_ms(work) / 2
+            least[number] = min(least[number], ms) if turn else np.inf
     return least
 
 
 if __name__ == "__main__":
-    remeasure_tables(PAGE, pods, sphere, flicker, ellipses, speed)
+    remeasure_tables(PAGE, defaults, costs, pods, sphere, flicker, ellipses, speed)

@@ -8,32 +8,26 @@ need the data folder.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import cache, partial
-from pathlib import Path
 
 import numpy as np
+from pictures import DATA, DOCS, draw, processor_ms, renderer, request
 
-from viewer.backends import backend
 from viewer.backends.voxels import sight_of
 from viewer.bench.judge import Judge
 from viewer.bench.report.measurement import markdown_table, remeasure_tables, spaced
 from viewer.bench.scenes.catalog import subject
 from viewer.bench.scenes.subjects import Moment
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
-from viewer.renderer import Renderer
 from viewer.scan.octree.build import build
 from viewer.scan.octree.traverse import Traversal
 from viewer.scan.spacing import typical_spacing
 from viewer.view import View
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "voxels.md"
-DATA = ROOT.parent / "shared" / "data"
+PAGE = DOCS / "voxels.md"
 SIZE = (480, 360)
 AROUND = ((140, 20), (20, 10), (260, 30))  # degrees
 LOOK = Look(light="head")
@@ -57,12 +51,6 @@ ERRORS = {
     "psnr": "PSNR, dB",
 }
 ROUNDS = 7
-
-
-@cache
-def renderer() -> Renderer:
-    """The one that all pictures are drawn by."""
-    return Renderer()
 
 
 @cache
@@ -91,8 +79,8 @@ def errors() -> str:
             found, times = [], []
             surface = Surface(renderer().gpu, SIZE)
             for camera, judge in zip(views, judges, strict=True):
-                request = Request(here.pose, camera, drawn_by, backend(drawn_by).params(setting), LOOK)
-                times.append(_ms(partial(_draw, request, surface), rounds=2))
+                asked = request(here.pose, camera, drawn_by, setting, LOOK)
+                times.append(_ms(partial(draw, asked, surface), rounds=2))
                 found.append(judge.errors(surface))
             means = {key: float(np.mean([each[key] for each in found])) for key in ERRORS}
             means["depth_median"] /= spacing
@@ -120,12 +108,11 @@ def costs() -> str:
 
         surface = Surface(renderer().gpu, SIZE)
         views = [camera.orbited(step, 0.0) for step in range(ROUNDS + 1)]
-        params = backend("voxels").params()
-        requests = iter([Request(pose, view, "voxels", params, LOOK) for view in views])
-        _draw(next(requests), surface)
-        moved = _ms(lambda requests=requests, surface=surface: _draw(next(requests), surface))
-        still = Request(pose, views[-1], "voxels", params, LOOK)
-        again = _ms(partial(_draw, still, surface))
+        requests = iter([request(pose, view, "voxels", {}, LOOK) for view in views])
+        draw(next(requests), surface)
+        moved = _ms(lambda requests=requests, surface=surface: draw(next(requests), surface))
+        still = request(pose, views[-1], "voxels", {}, LOOK)
+        again = _ms(partial(draw, still, surface))
         works = (partial(build, cloud, attributes=False), partial(build, cloud), cut)
         lines.append(
             [
@@ -140,19 +127,9 @@ def costs() -> str:
     return markdown_table(head, lines, left=["scene"])
 
 
-def _draw(request: Request, surface: Surface) -> None:
-    while render_frame(renderer(), request, surface):
-        pass
-
-
 def _ms(work: Callable[[], object], rounds: int = ROUNDS) -> float:
     """The least processor time of some rounds."""
-    times = []
-    for _ in range(rounds):
-        start = time.process_time()
-        work()
-        times.append(1e3 * (time.process_time() - start))
-    return min(times)
+    return min(processor_ms(work) for _ in range(rounds))
 
 
 if __name__ == "__main__":

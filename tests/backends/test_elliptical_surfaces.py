@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scenes import NOTHING, sphere
 from test_elliptical import rays
 
+from viewer.bench.scenes import samples
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
@@ -32,15 +33,8 @@ def surfels(draw: Draw) -> Draw:
 
 
 def cylinder(rings: int, around: int) -> PointCloud:
-    """Four units high, one in radius, in rings; ellipses that just close it."""
-    turn, level = np.meshgrid(np.arange(around) * 2 * np.pi / around, (np.arange(rings) + 0.5) / rings - 0.5)
-    normals = np.column_stack([np.cos(turn).ravel(), 0 * turn.ravel(), np.sin(turn).ravel()])
-    half_axes = [0.0, 0.75 * 4 / rings, 0.0, 0.75 * 2 * np.pi / around]
-    return PointCloud.from_arrays(
-        normals + np.outer(4 * level.ravel(), [0.0, 1.0, 0.0]),
-        normals=normals,
-        axes=np.tile(half_axes, (len(normals), 1)),
-    )
+    """Rings of ellipses that just close it."""
+    return PointCloud.from_arrays(**samples.rings(rings, around))
 
 
 def holes_and_spill(surfels: Draw, cloud: PointCloud) -> tuple[int, int]:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, plane, sphere
 
 from viewer.analysis.pick import pick
@@ -20,8 +19,7 @@ from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.surface import Surface
 from viewer.look import Look
-from viewer.mesh.reference import Reference, footprint, trace, visible
-from viewer.mesh.scene import Scene
+from viewer.mesh.reference import footprint, trace, visible_pixels
 from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
@@ -117,7 +115,7 @@ def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
     pose = Pose.of(0, 0.0, "", capture(mesh, pods, (640, 480), [noise] * 2, seed=0, frame=0))
     camera = Camera.orbit(mesh.bounds, 20, 30, aspect=1.5)
     truth = trace(mesh, camera, size)
-    scanned = seen_by(mesh, truth, pods)
+    scanned = visible_pixels(mesh, truth, pods)
     outline = np.count_nonzero(metrics._outline(truth.covered))
     holes, spill, boundary = [], [], []
     for enlarge in (1.0, 2.0):
@@ -130,14 +128,6 @@ def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
     assert holes[1] <= holes[0] / 2
     assert spill[1] < spill[0] + 1
     assert boundary[1] < boundary[0] + 1
-
-
-def seen_by(scene: Scene, picture: Reference, pods: list[Camera]) -> NDArray[np.bool_]:
-    """Which pixels (H, W) show what a pod sees as well."""
-    points = picture.positions() + (picture.origin - scene.origin)
-    seen = np.zeros(picture.covered.shape, bool)
-    seen[picture.covered] = np.any([visible(scene, points, pod, None) for pod in pods], axis=0)
-    return seen
 
 
 @every_feed

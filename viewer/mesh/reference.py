@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -143,6 +144,14 @@ def visible(
         else:
             hidden = _cast(scene, starts, steps, 0.0, np.inf).distance < limit
         seen[start + ahead] = ~hidden
+    return seen
+
+
+def visible_pixels(scene: Scene, picture: Reference, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
+    """Tell which pixels of a picture, (H, W), show what at least one of the cameras sees as well."""
+    points = picture.positions() + (picture.origin - scene.origin)
+    seen = np.zeros(picture.covered.shape, bool)
+    seen[picture.covered] = np.any([visible(scene, points, camera) for camera in cameras], axis=0)
     return seen
 
 

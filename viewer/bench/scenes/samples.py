@@ -84,6 +84,21 @@ def wall(columns: int, rows: int, spacing: float, wave: float = 0.0) -> Arrays:
     return {**arrays, "colors": 0.5 + 0.5 * np.sin(positions / spacing * wave + np.arange(3))}
 
 
+def rings(count: int, around: int) -> Arrays:
+    """A cylinder about the y axis, four units high, one in radius, in rings of ellipses that just close it.
+
+    count: of rings. around: points of each. `axes` in place of `radii`, as `PointCloud` has them.
+    """
+    turn, level = np.meshgrid(np.arange(around) * 2 * np.pi / around, (np.arange(count) + 0.5) / count - 0.5)
+    normals = np.column_stack([np.cos(turn).ravel(), 0 * turn.ravel(), np.sin(turn).ravel()])
+    half_axes = [0.0, 0.75 * 4 / count, 0.0, 0.75 * 2 * np.pi / around]
+    return {
+        "positions": normals + np.outer(4 * level.ravel(), [0.0, 1.0, 0.0]),
+        "normals": normals,
+        "axes": np.tile(half_axes, (len(normals), 1)),
+    }
+
+
 def line(count: int, end: tuple[float, float, float]) -> Arrays:
     """Points on the line from -end to end, facing +z."""
     positions = np.linspace(-1, 1, count)[:, None] * np.array(end)
