@@ -24,6 +24,22 @@ LEVEL_COLORS = ("#56b4e9", "#009e73", "#f0e442", "#e69f00", "#cc79a7")
 HOLE_COLOR = "#ff0000"
 HOLE_REACH = 8  # pixels: half of the widest gaps that count as holes, which are as wide as a pixel of level 4
 _UNMAPPED = {"color_by": tuple(name for name in COLOR_BY if name not in ("depth", "height"))}
+COLOR_WORDS = {
+    "auto": "The scan's own",
+    "own": "Its colours",
+    "plain": "One colour",
+    "normal": "Direction of the surface",
+    "depth": "Distance from the viewer",
+    "height": "Height",
+    "id": "Number of the point",
+    "level": "What was filled",
+}
+LIGHT_WORDS = {
+    "auto": "Automatic",
+    "flat": "None",
+    "head": "From the viewer",
+    "fixed": "From a fixed side",
+}
 _FIXED, _FLAT = {"light": ("fixed",)}, {"light": ("flat",)}
 _EYE_DOME = {"eye_dome": (None, True)}
 
@@ -42,47 +58,67 @@ class Look:
         "auto",
         f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, #N for scalar N, or a number "
         "that the backend finds",
+        title="Colour by",
+        words=COLOR_WORDS,
         group="Colour",
+        basic=True,
     )
     color_map: str = param(
         "batlow",
         "Colour map of numbers",
+        title="Colour map",
         choices=COLOR_MAPS,
         group="Colour",
         unless=_UNMAPPED,
+        basic=True,
     )
     low: float | None = param(
-        None, "Value at the map's start; auto: from the data", type=float, group="Colour", unless=_UNMAPPED
-    )
+        None, "Value at the map's start; auto: from the data",
+        type=float, group="Colour", unless=_UNMAPPED, basic=True,
+    )  # fmt: skip
     high: float | None = param(
-        None, "Value at the map's end; auto: from the data", type=float, group="Colour", unless=_UNMAPPED
+        None, "Value at the map's end; auto: from the data",
+        type=float, group="Colour", unless=_UNMAPPED, basic=True,
+    )  # fmt: skip
+    up: str = param(
+        "+y",
+        "The axis that points up, and that height is measured along",
+        choices=tuple(AXES),
+        group="Colour",
     )
-    up: str = param("+y", "The axis that height is measured along", choices=tuple(AXES), group="Colour")
-    plain: str = param("#c8c2b8", "Colour of points that have none, #rrggbb", group="Colour")
-    background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa", group="Colour")
+    plain: str = param(
+        "#c8c2b8", "Colour of points that have none, #rrggbb",
+        title="Surface", group="Colour", basic=True,
+    )  # fmt: skip
+    background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa", group="Colour", basic=True)
     holes: bool = param(
         False,
         f"Paint holes red: gaps of up to {2 * HOLE_REACH} pixels between what is shown",
+        title="Show holes",
         group="Colour",
         key="G",
+        basic=True,
     )
     light: str = param(
         "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
-        choices=("auto", "flat", "head", "fixed"), group="Light",
+        choices=("auto", "flat", "head", "fixed"), words=LIGHT_WORDS, group="Light", basic=True,
     )  # fmt: skip
     azimuth: float = param(
-        -35.0, "Where the fixed light stands", low=-180, high=180, unit="degrees", group="Light", when=_FIXED
-    )
+        -35.0, "Where the fixed light stands",
+        low=-180, high=180, unit="degrees", group="Light", when=_FIXED, basic=True,
+    )  # fmt: skip
     elevation: float = param(
-        40.0, "How high the fixed light stands", low=-90, high=90, unit="degrees", group="Light", when=_FIXED
-    )
+        40.0, "How high the fixed light stands",
+        low=-90, high=90, unit="degrees", group="Light", when=_FIXED, basic=True,
+    )  # fmt: skip
     ambient: float = param(0.25, "Light from everywhere", low=0, high=1, group="Light", unless=_FLAT)
     diffuse: float = param(0.75, "Phong's diffuse share", low=0, high=1, group="Light", unless=_FLAT)
     specular: float = param(0.12, "Phong's specular share", low=0, high=1, group="Light", unless=_FLAT)
     shininess: float = param(24.0, "Phong's exponent", low=1, high=200, group="Light", unless=_FLAT)
     eye_dome: bool | None = param(
-        None, "Darken where the depth steps back; auto: if unlit", type=bool, group="Light"
-    )
+        None, "Darken where the depth steps back; auto: if unlit",
+        type=bool, title="Dark edges", group="Light", basic=True,
+    )  # fmt: skip
     eye_dome_strength: float = param(
         1.0, "Strength of eye-dome lighting", low=0, high=20, group="Light", when=_EYE_DOME
     )

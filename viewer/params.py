@@ -43,9 +43,12 @@ class Parameter:
     changes (`AFFECTS`). optional: None ("auto" in text) is allowed. unit: of a number, empty: none.
     group: the heading that it stands under, empty: none. when: all that has to hold for it to matter.
     key: what switches a bool on the keyboard, empty: nothing. deprecated: former names, which are still read.
+    title: the name in words. words: choice -> what people call it, where that is another word. basic: whether
+    it is for everybody; the others are for those who look for them.
     """
 
     name: str
+    title: str
     type: type
     default: Any
     help: str
@@ -60,11 +63,8 @@ class Parameter:
     when: tuple[Condition, ...]
     key: str
     deprecated: tuple[str, ...]
-
-    @property
-    def title(self) -> str:
-        """The name in words, as the panel has it."""
-        return self.name.replace("_", " ").capitalize()
+    words: Mapping[str, str]
+    basic: bool
 
     def matters(self, values: object) -> bool:
         """Whether its value matters beside the other values of the same declaration."""
@@ -111,11 +111,14 @@ def param(
     unless: Mapping[str, tuple[Any, ...]] | None = None,
     key: str = "",
     deprecated: tuple[str, ...] = (),
+    title: str = "",
+    words: Mapping[str, str] | None = None,
+    basic: bool = False,
 ) -> Any:
     """A dataclass field that is a parameter, as `Parameter` says.
 
-    type: needed where the default is None. when, unless: names of other parameters -> the values of them with
-    which this one matters, or does not.
+    type: needed where the default is None. title: where that is not the name in words. when, unless: names of
+    other parameters -> the values of them with which this one matters, or does not.
     """
     assert affects in AFFECTS
     return dataclasses.field(
@@ -134,6 +137,9 @@ def param(
             "when": (*_conditions(when, negated=False), *_conditions(unless, negated=True)),
             "key": key,
             "deprecated": deprecated,
+            "title": title,
+            "words": words or {},
+            "basic": basic,
         },
     )
 
@@ -150,7 +156,12 @@ def describe(cls: type) -> tuple[Parameter, ...]:
 @cache
 def _described(cls: Hashable) -> tuple[Parameter, ...]:
     assert isinstance(cls, type)
-    declared = tuple(Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(cls))
+    declared = tuple(
+        Parameter(
+            name=f.name, default=f.default, **{**f.metadata, "title": f.metadata["title"] or in_words(f.name)}
+        )
+        for f in dataclasses.fields(cls)
+    )
     by_name = {parameter.name: parameter for parameter in declared}
     for parameter in declared:
         if problem := _problem(parameter, by_name):
@@ -174,12 +185,19 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
             return f"goes by '{condition.parameter}', which is no other parameter; there are {known}"
     try:
         parameter.parse(parameter.default)
+        for word in parameter.words:
+            parameter.parse(word)
         for condition in parameter.when:
             for value in condition.values:
                 others[condition.parameter].parse(value)
     except InputError as error:
         return f"has a default or a condition that cannot be: {error}"
     return ""
+
+
+def in_words(name: str) -> str:
+    """An identifier as the panel has it."""
+    return name.replace("_", " ").capitalize()
 
 
 def switches(values: object) -> dict[str, bool]:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from viewer.app import settings
 from viewer.app.files.keeping import take_over
 from viewer.app.output.export_plan import Choices
+from viewer.app.panel import PanelChoices
 from viewer.app.place import Place, reachable
 from viewer.app.playing.player import Pace
 from viewer.app.session import Session, known_as
@@ -42,6 +43,7 @@ FULL = Settings(
     export=Choices(what="turntable", width=640, anonymous=True),
     export_marks=Marks(scale_bar=True),
     recent=("/scans/b", "demo"),
+    panel=PanelChoices(30.0, {"Statistics": True}),
     tools={"notes": {"texts": False}},
 )
 

@@ -307,7 +307,7 @@ def test_idle_it_draws_nothing_and_takes_no_processor_time(app: RunningApp) -> N
 def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> None:
     """The points' size: a slider from 0 to 32."""
     size = "point_size"
-    app.choose(PANEL, "##backend", "Points##points")
+    app.choose(PANEL, "##backend", "###points")
     app.act(PANEL, ("item_input_value", f"{size}/##value", 0))
     app.settle()
     before = Screenshot(app)

@@ -41,7 +41,7 @@ def app(screen: Screen, scan: Path, tmp_path: Path) -> Iterator[RunningApp]:
 
 def choose(app: RunningApp, backend: str) -> State:
     """Draw with a backend; the first picture of it at rest."""
-    app.choose(PANEL, "##backend", f"{backend.capitalize()}##{backend}")
+    app.choose(PANEL, "##backend", f"###{backend}")
     return app.see(lambda state: state.is_idle, backend=backend)
 
 

@@ -127,7 +127,7 @@ def test_the_colour_bar_shows_the_map(app: RunningApp) -> None:
 
 def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose("what", "Turntable##turntable")
+    dialog.choose("what", "###turntable")
     dialog.enter("pictures", 3)
     dialog.enter("width", 96)
     dialog.enter("height", 64)
@@ -149,10 +149,10 @@ def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path)
 
 def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose("what", "Frames, one after the other##frames")
+    dialog.choose("what", "###frames")
     dialog.enter("first", 2)
     dialog.enter("last", 5)
-    dialog.choose("format", "MP4 film##mp4")
+    dialog.choose("format", "###mp4")
     dialog.enter("name", "frames")
     dialog.export()
     app.told(r"Saved .*frames.mp4")
@@ -164,8 +164,8 @@ def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Pa
 
 def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose("format", "EXR: the surface behind the picture##exr")
-    dialog.choose("what", "Current view##view")
+    dialog.choose("format", "###exr")
+    dialog.choose("what", "###view")
     dialog.tick("##anonymous")
     dialog.enter("name", "view")
     dialog.export()
@@ -194,10 +194,10 @@ def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path)
 
 def begin_a_long_one(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
-    dialog.choose("what", "Turntable##turntable")
+    dialog.choose("what", "###turntable")
     dialog.enter("pictures", 300)
-    dialog.choose("format", "PNG pictures##png")
-    dialog.choose("size", "1920 x 1080##1920x1080")
+    dialog.choose("format", "###png")
+    dialog.choose("size", "###1920x1080")
     dialog.enter("name", "long")
     dialog.export()
     app.see(is_exporting=True)

@@ -51,7 +51,7 @@ def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
 ) -> None:
     other = spheres(tmp_path / "other", 1)
     with running_app(screen, tmp_path, lacking, other) as app:
-        app.choose(PANEL, "color_by/##value", "q##q")
+        app.choose(PANEL, "color_by/##value", "###q")
         app.settle()
         (with_q,) = saved(app, "p").entries
         assert with_q.look.color_by == "q"

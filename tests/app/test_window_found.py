@@ -35,10 +35,10 @@ def app(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ru
 
 def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(backends(), "finding", finding.BACKEND)
-    app.choose(PANEL, "##backend", "Finding##finding")
+    app.choose(PANEL, "##backend", "###finding")
     app.act(PANEL, ("item_input_value", "point_size/##value", 6))
-    app.choose(PANEL, "color_by/##value", "gap##gap")
-    app.choose(PANEL, "light/##value", "flat##flat")
+    app.choose(PANEL, "color_by/##value", "###gap")
+    app.choose(PANEL, "light/##value", "###flat")
     assert app.settle().document["look"]["color_by"] == "gap"
     left, top, width, height = app.view()
     app.screen.do("mousemove", left + width // 2, top + height // 2, "sleep", 0.2)
@@ -60,12 +60,12 @@ def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.Monke
 def test_other_renderers_show_other_colours_and_say_so(app: RunningApp) -> None:
     above = slice(0, app.view()[3] // 2)  # the messages
     before = shown(app)[above].copy()
-    app.choose(PANEL, "##backend", "Points##points")
+    app.choose(PANEL, "##backend", "###points")
     app.told("'gap' is not found by Points, but by Finding: other colours are shown")
     assert app.settle().backend == "points"
     assert app.state.document["look"]["color_by"] == "gap", "for when it is back"
     assert (shown(app)[above] != before).mean() > 0.1
-    app.choose(PANEL, "##backend", "Finding##finding")
+    app.choose(PANEL, "##backend", "###finding")
     app.settle()
     app.screen.do("mousemove", app.view()[0], app.view()[1])
     app.settle()

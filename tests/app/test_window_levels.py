@@ -113,7 +113,7 @@ def params(state: State) -> dict[str, object]:
 def draw_pyramids(app: RunningApp, primitive: str) -> None:
     """Have pyramidal projection draw, which is the default, of points or polygons."""
     assert app.settle().backend == "pyramidal"
-    app.choose(PANEL, "primitive/##value", f"{primitive}##{primitive}")
+    app.choose(PANEL, "primitive/##value", f"###{primitive}")
     app.settle()
 
 
@@ -121,12 +121,12 @@ def draw_pyramids(app: RunningApp, primitive: str) -> None:
 def levels(app: RunningApp) -> Iterator[RunningApp]:
     """Pyramidal projection of points, coloured by level and not lit."""
     draw_pyramids(app, "points")
-    app.choose(PANEL, "color_by/##value", "level##level")
-    app.choose(PANEL, "light/##value", "flat##flat")
+    app.choose(PANEL, "color_by/##value", "###level")
+    app.choose(PANEL, "light/##value", "###flat")
     app.settle()
     yield app
-    app.choose(PANEL, "color_by/##value", "auto##auto")
-    app.choose(PANEL, "light/##value", "auto##auto")
+    app.choose(PANEL, "color_by/##value", "###auto")
+    app.choose(PANEL, "light/##value", "###auto")
 
 
 def test_each_level_has_its_key(levels: RunningApp) -> None:

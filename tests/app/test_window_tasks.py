@@ -82,7 +82,7 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     left, top, width, height = app.view()
     part = np.s_[top + 200 : top + height - 100, left : left + width]  # without marks
     before, pictures = app.screen.picture()[part], app.state.pictures
-    app.choose(PANEL, "##backend", "Surfels##surfels")
+    app.choose(PANEL, "##backend", "###surfels")
     app.see(lambda state: state.jobs)
     press_until(app, "Escape", "Cancelled: Estimating normals")
     app.screen.do("key", "Escape")  # away with the note
@@ -91,7 +91,7 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     assert {state.backend for state in app.pictures(pictures)} <= {"auto_splats"}, "which stays meanwhile"
     assert after.pictures <= pictures + 4, "the same picture is not drawn again and again"
     assert (app.screen.picture()[part] == before).all()
-    app.choose(PANEL, "##backend", "Surfels##surfels")
+    app.choose(PANEL, "##backend", "###surfels")
     app.see(frame=0, backend="surfels")
     app.settle()
     assert (app.screen.picture()[part] != before).any()

@@ -377,7 +377,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         plain = saved_picture(app)
 
         press(app, "alt+a")
-        app.choose(PANEL, "color_by/##value", "rising##rising")
+        app.choose(PANEL, "color_by/##value", "###rising")
         app.settle()
         color, laid, _ = shown(app)
         assert (color, laid - before) == ("rising", 4 * 400 * 400), "a number a point, and nothing else"

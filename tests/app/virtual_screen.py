@@ -169,8 +169,11 @@ class RunningApp:
         """Act on a window's widgets by their names, when all events so far were taken in.
 
         window: its name; a part of it that scrolls by itself has its own below that. actions: methods of
-        TestContext of ImGui's test engine and their arguments, as ("item_click", "Time each pass").
+        TestContext of ImGui's test engine and their arguments, as ("item_click", "Time each pass"). Sections
+        of the panel are opened before.
         """
+        if window == PANEL:
+            actions = (("item_open_all", ""), *actions)
         problem = self._ask(window, *actions).problem
         assert not problem, f"{window}: {actions}: {problem}"
 

@@ -41,6 +41,7 @@ from .notices import Notices
 from .output.capture import Capture
 from .output.exporting import Exporting
 from .output.replaying import Replayer
+from .panel import Panel
 from .playing.ahead import Ahead
 from .playing.playback import Playback
 from .scene.bookmarks import Bookmarks
@@ -71,7 +72,8 @@ class App:
     keeping: keeps what is to come back at the next start.
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
     and films at other sizes.
-    commands: all that can be done. keys: which do what. tools: what is in their folder. help: its open pages.
+    panel: at the right. commands: all that can be done. keys: which do what.
+    tools: what is in their folder. help: its open pages.
     theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
     tasks: work that goes on beside it. counting: of the points that are shown.
     """
@@ -133,6 +135,7 @@ class App:
         self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
         self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
+        self.panel = Panel(remembered.panel)
         self.capture: Capture = Capture(self.session, self.playback, self.viewport, self.note)
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(
@@ -272,6 +275,7 @@ class App:
             marks=self.marks.shown, cube=self.steering.cube.is_shown,
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
+            panel=self.panel.chosen,
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import escape, menu, panel
+from . import escape, menu
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .app import App
 
 Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
-_PANEL_WIDTH = 21.0  # in heights of the font
+_GRIP = 0.4  # width of what resizes the panel, in heights of the font
 _BAR_HEIGHT = 4.8
 # No background: the window is filled with the panels' colour before.
 _STILL = (
@@ -61,13 +61,20 @@ def _draw_parts(app: App) -> tuple[Place, float]:
         top = _draw_head(app, whole.x)
     em = imgui.get_font_size()
     # Whole numbers, so that the picture's edges fall on pixels.
-    width = max(1, int(whole.x - min(_PANEL_WIDTH * em, 0.5 * whole.x)))
+    width = max(1, int(whole.x - min(app.panel.width * em, 0.5 * whole.x)))
     bottom = int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y))
     height = max(1, bottom - top)
     view_and_head = _draw_view(app, top, width, height)
     with app.failures.told("The panel"):
-        _place("panel", width, top, whole.x - width, height)
-        panel.draw(app)
+        grip = int(_GRIP * em)
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+        imgui.push_style_var(imgui.StyleVar_.window_min_size, ImVec2(1, 1))
+        _place("grip", width, top, grip, height)
+        imgui.pop_style_var(2)
+        app.panel.draw_grip(height)
+        imgui.end()
+        _place("panel", width + grip, top, whole.x - width - grip, height)
+        app.panel.draw(app)
         imgui.end()
     with app.failures.told("The timeline"):
         _place("timeline", 0, bottom, whole.x, whole.y - bottom)

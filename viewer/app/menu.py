@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from . import theme
+from . import theme, widgets
 from .commands import Command, Entry, Listing, Menu
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def _draw_button(app: App, command: Command[App]) -> None:
     if is_on:
         imgui.pop_style_color()
     imgui.end_disabled()
-    imgui.set_item_tooltip(app.keys.hint(command.name))
+    widgets.tooltip(app.keys.hint(command.name))
 
 
 def _draw(app: App, entry: Entry[App]) -> None:

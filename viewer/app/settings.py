@@ -35,7 +35,9 @@ from ..look import COLOR_BY, Look
 from ..output.marks import Marks
 from ..params import describe
 from . import theme
+from .files.scans import MOST_RECENT
 from .output.export_plan import Choices
+from .panel import PanelChoices
 from .place import Place
 from .playing.player import Pace
 from .scene import legend, turntable
@@ -44,7 +46,6 @@ from .session import Session
 T = TypeVar("T")
 FORMAT = 1
 FILE = "settings.json"
-MOST_RECENT = 15
 _MOST_BYTES = 32 * 2**20  # of the file
 ThemeName = Annotated[str, Kind("a theme", theme.PALETTES.__contains__)]
 TextScale = Annotated[float, Kind("a size of text", theme.TEXT_SCALES.__contains__)]
@@ -81,6 +82,7 @@ class Settings:
     its `Params`. marks: over the view. cube: whether the orientation cube is shown. turn_seconds: of the
     turntable. export, export_marks: of the export dialog. recent: the scans opened last, newest first.
     places: what earlier versions kept here of each scan, whose documents have files of their own now.
+    panel: its width, and which of its sections are open.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
     """
 
@@ -98,6 +100,7 @@ class Settings:
     export_marks: Marks = field(default_factory=Marks)
     recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
     places: Mapping[str, SavedSession] = field(default_factory=dict)
+    panel: PanelChoices = field(default_factory=PanelChoices)
     tools: Annotated[Mapping[str, Mapping[str, Any]], ReadBy(_read_tools)] = field(default_factory=dict)
 
     @classmethod

@@ -133,4 +133,4 @@ class Tasks:
         imgui.same_line()
         if imgui.button(f"Cancel##{id(task)}"):
             self.cancel(task)
-        imgui.set_item_tooltip("Cancel (Esc)" if task in self.ended_by_escape else "Cancel")
+        widgets.tooltip("Cancel (Esc)" if task in self.ended_by_escape else "Cancel")

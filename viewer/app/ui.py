@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from . import widgets
 from .keys import Keys
 
 
@@ -16,7 +17,7 @@ class Ui:
     def tooltip(self, text: str, command: str) -> None:
         """Explain the last widget, and name the keys of the command that does the same."""
         keys = self._keys.of[command]
-        imgui.set_item_tooltip(text + (f" ({keys})" if keys else ""))
+        widgets.tooltip(text + (f" ({keys})" if keys else ""))
 
     def button_size(self, count: int) -> ImVec2:
         """The size of a button of which so many stand in a row."""

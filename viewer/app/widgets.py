@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -21,24 +21,46 @@ T = TypeVar("T")
 _LABEL_SHARE = 0.46  # of the width
 _DIALOG_WIDTH = 34.0  # in heights of the font
 _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
+_TOOLTIP = 60  # characters of a line
+_NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+_FACTS = 6.0  # where facts begin, in heights of the font
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
-def edit(values: T, defaults: T, choices: Mapping[str, Mapping[str, str]] | None = None) -> T:
-    """A row for each parameter that matters beside the others, under the headings of their groups: label,
-    widget, and what resets it where it is not its default. The same object while nothing is edited.
+def edit(
+    values: T,
+    defaults: T,
+    choices: Mapping[str, Mapping[str, str]] | None = None,
+    hidden: Collection[str] = (),
+) -> T:
+    """A row for each parameter that matters beside the others: label, widget, and what resets it where it is
+    not its default; those that are not basic under "Advanced", which is closed at first, and the headings of
+    their groups. The same object while nothing is edited.
 
-    choices: words to choose from and their titles, for parameters that declare none.
+    choices: words to choose from and their titles, for parameters that declare none. hidden: names of
+    parameters that stand elsewhere.
     """
-    group = ""
-    for parameter in describe(type(values)):
-        if not parameter.matters(values):
-            continue
-        if parameter.group != group:
-            group = parameter.group
-            imgui.separator_text(group)
+    shown = [one for one in describe(type(values)) if one.matters(values) and one.name not in hidden]
+    basic = [one for one in shown if one.basic]
+    values = _edit_rows(basic, values, defaults, choices or {})
+    if len(basic) < len(shown) and imgui.tree_node_ex(f"Advanced##{type(values).__qualname__}", _NO_PUSH):
+        group = ""
+        for parameter in shown:
+            if parameter.basic or not parameter.matters(values):
+                continue
+            if parameter.group != group:
+                group = parameter.group
+                imgui.separator_text(group)
+            values = _edit_rows([parameter], values, defaults, choices or {})
+    return values
+
+
+def _edit_rows(
+    parameters: Iterable[Parameter], values: T, defaults: T, choices: Mapping[str, Mapping[str, str]]
+) -> T:
+    for parameter in parameters:
         old, default = (getattr(each, parameter.name) for each in (values, defaults))
-        new = _edit_row(parameter, old, default, (choices or {}).get(parameter.name, {}))
+        new = _edit_row(parameter, old, default, choices.get(parameter.name, parameter.words))
         if new != old:
             values = replace(values, **{parameter.name: new})  # type: ignore[type-var]
     return values
@@ -60,8 +82,8 @@ def _edit_row(parameter: Parameter, value: Any, default: Any, words: Mapping[str
 
 
 def _in_words(parameter: Parameter) -> str:
-    """Words on what a parameter does, and which key switches it."""
-    return parameter.help + (f" ({parameter.key})" if parameter.key else "")
+    """Words on what a parameter does, its identifier, and which key switches it."""
+    return f"{parameter.name}: {parameter.help}" + (f" ({parameter.key})" if parameter.key else "")
 
 
 def _value_in_words(value: Any, titles: Mapping[str, str]) -> str:
@@ -72,13 +94,31 @@ def _value_in_words(value: Any, titles: Mapping[str, str]) -> str:
     return titles.get(value, value) if isinstance(value, str) else f"{value:g}"
 
 
-def label(text: str, tooltip: str = "", gutter: float = 0.0) -> None:
+def tooltip(text: str) -> None:
+    """Explain the last widget, in lines that can be read, while the mouse rests on it."""
+    if imgui.begin_item_tooltip():
+        imgui.push_text_wrap_pos(_TOOLTIP * imgui.calc_text_size("n").x)
+        imgui.text_unformatted(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+
+
+def fact(name: str, text: str) -> None:
+    """A row that tells something: what it is, faint, and its value."""
+    imgui.text_disabled(name)
+    imgui.same_line(_FACTS * imgui.get_font_size())
+    imgui.push_text_wrap_pos(0)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
+
+
+def label(text: str, help: str = "", gutter: float = 0.0) -> None:
     """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end."""
     width = imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
     imgui.text(text)
-    if tooltip:
-        imgui.set_item_tooltip(tooltip)
+    if help:
+        tooltip(help)
     imgui.same_line(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE)
     imgui.set_next_item_width(-1 - gutter)
 
@@ -88,7 +128,7 @@ def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, st
     titles = titles or {}
     if imgui.begin_combo(f"##{name}", titles.get(current, current)):
         for word in words:
-            if imgui.selectable(f"{titles.get(word, word)}##{word}", word == current)[0]:
+            if imgui.selectable(f"{titles.get(word, word)}###{word}", word == current)[0]:
                 current = word
         imgui.end_combo()
     return current
@@ -111,7 +151,7 @@ def _edit(parameter: Parameter, value: Any, words: Mapping[str, str] | None = No
     if parameter.type is bool:
         return imgui.checkbox(name, value)[1]
     if words or parameter.choices:
-        return combo("value", value, list(words or parameter.choices), words)
+        return combo("value", value, list(parameter.choices or words or ()), words)
     if parameter.type is str:
         return _edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
     return _edit_number(name, parameter, value)
@@ -196,16 +236,16 @@ def modal(title: str, is_open: bool) -> Iterator[bool]:
         imgui.end_popup()
 
 
-def flat_button(icon: str, tooltip: str) -> bool:
+def flat_button(icon: str, help: str) -> bool:
     """An icon that is a button without a frame; True when it is pressed."""
     imgui.push_style_color(imgui.Col_.button, 0)
     pressed = imgui.button(icon, ImVec2(imgui.get_frame_height(), 0))
     imgui.pop_style_color()
-    imgui.set_item_tooltip(tooltip)
+    tooltip(help)
     return pressed
 
 
-def icon_button(icon: str, tooltip: str, color: int | None = None) -> bool:
+def icon_button(icon: str, help: str, color: int | None = None) -> bool:
     """A square button with one icon; True when it is pressed. color: 0xRRGGBB of the icon."""
     side = imgui.get_frame_height()
     if color is not None:
@@ -213,5 +253,5 @@ def icon_button(icon: str, tooltip: str, color: int | None = None) -> bool:
     pressed = imgui.button(icon, ImVec2(1.3 * side, side))
     if color is not None:
         imgui.pop_style_color()
-    imgui.set_item_tooltip(tooltip)
+    tooltip(help)
     return pressed

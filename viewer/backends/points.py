@@ -44,6 +44,7 @@ class Params:
         high=_LARGEST,
         unit="px",
         sweep=(0, 1, 2, 4),
+        basic=True,
     )
 
 

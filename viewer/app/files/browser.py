@@ -166,7 +166,7 @@ class Browser:
         imgui.set_next_item_width(-1)
         returns = imgui.InputTextFlags_.enter_returns_true
         entered, self._text = widgets.edit_path("##path", self._text, returns)
-        imgui.set_item_tooltip("A folder, a file, or a pattern such as frame%04d.ply; Enter goes there")
+        widgets.tooltip("A folder, a file, or a pattern such as frame%04d.ply; Enter goes there")
         if entered:
             self._enter_text()
 
@@ -187,7 +187,7 @@ class Browser:
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
                 self._open_again(scan)
                 imgui.close_current_popup()
-            imgui.set_item_tooltip(printable(scan))
+            widgets.tooltip(printable(scan))
         if not scans:
             imgui.text("none")
         imgui.pop_id()

@@ -14,10 +14,11 @@ from ...scan.listing import is_there, named_scans, scans_beside
 from ...scan.open import DEMO
 from ...task import Task, in_background
 from ..session import Session, known_as
-from ..settings import MOST_RECENT
 
 if TYPE_CHECKING:
     from ..commands import Item
+
+MOST_RECENT = 15  # scans that are remembered
 
 
 class Scans:

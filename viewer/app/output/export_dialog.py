@@ -100,7 +100,7 @@ def _edit_marks(marks: Marks, choices: Choices) -> Marks:
     imgui.begin_group()
     for name, title in _MARKS.items():
         marks = replace(marks, **{name: imgui.checkbox(title, getattr(marks, name))[1]})
-        imgui.set_item_tooltip(_HELP[name])
+        widgets.tooltip(_HELP[name])
     imgui.end_group()
     imgui.end_disabled()
     return marks
@@ -110,9 +110,7 @@ def _edit_place(choices: Choices, problems: dict[str, str]) -> Choices:
     widgets.label("Leave out names, paths", _HELP["anonymous"])
     imgui.begin_disabled(choices.format == MP4)
     anonymous = imgui.checkbox("##anonymous", choices.anonymous)[1]
-    imgui.set_item_tooltip(
-        "A film tells nothing of its scan" if choices.format == MP4 else _HELP["anonymous"]
-    )
+    widgets.tooltip("A film tells nothing of its scan" if choices.format == MP4 else _HELP["anonymous"])
     imgui.end_disabled()
     widgets.label("Folder", _HELP["folder"])
     folder = widgets.edit_path("##folder", choices.folder)[1]

@@ -41,7 +41,7 @@ def draw(app: App) -> None:
     if is_wide:
         imgui.same_line()
         imgui.text_disabled(report)
-        imgui.set_item_tooltip(
+        widgets.tooltip(
             "Frames a second that are shown, and that the scan has at this speed; frames that were left out, "
             "as they were not read or drawn at their time"
         )
@@ -80,7 +80,7 @@ def _draw_pace(app: App) -> None:
     titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
     chosen = float(widgets.combo("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
     hints = (app.keys.hint(name) for name in ("slower", "faster", "speed_1"))
-    imgui.set_item_tooltip("Speed of playing. " + ", ".join(hints))
+    widgets.tooltip("Speed of playing. " + ", ".join(hints))
     if chosen != pace.speed:
         app.change_pace(speed=chosen)
     imgui.same_line()
@@ -92,7 +92,7 @@ def _draw_place(playback: Playback) -> None:
     left = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
     imgui.text(_place(timeline.times[index], index, len(timeline)))
-    imgui.set_item_tooltip(timeline.label(index))
+    widgets.tooltip(timeline.label(index))
     widest = max(
         imgui.calc_text_size(_place(time, len(timeline) - 1, len(timeline))).x
         for time in (timeline.times[0], timeline.times[-1])
@@ -183,4 +183,4 @@ def _draw_status(playback: Playback, pointer: Pointer, notices: Notices) -> None
     imgui.same_line()
     imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)
     imgui.text_disabled(name)
-    imgui.set_item_tooltip("\n".join(names))
+    widgets.tooltip("\n".join(names))

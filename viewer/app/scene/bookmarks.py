@@ -114,7 +114,7 @@ class Bookmarks:
         if imgui.selectable(f"{name}##go", self.is_shown(bookmark), 0, ImVec2(room, 0))[0]:
             self.go_to(bookmark)
         if name != bookmark.name:
-            imgui.set_item_tooltip(bookmark.name)
+            widgets.tooltip(bookmark.name)
         imgui.same_line(0, gap)
         if widgets.icon_button(icons.ICON_FA_EDIT, "Rename"):
             self.editing, self._text, self._is_asked = bookmark, bookmark.name, True

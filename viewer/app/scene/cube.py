@@ -12,7 +12,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from numpy.typing import NDArray
 
-from .. import theme
+from .. import theme, widgets
 from . import navigation, orientation
 from .orientation import Direction
 
@@ -90,7 +90,7 @@ def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: b
         delta = imgui.get_io().mouse_delta / (2 * reach)
         steering.move("Turn view", navigation.orbit(camera, delta.x, -delta.y, document.pivot))
     elif under is not None:
-        imgui.set_item_tooltip(f"Look from {orientation.name(under)}")
+        widgets.tooltip(f"Look from {orientation.name(under)}")
 
 
 def draw(cube: OrientationCube, document: Document, palette: theme.Palette, size: ImVec2) -> None:

@@ -81,6 +81,14 @@ class Steering:
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
             self._session.change("Look from there", camera=turned, pivot=None)
 
+    def set_up(self, up: str) -> None:
+        """Say which axis of the scan is up, a name of `AXES`, and show all of it upright, from the front."""
+        pose, camera = self._playback.pose, self._session.document.camera
+        look = replace(self._session.document.look, up=up)
+        if pose and camera:
+            camera = navigation.view_from(0, 0, camera, self.bounds(pose), self._viewport.aspect, up)
+        self._session.change("Turn upright", look=look, camera=camera, pivot=None)
+
     def project(self, projection: str) -> None:
         """Show the same in a projection of `camera.PROJECTIONS`."""
         if camera := self._session.document.camera:

@@ -21,7 +21,7 @@ from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
 from .values import give_value
 
-TITLE = "Auto splats"
+TITLE = "Smooth surface"
 BLENDS = True
 FINDS_NORMALS = True
 
@@ -53,6 +53,8 @@ class Params:
         low=3,
         high=MOST_NEIGHBORS,
         sweep=(6, 10, 20),
+        title="Smoothing",
+        basic=True,
         group=_NEIGHBORS,
     )
     adaptive: bool = param(
@@ -95,7 +97,7 @@ class Params:
         False, "Splats are longer where neighbors are farther apart, else round", group=_SPLATS
     )
     radius_scale: float = param(
-        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group=_SPLATS
+        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group=_SPLATS, basic=True
     )
     refine: bool = param(
         True,

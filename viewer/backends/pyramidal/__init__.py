@@ -28,7 +28,7 @@ from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
 from .views import MODES, ViewSource
 
-TITLE = "Pyramidal projection"
+TITLE = "Filled surface"
 FILLS = True
 BLENDS = True
 
@@ -52,7 +52,15 @@ _LEVELS, _HIDDEN, _VIEWS, _SMOOTHING = "Levels", "Hidden points", "Range images"
 class Params:
     """Parameters of pyramidal projection."""
 
-    fill: bool = param(True, "Fill holes from coarser levels", key="H", group=_LEVELS, sweep=(True, False))
+    fill: bool = param(
+        True,
+        "Fill holes from coarser levels",
+        key="H",
+        group=_LEVELS,
+        sweep=(True, False),
+        title="Fill holes",
+        basic=True,
+    )
     level_0: bool = param(True, "Show what was measured", key="0", group=_LEVELS)
     level_1: bool = param(True, "Fill from half the size", key="1", group=_LEVELS, when=_FILLING)
     level_2: bool = param(True, "Fill from a quarter of the size", key="2", group=_LEVELS, when=_FILLING)
@@ -95,6 +103,8 @@ class Params:
         True,
         "Leave out samples seen through the holes of a nearer surface",
         key="Shift+H",
+        title="Hide what lies behind",
+        basic=True,
         group=_HIDDEN,
         sweep=(True, False),
     )

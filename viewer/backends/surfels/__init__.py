@@ -30,7 +30,7 @@ from .splats import FRAGMENT, SURFEL, Splats
 from .subpixel import average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, splat
 
-TITLE = "Surfels"
+TITLE = "Discs"
 BLENDS = FILLS = True
 
 _SORTED = {"passes": ("sorted",)}
@@ -98,7 +98,7 @@ class Params:
         group="Splats",
     )
     radius_scale: float = param(
-        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group="Splats"
+        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group="Splats", basic=True
     )
     mask_falloff: float = param(
         4.0,

@@ -104,6 +104,8 @@ class Params:
         "What octants look like. discs: a piece of the surface, at the mean position and along the mean "
         "normal of what they hold; cubes: the octant, lit by the mean normal; flat_cubes: lit by its faces",
         choices=("discs", *_CUBES),
+        words={"discs": "Pieces of the surface", "cubes": "Cubes", "flat_cubes": "Flat cubes"},
+        basic=True,
         affects="derive",
         group="Octants",
     )
@@ -135,7 +137,14 @@ class Params:
         when={"shape": _CUBES},
     )
     max_depth: int = param(
-        DEEPEST, "The deepest level drawn", low=0, high=DEEPEST, sweep=(6, 7, 8, 9, 10, 11), group="Octants"
+        DEEPEST,
+        "The deepest level drawn",
+        low=0,
+        high=DEEPEST,
+        sweep=(6, 7, 8, 9, 10, 11),
+        group="Octants",
+        title="Detail",
+        basic=True,
     )
     pixel_threshold: float = param(
         1.0,

@@ -24,7 +24,7 @@ def draw(measuring: Tool, ui: Ui) -> None:
     ui.tooltip("Click two places in the view for their distance", "measure")
     imgui.same_line()
     measuring.filled = imgui.checkbox("Allow filled", measuring.filled)[1]
-    imgui.set_item_tooltip("Also take places where the renderer has filled a hole, and no point was measured")
+    widgets.tooltip("Also take places where the renderer has filled a hole, and no point was measured")
     _draw_unit(measuring)
     for number, reading in enumerate(measuring.readings()):
         imgui.push_id(number)
@@ -50,7 +50,7 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
     right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
     imgui.text(f"{number + 1}:  {distance_words(reading, measuring.desk.unit)}")
-    imgui.set_item_tooltip(_details(reading, measuring.desk.unit))
+    widgets.tooltip(_details(reading, measuring.desk.unit))
     imgui.same_line(right - 1.3 * imgui.get_frame_height())
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
     words = snap_words(reading)
@@ -58,7 +58,7 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
         words += f", {reading.motion}"
     imgui.text_disabled(widgets.fitted(words, imgui.get_content_region_avail().x))
     if reading.fixed and len(measuring.desk.timeline) > 1:
-        imgui.set_item_tooltip(f"Fixed in space: {reading.fixed}")
+        widgets.tooltip(f"Fixed in space: {reading.fixed}")
     return is_deleted
 
 
@@ -83,11 +83,11 @@ def _draw_outlets(measuring: Tool, ui: Ui) -> None:
     third = ui.button_size(3)
     if imgui.button("Copy", third):
         measuring.copy()
-    imgui.set_item_tooltip("As a table, into the clipboard")
+    widgets.tooltip("As a table, into the clipboard")
     imgui.same_line()
     if imgui.button("Save CSV...", third):
         measuring.ask_to_save()
     imgui.same_line()
     if imgui.button("Clear", third):
         measuring.clear()
-    imgui.set_item_tooltip("Delete all; undo brings them back")
+    widgets.tooltip("Delete all; undo brings them back")

@@ -1,0 +1,27 @@
+"""The panel's section on the renderer: which one draws, and how."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from ...backends import backend, backends
+from .. import widgets
+
+if TYPE_CHECKING:
+    from ...scan.pose import Pose
+    from ..scene.rendering import Rendering
+    from ..session import Session
+
+
+def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
+    """Declare the section."""
+    name, _ = session.document.chosen(pose)
+    imgui.set_next_item_width(-1)
+    chosen = widgets.combo("backend", name, list(backends()), {n: b.title for n, b in backends().items()})
+    widgets.tooltip(f"{name}: {backend(name).help}")
+    if chosen != name:
+        rendering.choose(chosen)
+    _, params = session.document.chosen(pose)
+    rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))

@@ -1,0 +1,91 @@
+"""The panel's section on the scan: which one, what it holds, and what a user can say about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import imgui
+
+from ...files import printable
+from ...geometry import AXES
+from .. import widgets
+from ..files.scans import title
+
+if TYPE_CHECKING:
+    from ...scan.pose import Pose
+    from ..files.scans import Scans
+    from ..keys import Keys
+    from ..playing.playback import Playback
+    from ..scene.steering import Steering
+    from ..session import Session
+
+_ATTRIBUTES = {"colors": "colours", "normals": "normals", "radii": "radii"}
+
+
+@dataclass(frozen=True)
+class ScanSection:
+    """The section, and what it tells of and changes."""
+
+    scans: Scans
+    session: Session
+    playback: Playback
+    steering: Steering
+    keys: Keys
+
+    def draw(self) -> None:
+        """Declare it."""
+        if len(self.scans.listed) > 1:
+            self._draw_scans()
+        else:
+            room = imgui.get_content_region_avail().x
+            imgui.text_unformatted(widgets.fitted(title(self.session.scan), room))
+            widgets.tooltip(printable(self.session.scan))
+        if self.playback.pose is not None:
+            self._draw_facts(self.playback.pose)
+            self._draw_up()
+
+    def _draw_scans(self) -> None:
+        """Declare the list of scans, and buttons to the one before and the next."""
+        gap = imgui.get_style().item_inner_spacing.x
+        for icon, step, name in (
+            (icons.ICON_FA_CHEVRON_LEFT, -1, "previous"), (icons.ICON_FA_CHEVRON_RIGHT, 1, "next"),
+        ):  # fmt: skip
+            hint = self.keys.of[f"{name}_scan"]
+            if widgets.icon_button(icon, f"{name.capitalize()} scan" + (f" ({hint})" if hint else "")):
+                self.scans.step(step)
+            imgui.same_line(0, gap)
+        imgui.set_next_item_width(-1)
+        room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height()
+        if imgui.begin_combo("##scan", widgets.fitted(title(self.session.scan), room)):
+            for number, (name, act, is_open) in enumerate(self.scans.items(self.scans.listed)):
+                if imgui.selectable(f"{name}##{number}", is_open)[0]:
+                    act()
+            imgui.end_combo()
+        widgets.tooltip(printable(self.session.scan))
+
+    def _draw_facts(self, pose: Pose) -> None:
+        dropped = f" ({pose.dropped:,} dropped)" if pose.dropped else ""
+        widgets.fact("Points", f"{pose.count:,}{dropped}")
+        bounds = self.steering.bounds(pose)
+        size = " x ".join(f"{edge:.4g}" for edge in bounds.high - bounds.low)
+        widgets.fact("Size", f"{size} {self.playback.unit}")
+        widgets.fact("Stored", _stored(pose))
+
+    def _draw_up(self) -> None:
+        widgets.label("Up", "The axis of the scan that points up; heights are measured along it")
+        now = self.session.document.look.up
+        chosen = widgets.combo("up", now, tuple(AXES))
+        if chosen != now:
+            self.steering.set_up(chosen)
+
+
+def _stored(pose: Pose) -> str:
+    """Words on what the scan has stored of each point."""
+    cloud = pose.overview
+    names = [words for name, words in _ATTRIBUTES.items() if getattr(cloud, name) is not None]
+    names += [printable(name) for name in cloud.scalars]
+    views = len(pose.views)
+    kind = f"{views} range image{'s' if views > 1 else ''}" if views else "positions"
+    return ", ".join([kind, *names])
