@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("imgui_bundle")
 
-from imgui_bundle import ImVec2, icons_fontawesome_4, imgui
+from imgui_bundle import ImVec2, icons_fontawesome_6, imgui
 
 from viewer import app
 from viewer.app import theme
@@ -119,5 +119,5 @@ def test_every_icon_of_the_window_is_in_its_font(context: Any) -> None:
     sources = [path.read_text(encoding="utf-8") for path in Path(app.__file__).parent.rglob("*.py")]
     names = {name for source in sources for name in re.findall(r"ICON_FA_\w+", source)}
     assert len(names) > 8
-    missing = {name for name in names if not font.is_glyph_in_font(ord(getattr(icons_fontawesome_4, name)))}
+    missing = {name for name in names if not font.is_glyph_in_font(ord(getattr(icons_fontawesome_6, name)))}
     assert missing == set()

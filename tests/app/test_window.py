@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, Screen, running_app
 from written import picture
@@ -320,7 +320,9 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
     app.settle()
     assert difference(Screenshot(app).pixels, before.pixels) == 0
     app.act(
-        PANEL, ("item_input_value", f"{size}/##value", 32), ("item_click", f"{size}/{icons.ICON_FA_UNDO}")
+        PANEL,
+        ("item_input_value", f"{size}/##value", 32),
+        ("item_click", f"{size}/{icons.ICON_FA_ARROW_ROTATE_LEFT}"),
     )
     app.settle()
     assert assert_true_picture(app).description["params"] == {"point_size": 1}, "the default"

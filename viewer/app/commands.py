@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from imgui_bundle import icons_fontawesome_6 as icons
+
 from ..backends import Backend, backends
 from ..errors import InputError, unknown_name
 from ..look import Look
@@ -33,7 +35,7 @@ def _always(doer: Any) -> bool:
 class Command(Generic[T]):
     """Something to do. T is who does it: the app, or a tool.
 
-    name: in the file of keys. title: in menus. short: on the toolbar.
+    name: in the file of keys. title: in menus. short: on the toolbar. icon: beside that.
     key: its usual keys, such as "Ctrl+1", several with a space between; empty: none. repeats: again and again
     while they are held. is_on: whether to tick it, None for what is not on or off. can: whether it can be
     done now. title_now: what the menu says where that changes.
@@ -47,6 +49,7 @@ class Command(Generic[T]):
     is_on: Callable[[T], bool] | None = None
     can: Callable[[T], bool] = _always
     short: str = ""
+    icon: str = ""
     title_now: Callable[[T], str] | None = None
 
 
@@ -60,14 +63,16 @@ class Listing(Generic[T]):
 
 @dataclass(frozen=True)
 class Menu(Generic[T]):
-    """Groups of entries, with a line between them. is_there: whether it is shown."""
+    """Groups of entries, with a line between them. is_there: whether it is shown. icon: on the toolbar."""
 
     title: str
     groups: tuple[tuple[Command[T] | Listing[T] | Menu[T], ...], ...]
     is_there: Callable[[T], bool] = _always
+    icon: str = ""
 
 
 Entry = Command[T] | Listing[T] | Menu[T]
+Toolbar = tuple[tuple["str | Menu[App]", ...], ...]  # groups of names of commands, and of menus
 
 
 def _has_frames(app: App) -> bool:
@@ -106,7 +111,7 @@ def _view(number: int, side: str) -> Command[App]:
     title = side.capitalize()
     return Command(
         f"view_{side}", title, lambda app: app.steering.look_from(*navigation.VIEWS[side]), f"Ctrl+{number}",
-        can=_has_camera, short=title,
+        can=_has_camera,
     )  # fmt: skip
 
 
@@ -165,7 +170,10 @@ def _themes(app: App) -> Iterator[Item]:
 
 _FILE: Menu[App] = Menu("File", (
     (
-        Command("open", "Open...", lambda app: app.browser.show(), "Ctrl+O", short="Open"),
+        Command(
+            "open", "Open...", lambda app: app.browser.show(), "Ctrl+O", short="Open",
+            icon=icons.ICON_FA_FOLDER_OPEN,
+        ),
         Listing("Open recent", lambda app: app.scans.items(app.scans.lately)),
         Listing("Scans", lambda app: app.scans.items(app.scans.listed)),
         Command("next_scan", "Next scan", lambda app: app.scans.step(1), "PageDown", can=_has_scans),
@@ -177,10 +185,14 @@ _FILE: Menu[App] = Menu("File", (
             "save_session", "Save session...", lambda app: app.sessions.ask_to_save(), "Ctrl+Shift+S",
             can=_has_camera,
         ),
-        Command("screenshot", "Screenshot", lambda app: app.capture.screenshot(), "P", short="Screenshot"),
+        Command(
+            "screenshot", "Screenshot", lambda app: app.capture.screenshot(), "P", short="Screenshot",
+            icon=icons.ICON_FA_CAMERA,
+        ),
         Command(
             "record", "Record", lambda app: app.capture.toggle_recording(), "R",
             is_on=lambda app: app.capture.recorder is not None, short="Record",
+            icon=icons.ICON_FA_CIRCLE_DOT,
         ),
         Command(
             "replay", "Replay the recording", lambda app: app.replayer.replay_last(), "Shift+R",
@@ -188,7 +200,7 @@ _FILE: Menu[App] = Menu("File", (
         ),
         Command(
             "export", "Export...", lambda app: app.exporting.ask(), "Ctrl+E",
-            can=lambda app: app.exporting.can,
+            can=lambda app: app.exporting.can, short="Export", icon=icons.ICON_FA_FILM,
         ),
     ),
     (Command("quit", "Quit", lambda app: app.quit(), "Ctrl+Q"),),
@@ -196,11 +208,13 @@ _FILE: Menu[App] = Menu("File", (
 _EDIT: Menu[App] = Menu("Edit", (
     (
         Command(
-            "undo", "Undo", lambda app: app.undo(), "Ctrl+Z", can=_can_undo,
+            "undo", "Undo", lambda app: app.undo(), "Ctrl+Z", can=_can_undo, short="Undo",
+            icon=icons.ICON_FA_ARROW_ROTATE_LEFT,
             title_now=lambda app: f"Undo {app.session.history.undoes or ''}",
         ),
         Command(
-            "redo", "Redo", lambda app: app.redo(), "Ctrl+Y Ctrl+Shift+Z", can=_can_redo,
+            "redo", "Redo", lambda app: app.redo(), "Ctrl+Y Ctrl+Shift+Z", can=_can_redo, short="Redo",
+            icon=icons.ICON_FA_ARROW_ROTATE_RIGHT,
             title_now=lambda app: f"Redo {app.session.history.redoes or ''}",
         ),
     ),
@@ -225,11 +239,17 @@ _BOOKMARKS: Menu[App] = Menu("Bookmarks", (
     ),
     (Listing("Go to", lambda app: app.bookmarks.items()),),
 ))  # fmt: skip
+_FROM: Menu[App] = Menu(
+    "From", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)
+)
 _VIEW: Menu[App] = Menu("View", (
     (
-        Command("fit", "Fit", lambda app: app.steering.fit(), "F", can=_has_camera, short="Fit"),
+        Command(
+            "fit", "Fit", lambda app: app.steering.fit(), "F", can=_has_camera, short="Fit",
+            icon=icons.ICON_FA_EXPAND,
+        ),
         Command("center", "Centre the point", lambda app: app.steering.center(), "Z", can=_has_camera),
-        Menu("From", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)),
+        _FROM,
         Command(
             "orthographic", "Orthographic", lambda app: app.steering.switch_projection(), "O",
             is_on=lambda app: app.steering.is_orthographic, can=_has_camera,
@@ -305,9 +325,11 @@ _HELP: Menu[App] = Menu("Help", (
     ),
 ))  # fmt: skip
 _MENUS: tuple[Menu[App], ...] = (_FILE, _EDIT, _VIEW, _TOOLS, _HELP)
-_TOOLBAR: tuple[tuple[str, ...], ...] = (
-    ("open",), ("fit",), tuple(f"view_{side}" for side in navigation.VIEWS), ("screenshot", "record"),
-)  # fmt: skip
+# Before what tools put there, and after it.
+_TOOLBAR_BEGIN: Toolbar = (
+    ("open", "fit", Menu("View", (*_FROM.groups, (_TURNTABLE, _BOOKMARKS)), icon=icons.ICON_FA_EYE)),
+)
+_TOOLBAR_END: Toolbar = (("screenshot", "export", "record"), ("undo", "redo"))
 _MOUSE: tuple[tuple[str, str], ...] = (
     ("Left drag", "Orbit"),
     ("Middle drag, Shift+left drag", "Pan"),
@@ -329,13 +351,13 @@ def _commands(entry: Entry[T]) -> Iterator[Command[T]]:
 class Commands:
     """The table: the window's own commands, and those that were added to it.
 
-    menus: in their order. toolbar: groups of names. mouse: how, and what it does. of: name -> command, the
+    menus: in their order. mouse: how, and what it does. of: name -> command, the
     window's own first. tool_of: name -> the name of the tool that it is of; without the window's own.
     """
 
     def __init__(self) -> None:
         self.menus = _MENUS
-        self.toolbar = _TOOLBAR
+        self._tools_bar: Toolbar = ()
         self.mouse = _MOUSE
         own = [command for menu in _MENUS for command in _commands(menu)]
         own.sort(key=lambda command: command in _SWITCHES.groups[0])  # which have those keys that are left
@@ -365,4 +387,12 @@ class Commands:
             for there in self.menus
         )  # fmt: skip
         if short := tuple(command.name for command in added if command.short):
-            self.toolbar = (*self.toolbar, short)
+            more = tuple(entry for entry in entries if isinstance(entry, Menu))
+            drop = (Menu("", tuple(group for menu in more for group in menu.groups)),) if more else ()
+            self._tools_bar = (*self._tools_bar, (*short, *drop))
+
+    @property
+    def toolbar(self) -> Toolbar:
+        """The toolbar: groups of names of commands, and menus; one without a title drops from the command
+        before it."""
+        return (*_TOOLBAR_BEGIN, *self._tools_bar, *_TOOLBAR_END)

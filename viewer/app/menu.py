@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from . import theme, widgets
-from .commands import Command, Entry, Listing, Menu
+from .commands import Command, Entry, Listing, Menu, Toolbar
 
 if TYPE_CHECKING:
     from .app import App
@@ -26,41 +27,83 @@ def draw_bar(app: App) -> float:
 
 
 def draw_toolbar(app: App) -> None:
-    """Declare the toolbar in the current ImGui window: as many buttons as there is room for."""
-    gap = imgui.get_style().item_spacing.x
+    """Declare the toolbar in the current ImGui window: icons and words, icons alone where there is no room
+    for both, and as many as there is room for."""
+    groups = app.commands.toolbar
     room = imgui.get_content_region_avail().x
-    for group in app.commands.toolbar:
-        if group is not app.commands.toolbar[0]:
-            _draw_line(gap)
-        for name in group:
-            command = app.commands.of[name]
-            width = imgui.calc_text_size(command.short).x + 2 * imgui.get_style().frame_padding.x
-            if imgui.get_cursor_pos_x() + width > room:
+    has_words = _width(app, groups) <= room
+    for group in groups:
+        if group is not groups[0]:
+            _draw_line()
+        for item in group:
+            text = _text(app, item, has_words)
+            if imgui.get_cursor_pos_x() + _button_width(text) > room:
                 return
-            _draw_button(app, command)
+            if isinstance(item, Menu):
+                _draw_drop(app, item, text)
+            else:
+                _draw_button(app, app.commands.of[item], text)
             imgui.same_line()
 
 
-def _draw_line(gap: float) -> None:
+def _width(app: App, groups: Toolbar) -> float:
+    """The width of a toolbar with words."""
+    gap = imgui.get_style().item_spacing.x
+    widths = [_button_width(_text(app, item, has_words=True)) + gap for group in groups for item in group]
+    return sum(widths) + gap * len(groups)
+
+
+def _button_width(text: str) -> float:
+    return (
+        imgui.calc_text_size(text, hide_text_after_double_hash=True).x + 2 * imgui.get_style().frame_padding.x
+    )
+
+
+def _text(app: App, item: str | Menu[App], has_words: bool) -> str:
+    """The text of a button, and its name after "###"."""
+    if isinstance(item, str):
+        command = app.commands.of[item]
+        icon, words, name = command.icon, command.short, item
+    elif not item.title:
+        return f"{icons.ICON_FA_CARET_DOWN}###more"
+    else:
+        icon, words, name = item.icon, f"{item.title} {icons.ICON_FA_CARET_DOWN}", item.title
+    return f"{icon}  {words}###{name}" if has_words and icon else f"{icon or words}###{name}"
+
+
+def _draw_line() -> None:
     """Between groups of buttons."""
+    gap = imgui.get_style().item_spacing.x
     imgui.same_line(0, 2 * gap)
     top = imgui.get_cursor_screen_pos() - ImVec2(gap, 0)
     bottom = top + ImVec2(0, imgui.get_frame_height())
     imgui.get_window_draw_list().add_line(top, bottom, imgui.get_color_u32(imgui.Col_.separator))
 
 
-def _draw_button(app: App, command: Command[App]) -> None:
+def _draw_button(app: App, command: Command[App], text: str) -> None:
     is_on = command.is_on is not None and command.is_on(app)
     imgui.begin_disabled(not command.can(app))
     if is_on:
         imgui.push_style_color(imgui.Col_.text, theme.packed(app.palette.accent))
-    if imgui.button(command.short):
+    if imgui.button(text):
         with app.failures.told(command.title):
             command.act(app)
     if is_on:
         imgui.pop_style_color()
     imgui.end_disabled()
     widgets.tooltip(app.keys.hint(command.name))
+
+
+def _draw_drop(app: App, menu: Menu[App], text: str) -> None:
+    """A button that a menu drops from; one without a title stands close to the button before it."""
+    if not menu.title:
+        imgui.same_line(0, 1)
+    if imgui.button(text):
+        imgui.open_popup(f"drop {menu.title}")
+    imgui.set_next_window_pos(ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y))
+    if imgui.begin_popup(f"drop {menu.title}"):
+        _draw_groups(app, menu)
+        imgui.end_popup()
 
 
 def _draw(app: App, entry: Entry[App]) -> None:

@@ -150,4 +150,4 @@ def add_fonts() -> None:
     fonts.add_font_from_file_ttf(str(_FONTS / "Roboto" / "Roboto-Regular.ttf"), _FONT_SIZE)
     icons = imgui.ImFontConfig()
     icons.merge_mode = True
-    fonts.add_font_from_file_ttf(str(_FONTS / "fontawesome-webfont.ttf"), 0.85 * _FONT_SIZE, icons)
+    fonts.add_font_from_file_ttf(str(_FONTS / "Font_Awesome_6_Free-Solid-900.otf"), 0.85 * _FONT_SIZE, icons)

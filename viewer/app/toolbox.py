@@ -109,7 +109,7 @@ class Toolbox:
         return Command(
             entry.name, entry.title, lambda _: self._ask(slot, entry.act, self.note), entry.key,
             entry.repeats, None if is_on is None else lambda _: bool(self._ask(slot, is_on)),
-            lambda _: bool(self._ask(slot, entry.can)), entry.short,
+            lambda _: bool(self._ask(slot, entry.can)), entry.short, entry.icon,
         )  # fmt: skip
 
     def _items(self, slot: Slot, listing: Listing[Any]) -> Iterator[Item]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from imgui_bundle import ImVec2, imgui
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..files import printable
 from ..look import rgba
@@ -75,7 +75,7 @@ def _edit_row(parameter: Parameter, value: Any, default: Any, words: Mapping[str
     if value != default:
         imgui.same_line(imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x - gutter)
         text = _value_in_words(default, words)
-        if flat_button(icons.ICON_FA_UNDO, f"Back to the default, {text}"):
+        if flat_button(icons.ICON_FA_ARROW_ROTATE_LEFT, f"Back to the default, {text}"):
             new = default
     imgui.pop_id()
     return new

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...document.recording import is_recording
 from ...document.saved_session import is_session

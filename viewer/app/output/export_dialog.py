@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ...output.export import numbered
@@ -140,7 +140,7 @@ def _draw_problems(problems: dict[str, str], *names: str) -> None:
 
 
 def _warn(text: str) -> None:
-    imgui.text_wrapped(f"{icons.ICON_FA_EXCLAMATION_TRIANGLE}  {text}")
+    imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {text}")
 
 
 # --- the end of it --------------------------------------------------------------------------

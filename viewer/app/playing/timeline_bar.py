@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
 from .. import theme, widgets
@@ -52,10 +52,10 @@ def _draw_steps(app: App) -> None:
     """Buttons that go somewhere or start to."""
     playing = app.playback.player.playing
     for icon, name in (
-        (icons.ICON_FA_FAST_BACKWARD, "first"),
-        (icons.ICON_FA_STEP_BACKWARD, "back"),
+        (icons.ICON_FA_BACKWARD_FAST, "first"),
+        (icons.ICON_FA_BACKWARD_STEP, "back"),
         (icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY, "play"),
-        (icons.ICON_FA_STEP_FORWARD, "next"),
+        (icons.ICON_FA_FORWARD_STEP, "next"),
     ):
         _draw_button(app, icon, name)
 
@@ -71,7 +71,7 @@ def _draw_pace(app: App) -> None:
     """Declare how it plays."""
     pace, accent = app.session.pace, app.palette.accent
     for icon, name, about in (
-        (icons.ICON_FA_REDO, "loop", ": play round the end"),
+        (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": play round the end"),
         (icons.ICON_FA_BACKWARD, "reverse", ""),
         (icons.ICON_FA_FILM, "every_frame", ", however long it takes, rather than keep time"),
     ):

@@ -9,7 +9,7 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...document.document import Bookmark
 from .. import widgets
@@ -116,7 +116,7 @@ class Bookmarks:
         if name != bookmark.name:
             widgets.tooltip(bookmark.name)
         imgui.same_line(0, gap)
-        if widgets.icon_button(icons.ICON_FA_EDIT, "Rename"):
+        if widgets.icon_button(icons.ICON_FA_PEN_TO_SQUARE, "Rename"):
             self.editing, self._text, self._is_asked = bookmark, bookmark.name, True
         imgui.same_line(0, gap)
         return widgets.icon_button(icons.ICON_FA_TRASH, "Delete")

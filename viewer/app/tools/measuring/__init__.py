@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ....analysis.measure import End, Measurement, Reading, reading_of, save_table, table, to_text
@@ -229,6 +230,7 @@ COMMANDS = {
         Command(
             "measure", "Measure", Tool.toggle, "M",
             is_on=lambda tool: tool.is_active, can=lambda tool: tool.desk.document.camera is not None,
+            short="Measure", icon=icons.ICON_FA_RULER,
         ),
         Menu("Measurements", (
             (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from imgui_bundle import icons_fontawesome_4 as icons
+from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ....analysis.measure import End, Reading
