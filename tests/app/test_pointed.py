@@ -32,6 +32,11 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
     ]
 
 
+def test_it_says_where_another_surface_may_be_meant() -> None:
+    words = [describe_pick(Picked(np.zeros(3), level=0, doubt=doubt), "", "m", 1.0) for doubt in (0.04, 0.06)]
+    assert [("at an outline" in some) for some in words] == [False, True]
+
+
 def test_what_was_filled_is_no_point() -> None:
     assert describe_pick(Picked(np.zeros(3), level=2), "frame 1/1", "units", 1.0)[1:] == [
         "frame 1/1",

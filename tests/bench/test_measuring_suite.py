@@ -31,17 +31,7 @@ from viewer.scan.pose import Pose
 
 SIZE = (400, 300)
 COUNT = 300_000
-
-
-# What ± holds where that is not 93 to 98 %, by scene and renderer: the dragon's folds lie close behind one
-# another, and at their outlines a splat shows one where another is.
-MISSED = {("dragon-100k", "points"): 90.9, ("dragon-100k", "surfels"): 92.0}
-CELLS = [
-    pytest.param(
-        *cell, marks=[pytest.mark.xfail(strict=True, reason=f"{MISSED[cell]} %")] if cell in MISSED else []
-    )
-    for cell in product(SCENES, DRAWN)
-]
+VIEWS, PAIRS = 4, 400
 
 
 @cache
@@ -51,7 +41,7 @@ def scanned(scene: str, data: Path) -> tuple[Subject, Moment]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scene", "name"), CELLS)
+@pytest.mark.parametrize(("scene", "name"), [*product(SCENES, DRAWN)])
 def test_the_true_distance_is_within_what_is_said_in_95_percent(
     renderer: Renderer, data_dir: Path, scene: str, name: str
 ) -> None:
@@ -61,10 +51,11 @@ def test_the_true_distance_is_within_what_is_said_in_95_percent(
             renderer,
             moment.pose,
             moment.truth,
-            zoomed(moment.truth, zoom, 2, SIZE, subject.up),
+            zoomed(moment.truth, zoom, VIEWS, SIZE, subject.up),
             SIZE,
             name,
             DRAWN[name],
+            pairs=PAIRS,
         )
         for zoom in ZOOMS
     ]

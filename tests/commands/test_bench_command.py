@@ -157,6 +157,13 @@ def test_two_files_of_one_name_are_refused(refused: Refused, tmp_path: Path) -> 
     assert "ball.ply" in refused("bench", "--scene", *files, "-o", tmp_path / "out")
 
 
+def test_measuring_takes_the_scenes_that_are_named(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "ball.obj"
+    done = run("bench", "--suite", "measuring", "--scene", file, "-o", tmp_path / "out")
+    assert done.code == 2
+    assert f"{file} is left out" in done.err
+
+
 @pytest.mark.slow
 def test_a_damaged_scene_is_left_out_and_the_others_are_measured(run: Run, tmp_path: Path) -> None:
     models = tmp_path / "data" / "models"

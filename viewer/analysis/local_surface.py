@@ -29,6 +29,8 @@ _THICK = 0.2
 _NOISES = (0.0, *(10.0 ** (n / 2) for n in range(-6, 5)))  # variances that are tried, of noise to bending
 _EXACT = 1e-9  # of the bending, added where there is no noise: so that rounding does not count
 _ASIDE = 0.5  # pixels to each side, between which the slope is taken
+_TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+_DIRECTIONS = np.stack([np.cos(_TURNS), np.sin(_TURNS)])  # all round, (2, 48)
 
 Float = NDArray[np.float64]
 
@@ -38,12 +40,15 @@ class LocalSurface(NamedTuple):
 
     depth: there, scan units. slope: (2,) change of depth per pixel to the right and down. deviation: standard
     deviation of `depth`, scan units. used: (n,) numbers of the points that told it, the nearest first.
+    doubt: the chance that another surface is seen there, 0 to 1: the pixel lies beyond points of this one,
+    which may end before it, or of one before it, which may not. `deviation` holds how far apart they are.
     """
 
     depth: float
     slope: Float
     deviation: float
     used: NDArray[np.intp]
+    doubt: float = 0.0
 
 
 def local_surface(
@@ -54,23 +59,40 @@ def local_surface(
     pixel: (2,) coordinates, the centre being at a half. about: (3,) a place of the surface near there, the
     nearest points to which are looked at first. positions: (N, 3), in front of the eye; both relative to the
     view's origin. seen: the number of the point that has to belong to it. Where that surface ends or bends
-    away before the pixel, which a splat beyond its edge shows, it is the one behind.
+    away before the pixel, which a splat beyond its edge shows, it is the one behind. Where it may end there,
+    it is the likelier of both.
     """
     if len(positions) < LEAST:
         return None
     pixels, depths = view.project(positions)
-    found, reach = _fitted(view, pixel, about, positions, pixels - pixel, depths, seen)
-    for _ in range(_BEHIND):
-        if found is not None or not reach:
+    front = None
+    for _ in range(_BEHIND + 1):
+        found, reach = _fitted(view, pixel, about, positions, pixels - pixel, depths, seen)
+        if front is not None:
+            return _either(front, found)
+        if found is not None:
+            if not found.doubt:
+                return found
+            front = found
+        if not reach:
             break
         # Of what lies farther back, what the picture has nearest to the pixel.
-        behind = depths > view.depths(about) + reach
+        behind = depths > (view.depths(about) if front is None else front.depth) + reach
         if not behind.any():
             break
         seen = int(np.where(behind, np.hypot(*(pixels - pixel).T), np.inf).argmin())
         about = positions[seen]
-        found, reach = _fitted(view, pixel, about, positions, pixels - pixel, depths, seen)
-    return found
+    return front
+
+
+def _either(front: LocalSurface, behind: LocalSurface | None) -> LocalSurface:
+    """The likelier of a surface that may end before the pixel and the one behind it. That it may be the other
+    adds to the variance as much as they are apart, squared, by its chance."""
+    if behind is None:
+        return front
+    likelier, doubt = (front, front.doubt) if front.doubt <= 0.5 else (behind, 1 - front.doubt)
+    apart = np.sqrt(doubt) * (behind.depth - front.depth)
+    return likelier._replace(deviation=float(np.hypot(likelier.deviation, apart)), doubt=doubt)
 
 
 def _fitted(
@@ -105,7 +127,7 @@ def _fitted(
     lean = np.hypot(1, np.linalg.norm(slope) / _footprint(view, start))
     if np.sqrt(np.mean(off[belongs] ** 2)) / lean > _THICK * reach:
         return None, 0.0  # they fill space
-    return _plate(view, offsets[used], depths[used], start, slope, used), 0.0
+    return _plate(view, offsets[used], depths[used], start, slope, used), reach
 
 
 def _parabola(
@@ -139,6 +161,7 @@ def _plate(
     along = np.linalg.cholesky(footprint**2 * np.eye(2) + np.outer(slope, slope))
     sides = _ASIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     flat = np.concatenate([offsets, sides]) @ along
+    doubt = _chance_of_end(flat[: len(offsets)])
     scale = float(np.sqrt((flat**2).sum(axis=1).max()))
     flat, count = flat / scale, len(offsets)
     bending = _bending(flat, flat[:count])
@@ -167,7 +190,19 @@ def _plate(
     known = len(power)
     deviation = scale * np.sqrt(variance * open_ * known / (known - 2))
     slope = scale * np.array([found[1] - found[2], found[3] - found[4]]) / (2 * _ASIDE)
-    return LocalSurface(start + scale * float(found[0]), slope, float(deviation), used)
+    return LocalSurface(start + scale * float(found[0]), slope, float(deviation), used, doubt)
+
+
+def _chance_of_end(flat: Float) -> float:
+    """The chance that a surface ends between its points (n, 2) and the origin. 0 where they lie all round.
+
+    Points by chance, one per s^2, leave out a strip of length s and width d in exp(-d / s) of cases.
+    """
+    beyond = float((-flat @ _DIRECTIONS).min(axis=0).max())  # the way to where points are
+    area = 4 * np.pi * np.sqrt(max(float(np.linalg.det(np.cov(flat.T))), 0.0))  # of an even ellipse
+    if beyond <= 0 or area <= 0:
+        return 0.0
+    return float(-np.expm1(-beyond / np.sqrt(area / len(flat))))
 
 
 def _footprint(view: View, depth: float) -> float:

@@ -43,7 +43,7 @@ class End:
     there, or of the nearest one, None where none is. spacing: distance between the points around it, scan
     units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how the
     place that was meant may lie off the position, squared scan units; None: unknown. neighbors: points around
-    it that it follows, and where they were when it was set.
+    it that it follows, and where they were when it was set. at_outline: as of a `Picked`.
     """
 
     frame: int
@@ -55,6 +55,7 @@ class End:
     level: int
     covariance: tuple[float, float, float, float, float, float] | None = None
     neighbors: tuple[Neighbor, ...] = ()
+    at_outline: bool = False
 
     @classmethod
     def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> End:
@@ -92,6 +93,7 @@ class End:
             level=picked.level,
             covariance=None if covariance is None else _six(covariance),
             neighbors=neighbors,
+            at_outline=picked.at_outline,
         )
 
     @property

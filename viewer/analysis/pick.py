@@ -20,6 +20,7 @@ from ..scan.spacing import ENOUGH, nearest_rows, spacing_at
 from .local_surface import LocalSurface, local_surface
 
 SURE = 1.96  # standard deviations within which 95 % of a normal distribution lie
+LEFT_OUT = 0.05  # the share beyond
 _REACH = 4  # pixels from points to the middle of a gap, where spacings are less
 _GAP = 1.5  # spacings from points to the middle of a gap between them, at most
 _BEHIND = (
@@ -49,6 +50,8 @@ class Picked:
     level: 0 measured, n filled from level n.
     covariance: (3, 3) float64, squared scan units: how the place that was meant may lie off the position, by
     what the points leave open and by the size of the pixel, in which it may be anywhere. None: unknown.
+    doubt: the chance that another surface is meant, before or behind, 0 to 1; the covariance holds it where
+    that one is seen.
     neighbors: points of the surface around it, the nearest first; none where few are seen.
     The fields below are empty where it was filled.
     row: the point's place in the cloud's arrays; the first of several that are shown as one. id: its index
@@ -64,6 +67,7 @@ class Picked:
     level: int
     covariance: NDArray[np.float64] | None = None
     neighbors: tuple[Neighbor, ...] = ()
+    doubt: float = 0.0
     row: int | None = None
     id: int | None = None
     point: NDArray[np.float64] | None = None
@@ -83,6 +87,11 @@ class Picked:
         """How far off the position the place that was meant is at most, along any one line, with 95 %; scan
         units. None where it is unknown."""
         return None if self.covariance is None else largest_deviation(self.covariance)
+
+    @property
+    def at_outline(self) -> bool:
+        """Whether another surface may be meant, in more than the 5 % that are left out of what is said."""
+        return self.doubt > LEFT_OUT
 
     @property
     def measured(self) -> bool:
@@ -136,6 +145,7 @@ def pick(
         _position(surface, pixel, depth if found is None else found.depth),
         level,
         *_told(surface, pixel, found, ids, points),
+        doubt=0.0 if found is None else found.doubt,
         row=row,
         id=id_,
         point=place.points(cloud.world(at)),

@@ -12,6 +12,7 @@ from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from importlib.util import find_spec
 from itertools import chain, count, product
 from pathlib import Path
@@ -22,6 +23,7 @@ from ..bench.defaults import SCENES as DEFAULT_SCENES
 from ..bench.defaults import default_groups
 from ..bench.forecast import forecast
 from ..bench.measuring import NAME as MEASURING
+from ..bench.measuring import SCENES as MEASURED_SCENES
 from ..bench.measuring import measure_distances, write_measuring
 from ..bench.papers.farooq_2013 import pyramids
 from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
@@ -79,14 +81,14 @@ class _PageSuite:
 
     groups: what is drawn, of some scenes. write_page: makes the page of a folder. page: its name. scenes:
     which, unless others are named; None: it has its own. others: what else is measured, by the files of its
-    rows. usual: settings unless told otherwise.
+    rows, given the bench, and the scenes where it has any. usual: settings unless told otherwise.
     """
 
     groups: Callable[[BenchSettings, Sequence[str]], list[Group]]
     write_page: Callable[[Path], Path]
     page: str
     scenes: Sequence[str] | None = None
-    others: Mapping[str, Callable[[Bench], Iterator[Row]]] = field(default_factory=dict)
+    others: Mapping[str, Callable[..., Iterator[Row]]] = field(default_factory=dict)
     usual: BenchSettings = field(default_factory=BenchSettings)
 
 
@@ -120,8 +122,9 @@ _WITH_PAGES = {
         lambda *_: [],
         write_measuring,
         MEASURING,
+        MEASURED_SCENES,
         others={DISTANCES: measure_distances},
-        usual=BenchSettings(size=(400, 300), views=2, frames=0),
+        usual=BenchSettings(size=(400, 300), views=8, frames=0),
     ),
     "slomp": _PageSuite(lambda *_: slomp.groups(), write_table_two, TABLE_TWO),
     "octrees": _PageSuite(
@@ -271,7 +274,13 @@ def _report(args: Namespace) -> None:
 
 def _others(args: Namespace) -> Mapping[str, Callable[[Bench], Iterator[Row]]]:
     """Other measurements of a suite than pictures of scenes, by the files of their rows."""
-    return _WITH_PAGES[args.suite].others if args.suite in _WITH_PAGES else {}
+    if args.suite not in _WITH_PAGES:
+        return {}
+    suite = _WITH_PAGES[args.suite]
+    if suite.scenes is None:
+        return suite.others
+    scenes = args.scene or suite.scenes
+    return {name: partial(measure, scenes=scenes) for name, measure in suite.others.items()}
 
 
 def _report_files(args: Namespace) -> list[Path]:

@@ -52,6 +52,8 @@ def describe_pick(picked: Picked, frame: str, unit: str, radius: float) -> list[
     words = [f"{', '.join(f'{v:.{decimals}f}' for v in picked.position)}{sure} {unit}", frame]
     seen = "measured" if picked.measured else f"filled from level {picked.level}"
     words.append(seen if picked.id is None else f"point {picked.id}, {seen}")
+    if picked.at_outline:
+        words.append("at an outline")
     words += [f"{name} {_number(value)}" for name, value in picked.scalars.items()]
     if picked.color is not None:
         words.append("colour #" + "".join(f"{channel:02x}" for channel in picked.color[:3]))

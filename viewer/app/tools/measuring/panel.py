@@ -75,6 +75,7 @@ def _end_words(end: End, unit: str) -> str:
     place = ", ".join(f"{v:.9g}" for v in end.position)
     spacing = "unknown" if end.spacing is None else f"{end.spacing:.3g} {unit}"
     seen = f", filled from level {end.level}" if end.level else ""
+    seen += ", at an outline: it may be the surface before or behind" if end.at_outline else ""
     sure = "" if end.uncertainty is None else f" ± {end.uncertainty:.2g}"
     return f"{what}, frame {end.frame + 1}: {place}{sure} {unit}, spacing {spacing}{seen}"
 
