@@ -16,5 +16,5 @@ vec3 light_of(vec3 roots) { return roundEven(roots * roots * (LIGHT_STEPS / (LIG
 
 vec3 to_roots(vec3 encoded) { return roundEven(sqrt(to_linear(encoded)) * LIGHT_ROOTS); }
 
-// sRGB of a sum of such light, times weights that add up to `total`.
-vec3 srgb_of_light(vec3 sum, float total) { return to_srgb(sum / (LIGHT_STEPS * total)); }
+// sRGB of such light.
+vec3 srgb_of_light(vec3 light) { return to_srgb(light / LIGHT_STEPS); }

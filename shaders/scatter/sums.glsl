@@ -11,5 +11,3 @@ void add(uint cell, float numbers[CHANNELS]) {
         atomicAdd(sums[CHANNELS * cell + k], int(roundEven(number / steps[k])));
     }
 }
-
-float sum_of(uint cell, uint k) { return float(sums[CHANNELS * cell + k]) * steps[k]; }

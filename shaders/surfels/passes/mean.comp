@@ -5,6 +5,7 @@
 #include "common/view.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
+#include "common/split.glsl"
 #include "scatter/sums.glsl"
 #include "surfels/passes/look.glsl"
 #include <params>
@@ -15,6 +16,12 @@ layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_nor
 layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors[]; };
 #endif
 
+// Three of a cell's sums, from the k-th on: whole numbers, in steps of one.
+ivec3 sums_from(uint cell, uint k) {
+    uint at = CHANNELS * cell + k;
+    return ivec3(sums[at], sums[at + 1u], sums[at + 2u]);
+}
+
 void main() {
     uint i = item();
     if (i >= list_count) return;
@@ -23,15 +30,16 @@ void main() {
     for (uint k = 0u; k < CHANNELS; ++k) sums[CHANNELS * cell + k] = 0;
 #else
     // The shown splat passes, unless two programs round apart: then it is alone.
-    float count = sum_of(cell, 0u);
-    float mean = count == 0.0 || count > MOST ? 0.0 : mean_share;
+    int count = sums[CHANNELS * cell];
+    float mean = count == 0 || count > MOST ? 0.0 : mean_share;
+    uint divisor = uint(max(count, 1));
     uvec2 look = texelFetch(looks, int(texelFetch(rows, int(cell)).r)).xy;
 #if HAS_COLORS
-    vec3 light = vec3(sum_of(cell, 4u), sum_of(cell, 5u), sum_of(cell, 6u)) / max(count, 1.0);
-    own_colors[cell] = packUnorm4x8(vec4(srgb_of_light(mix(light_of(look), light, mean), 1.0), 1.0));
+    vec3 light = means_of(sums_from(cell, 4u), divisor);
+    own_colors[cell] = packUnorm4x8(vec4(srgb_of_light(mix(light_of(look), light, mean)), 1.0));
 #endif
-    vec3 sum = vec3(sum_of(cell, 1u), sum_of(cell, 2u), sum_of(cell, 3u));
-    sum = mix(normal_of(look) / NORMAL_STEPS, sum / max(length(sum), 1e-6), mean);
-    for (uint k = 0u; k < 3u; ++k) own_normals[3u * cell + k] = sum[k];
+    vec3 normal = means_of(sums_from(cell, 1u), divisor);
+    normal = mix(normal_of(look) / NORMAL_STEPS, normal / max(length(normal), 1e-6), mean);
+    for (uint k = 0u; k < 3u; ++k) own_normals[3u * cell + k] = normal[k];
 #endif
 }

@@ -19,6 +19,7 @@ void main() {
     ivec2 pixel = ivec2(index % view_size.x, index / view_size.x);
     vec4 light = texelFetch(color_sums, pixel, 0);
     vec3 normal = texelFetch(normal_sums, pixel, 0).xyz;
-    store_mean(index, light.rgb, normal, light.a, OVER != 0 ? light.a : 1.0, row);
+    float total = light.a > 0.0 ? light.a : 1.0;
+    store_mean(index, light.rgb / total, normal / total, light.a > 0.0, OVER != 0 ? light.a : 1.0, row);
     if (uintBitsToFloat(texelFetch(depths, index).r) < 0.0) list[reserve(1u)] = uint(index);
 }

@@ -5,17 +5,16 @@ layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors
 #endif
 layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_normals[]; };
 
-// light, normal: sums of what `look.glsl` gives, times weights that add up to `total`; row: what is
-// shown, where those are nothing. coverage: of the pixel.
-void store_mean(int index, vec3 light, vec3 normal, float total, float coverage, uint row) {
-    if (total == 0.0) {
+// light, normal: means of what `look.glsl` gives; where nothing was added, that of the row that is shown. coverage: of
+// the pixel.
+void store_mean(int index, vec3 light, vec3 normal, bool is_added, float coverage, uint row) {
+    if (!is_added) {
         uvec2 look = texelFetch(looks, int(row)).xy;
         light = light_of(look);
         normal = normal_of(look);
-        total = 1.0;
     }
 #if HAS_COLORS
-    own_colors[index] = packUnorm4x8(vec4(srgb_of_light(light, total), coverage));
+    own_colors[index] = packUnorm4x8(vec4(srgb_of_light(light), coverage));
 #endif
     own_normals[3 * index] = normal.x;
     own_normals[3 * index + 1] = normal.y;

@@ -6,6 +6,7 @@
 #include "surfels/passes/limit.glsl"
 #include "surfels/passes/look.glsl"
 #include "surfels/passes/store.glsl"
+#include "common/split.glsl"
 
 // A float holds the sums of so many discs exactly, an integer those of a whole list (TileLists): the order of a
 // tile's list, which changes from frame to frame, does not show.
@@ -104,6 +105,8 @@ void main() {
     if (tile < 0) return;
     for (int k = 0; k < ROWS; ++k)
         if (shown[k] != NOTHING) {
-            store_mean(index_of(k), vec3(light[k]), vec3(normal[k]), float(total[k]), 1.0, shown[k]);
+            uint count = uint(max(total[k], 1));
+            vec3 mean_light = means_of(light[k], count), mean_normal = means_of(normal[k], count);
+            store_mean(index_of(k), mean_light, mean_normal, total[k] > 0, 1.0, shown[k]);
         }
 }

@@ -97,7 +97,7 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
         points.bind(program)
 
     def run(step: int) -> None:
-        defines = {"STEP": step, "MOST": float(_MOST), **fixed.defines, **bound}
+        defines = {"STEP": step, "MOST": _MOST, **fixed.defines, **bound}
         program = gpu.compute("surfels/passes/mean.comp", defines, params=splats)
         sums.buffer.bind_to_storage_buffer(Storage.SUMS)
         covered.run(program)
