@@ -3,6 +3,29 @@
 
 vec3 surfel_u, surfel_v;  // half edges, view space
 vec3 surfel_center;
+vec4 surfel_part;  // lowest, highest local coordinates of what is drawn of the quad
+
+const float HUGE = 8.0;  // depths of the centre, or heights of the picture
+
+// Of a quad far larger than the picture, what the picture's corners see of it: its own corners would be so far away
+// that float32 resolves pixels there. All of it where the picture shows the plane's horizon.
+vec4 part_in_picture() {
+    vec3 n = cross(surfel_u, surfel_v);
+    vec2 lowest = vec2(1.0), highest = vec2(-1.0);
+    for (int i = 0; i < 4; ++i) {
+        vec2 pixel = vec2(i & 1, i >> 1) * view_size;
+        vec3 from = view_perspective ? vec3(0.0) : from_pixel(pixel, 0.0);
+        vec3 along = view_perspective ? from_pixel(pixel, 1.0) : vec3(0.0, 0.0, -1.0);
+        float t = dot(n, surfel_center - from) / dot(n, along);
+        if (!(abs(t) < UNKNOWN) || (view_perspective && t <= 0.0)) return vec4(-1.0, -1.0, 1.0, 1.0);
+        vec3 off = from + t * along - surfel_center;
+        vec2 local = vec2(dot(off, surfel_u) / dot(surfel_u, surfel_u), dot(off, surfel_v) / dot(surfel_v, surfel_v));
+        lowest = min(lowest, local);
+        highest = max(highest, local);
+    }
+    vec2 margin = 0.01 * (highest - lowest);
+    return clamp(vec4(lowest - margin, highest + margin), -1.0, 1.0);
+}
 
 bool begin_shape(Point point) {
     if (!has_splat(point)) return false;
@@ -25,10 +48,12 @@ bool begin_shape(Point point) {
     vec2 lengths = splat_axes(point, n, depth, u, v);
     surfel_u = mat3(world_to_view) * u * lengths.x;
     surfel_v = mat3(world_to_view) * v * lengths.y;
+    float usual = view_perspective ? depth : view_size.y / view_scale;
+    surfel_part = reach > HUGE * usual ? part_in_picture() : vec4(-1.0, -1.0, 1.0, 1.0);
     return true;
 }
 
 Corner corner(int i) {
-    vec2 local = vec2((i & 1) * 2 - 1, (i >> 1) * 2 - 1);
+    vec2 local = vec2((i & 1) == 0 ? surfel_part.x : surfel_part.z, (i >> 1) == 0 ? surfel_part.y : surfel_part.w);
     return Corner(surfel_center + local.x * surfel_u + local.y * surfel_v, local);
 }
