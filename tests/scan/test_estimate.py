@@ -241,37 +241,44 @@ def test_a_stray_point_gets_no_huge_splat() -> None:
 
 @pytest.mark.parametrize("viewpoint", [None, (0.0, 0.0, -5.0)])
 @pytest.mark.parametrize(
-    "points",
+    ("points", "length"),
     [
-        np.zeros((0, 3)),
-        np.zeros((1, 3)),
-        [[0, 0, 0], [1, 2, 3]],
-        np.full((50, 3), 7.0),
-        np.repeat([[0, 0, 0], [0, 0, 1]], 30, axis=0),
-        np.outer(np.arange(30), [1, 2, 3]),
-        np.outer(np.linspace(0, 1e-6, 30), [1, 0, 0]) + 1,
-        grid(5),
-        grid(5, spacing=1e-12),
-        np.vstack([grid(5), [[1e15, 0, 0]]]),
+        (np.zeros((0, 3)), 0),
+        (np.zeros((1, 3)), 0),
+        ([[0, 0, 0], [1, 2, 3]], 0),
+        (np.full((50, 3), 7.0), 0),
+        (np.repeat([[0, 0, 0], [0, 0, 1]], 30, axis=0), 0),
+        (np.outer(np.arange(30), [1, 2, 3]), 0),
+        (np.outer(np.arange(200), [0.3, 0.1, 0.7]) + 40, 0),
+        (np.outer(np.linspace(0, 1e-6, 30), [1, 0, 0]) + 1, 0),
+        (grid(5), 1),
+        (grid(5, spacing=1e-12), 1),
+        (np.vstack([grid(5), [[1e15, 0, 0]]]), [*[1] * 25, 0]),
     ],
-    ids=["none", "one", "two", "copies", "two places", "line", "short line", "plane", "tiny", "outlier"],
+    ids=[
+        *("none", "one", "two", "copies", "two places"),
+        *("line", "rounded line", "short line", "plane", "tiny", "outlier"),
+    ],
 )
-def test_degenerate_clouds_give_unit_normals_and_positive_radii(
-    points: NDArray, viewpoint: tuple[float, float, float] | None
+def test_degenerate_clouds_give_unit_normals_or_none_and_positive_radii(
+    points: NDArray, length: int | list[int], viewpoint: tuple[float, float, float] | None
 ) -> None:
     cloud = PointCloud.from_arrays(np.asarray(points, np.float64))
     normals, radii = cloud_normals(cloud, viewpoint=viewpoint), cloud_radii(cloud)
     assert normals.shape == (len(points), 3)
-    assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-5)
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(length, abs=1e-5)
     assert radii.shape == (len(points),)
     assert np.isfinite(radii).all()
     assert (radii > 0).all()
 
 
-def test_normals_across_a_line() -> None:
-    direction = np.array([1, 2, 3]) / np.sqrt(14)
-    normals = cloud_normals(PointCloud.from_arrays(np.outer(np.arange(30.0), direction)))
-    assert normals @ direction == pytest.approx(0, abs=1e-3)
+def test_a_line_beside_a_surface_has_no_normals_and_a_bent_one_does() -> None:
+    apart = np.outer(np.arange(60), [0.1, 0.2, 0]) + np.array([1000, 0, 0])
+    normals = cloud_normals(PointCloud.from_arrays(np.concatenate([grid(12), apart])))
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(np.repeat([1, 0], [144, 60]), abs=1e-5)
+    apart[:, 1] += 1e-3 * np.arange(60) ** 2
+    normals = cloud_normals(PointCloud.from_arrays(np.concatenate([grid(12), apart])))
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-5)
 
 
 @pytest.mark.parametrize("viewpoint", [(0, 0), (0, 0, np.nan)])

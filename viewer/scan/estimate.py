@@ -1,7 +1,7 @@
 """Attributes that a scan lacks, estimated from the points alone: normals, radii, fake colours.
 
 Copies of a point count once: estimates are made on distinct positions and handed to the copies.
-So neither a scan full of duplicates nor a handful of points gives NaN, zero or infinity.
+So neither a scan full of duplicates nor a handful of points gives NaN or infinity, or radii of zero.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def cloud_normals(cloud: PointCloud, viewpoint: ArrayLike | None = None) -> NDAr
 
     viewpoint: (3,), where the scanner stood, in absolute scan units: normals face it; None: the cloud's.
     Where nothing tells it, normals face outwards, those of a sheet that can be seen from both sides the front
-    (+z), see `sides`. Where neighbours span no plane, some unit vector across them. Raises InputError where
-    the viewpoint is not finite.
+    (+z), see `sides`. Where all neighbours lie in a line, to rounding, nothing tells a normal: zero, which
+    stands for none. Raises InputError where the viewpoint is not finite.
     """
     eye = cloud.viewpoint if viewpoint is None else checked_viewpoint(viewpoint)
     if not len(cloud):
@@ -65,6 +65,7 @@ def cloud_normals(cloud: PointCloud, viewpoint: ArrayLike | None = None) -> NDAr
         normals = facing_out(points, normals, near[:, :LINKED])
     else:
         normals = facing(normals, eye - cloud.origin - points)
+    normals[_in_lines(points, near)] = 0
     return normals[copies]
 
 
@@ -97,6 +98,18 @@ def fake_color(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
     rgba = np.full((len(normals), 4), 255, np.uint8)
     rgba[:, :3] = np.rint(np.clip(np.nan_to_num(normals) * 0.5 + 0.5, 0, 1) * 255)
     return rgba
+
+
+def _in_lines(points: Vectors, near: NDArray[np.int32]) -> NDArray[np.intp]:
+    """The rows of points (N, 3) that lie in a line with all their neighbours, near (N, K), the farthest last;
+    as far as float32 tells, which points were stored in."""
+    rows = np.arange(len(points))
+    rounding = 4 * _FLOAT.eps * np.maximum(np.abs(points), np.abs(points[near[:, -1]])).max(axis=1)
+    for column in range(1, near.shape[1] - 1):  # most points are told by the first
+        off, along = (points[near[rows, to]] - points[rows] for to in (column, -1))
+        aside = np.linalg.norm(np.cross(off, along), axis=1)
+        rows = rows[aside <= rounding[rows] * np.linalg.norm(along, axis=1)]
+    return rows
 
 
 def _distinct(positions: NDArray[np.float32]) -> tuple[Vectors, NDArray[np.intp]]:
