@@ -35,13 +35,13 @@ BLENDS = True
 _BY_CELLS = "a pixel is filled by whole cells; at their edges the last bit tells which, and what encloses it"
 KEPT = {"fill": "holes of clouds; polygons of dense range views leave few to fill"}
 LIMITS = {
-    "eye inside the cloud": Limit(0.02, _BY_CELLS),
+    "eye inside the cloud": Limit(0.01, _BY_CELLS),
     "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
     "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
-    "coplanar points": Limit(0.02, _BY_CELLS),
-    "collinear points": Limit(0.04, _BY_CELLS),
-    "collinear points end on, perspective": Limit(0.1, NO_SPACING),
-    "collinear points end on, orthographic": Limit(0.1, NO_SPACING),
+    "coplanar points": Limit(0.008, _BY_CELLS),
+    "collinear points": Limit(0.035, _BY_CELLS),
+    "collinear points end on, perspective": Limit(0.08, NO_SPACING),
+    "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
 }
 
 _FILLING = {"fill": (True,)}

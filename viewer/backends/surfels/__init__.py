@@ -39,17 +39,18 @@ _SEEN_THROUGH = (
     "how often a point is there, and of two at one depth by the last bit"
 )
 LIMITS = {
-    "zoomed in on 10^-6 of the scan": Limit(0.01, _SEEN_THROUGH, _SORTED),
-    "zoomed in on 10^-3 of a splat": Limit(0.01, _SEEN_THROUGH, _SORTED),
-    "points x1000, one after the other": Limit(0.2, _SEEN_THROUGH, _SORTED),
-    "points x1000, all over again": Limit(0.2, _SEEN_THROUGH, _SORTED),
-    "points x1000 without radii": Limit(0.4, _SEEN_THROUGH, _SORTED),
-    "one point x1000": Limit(0.05, _SEEN_THROUGH, _SORTED),
-    "collinear points end on, perspective": Limit(0.005, _SEEN_THROUGH, _SORTED),
-    "collinear points end on, orthographic": Limit(0.005, _SEEN_THROUGH, _SORTED),
-    "zero radii": Limit(0.8, _SEEN_THROUGH, _SORTED),
-    "negative radii": Limit(0.8, _SEEN_THROUGH, _SORTED),
-    "NaN radii": Limit(0.8, _SEEN_THROUGH, _SORTED),
+    "zoomed in on 10^-6 of the scan": Limit(0.0, _SEEN_THROUGH, _SORTED),
+    "zoomed in on 10^-3 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
+    "zoomed in on 10^-6 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
+    "points x1000, one after the other": Limit(0.21, _SEEN_THROUGH, _SORTED),
+    "points x1000, all over again": Limit(0.21, _SEEN_THROUGH, _SORTED),
+    "points x1000 without radii": Limit(0.35, _SEEN_THROUGH, _SORTED),
+    "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
+    "collinear points end on, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
+    "collinear points end on, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
+    "zero radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
+    "negative radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
+    "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
 }
 
 _WAYS = ("tiles", *FEEDS)
