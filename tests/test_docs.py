@@ -101,6 +101,28 @@ def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool
     assert page.read_text(encoding="utf-8") == filled
 
 
+def test_each_place_of_a_table_has_what_makes_it() -> None:
+    """A suite of the benchmark, or a script of docs/tables; and none of them makes one without a place."""
+    made = [
+        (suite.PAGE, key)
+        for suite in (scene_table, defaults_page, measuring)
+        for key in suite.tables(
+            [suite.read_measurement(next((ROOT / "docs" / "data").glob(f"{suite.NAME}*")))]
+        )
+    ]
+    for script in (ROOT / "docs" / "tables").glob("*.py"):
+        text = script.read_text(encoding="utf-8")
+        for tables in re.findall(r"remeasure_tables\(PAGE, (.*)\)", text):
+            (page,) = re.findall(r'^PAGE = .*"([\w-]+\.md)"$', text, re.M)
+            made += [(page, key) for key in tables.split(", ")]
+    places = [
+        (page.name, key)
+        for page in DOCS
+        for key in re.findall(r"^<!-- (\w+) -->$", page.read_text(encoding="utf-8"), re.M)
+    ]
+    assert sorted(made) == sorted(places)
+
+
 def commands(text: str) -> list[str]:
     """The lines of the sh blocks, without comments and continued lines joined."""
     lines = "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.S | re.M)).replace("\\\n", " ").splitlines()
