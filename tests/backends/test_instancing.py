@@ -233,6 +233,18 @@ void main() {
 """
 
 
+@pytest.mark.parametrize("passes", ["one", "two", "one_blended", "sorted"])
+def test_statistics_tell_what_feed_really_ran(surfels: Draw, passes: str) -> None:
+    """Uniform blocks bring what the pose stores, and no radii that were found on the GPU, nor sorted points."""
+    camera, bare = CAMERAS["perspective"], replace(CLOUD, radii=None)
+    for cloud, replaced in ((CLOUD, passes == "sorted"), (bare, True)):
+        by = {feed: surfels(cloud, camera, instancing=feed, passes=passes) for feed in ("ubo", "tbo")}
+        told = by["ubo"].stats.chosen.get("instancing", "")
+        assert told.startswith("tbo, in place of ubo") == replaced, told
+        assert "instancing" not in by["tbo"].stats.chosen
+        assert_equal(by["ubo"], by["tbo"])
+
+
 @pytest.mark.parametrize("feed", ["tiles", *FEEDS])
 def test_points_take_what_a_compute_pass_made(renderer: Renderer, tmp_path: Path, feed: str) -> None:
     gpu, count = renderer.gpu, len(CLOUD)

@@ -156,15 +156,9 @@ def amplify(
     """Draw points as shapes, in id order with a strict depth test.
 
     feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth. params: what
-    both find in `<params>`. over: draw over what the surface holds. Statistics tell where another feed has to
-    bring them (`fitting_feed`).
+    both find in `<params>`. over: draw over what the surface holds.
     """
-    gpu = surface.gpu
-    if (fitting := fitting_feed(points, feed)) != feed:
-        surface.stats.chosen["instancing"] = (
-            f"{fitting}, in place of {feed}, which brings whole poses as stored"
-        )
-        feed = fitting
+    gpu, feed = surface.gpu, told_feed(points, feed, surface)
     with gpu.timers.measure("splat"):
         surface.raster().clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -230,6 +224,15 @@ def fitting_feed(points: Points, feed: str) -> str:
     `ubo` and `vbo` where only some are drawn, of all that bring attributes where these are packed."""
     replaced = _ATTRIBUTE_FEEDS if points.packed else _WHOLE if points.rows is not None else ()
     return "tbo" if feed in replaced or (points.buffers and feed == "ubo") else feed
+
+
+def told_feed(points: Points, feed: str, surface: Surface) -> str:
+    """The `fitting_feed`; the surface's statistics tell where it is another."""
+    fitting = fitting_feed(points, feed)
+    if fitting != feed:
+        told = f"{fitting}, in place of {feed}, which brings whole poses as stored"
+        surface.stats.chosen["instancing"] = told
+    return fitting
 
 
 def _attributes(

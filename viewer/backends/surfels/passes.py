@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu import gl
-from ...gpu.amplify import Points, draw_shapes
+from ...gpu.amplify import Points, draw_shapes, told_feed
 from ...gpu.bindings import Texture
 from ...gpu.constants import BEHIND
 from ...gpu.context import Gpu
@@ -59,7 +59,7 @@ def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> N
     Where the first pass finds nothing, the nearest of the enlarged splats fills the pixel, but not beyond
     the outline.
     """
-    gpu, target = surface.gpu, surface.raster()
+    gpu, target, feed = surface.gpu, surface.raster(), told_feed(points, feed, surface)
     with gpu.timers.measure("visibility"):
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -117,7 +117,7 @@ def splat_over(points: Points, surface: Surface, feed: str, splats: Splats, test
 
     tested: whether what was drawn before hides what is behind it, all of a quad and not its mask alone.
     """
-    gpu = surface.gpu
+    gpu, feed = surface.gpu, told_feed(points, feed, surface)
     with _sums(points, surface) as sums, gpu.timers.measure("over"):
         sums.clear()
         sums.clear_depth()
