@@ -22,7 +22,11 @@ from viewer.bench.numerics import (
     rows,
     ways_of,
 )
+from viewer.frame import Request, render_frame
+from viewer.gpu.amplify import FEEDS
+from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
+from viewer.scan.pose import Pose
 
 ROWS = list(rows())
 MOST = 7  # principles that keep rows from holding
@@ -64,6 +68,17 @@ def test_the_ways_of_surfels_are_among_them() -> None:
     ways = ways_of(backends()["surfels"])
     drawn = [backends()["surfels"].params().passes, *(way["passes"] for way in ways if "passes" in way)]
     assert {"one", "two", "sorted"} <= set(drawn) | ({"two"} if "auto" in drawn else set())
+
+
+@pytest.mark.parametrize("name", [name for name in variants() if name.endswith(FEEDS)])
+def test_a_feed_brings_the_points_of_rows(renderer: Renderer, name: str) -> None:
+    """Where another ran in its place, statistics would tell."""
+    backend, setting = of_variant(name)
+    shot = ROWS[0].shot()
+    pose, surface = Pose(0, 0.0, "", shot.cloud()), Surface(renderer.gpu, shot.size)
+    render_frame(renderer, Request(pose, shot.camera, backend, backends()[backend].params(setting)), surface)
+    assert "in place of" not in surface.stats.chosen.get("instancing", "")
+    assert "splat" not in surface.stats.skipped
 
 
 def test_the_shapes_of_voxels_are_among_them() -> None:
