@@ -235,7 +235,7 @@ void main() {
 
 @pytest.mark.parametrize("passes", ["one", "two", "one_blended", "sorted"])
 def test_statistics_tell_what_feed_really_ran(surfels: Draw, passes: str) -> None:
-    """Uniform blocks bring what the pose stores, and no radii that were found on the GPU, nor sorted points."""
+    """Uniform blocks bring what the pose stores: no radii that were found on the GPU, no sorted points."""
     camera, bare = CAMERAS["perspective"], replace(CLOUD, radii=None)
     for cloud, replaced in ((CLOUD, passes == "sorted"), (bare, True)):
         by = {feed: surfels(cloud, camera, instancing=feed, passes=passes) for feed in ("ubo", "tbo")}

@@ -124,8 +124,8 @@ def test_no_octant_of_the_picture_is_missing(draw: Draw) -> None:
 
 
 def before_surface(surface: Surface, true_depth: NDArray[np.floating]) -> NDArray[np.float64]:
-    """How far what is seen lies behind the surface, signed, along the rays of pixels that see both; (N,), scan
-    units."""
+    """How far what is seen lies behind the surface, signed, along the rays of pixels that see both; (N,), in
+    scan units."""
     both = (surface.row != NOTHING) & np.isfinite(true_depth)
     _, along = rays(surface)
     return (surface.depth[both] - true_depth[both]) * np.linalg.norm(along, axis=-1)[both]
