@@ -99,7 +99,7 @@ def fail(name):
     setattr(owner, name, failing)
 """
 PARTS = [
-    "viewer.app.panel._draw_statistics", "viewer.app.playing.timeline_bar._draw_track",
+    "viewer.app.panel.appearance.draw", "viewer.app.playing.timeline_bar._draw_track",
     "viewer.app.scene.cube.draw", "viewer.app.scene.view._take_drag", "viewer.app.menu.draw_toolbar",
     "viewer.app.scene.viewport.render_frame", "viewer.app.scene.viewport.Viewport.present",
     "viewer.app.scene.viewport.Viewport.pick", "viewer.app.playing.playback.Playback.advance",

@@ -37,7 +37,7 @@ from .files.opening import Opened, Opening, begin, find_facts
 from .files.scans import Scans, title
 from .files.sessions import Sessions
 from .help import Help
-from .notices import Notices
+from .notices import Notices, Problem
 from .output.capture import Capture
 from .output.exporting import Exporting
 from .output.replaying import Replayer
@@ -239,7 +239,7 @@ class App:
                 keys.write_template(self._keys_file, self.commands)
             self.note(f"The keys are in {self._keys_file}; edit it and start Scan4D again.")
         except InputError as error:
-            self.note(str(error))
+            self.note(Problem(str(error)))
 
     def open(self, scan: str, session: SavedSession | None = None) -> None:
         """Open another scan on a worker, instead of one that is being opened; the current one stays
@@ -295,7 +295,7 @@ class App:
         try:
             opened = self._opening.take()
         except Scan4DError as error:
-            self.note(f"Cannot open: {error}")
+            self.note(Problem(f"Cannot open: {error}"))
             self.scans.look(self.session.scan)
             return
         if opened is not None:

@@ -272,7 +272,13 @@ _VIEW: Menu[App] = Menu("View", (
         ),
     ),
     (_mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C")),
-    tuple(_look_switch(parameter) for parameter in describe(Look) if parameter.key),
+    (
+        *(_look_switch(parameter) for parameter in describe(Look) if parameter.key),
+        Command(
+            "reset", "Back to the usual appearance", lambda app: app.rendering.reset(), "Ctrl+R",
+            can=lambda app: not app.rendering.is_default,
+        ),
+    ),
     (Listing("Theme", _themes), Command("theme", "Next theme", lambda app: app.next_theme(), "T")),
     (
         Command("text_larger", "Larger text", lambda app: app.change_text(1), "Ctrl+="),

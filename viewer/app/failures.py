@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 
 from ..errors import Scan4DError
 from ..task import Cancelled
+from .notices import Problem
 
 log = logging.getLogger(__name__)
 _PAUSE = 10.0  # seconds without it, after which the same is told again
@@ -60,7 +61,7 @@ class Failures:
         before, self._last[what] = self._last.get(what, -math.inf), now
         if now - before > _PAUSE:
             log.error("%s failed", what, exc_info=error)
-            self._note(words or failure_in_words(what, error))
+            self._note(Problem(words or failure_in_words(what, error)))
 
 
 def failure_in_words(what: str, error: BaseException) -> str:

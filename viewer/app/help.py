@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
 from .. import __version__
+from ..files import printable
+from ..folders import user_folder
 from ..gpu.context import Gpu
+from . import widgets
 from .commands import Command, Commands, Menu
 from .keys import Keys
 from .notices import Notices
 
 _PAGES = ("Keys and mouse", "Messages", "About")
-_SIZE = ImVec2(44.0, 30.0)  # in heights of the font
-_KEY_COLUMN = 15.0
+_SIZE = ImVec2(60.0, 34.0)  # in heights of the font
+_KEY_COLUMN = 12.0
+_TWO_COLUMNS = 50.0  # least width of two columns
+Section = tuple[str, Sequence[tuple[str, str]]]  # its title and rows
 
 
 class Help:
@@ -27,6 +33,7 @@ class Help:
         self._commands, self._keys, self._notices, self._gpu = commands, keys, notices, gpu
         self.open: set[str] = set()
         self.focused: str | None = None
+        self._searched = ""
 
     def toggle(self, page: str) -> None:
         """Open or close one of the pages."""
@@ -59,21 +66,40 @@ class Help:
                 self.toggle(page)
 
     def _draw_keys(self) -> None:
-        """Declare the mouse, then every command in the order of the menus."""
-        imgui.separator_text("Mouse")
-        for name, does in self._commands.mouse:
-            _row(name, does)
-        for menu in self._commands.menus:
-            imgui.separator_text(menu.title)
-            self._draw_commands(menu)
+        """Declare the mouse, then every command in the order of the menus, in two columns where there is
+        room; of all those that have the words that are searched for."""
+        imgui.set_next_item_width(-1)
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
+        self._searched = imgui.input_text_with_hint("##search", "Search", self._searched)[1]
+        sections = [("Mouse", [(does, how) for how, does in self._commands.mouse])]
+        sections += [(menu.title, list(self._rows(menu))) for menu in self._commands.menus]
+        words = self._searched.lower().split()
+        found = [
+            (title, [row for row in rows if has_words((title, *row), words)]) for title, rows in sections
+        ]
+        found = [(title, rows) for title, rows in found if rows]
+        if not found:
+            imgui.text_disabled("Nothing has these words.")
+        room = imgui.get_content_region_avail().x / imgui.get_font_size()
+        columns = 2 if room >= _TWO_COLUMNS and not words else 1
+        if found and imgui.begin_table("commands", columns):
+            for column in in_columns(found, columns):
+                imgui.table_next_column()
+                for title, rows in column:
+                    imgui.separator_text(title)
+                    for does, keys in rows:
+                        _row(keys, does)
+            imgui.end_table()
 
-    def _draw_commands(self, menu: Menu[Any], path: str = "") -> None:
+    def _rows(self, menu: Menu[Any], path: str = "") -> Iterator[tuple[str, str]]:
+        """What each command of a menu does, and its keys."""
         for group in menu.groups:
             for entry in group:
                 if isinstance(entry, Command):
-                    _row(self._keys.of[entry.name] or "-", path + entry.title)
+                    yield path + entry.title, self._keys.of[entry.name] or "-"
                 elif isinstance(entry, Menu):
-                    self._draw_commands(entry, f"{path}{entry.title}: ")
+                    yield from self._rows(entry, f"{path}{entry.title}: ")
 
     def _draw_messages(self) -> None:
         """Declare all messages, the latest first."""
@@ -92,11 +118,33 @@ class Help:
         imgui.text_wrapped(f"Scan4D {__version__}: a viewer for 4D scans.")
         imgui.spacing()
         software = ", in software" if gpu.software else ""
-        imgui.text_wrapped(f"OpenGL {gpu.driver} on {gpu.device}{software}")
-        imgui.text_wrapped(f"{len(self._commands.of)} commands. {self._keys.hint('keys')}: all their keys.")
+        widgets.fact("Device", f"OpenGL {gpu.driver} on {gpu.device}{software}")
+        widgets.fact("Licence", "MIT")
+        widgets.fact("Settings", printable(str(user_folder())))
+        imgui.spacing()
+        if imgui.button("Copy"):
+            imgui.set_clipboard_text(f"Scan4D {__version__}, OpenGL {gpu.driver} on {gpu.device}{software}")
+        widgets.tooltip("Version and device, for a report")
 
 
-def _row(name: str, does: str) -> None:
-    imgui.text_disabled(name)
-    imgui.same_line(_KEY_COLUMN * imgui.get_font_size())
+def has_words(texts: Iterable[str], words: Iterable[str]) -> bool:
+    """Whether each of the words, lower case, is in one of the texts."""
+    return all(any(word in text.lower() for text in texts) for word in words)
+
+
+def in_columns(sections: Sequence[Section], count: int) -> list[list[Section]]:
+    """Put sections of rows into so many columns of about one length, in order."""
+    columns: list[list[Section]] = [[] for _ in range(count)]
+    whole, before = sum(len(rows) + 1 for _, rows in sections), 0
+    for title, rows in sections:
+        columns[min((before + len(rows) // 2) * count // whole, count - 1)].append((title, rows))
+        before += len(rows) + 1
+    return columns
+
+
+def _row(keys: str, does: str) -> None:
+    start = imgui.get_cursor_pos_x()
+    imgui.text_disabled(keys)
+    imgui.same_line()
+    imgui.set_cursor_pos_x(start + _KEY_COLUMN * imgui.get_font_size())
     imgui.text_wrapped(does)

@@ -1,31 +1,45 @@
-"""What the user is told: short notes over the picture that go by themselves, and a log that stays."""
+"""What the user is told: short notes over the picture that go by themselves, problems that stay until they
+are sent away, and a log of all."""
 
 from __future__ import annotations
 
 import logging
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..files import printable
+from . import theme, widgets
 
 log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
 _MOST_SHOWN = 3
 _MOST_KEPT = 1000
 _WIDTH, _FOOT = 34.0, 4.5  # in heights of the font; the foot is where the scale bar is
+_STILL = (
+    imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_focus_on_appearing
+    | imgui.WindowFlags_.always_auto_resize
+)  # fmt: skip
+
+
+class Problem(str):
+    """A text that tells what went wrong: it stays until the user sends it away."""
 
 
 @dataclass(frozen=True)
 class Notice:
-    """One message. at: when it came, local time. until: by the clock, when it goes."""
+    """One message. at: when it came, local time. until: by the clock, when it goes. is_problem: whether it
+    tells what went wrong."""
 
     text: str
     at: datetime
     until: float
+    is_problem: bool = False
 
 
 class Notices:
@@ -34,42 +48,91 @@ class Notices:
     def __init__(self) -> None:
         self.all: list[Notice] = []
         self.count = 0  # ever told
+        self._foot = 0.0  # height of the problems over the picture
 
     def tell(self, text: str) -> None:
-        """Show a message for as long as it takes to read, and keep it in the log."""
-        text = printable(text)
+        """Show a message for as long as it takes to read, a `Problem` until it is sent away, and keep it in
+        the log."""
+        is_problem, text = isinstance(text, Problem), printable(text)
         log.info("%s", text)
         seconds, per_letter = _LASTS
-        until = time.monotonic() + seconds + per_letter * len(text)
-        self.all.append(Notice(text, datetime.now(), until))
+        until = math.inf if is_problem else time.monotonic() + seconds + per_letter * len(text)
+        self.all = [self._gone(each) if is_problem and each.text == text else each for each in self.all]
+        self.all.append(Notice(text, datetime.now(), until, is_problem))
         del self.all[:-_MOST_KEPT]
         self.count += 1
 
     def shown(self, now: float) -> list[Notice]:
-        """Notices to show over the picture, the oldest first."""
-        return [notice for notice in self.all[-_MOST_SHOWN:] if notice.until > now]
+        """Notices to show over the picture, the oldest first: the last few, and the last few problems."""
+        there = [notice for notice in self.all[-_MOST_SHOWN:] if notice.until > now and not notice.is_problem]
+        problems = [notice for notice in self.all if notice.is_problem and notice.until > now]
+        return problems[-_MOST_SHOWN:] + there
 
     def next_change(self, now: float) -> float:
-        """Seconds until one of those shown goes; infinite where none is shown."""
+        """Seconds until one of those shown goes; infinite where none does by itself."""
         return min((notice.until - now for notice in self.shown(now)), default=math.inf)
+
+    def send_away(self, gone: Notice) -> None:
+        """Show one of them no longer."""
+        self.all = [self._gone(notice) if notice is gone else notice for notice in self.all]
 
     def on_escape(self) -> bool:
         """Show none of them any longer."""
-        self.all = [Notice(notice.text, notice.at, 0.0) for notice in self.all]
+        self.all = [self._gone(notice) for notice in self.all]
         return True
 
+    def _gone(self, notice: Notice) -> Notice:
+        return replace(notice, until=0.0)
 
-def draw(notices: Notices, size: ImVec2) -> None:
-    """Declare notes in the current ImGui window, the 3D view. size: of the view."""
-    em = imgui.get_font_size()
-    wrap = min(_WIDTH * em, 0.8 * size.x)
-    pad = ImVec2(0.8 * em, 0.5 * em)
-    bottom = size.y - _FOOT * em
-    for notice in reversed(notices.shown(time.monotonic())):
-        extent = imgui.calc_text_size(notice.text, wrap_width=wrap)
-        corner = ImVec2((size.x - extent.x) / 2, bottom - extent.y)
-        draw_text(notice.text, corner, extent, wrap, pad)
-        bottom = corner.y - 2 * pad.y - 0.4 * em
+    def draw(self, size: ImVec2) -> None:
+        """Declare notes in the current ImGui window, the 3D view. size: of the view."""
+        em = imgui.get_font_size()
+        wrap = min(_WIDTH * em, 0.8 * size.x)
+        pad = ImVec2(0.8 * em, 0.5 * em)
+        bottom = size.y - _FOOT * em - self._foot
+        for notice in reversed(self.shown(time.monotonic())):
+            if notice.is_problem:
+                continue
+            extent = imgui.calc_text_size(notice.text, wrap_width=wrap)
+            corner = ImVec2((size.x - extent.x) / 2, bottom - extent.y)
+            draw_text(notice.text, corner, extent, wrap, pad)
+            bottom = corner.y - 2 * pad.y - 0.4 * em
+
+    def draw_problems(self, left: float, top: float, width: float, height: float, color: int) -> None:
+        """Declare a window with the problems, over the 3D view. color: 0xRRGGBB, of the mark beside each."""
+        problems = [notice for notice in self.shown(time.monotonic()) if notice.is_problem]
+        self._foot = 0.0
+        if not problems:
+            return
+        em = imgui.get_font_size()
+        foot = ImVec2(left + width / 2, top + height - 0.5 * _FOOT * em)
+        imgui.set_next_window_pos(foot, imgui.Cond_.always, ImVec2(0.5, 1.0))
+        imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(width, height))
+        imgui.begin("problems", None, _STILL)
+        buttons = 2 * imgui.get_frame_height() + 3 * em
+        wrap = max(10 * em, min(_WIDTH * em, width - buttons - 5 * em))
+        for number, notice in enumerate(problems):
+            imgui.push_id(number)
+            self._draw_problem(notice, wrap, color)
+            imgui.pop_id()
+        self._foot = imgui.get_window_size().y
+        imgui.end()
+
+    def _draw_problem(self, notice: Notice, wrap: float, color: int) -> None:
+        imgui.push_style_color(imgui.Col_.text, theme.packed(color))
+        imgui.text(icons.ICON_FA_TRIANGLE_EXCLAMATION)
+        imgui.pop_style_color()
+        imgui.same_line()
+        start = imgui.get_cursor_pos_x()
+        imgui.push_text_wrap_pos(start + wrap)
+        imgui.text_unformatted(notice.text)
+        imgui.pop_text_wrap_pos()
+        imgui.same_line(start + wrap + imgui.get_style().item_spacing.x)
+        if imgui.button("Copy"):
+            imgui.set_clipboard_text(notice.text)
+        imgui.same_line()
+        if widgets.icon_button(icons.ICON_FA_XMARK, "Send it away (Esc)"):
+            self.send_away(notice)
 
 
 def draw_text(text: str, corner: ImVec2, extent: ImVec2, wrap: float, pad: ImVec2) -> None:

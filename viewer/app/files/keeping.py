@@ -11,6 +11,7 @@ from ...document.keeper import Keeper
 from ...document.saved_session import SavedSession, keep, kept_file
 from ...errors import InputError
 from .. import settings
+from ..notices import Problem
 from ..playing.playback import Playback
 from ..session import Session
 from ..settings import Settings
@@ -73,4 +74,4 @@ class Keeping:
 
     def _tell(self, problem: str | None) -> None:
         if problem:
-            self._note(problem)
+            self._note(Problem(problem))

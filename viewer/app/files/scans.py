@@ -13,6 +13,7 @@ from ...files import printable
 from ...scan.listing import is_there, named_scans, scans_beside
 from ...scan.open import DEMO
 from ...task import Task, in_background
+from ..notices import Problem
 from ..session import Session, known_as
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class Scans:
         """Tell in one message what cannot be opened."""
         if problems:
             others = f" {len(problems) - 1} others cannot be opened either." if len(problems) > 1 else ""
-            self._note(f"Cannot open: {problems[0]}.{others}")
+            self._note(Problem(f"Cannot open: {problems[0]}.{others}"))
 
     def opened(self, scan: str) -> None:
         """Take in that a scan was opened. The list stays where that is in it, else it is made anew."""

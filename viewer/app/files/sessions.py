@@ -11,6 +11,7 @@ from ...errors import InputError
 from ...files import free_file, printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
+from ..notices import Problem
 from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
 from ..session import Session, known_as
@@ -54,7 +55,7 @@ class Sessions:
             session = SavedSession.load(path)
             scan = place_of(session.scan, path)
         except InputError as error:
-            self._note(str(error))
+            self._note(Problem(str(error)))
             return
         if is_there(scan):
             self.open_with(session, scan)

@@ -20,6 +20,7 @@ from ...files import free_file, working_folder
 from ...output.export import write_png
 from ...task import Task, in_background
 from ..failures import failure_in_words
+from ..notices import Problem
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -65,7 +66,7 @@ class Capture:
             entry = self.shown()
         except InputError as error:
             entry = None
-            self._note(f"The picture cannot be replayed: {error}")
+            self._note(Problem(f"The picture cannot be replayed: {error}"))
         work = partial(self._save_picture, surface.image(), entry, self._session.hash_found)
         self._saving.append(in_background(Task("Saving"), work))
 
@@ -78,7 +79,7 @@ class Capture:
             try:
                 self.shown()
             except InputError as error:
-                self._note(f"Cannot record: {error}")
+                self._note(Problem(f"Cannot record: {error}"))
                 return
             self.recorder = Recorder(now)
             self._note("Recording what is shown, until you stop it.")
@@ -115,7 +116,7 @@ class Capture:
         try:
             entry = self.shown()
         except InputError as error:
-            self._note(f"The recording ends: {error}")
+            self._note(Problem(f"The recording ends: {error}"))
             self.toggle_recording()
             return
         if entry is None:

@@ -16,6 +16,7 @@ from ...files import working_folder
 from ...output.marks import Marks
 from ...scan.inputs import found_among, scan_inputs
 from ...task import Cancelled, Task, in_background
+from ..notices import Problem
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -142,7 +143,7 @@ class Exporting:
         try:
             return self._shown()
         except InputError as error:
-            self._note(f"Cannot export: {error}")
+            self._note(Problem(f"Cannot export: {error}"))
         return None
 
     def advance(self) -> None:
@@ -156,7 +157,7 @@ class Exporting:
             log.debug("the export is gone")
         except Exception as error:  # whatever the process meets, the window stays
             log.debug("cannot export", exc_info=error)
-            self._note(f"Cannot export: {error}")
+            self._note(Problem(f"Cannot export: {error}"))
 
     def _tell(self, made: Made) -> None:
         first, last = made.files[0], made.files[-1]

@@ -14,6 +14,7 @@ from ...document.anonymous import in_place, middle_of
 from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
 from ...errors import InputError
 from ...scan.pose import Pose
+from ..notices import Problem
 from ..session import known_as
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class Replaying:
             try:
                 place = place_of(entry.scan, self.path)
             except InputError as error:
-                app.note(str(error))
+                app.note(Problem(str(error)))
                 return False
             if self._asked != place:  # else it could not be opened, and that was told
                 self._asked = place
@@ -136,7 +137,7 @@ class Replayer:
         try:
             self.replaying = Replaying(path)
         except InputError as error:
-            self._app.note(str(error))
+            self._app.note(Problem(str(error)))
             return
         self._app.playback.player.pause()
         self._app.steering.turntable.stop()

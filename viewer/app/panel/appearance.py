@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
+from imgui_bundle import imgui
+
 from ...backends import backend
 from ...files import printable
 from ...look import COLOR_BY, COLOR_WORDS, Look, drawable
 from ...params import in_words
 from .. import widgets
+from ..ui import Ui
 
 if TYPE_CHECKING:
     from ...scan.pose import Pose
@@ -17,12 +20,17 @@ if TYPE_CHECKING:
     from ..session import Session
 
 
-def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
+def draw(session: Session, rendering: Rendering, pose: Pose, ui: Ui) -> None:
     """Declare the section."""
     look = session.document.look
     names = session.laid.layers(pose).names(pose.overview.scalars)
     colors = _colors(look, names, backend(session.document.chosen(pose)[0]).values)
     rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": colors}, hidden=("up",)))
+    imgui.begin_disabled(rendering.is_default)
+    if imgui.button("Back to the usual", ui.button_size(1)):
+        rendering.reset()
+    imgui.end_disabled()
+    ui.tooltip("Appearance and renderer as of a scan that was never open", "reset")
 
 
 def _colors(look: Look, scalars: Collection[str], found: Collection[str]) -> dict[str, str]:

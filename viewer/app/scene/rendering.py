@@ -56,6 +56,17 @@ class Rendering:
         """Draw with a backend."""
         self._session.change(f"Choose {backends()[name].title}", backend=name)
 
+    def reset(self) -> None:
+        """Draw as a scan is drawn that was never open: renderer, its parameters and look."""
+        look = Look(up=self._session.document.look.up)
+        self._session.change("Back to defaults", backend=None, params={}, look=look)
+
+    @property
+    def is_default(self) -> bool:
+        """Whether all is drawn as `reset` has it."""
+        document = self._session.document
+        return document.backend is None and not document.params and document.look == Look(up=document.look.up)
+
     def step(self, by: int) -> None:
         """Draw with the next backend, 1, or the one before, -1."""
         if self.backend is not None:

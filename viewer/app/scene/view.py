@@ -50,7 +50,7 @@ def draw(app: App) -> float:
         app.marks.draw(size)
     text = printable(_note(app) or "")
     head = _draw_note(text, size) if text else _draw_prompt(app.tools.prompt, size)
-    notices.draw(app.notices, size)
+    app.notices.draw(size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
     return head

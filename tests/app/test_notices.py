@@ -1,0 +1,73 @@
+"""Messages: short notes go by themselves, problems stay until they are sent away."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+
+pytest.importorskip("imgui_bundle")
+
+from viewer.app.help import has_words, in_columns
+from viewer.app.notices import Notices, Problem
+
+
+def texts(notices: Notices, now: float) -> list[str]:
+    return [notice.text for notice in notices.shown(now)]
+
+
+def test_notes_go_by_themselves_and_problems_do_not() -> None:
+    notices = Notices()
+    notices.tell(Problem("it is broken"))
+    notices.tell("saved")
+    now = time.monotonic()
+    assert texts(notices, now) == ["it is broken", "saved"]
+    assert 0 < notices.next_change(now) < 10
+    later = now + 3600
+    assert texts(notices, later) == ["it is broken"]
+    assert notices.next_change(later) == math.inf
+
+
+def test_notes_do_not_push_a_problem_away() -> None:
+    notices = Notices()
+    notices.tell(Problem("it is broken"))
+    for number in range(10):
+        notices.tell(f"note {number}")
+    assert texts(notices, time.monotonic()) == ["it is broken", "note 7", "note 8", "note 9"]
+
+
+def test_a_problem_told_again_is_shown_once_and_logged_twice() -> None:
+    notices = Notices()
+    for _ in range(2):
+        notices.tell(Problem("it is broken"))
+    assert texts(notices, time.monotonic()) == ["it is broken"]
+    assert len(notices.all) == notices.count == 2
+
+
+def test_problems_are_sent_away_one_by_one_or_all_by_escape() -> None:
+    notices = Notices()
+    for text in ("one", "two", "three"):
+        notices.tell(Problem(text))
+    now = time.monotonic()
+    notices.send_away(notices.shown(now)[1])
+    assert texts(notices, now) == ["one", "three"]
+    notices.on_escape()
+    assert texts(notices, now) == []
+    assert [notice.text for notice in notices.all] == ["one", "two", "three"]
+
+
+def test_columns_of_the_keys_are_about_as_long_and_keep_their_order() -> None:
+    sections = [(str(number), [("does", "key")] * rows) for number, rows in enumerate((5, 12, 2, 25, 15, 6))]
+    left, right = in_columns(sections, 2)
+    assert left + right == sections
+    length = [sum(len(rows) + 1 for _, rows in column) for column in (left, right)]
+    assert abs(length[0] - length[1]) <= 25
+    assert in_columns(sections, 1) == [sections]
+
+
+@pytest.mark.parametrize(("words", "is_found"), [
+    ([], True), (["frame"], True), (["next", "fra"], True), (["right", "next"], True), (["none"], False),
+])  # fmt: skip
+def test_searching_goes_by_all_words(words: list[str], is_found: bool) -> None:
+    assert has_words(("Playback", "Next frame", "Right"), words) is is_found
