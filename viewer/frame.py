@@ -11,7 +11,6 @@ from typing import Any
 from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
-from .geometry import UP
 from .gpu.pose import drawn_bounds
 from .gpu.shade import shade
 from .gpu.surface import Surface
@@ -215,7 +214,7 @@ def render(
     bounds = layers.place.bounds(resident.bounds)
     request = Request(
         pose=pose,
-        camera=camera or first_camera(views, bounds, size[0] / size[1], pose.up or UP),
+        camera=camera or first_camera(views, bounds, size[0] / size[1], pose.upright.up),
         backend=name,
         params=chosen,
         look=look or Look(),

@@ -19,8 +19,16 @@ AXES: dict[str, Vector] = {
 }
 
 
-# The front of a subject, at right angles to each up axis; azimuth 0 looks from there.
-_FRONTS: dict[str, Vector] = {"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}
+# The front of a subject, at right angles to each up axis; azimuth 0 looks from there, along y or z with x to
+# the right. With y down, as depth cameras have it, z points away from them.
+_FRONTS: dict[str, Vector] = {
+    "+x": (0, 0, 1),
+    "-x": (0, 0, 1),
+    "+y": (0, 0, 1),
+    "-y": (0, 0, -1),
+    "+z": (0, -1, 0),
+    "-z": (0, 1, 0),
+}
 
 
 def vector(values: Iterable[float]) -> Vector:
@@ -39,4 +47,4 @@ def up_vector(name: str) -> Vector:
 def front_vector(up: str) -> Vector:
     """The unit vector towards the front of a subject that stands along an up axis such as '+y'."""
     up_vector(up)
-    return _FRONTS[up[1]]
+    return _FRONTS[up]

@@ -123,7 +123,7 @@ def test_place_is_the_pixel_in_heights(camera: Camera) -> None:
 def test_views_show_the_side_they_name(camera: Camera, up: str) -> None:
     """A subject that stands upright and faces the front: its left hand, nose and crown."""
     crown = np.array(up_vector(up), float)
-    nose = np.array({"x": (0, 0, 1), "y": (0, 0, 1), "z": (0, -1, 0)}[up[1]], float)
+    nose = np.array({"+y": (0, 0, 1), "-y": (0, 0, -1), "+z": (0, -1, 0), "-x": (0, 0, 1)}[up], float)
     left = np.cross(crown, nose)
     toward = {"front": nose, "back": -nose, "left": left, "right": -left, "top": crown, "bottom": -crown}
     # Up in the picture; seen from the top or the bottom, the back of the head or the face.

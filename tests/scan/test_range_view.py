@@ -327,8 +327,6 @@ def test_what_is_up_is_what_is_up_in_the_pictures() -> None:
     assert up_axis([turned_to((0.6, 0.8, 0), (0, 0, -1))]) == "+y"
     assert up_axis([down, turned_to((0, 1, 0), (0, 0, -1))]) is None
     assert up_axis([]) is None
-    assert Pose.of(0, 0.0, "", (down,)).up == "-y"
-    assert Pose.of(0, 0.0, "", down.points()).up is None
 
 
 MIRROR = np.diag([1.0, 1, -1, 1])

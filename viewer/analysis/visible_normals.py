@@ -11,7 +11,6 @@ from ..backends.auto_splats.neighborhoods import MOST_NEIGHBORS, Neighborhoods, 
 from ..camera import Camera
 from ..errors import InputError
 from ..frame import shared_renderer
-from ..geometry import UP
 from ..gpu.constants import UNKNOWN
 from ..gpu.surface import Surface
 from ..scan.pods import first_camera
@@ -89,7 +88,7 @@ def estimate_normals(
     surface = Surface(renderer.gpu, size)
     resident = renderer.resident(pose)
     bounds = resident.bounds
-    camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.up or UP)
+    camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.upright.up)
     view = View.of(camera, size, resident.origin, bounds)
     surface.start(resident, view)
     found = surface.keep(Neighborhoods)

@@ -127,7 +127,7 @@ class App:
         self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
         self.steering: Steering = Steering(
             self.session, self.playback, self.viewport, self.pointer, remembered.cube,
-            remembered.turn_seconds, up is not None,
+            remembered.turn_seconds, up is not None, self.note,
         )  # fmt: skip
         self.marks: ViewMarks = ViewMarks(
             self.session, self.playback, self.viewport, self.steering, remembered.marks

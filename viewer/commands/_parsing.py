@@ -151,7 +151,7 @@ def _common_arguments() -> _Parser:
     group.add_argument(
         "--fps", type=float, metavar="F", help="poses a second, and pictures a second of a film"
     )
-    group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="the axis that is up, else as views tell")
+    group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="the axis that is up, else guessed")
     group.add_argument(
         "-q", "--quiet", action="store_true", help="no progress, no warnings, no names of what was written"
     )

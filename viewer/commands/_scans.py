@@ -115,12 +115,13 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
 
 
 def told_up(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> str:
-    """The axis that is up: as the arguments tell, else the first of these poses that can be read, else +y."""
+    """The axis that is up: as the arguments tell, else as is guessed of the first of these poses that can
+    be read, else +y."""
     if args.up:
         return args.up
     for index in indices:
         with suppress(InputError):
-            return timeline.pose(index).up or UP
+            return timeline.pose(index).upright.up
     return UP
 
 

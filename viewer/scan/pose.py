@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from ..bounds import Bounds
 from .points import PointCloud, strided
 from .range_points import RangePoints
-from .range_view import RangeView, up_axis
+from .range_view import RangeView
 from .spacing import ENOUGH, typical_spacing
+from .upright import Upright, guess_up
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 
@@ -54,9 +55,9 @@ class Pose:
         return () if isinstance(self.points, PointCloud) else self.points.views
 
     @property
-    def up(self) -> str | None:
-        """The name of the axis that its range views tell is up; None without any, or where they disagree."""
-        return up_axis(self.views)
+    def upright(self) -> Upright:
+        """Guess of what is up, see `guess_up`; found once, in some milliseconds."""
+        return self.overview.remember(guess_up, views=self.views)
 
     @property
     def overview(self) -> PointCloud:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from concurrent.futures import Future, wait
+from functools import partial
 from typing import NamedTuple
 
 from ...document.recording import fingerprint
@@ -19,11 +20,14 @@ log = logging.getLogger(__name__)
 _MANY = 200_000  # points, of which facts take longer to find than a window may stop for
 
 
-def find_facts(pose: Pose, of_points: bool = False) -> None:
+def find_facts(pose: Pose, of_points: bool = False, is_first: bool = False) -> None:
     """Find what drawing asks of a large pose, on the thread that has read it.
 
-    of_points: whether its points are drawn, so that those of range views are merged.
+    of_points: whether its points are drawn, so that those of range views are merged. is_first: whether the
+    first view of the scan may be made of it.
     """
+    if is_first:
+        pose.upright  # noqa: B018, found once
     large = pose.count > _MANY
     if large:
         pose.overview.bounds()
@@ -59,7 +63,7 @@ Find = Callable[[], SavedSession | None]  # how a scan was left; it may raise In
 
 def begin(timeline: Timeline, find: Find, session: SavedSession | None = None) -> Opened:
     """Have its poses come with their facts, and find its hash in the background."""
-    timeline.finish = find_facts
+    timeline.finish = partial(find_facts, is_first=True)
     hash = in_background(Task("Hashing"), lambda: fingerprint(timeline.files))
     left, problem = None, None
     try:

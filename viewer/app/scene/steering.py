@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from ...bounds import Bounds
 from ...camera import Camera
+from ...geometry import UP
 from ...scan.pods import first_camera
 from ...scan.pose import Pose
+from ...scan.upright import first_elevation
 from ..playing.playback import Playback
 from ..session import Session
 from . import navigation
@@ -37,14 +40,15 @@ class Steering:
         cube: bool,
         turn_seconds: float,
         up_is_told: bool,
+        note: Callable[[str], None],
     ) -> None:
         """cube: whether it is shown. turn_seconds: that the turntable takes. up_is_told: whether the user
-        tells what is up in all scans."""
+        tells what is up in all scans. note: tells the user something."""
         self._session, self._playback, self._viewport, self._pointer = session, playback, viewport, pointer
         self.gesture: str | None = None
         self.cube: OrientationCube = OrientationCube(cube)
         self.turntable: Turntable = Turntable(turn_seconds)
-        self._is_checked, self._up_is_told = False, up_is_told
+        self._is_checked, self._up_is_told, self._note = False, up_is_told, note
         self._wheeled = -math.inf  # by the clock, when the wheel was turned last
 
     @property
@@ -86,7 +90,8 @@ class Steering:
         pose, camera = self._playback.pose, self._session.document.camera
         look = replace(self._session.document.look, up=up)
         if pose and camera:
-            camera = navigation.view_from(0, 0, camera, self.bounds(pose), self._viewport.aspect, up)
+            bounds, aspect = self.bounds(pose), self._viewport.aspect
+            camera = navigation.view_from(0, first_elevation(bounds, up), camera, bounds, aspect, up)
         self._session.change("Turn upright", look=look, camera=camera, pivot=None)
 
     def project(self, projection: str) -> None:
@@ -144,14 +149,18 @@ class Steering:
         where its pods look from, or from the front.
 
         The latter is looked at once a scan: its file may have changed since it was left. Where there is none
-        at first, the pose tells what is up, unless the user did.
+        at first, what is up is guessed of the pose, unless the user told, and told where it is not the usual.
         """
         camera = self._session.document.camera
         bounds, aspect = self.bounds(pose), self._viewport.aspect
         if not self._is_checked:
             self._is_checked = True
-            if camera is None and pose.up and not self._up_is_told:
-                self._session.amend(look=replace(self._session.document.look, up=pose.up))
+            if camera is None and not self._up_is_told:
+                self._session.amend(look=replace(self._session.document.look, up=pose.upright.up))
+                if pose.upright.up != UP:
+                    self._note(
+                        f"Up is taken to be {pose.upright.up}: {pose.upright.why}. Change it beside the cube."
+                    )
             if camera is not None and not navigation.shows(camera, bounds, aspect):
                 camera = None
         if camera is None:

@@ -1,0 +1,193 @@
+"""Which way is up in a scan, where its user has not said so: guessed from what its frames tell.
+
+A cascade, the surest first: the pictures of range views, map coordinates, the place of a depth camera,
+ground, and what a body stands on. Nobody measures with x up, so that only y and z are guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bounds import Bounds
+from ..geometry import AXES, UP, up_vector
+from .points import PointCloud, strided
+from .range_view import RangeView, up_axis
+
+FROM_ABOVE = 35.0  # degrees: the elevation that ground is first seen from
+_LOW = 0.35  # height of ground, in lengths of its shorter side
+_ENOUGH = 100  # points, of which shapes are guessed
+_FAR = 100.0  # extents that map coordinates are away from zero
+_OF_HEIGHT = 0.05  # how much less far away the heights beside them are
+_THINNEST = 1e-3  # a sheet without any relief may be a wall as well as a floor
+_FILLED, _TENTHS = (
+    0.7,
+    10,
+)  # of ground, the share of its cells that have points, and their number along a side
+_CELLS = 40  # along a side of the grid that tells whether one side alone was seen
+_BAND = 0.04  # of the height: what touches the ground
+_BROAD = 0.4  # what it stands on, in shares of the spread of the whole
+_STEADY = 1.2  # how far the whole may be off the middle of what it stands on, in standard deviations of that
+_ONE_SIDED = 0.1  # of the depth: how far apart points in one line of sight are where one side was seen
+_SLENDER, _UPENDED = 4.0, 1.2  # heights of what stands upright, in lengths of its longer side
+_BEFORE = 0.2  # how far before all points a depth camera is, in lengths of their longest side
+_ASIDE = 0.6  # tangent of how far from the middle of its picture most may be
+_FACING = 0.5  # cosine between its view axis and what faces it, in the mean
+
+
+@dataclass(frozen=True)
+class Upright:
+    """An up axis, and what tells it.
+
+    up: a name of `AXES`. why: in words. confidence: 0..1, how likely it is right; below 0.5
+    nothing tells it.
+    """
+
+    up: str
+    why: str
+    confidence: float
+
+
+_UNTOLD = Upright(UP, "nothing tells otherwise", 0.4)
+
+
+def guess_up(cloud: PointCloud, views: Sequence[RangeView] = ()) -> Upright:
+    """Guess what is up, from some thousands of the points and the range views that they are of, if any."""
+    points = strided(cloud.positions).astype(np.float64) + cloud.origin
+    normals = None if cloud.normals is None else strided(cloud.normals).astype(np.float64)
+    if (told := _of_pictures(views, points)) is not None:
+        return told
+    for rule in (_of_a_map, _of_a_camera, _of_ground, _of_a_body):
+        if len(points) and (found := rule(points, normals)) is not None:
+            return found
+    return _UNTOLD
+
+
+def first_elevation(bounds: Bounds, up: str) -> float:
+    """The elevation in degrees that a scan is first seen from: level, or from above where it is ground, as
+    streets, rooms and terrain are. up: as `up_vector` takes it."""
+    edges = bounds.high - bounds.low
+    along = int(np.abs(up_vector(up)).argmax())
+    is_low = edges[along] < _LOW * np.delete(edges, along).min()
+    return FROM_ABOVE if is_low or (up == "+z" and _is_map(bounds)) else 0.0
+
+
+def _is_map(bounds: Bounds) -> bool:
+    """Whether east and north are far from zero, in metres or feet, and heights beside them are not."""
+    east, north, height = np.abs(bounds.center)
+    far = min(east, north)
+    return bool(far > _FAR * (bounds.high - bounds.low).max() and height < _OF_HEIGHT * far)
+
+
+def _of_pictures(views: Sequence[RangeView], points: NDArray[np.float64]) -> Upright | None:
+    """Pictures have their own up; those of heights on ground have it towards the eye."""
+    told = up_axis(views)
+    if told is None:
+        return None
+    if len(points) and all(view.kind == "height" for view in views):
+        low, high = points.min(axis=0), points.max(axis=0)
+        back = np.mean([view.world_to_camera[2, :3] for view in views], axis=0)
+        above = max(AXES, key=lambda name: float(back @ AXES[name]))
+        if first_elevation(Bounds(low, high), above):
+            return Upright(above, "it is a map of heights", 0.95)
+    return Upright(told, "its range images stand so", 0.95)
+
+
+def _of_a_map(points: NDArray[np.float64], normals: object) -> Upright | None:
+    return Upright("+z", "it has map coordinates", 0.95) if _is_map(_body(points)) else None
+
+
+def _of_a_camera(points: NDArray[np.float64], normals: NDArray[np.float64] | None) -> Upright | None:
+    """A depth camera at zero looks along +z, and its +y is down: all is seen from there."""
+    body = _body(points)
+    if len(points) < _ENOUGH or body.low[2] <= _BEFORE * (body.high - body.low).max():
+        return None
+    rays = points[:, :2] / points[:, 2:]
+    is_in_picture = (np.abs(np.median(rays, axis=0)) < _ASIDE).all()
+    is_seen_from_there = is_in_picture and _depth_of_sight(rays, points[:, 2]) < _ONE_SIDED
+    if normals is not None:
+        is_seen_from_there |= bool(np.nanmean(normals[:, 2]) < -_FACING)
+    return Upright("-y", "it was seen by a depth camera", 0.8) if is_seen_from_there else None
+
+
+def _of_ground(points: NDArray[np.float64], normals: object) -> Upright | None:
+    """Ground is wide and low, and is all over its outline, as somebody with both arms out is not."""
+    if len(points) < _ENOUGH:
+        return None
+    for share in (0.02, 0.005):  # lidar sees far things, and some below the ground
+        body = _body(points, share)
+        thickness, width = np.sort(body.high - body.low)[:2]
+        for up in ("+z", "+y"):
+            is_low = _THINNEST * width < thickness and first_elevation(body, up) > 0
+            if is_low and _filled(points, body, "xyz".index(up[1])) > _FILLED:
+                return Upright(up, "it is wide and low", 0.8)
+    return None
+
+
+def _of_a_body(points: NDArray[np.float64], normals: object) -> Upright | None:
+    """Bodies and things stand on what is lowest, or are slender as masts are."""
+    if len(points) < _ENOUGH:
+        return None
+    body = _body(points)
+    wide, high, deep = body.high - body.low
+    if min(wide, high, deep) <= _THINNEST * max(wide, high, deep):
+        return None
+    near = body.grown(0.5 * max(wide, high, deep))
+    points = points[((points > near.low) & (points < near.high)).all(axis=1)]
+    if _stands(points, 1):
+        return Upright(UP, "it stands so", 0.7)
+    if _depth_of_sight(points[:, :2], points[:, 2]) > _ONE_SIDED:  # else a relief, of a face perhaps
+        if _stands(points, 2):
+            return Upright("+z", "it stands so", 0.7)
+        if high > _UPENDED * max(wide, deep) and _stands(points * (1, -1, 1), 1):
+            return Upright("-y", "it stands so", 0.6)
+    return Upright("+z", "it is slender", 0.6) if deep > _SLENDER * max(wide, high) else None
+
+
+def _body(points: NDArray[np.float64], share: float = 0.02) -> Bounds:
+    """The box around all points but a share at each end of each axis."""
+    low, high = np.quantile(points, [share, 1 - share], axis=0)
+    return Bounds(low, high)
+
+
+def _filled(points: NDArray[np.float64], body: Bounds, axis: int) -> float:
+    """The share of a box that has points, seen along an axis, in cells of a tenth of its sides."""
+    low, edges = np.delete(body.low, axis), np.delete(body.high - body.low, axis)
+    cells = np.floor((np.delete(points, axis, axis=1) - low) / edges * _TENTHS).astype(int)
+    inside = ((cells >= 0) & (cells < _TENTHS)).all(axis=1)
+    return len(np.unique(cells[inside] @ (_TENTHS, 1))) / _TENTHS**2
+
+
+def _stands(points: NDArray[np.float64], axis: int) -> bool:
+    """Whether points (N, 3) stand on their lowest ones along an axis: broadly, and steadily."""
+    height, across = points[:, axis], np.delete(points, axis, axis=1)
+    ground, top = np.quantile(height, [0.003, 0.997])
+    touching = across[height <= ground + _BAND * (top - ground)]
+    if len(touching) < 3:
+        return False
+    whole = np.cov(across.T)
+    if np.linalg.det(whole) <= (_THINNEST * np.trace(whole)) ** 2:  # a sheet
+        return False
+    below = np.cov(touching.T) + 1e-9 * np.trace(whole) * np.eye(2)
+    breadth = np.sqrt(np.linalg.det(below) / np.linalg.det(whole))
+    off = across.mean(axis=0) - touching.mean(axis=0)
+    return bool(breadth > _BROAD and off @ np.linalg.solve(below, off) < _STEADY**2)
+
+
+def _depth_of_sight(picture: NDArray[np.float64], depth: NDArray[np.float64]) -> float:
+    """How far apart the points of one cell of a picture are, as a rule, in shares of all depths: little where
+    one side alone was seen. picture: (N, 2) places in it, of any unit. Infinite where no cell has two."""
+    low, high = picture.min(axis=0), picture.max(axis=0)
+    cells = ((picture - low) / np.where(high > low, high - low, 1) * _CELLS).astype(int).clip(0, _CELLS - 1)
+    cell = cells @ (_CELLS, 1)
+    nearest, farthest = np.full(_CELLS**2, np.inf), np.full(_CELLS**2, -np.inf)
+    np.minimum.at(nearest, cell, depth)
+    np.maximum.at(farthest, cell, depth)
+    several = np.bincount(cell, minlength=_CELLS**2) > 1
+    reach = float(np.ptp(depth))
+    if not several.any():
+        return np.inf
+    return float(np.median(farthest[several] - nearest[several])) / reach if reach else 0.0
