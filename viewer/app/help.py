@@ -93,7 +93,7 @@ class Help:
             imgui.end_table()
 
     def _rows(self, menu: Menu[Any], path: str = "") -> Iterator[tuple[str, str]]:
-        """What each command of a menu does, and its keys."""
+        """The commands of a menu: what each does, and its keys."""
         for group in menu.groups:
             for entry in group:
                 if isinstance(entry, Command):
