@@ -58,15 +58,15 @@ def join(
     weights: NDArray[np.float32],
     order: NDArray[np.integer],
     most: int,
+    size: NDArray[np.int32],
     roots: NDArray[np.int32],
     signs: NDArray[np.int8],
 ) -> None:
-    """Join points to patches of `most` points at most, along links in an order, and make their normals agree.
+    """Join things to patches of size `most` at most, along links in an order, and make them agree.
 
-    links: (L, 2), weights: (L,). Gets roots (N,), the patch of each point, numbered from 0 up, and signs
-    (N,), 1 or -1, that make the normals of a patch agree.
+    links: (L, 2), weights: (L,). size: (N,), of each thing; it is written over. Gets roots (N,), the patch of
+    each thing, numbered from 0 up, and signs (N,), 1 or -1, that make the things of a patch agree.
     """
-    size = np.ones(len(roots), np.int32)
     for i in range(len(roots)):
         roots[i], signs[i] = i, 1
     for n in order:
@@ -98,3 +98,41 @@ def join(
             at = roots[at]
         patches[i], agreeing[i] = numbers[at], sign
     roots[:], signs[:] = patches, agreeing
+
+
+@compiled
+def settle(
+    links: NDArray[np.int32],
+    weights: NDArray[np.floating],
+    seen: NDArray[np.floating],
+    turns: int,
+    signs: NDArray[np.int8],
+) -> None:
+    """Turn things round, one by one, that disagree with the sum of their links and of `seen`, as long as
+    there are any, in `turns` rounds at most.
+
+    links: (L, 2), weights: (L,), seen: (N,), signs: (N,), which change.
+    """
+    first = np.zeros(len(signs) + 2, np.int64)
+    for n in range(len(links)):
+        first[links[n, 0] + 2] += 1
+        first[links[n, 1] + 2] += 1
+    for i in range(1, len(first)):
+        first[i] += first[i - 1]
+    other, weight = np.empty(2 * len(links), np.int32), np.empty(2 * len(links), np.float32)
+    for n in range(len(links)):
+        for end in range(2):
+            at = first[links[n, end] + 1]
+            other[at], weight[at] = links[n, 1 - end], weights[n]
+            first[links[n, end] + 1] += 1
+    for _ in range(turns):
+        is_settled = True
+        for i in range(len(signs)):
+            total = seen[i]
+            for n in range(first[i], first[i + 1]):
+                total += weight[n] * signs[other[n]]
+            if total * signs[i] < 0.0:
+                signs[i] = -signs[i]
+                is_settled = False
+        if is_settled:
+            break

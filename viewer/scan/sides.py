@@ -4,7 +4,8 @@ Two things tell it. From far around, the side is seen that is outside, unless ot
 of neighbours agree. Both are sums: the points become patches within which normals certainly agree, then the
 two patches that all links between them bind most firmly become one, again and again, and the view from
 outside is a patch among them (a greedy way to the least frustration of a signed graph; see Schertler et al.
-2017 and Keuper et al. 2015).
+2017 and Keuper et al. 2015). Then patches of many sizes, and at last single points, turn round where that
+makes the sum higher.
 """
 
 from __future__ import annotations
@@ -22,13 +23,16 @@ LINKED = 9  # neighbours that are linked, the point itself included
 # The outside of a surface is the side that more views see, from both ends of each axis.
 _AXES = 13
 _FRONT_BONUS = 0.5  # so that a sheet which is seen from both sides faces the front
-_CELL = 1.4  # of a view's grid, in reaches: wide enough to leave no holes in a surface
-_DEPTH = 1.8  # in reaches: so far behind the first point of its cell a point still counts as seen
+_CELL = 1.0  # of a view's grid, in reaches: wide enough to leave few holes in a surface
+_DEPTH = 1.4  # in reaches: so far behind the first point of its cell a point counts as seen less and less
 _GRID = 1024  # cells along an axis at most
-_PATCH = 100  # points at most: small enough that a wrong link spoils little, and sums are made of many
+# Points at most of patches, of patches of these, ...: small enough at first that a wrong link spoils little;
+# and in other sizes again, since what must turn as a whole may not be one patch.
+_PATCHES = ((10, 40, 160), (10, 40, 160, 640), (5, 20, 80, 320))
 _FIRM = 0.3  # weight of links within patches, at least
 _LEVELS = 255  # of weights that are told apart
 _SEEN = 0.1  # that a view from outside weighs in links
+_TURNS = 20  # rounds in which points or patches turn, one by one
 _OFTEN = 1 << 12  # steps between checkpoints
 
 
@@ -37,16 +41,16 @@ def facing_out(points: Vectors, normals: NDArray[np.float32], near: NDArray[np.i
 
     points: (N, 3), distinct. near: (N, K), each point and its nearest others, nearest first.
     """
+    from . import side_kernels
+
     reach = float(np.median(np.linalg.norm(points[near[:, -1]] - points, axis=1)))
     normals = facing(normals, np.array([[1e-6, 1e-3, 1.0]]))  # whichever sign they came with
-    outwards = np.einsum("ij,ij->i", normals, _seen_from(points, reach))
-    patches, signs, pairs, bonds = _patches(points, normals, near)
-    outside = int(patches.max()) + 1  # the view, beside all patches
-    seen = _SEEN * np.bincount(patches, outwards * signs)
-    checkpoint()
-    pairs = np.concatenate([pairs, np.column_stack([np.arange(outside), np.full(outside, outside)])])
-    agreeing = _agreement(pairs, np.concatenate([bonds, seen]))
-    return normals * (signs * agreeing[patches] * agreeing[outside])[:, None]
+    seen = _SEEN * np.einsum("ij,ij->i", normals, _seen_from(points, reach))
+    most = len(near) * (near.shape[1] - 1)
+    links, weights = np.empty((most, 2), np.int32), np.empty(most, np.float32)
+    found = side_kernels.link(points, normals, near, links, weights)
+    links, weights = links[:found], weights[:found]
+    return normals * _agreeing(links, weights, seen)[:, None]
 
 
 def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -55,34 +59,68 @@ def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> ND
     return np.where(away[:, None], -normals, normals)
 
 
-def _patches(
-    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int8], NDArray[np.intp], NDArray[np.float64]]:
-    """Patches of points and what binds them: the patch of each point, (N,), numbered from 0 up; 1 or -1,
-    (N,), which makes its normal agree with others of its patch; pairs of patches, (P, 2); and how firmly
-    their normals agree, (P,), below 0 where they oppose each other."""
+def _agreeing(
+    links: NDArray[np.int32], weights: NDArray[np.floating], seen: NDArray[np.floating]
+) -> NDArray[np.int8]:
+    """1 or -1 for each point, (N,), so that the weights between equal ones, less those between others, and
+    `seen`, (N,), signed, have a high sum. links: (L, 2). weights: (L,)."""
+    sizes = np.ones(len(seen), np.int32)
+    signs = _in_patches(links, weights, seen, sizes, _PATCHES[0], anew=True)
+    for patches in _PATCHES[1:]:
+        held = weights * signs[links].prod(axis=1)  # above 0 where the two agree
+        signs = signs * _in_patches(links, held, seen * signs, sizes, patches, anew=False)
+    return signs
+
+
+def _in_patches(
+    links: NDArray[np.int32],
+    weights: NDArray[np.floating],
+    seen: NDArray[np.floating],
+    sizes: NDArray[np.int32],
+    patches: tuple[int, ...],
+    anew: bool,
+) -> NDArray[np.int8]:
+    """1 or -1 for each thing, (N,), as `_agreeing` has it for points: by patches of at most so many points,
+    and patches of these, each turned as a whole before its parts are.
+
+    sizes: points of each thing, (N,). anew: from nothing; else only what agrees is joined, and the sum is
+    never less than with 1 everywhere.
+    """
     from . import side_kernels
 
-    most = len(near) * (near.shape[1] - 1)
-    links, weights = np.empty((most, 2), np.int32), np.empty(most, np.float32)
-    found = side_kernels.link(points, normals, near, links, weights)
-    links, weights = links[:found], weights[:found]
     checkpoint()
-    firm = np.flatnonzero(np.abs(weights) >= _FIRM)
-    levels = (_LEVELS * (1 - np.abs(weights[firm]))).astype(np.uint8)
-    order = firm[np.argsort(levels, kind="stable")]
-    checkpoint()
-    patches, signs = np.empty(len(near), np.int32), np.empty(len(near), np.int8)
-    side_kernels.join(links, weights, order, _PATCH, patches, signs)
-    checkpoint()
-    ends = patches[links]
-    across = np.flatnonzero(ends[:, 0] != ends[:, 1])
-    bonds = weights[across] * signs[links[across]].prod(axis=1)
-    count = int(patches.max()) + 1
-    keys = np.sort(ends[across], axis=1) @ np.array([count, 1])
+    if patches:
+        strength = np.abs(weights) if anew else weights
+        firm = np.flatnonzero(strength >= _FIRM)
+        levels = (_LEVELS * (1 - strength[firm] / strength.max(initial=1))).astype(np.uint8)
+        order = firm[np.argsort(levels, kind="stable")]
+        joined, agreeing = np.empty(len(sizes), np.int32), np.empty(len(sizes), np.int8)
+        side_kernels.join(links, weights, order, patches[0], sizes.copy(), joined, agreeing)
+        larger = np.bincount(joined, sizes).astype(np.int32)
+        bonds = _summed(joined[links], weights * agreeing[links].prod(axis=1), len(larger))
+        seen_of = np.bincount(joined, seen * agreeing).astype(np.float64)
+        of_patches = _in_patches(*bonds, seen_of, larger, patches[1:], anew)
+        signs = agreeing * of_patches[joined]
+    elif anew:
+        outside = len(sizes)  # the view, beside all patches
+        pairs = np.concatenate([links, np.column_stack([np.arange(outside), np.full(outside, outside)])])
+        signs = _agreement(pairs, np.concatenate([weights, seen]))
+        signs = signs[:-1] * signs[-1]
+    else:
+        signs = np.ones(len(sizes), np.int8)
+    side_kernels.settle(links, weights, seen, _TURNS, signs)
+    return signs
+
+
+def _summed(
+    links: NDArray[np.int32], weights: NDArray[np.floating], count: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Links (L, 2) between different ones of `count` things, each pair once, (P, 2), and their sums, (P,)."""
+    across = np.flatnonzero(links[:, 0] != links[:, 1])
+    keys = np.sort(links[across], axis=1).astype(np.int64) @ np.array([count, 1])
     pairs, pair_of = np.unique(keys, return_inverse=True)
-    summed = np.bincount(pair_of, bonds, len(pairs)).astype(np.float64)
-    return patches, signs, np.column_stack(np.divmod(pairs, count)), summed
+    summed = np.bincount(pair_of, weights[across], len(pairs)).astype(np.float64)
+    return np.column_stack(np.divmod(pairs, count)).astype(np.int32), summed
 
 
 def _agreement(pairs: NDArray[np.intp], bonds: NDArray[np.float64]) -> NDArray[np.int8]:
@@ -138,11 +176,11 @@ def _seen_from(points: Vectors, reach: float) -> NDArray[np.float32]:
 
 def _visible(
     points: NDArray[np.float32], axis: NDArray[np.float32], side: int
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether each point is seen from the two ends of an axis, the positive one first, (N,).
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """How far each point is seen from the two ends of an axis, the positive one first, 0 to 1, (N,).
 
-    points: in cells. A view looks at side x side cells; in each the first points are seen, and
-    those little behind them.
+    points: in cells. A view looks at side x side cells; in each the first point is seen, and those behind it
+    the less the farther they are: of the two sides of something thin, the one in front counts more.
     """
     across = np.cross(axis, np.eye(3, dtype=np.float32)[np.abs(axis).argmin()])
     across /= np.linalg.norm(across)
@@ -153,7 +191,10 @@ def _visible(
     np.maximum.at(nearest, at, depth)
     np.minimum.at(farthest, at, depth)
     little = np.float32(_DEPTH / _CELL)
-    return depth >= nearest[at] - little, depth <= farthest[at] + little
+    return (
+        np.maximum(1 - (nearest[at] - depth) / little, 0),
+        np.maximum(1 - (depth - farthest[at]) / little, 0),
+    )
 
 
 def _half_sphere(count: int) -> Vectors:
