@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 from PIL import Image
-from virtual_screen import PANEL, ROOT, SIZE, running_app, virtual_screen
+from virtual_screen import ROOT, SIZE, running_app, virtual_screen
 
 NOTES = 10  # seconds, after which those of the start are gone
 EYES = ((418, 331), (532, 331))  # below them, pixels of the screen
@@ -29,7 +29,6 @@ def main() -> None:
             for x, y in EYES:
                 screen.do("mousemove", x, y, "click", 1)
                 app.settle()
-            app.act(PANEL, ("scroll_to_bottom", ""))
             screen.do("key", "Escape", "mousemove", SIZE[0] - 1, SIZE[1] - 1)
             app.settle()
             screen.do("sleep", NOTES)
