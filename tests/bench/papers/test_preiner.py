@@ -132,7 +132,9 @@ def test_fits_with_and_without_hidden_neighbours() -> None:
 def test_pictures_stand_beside_those_of_all_points() -> None:
     text = page([MADE])
     assert [line[7] for line in cells(text, "", "", "planes of all points")] == ["32.0"]
-    assert [line[-1] for line in cells(text, "`horses`", "no", "no")] == ["20.0"]
+    assert [line[-1] for line in cells(text, "`horses`", "no", "no")] == ["5.00"]  # of four processors
+    timed = page([{**MADE, "timer": "query"}])
+    assert [line[-1] for line in cells(timed, "`horses`", "no", "no")] == ["20.0"]
     assert [line[7] for line in cells(text, "`horses`", "yes", "yes")] == ["26.0"]
 
 

@@ -86,9 +86,10 @@ class _Found:
 def build_and_cut(bench: Bench, scans: Sequence[Scan]) -> Iterator[Row]:
     """Table III: a row for each scan and delta, over the poses and viewpoints of the bench's views.
 
-    All works take turns. Their times, ms: "build" without and "attributes" with colours and normals of every
-    node; "cut" for a view at a pixel, "leaves" at no limit, both with centres; "sort" of numpy, of the same
-    Morton codes as the points come. On one thread, for fewer than 200 000 points. Nodes are inner ones.
+    All works take turns. Their times, ms of a processor: "build" without and "attributes" with colours and
+    normals of every node; "cut" for a view at a pixel, "leaves" at no limit, both with centres; "sort" of
+    numpy, of the same Morton codes as the points come. On one thread, for fewer than 200 000 points. Nodes
+    are inner ones.
     """
     settings = bench.settings
     for scan in scans:
@@ -123,10 +124,10 @@ def _measure(cloud: PointCloud, camera: Camera, delta: float, bench: Bench, foun
     with undisturbed():
         for turn in range(1 + _ROUNDS * settings.repeat):
             for name, work in works.items():
-                start = time.perf_counter()
+                start = time.process_time()
                 work()
                 if turn:  # not what it takes to begin
-                    found.ms[name].append((time.perf_counter() - start) * 1e3)
+                    found.ms[name].append((time.process_time() - start) * 1e3)
 
 
 def _works(cloud: PointCloud, tree: Octree, sight: Sight, stop: Stop) -> dict[str, Callable[[], int]]:
