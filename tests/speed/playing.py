@@ -11,25 +11,18 @@ a picture in full is there; the time counts from before the last event is sent.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
-import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "app"))
-from virtual_screen import RunningApp, Screen, State, running_app, virtual_screen
+from played_window import RunningApp, State, arguments_of, switch_to, window_on
 
 from viewer.app.playing.player import Player
-from viewer.scan.open import open_scan
 
 BACKENDS = ("surfels", "points")
 MODES = ("real time", "every frame")
@@ -89,25 +82,16 @@ class Watch:
 
 
 @contextmanager
-def playing(screen: Screen) -> Iterator[None]:
+def playing(app: RunningApp) -> Iterator[None]:
     """While the scan plays."""
-    screen.do("key", "space")
+    app.screen.do("key", "space")
     yield
-    screen.do("key", "space")
-
-
-def switch_to(app: RunningApp, backend: str) -> Drew:
-    """Draw with this backend; returns the picture at rest."""
-    while True:
-        state = app.settle()
-        if state.backend == backend:
-            return Drew.of(state)
-        app.screen.do("key", "b")
+    app.screen.do("key", "space")
 
 
 def measure_playing(app: RunningApp, watch: Watch, seconds: float, player: Player, full: Drew) -> str:
     """The numbers of a row of the first table."""
-    with playing(app.screen):
+    with playing(app):
         time.sleep(_SETTLING)
         drawn = watch.pictures(seconds)
     shown = [drawn[0], *(b for a, b in pairwise(drawn) if b.frame != a.frame)]
@@ -149,42 +133,26 @@ def rests(app: RunningApp, watch: Watch, count: int, full: Drew) -> dict[str, li
 
 
 def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments = arguments_of(__doc__)
     arguments.add_argument("--seconds", type=float, default=10.0)
     arguments.add_argument("--rests", type=int, default=15)
-    arguments.add_argument("--size", default="1280x720")
-    arguments.add_argument("scan", nargs="?", default="demo")
     options = arguments.parse_args()
-    width, height = (int(n) for n in options.size.split("x"))
-    with open_scan(options.scan) as timeline:
-        player = Player(timeline.times)
-
-    with tempfile.TemporaryDirectory() as name:
-        folders = [Path(name, part) for part in ("screen", "app")]
-        for folder in folders:
-            folder.mkdir()
-        with (
-            virtual_screen(folders[0], (width, height)) as screen,
-            running_app(screen, folders[1], options.scan) as app,
-        ):
-            watch = Watch(app)
-            print(
-                f"{options.scan}, {len(player)} frames at {player.rate:.3g} a second, window {options.size}"
-            )
-            print(f"load of the machine before: {os.getloadavg()[0]:.2f}")
-            print(f"renderer mode        {'fps':>6} {'left out':>8} {'lag':>6} {'points':>8} {'pixels':>8}")
-            for mode in MODES:
-                for backend in BACKENDS:
-                    full = switch_to(app, backend)
-                    print(
-                        f"{backend:8} {mode:11} {measure_playing(app, watch, options.seconds, player, full)}"
-                    )
-                screen.do("key", "e")
-            print(f"renderer rest after  {'median ms':>10} {'longest':>8}   to a picture in full")
+    with window_on(options) as (app, player):
+        watch = Watch(app)
+        print(f"{options.scan}, {len(player)} frames at {player.rate:.3g} a second, window {options.size}")
+        print(f"load of the machine before: {os.getloadavg()[0]:.2f}")
+        print(f"renderer mode        {'fps':>6} {'left out':>8} {'lag':>6} {'points':>8} {'pixels':>8}")
+        for mode in MODES:
             for backend in BACKENDS:
-                for what, times in rests(app, watch, options.rests, switch_to(app, backend)).items():
-                    print(f"{backend:8} {what:11} {np.median(times):10.0f} {max(times):8.0f}")
-            print(f"load of the machine after: {os.getloadavg()[0]:.2f}")
+                full = Drew.of(switch_to(app, backend))
+                print(f"{backend:8} {mode:11} {measure_playing(app, watch, options.seconds, player, full)}")
+            app.screen.do("key", "e")
+        print(f"renderer rest after  {'median ms':>10} {'longest':>8}   to a picture in full")
+        for backend in BACKENDS:
+            full = Drew.of(switch_to(app, backend))
+            for what, times in rests(app, watch, options.rests, full).items():
+                print(f"{backend:8} {what:11} {np.median(times):10.0f} {max(times):8.0f}")
+        print(f"load of the machine after: {os.getloadavg()[0]:.2f}")
 
 
 if __name__ == "__main__":

@@ -8,19 +8,14 @@ at rest. Processors are those that the window and the processes that help it too
 
 from __future__ import annotations
 
-import argparse
 import os
-import sys
-import tempfile
 import time
 from itertools import groupby
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "app"))
-from virtual_screen import RunningApp, running_app, virtual_screen
+from played_window import RunningApp, arguments_of, switch_to, window_on
 
 from viewer.app.playing.player import Player
-from viewer.scan.open import open_scan
 
 
 def cpu_seconds(process: int) -> float:
@@ -39,8 +34,7 @@ def cpu_seconds(process: int) -> float:
 
 def measure(app: RunningApp, backend: str, player: Player, rounds: int) -> None:
     """Play, and print a row for each round."""
-    while app.settle().backend != backend:
-        app.screen.do("key", "b")
+    switch_to(app, backend)
     first = app.state.pictures
     app.screen.do("key", "space")
     start = app.see(is_playing=True).at
@@ -62,26 +56,14 @@ def measure(app: RunningApp, backend: str, player: Player, rounds: int) -> None:
 
 
 def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments = arguments_of(__doc__)
     arguments.add_argument("--rounds", type=int, default=3)
-    arguments.add_argument("--size", default="1280x720")
     arguments.add_argument("--backend", default="voxels")
-    arguments.add_argument("scan", nargs="?", default="demo")
     options = arguments.parse_args()
-    width, height = (int(n) for n in options.size.split("x"))
-    with open_scan(options.scan) as timeline:
-        player = Player(timeline.times)
-    with tempfile.TemporaryDirectory() as name:
-        folders = [Path(name, part) for part in ("screen", "app")]
-        for folder in folders:
-            folder.mkdir()
-        with (
-            virtual_screen(folders[0], (width, height)) as screen,
-            running_app(screen, folders[1], options.scan) as app,
-        ):
-            print(f"{options.scan}, {options.backend}, load of the machine {os.getloadavg()[0]:.2f}")
-            print("round    shown  others     fps processors")
-            measure(app, options.backend, player, options.rounds)
+    with window_on(options) as (app, player):
+        print(f"{options.scan}, {options.backend}, load of the machine {os.getloadavg()[0]:.2f}")
+        print("round    shown  others     fps processors")
+        measure(app, options.backend, player, options.rounds)
 
 
 if __name__ == "__main__":
