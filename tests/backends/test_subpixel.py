@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import NOTHING, looking_down_z, sphere
+from scenes import NOTHING, looking_down_z, sphere, sphere_hits
 from test_instancing import assert_agree
 
 from viewer.bench.judge import Judge, Walk
@@ -185,3 +185,30 @@ def test_no_colours_and_no_radii_of_their_own(draw: Draw) -> None:
     covered = surface.row != NOTHING
     away = np.linalg.norm(surface.normal[covered], axis=1)
     np.testing.assert_allclose(away, 1, atol=1e-5)
+
+
+@pytest.mark.parametrize("instancing", ["auto", "tiles", "gs"])
+def test_a_lone_one_is_shown_in_its_plane_within_a_pixel_of_its_point(draw: Draw, instancing: str) -> None:
+    """Splats far apart and far smaller than a pixel, tilted by all angles."""
+    tilts = np.radians(np.linspace(0, 85, 18))
+    positions = np.stack([np.linspace(-0.9, 0.9, 18), 0.3 * np.sin(np.arange(18.0)), 0 * tilts], axis=1)
+    normals = np.stack([np.sin(tilts), 0 * tilts, np.cos(tilts)], axis=1)
+    cloud = PointCloud.from_arrays(positions, normals=normals, radii=np.full(18, 1e-5))
+    surface = surfels(draw, cloud, Camera((0, 0, 4), (0, 0, 0)), instancing=instancing)
+    y, x = np.nonzero(surface.row != NOTHING)
+    rows, depth = surface.row[y, x], surface.depth[y, x].astype(np.float64)
+    assert len(np.unique(rows)) >= 12
+    shown = surface.view.unproject(np.stack([x, y], axis=1) + 0.5, depth) + surface.view.origin
+    away, pixel = shown - positions[rows], depth / surface.view.scale
+    assert (np.linalg.norm(away, axis=1) <= 0.7072 * pixel * 1.02).all()
+    assert (np.abs(np.sum(away * normals[rows], axis=1)) <= 0.01 * pixel).all()
+
+
+def test_far_ones_show_the_depth_of_the_surface_at_the_middle_of_pixels(draw: Draw) -> None:
+    """By their planes; discs that face the eye would be off by up to a pixel's slope."""
+    view = camera()
+    surface, (depth, normal) = surfels(draw, CLOUD, view), sphere_hits(view, SIZE)
+    slanted = np.isfinite(depth) & (normal @ view.rotation()[2] < 0.6) & (normal @ view.rotation()[2] > 0.2)
+    error = np.abs(surface.depth[slanted] - depth[slanted]) * surface.view.scale / depth[slanted]
+    assert np.count_nonzero(slanted) > 1000
+    assert np.median(error) < 0.1
