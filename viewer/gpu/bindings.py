@@ -130,6 +130,7 @@ class Storage(IntEnum):
     AGAIN = 6
     AWAY = 6
     FARTHEST = 7
+    NEAREST = 7
     # Neighborhoods and their splats, beside a list.
     SPLATS = 0
     FOUND = 1

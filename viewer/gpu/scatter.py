@@ -77,9 +77,24 @@ def scatter(
         if listed is not None:
             listed.bind()
 
-    for number, name in enumerate(("depth", "id", "list") if listed is not None else ("depth", "id")):
-        with gpu.timers.measure(name):
-            visits.send(gpu, "scatter/best.glsl", bind, PASS=number)
+    with gpu.timers.measure("depth"):
+        visits.send(gpu, "scatter/best.glsl", bind, PASS=0)
+    take_items(gpu, visits, keys, best)
+    if listed is not None:
+        with gpu.timers.measure("list"):
+            visits.send(gpu, "scatter/best.glsl", bind, PASS=2)
+
+
+def take_items(gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.BufferTexture) -> None:
+    """The second step of `scatter`: where keys hold the least ones already, keep the lowest item that has its
+    cell's."""
+
+    def bind(_: Program) -> None:
+        keys.bind(Texture.KEYS)
+        best.buffer.bind_to_storage_buffer(Storage.BEST)
+
+    with gpu.timers.measure("id"):
+        visits.send(gpu, "scatter/best.glsl", bind, PASS=1)
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,22 @@
 // A disc's cells are the tiles of TILE x TILE pixels that it reaches: found in PASS 0, remembered for PASS 1.
-// Large discs, and those that cross the near plane, are listed to be rasterised.
+// Large discs, and those that cross the near plane, are listed to be rasterised; those of up to FEW pixels are sent to
+// these at once, and are in no list.
 // SIDE 0: all discs; 1: those that face the eye; 2: the others that 1 found, where `farthest` does not hide them;
 // 3: all that it does not hide.
 #include "surfels/tiles/grid.glsl"
-#if SIDE != 2
+#if PASS == 0 && SIDE != 2
 #include "amplify/texels.glsl"
-#include "surfels/disc.glsl"
+#include "surfels/pixels.glsl"
 #endif
 
 #if PASS == 0 && SIDE != 2
 layout(std430, binding = STORAGE_PLACES) writeonly buffer Places { vec4 places[]; };
 layout(std430, binding = STORAGE_FORMS) writeonly buffer Forms { vec4 forms[]; };
 layout(std430, binding = STORAGE_REACH) writeonly buffer Reach { uint reach[]; };
-layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, large[]; };
+layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, sent, large[]; };
+#if FEW
+layout(std430, binding = STORAGE_NEAREST) buffer Nearest { uint nearest_depths[]; };  // of each pixel, float bits
+#endif
 #else
 layout(binding = TEXTURE_REACH) uniform usamplerBuffer reach;
 #endif
@@ -56,30 +60,47 @@ bool is_hidden(ivec4 t, float nearest) {
 #endif
 
 #if PASS == 0 && SIDE != 2
-// Tiles whose pixel centres the box reaches: first, and the one after the last.
-ivec4 tiles_in(vec4 box) {
-    ivec4 pixels = ivec4(clamp(ceil(box - 0.5), vec4(0.0), vec2(view_size).xyxy));
+void take_pixel(uint pixel, uint depth, uint row) {
+#if FEW
+    atomicMin(nearest_depths[pixel], depth);
+#endif
+}
+
+// Tiles that have these pixels: first, and the one after the last.
+ivec4 tiles_of(ivec4 pixels) {
     if (any(greaterThanEqual(pixels.xy, pixels.zw))) return ivec4(0);
     return ivec4(pixels.xy / TILE, (pixels.zw + TILE - 1) / TILE);
 }
 
 // The tiles that a disc reaches, as a word; its key and form are written down. disc: its number. away: as in
 // `away_depths`.
-uint tiles_of(Point point, uint disc, out uint away_depth) {
+uint tiles_reached(Point point, uint disc, out uint away_depth) {
     away_depth = 0u;
     if (!begin_disc(point)) return 0u;
     vec2 depths = disc_range();
     if (depths.y < view_near || depths.x > view_far) return 0u;
     bool crosses = depths.x < view_near;
-    ivec4 t = crosses ? ivec4(0) : tiles_in(disc_box());
+    ivec4 pixels = crosses ? ivec4(0) : pixels_in(disc_box()), t = tiles_of(pixels);
     if (crosses || any(greaterThan(t.zw - t.xy, ivec2(SPAN)))) {
         large[atomicAdd(large_count, 1u)] = point.row;
         return 0u;
     }
     if (t.x >= t.z) return 0u;
+#if SIDE == 1
+    bool is_away = dot(disc_normal, towards_eye(disc_center)) <= 0.0;
+#else
+    const bool is_away = false;
+#endif
+#if FEW
+    if (!is_away && (pixels.z - pixels.x) * (pixels.w - pixels.y) <= FEW) {
+        take_pixels(pixels, point.row);
+        atomicAdd(sent, 1u);
+        return SENT;
+    }
+#endif
     float nearest = depths.x * (1.0 - 1e-6);
 #if SIDE == 1
-    if (dot(disc_normal, towards_eye(disc_center)) <= 0.0) {
+    if (is_away) {
         away = 1u;
         away_depth = floatBitsToUint(nearest);
     }
@@ -95,7 +116,7 @@ uint tiles_of(Point point, uint disc, out uint away_depth) {
 
 void scatter(uint i) {
 #if PASS == 0 && SIDE != 2
-    uint away_depth, word = tiles_of(texel_point(drawn_row(int(i))), i, away_depth);
+    uint away_depth, word = tiles_reached(texel_point(drawn_row(int(i))), i, away_depth);
     reach[i] = word;
 #if SIDE == 1
     away_depths[i] = away_depth;

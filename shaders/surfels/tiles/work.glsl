@@ -1,7 +1,8 @@
-// Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where large discs, which
-// reach anywhere, are rasterised. SECOND: of a second filling; BOTH: those that discs of the first one reach, too.
+// Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where some discs, which reach
+// anywhere, are rasterised or were sent to their pixels. SECOND: of a second filling; BOTH: those that discs of the
+// first one reach, too.
 layout(std430, binding = STORAGE_STARTS) readonly buffer Starts { uint starts[]; };
-layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, large[]; };
+layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, sent, large[]; };
 layout(std430, binding = STORAGE_WORK) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
 layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { uint farthest[]; };
 
@@ -17,7 +18,7 @@ uint entries_of(uint tile) {
     return entries;
 }
 
-uint word_of(uint tile) { return entries_of(tile) > 0u || large_count > 0u ? 1u : 0u; }
+uint word_of(uint tile) { return entries_of(tile) > 0u || large_count > 0u || sent > 0u ? 1u : 0u; }
 
 void take_sum(uint tile, uint sum) {
     uint entries = entries_of(tile), is_worked = word_of(tile);
@@ -25,7 +26,7 @@ void take_sum(uint tile, uint sum) {
 #if SECOND
     if (entries > 0u) farthest[tile] = 0u;  // is shown again
 #else
-    farthest[tile] = entries > 0u ? 0u : NO_DEPTH;  // through such a tile everything is seen
+    farthest[tile] = is_worked > 0u ? 0u : NO_DEPTH;  // through such a tile everything is seen
 #endif
     if (entries > longest) atomicMax(longest, entries);
     if (tile + 1u < word_count) return;

@@ -4,6 +4,9 @@ No atomics on pixels: a tile's pixels keep the nearest disc in registers, so tha
 does not matter. Splats that are too large for lists go through the rasteriser, in either pass, and tiles
 go on from what that found or added up; where any is large, all tiles are worked on.
 
+Where the nearest alone is wanted of many more points than there are pixels, as in a scan that is near and
+far at once, discs of a few pixels are sent to these, by atomics: lists of them would be very long.
+
 What faces away comes second: first the discs that face the eye are listed and shown, then those of the
 others that some tile they reach lets through, going by the farthest depth it shows. Of a closed surface
 that leaves the outline alone. A second pass goes over both lists. The CPU waits once for each, for the length
@@ -25,13 +28,16 @@ from ...gpu.bindings import Storage, Texture
 from ...gpu.bins import Bins
 from ...gpu.compact import scan_words
 from ...gpu.context import Gpu, Program
-from ...gpu.scatter import Visits
+from ...gpu.scatter import Visits, take_items
 from ...gpu.surface import Surface
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
 TILE = 8  # pixels of a tile's edge
 _MOST_TILES = 2048  # along an edge of the picture: what cells.glsl's words have bits for
 _DISC_BYTES = 16  # of a point in each of two buffers
+_FEW = 4  # pixels of the box of a disc that is sent to them: a square that the smallest discs fit into
+_MANY = 2.0  # points a pixel, from which on that is done: of fewer, lists take less
+_SENT = f"{1 << 27}u"  # what cells.glsl says in place of the tiles that such a disc reaches: none, one high
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
 # Entries of one tile's list: of more, sums of light could exceed 32 bits (31 x 4095 each); llvmpipe ends all
@@ -39,7 +45,7 @@ _ROOM = 4  # entries of the list for each point, to begin with
 # with so many would be slow.
 _LONGEST = 30_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
-_LARGE_HEAD = 16  # bytes before the rows of large discs
+_LARGE_HEAD = 20  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
 DEPTH, LIMIT = 1, 2  # what is kept of each tile: FARTHEST of show.comp
@@ -52,13 +58,13 @@ class TileLists:
 
     Discs are numbered in the order of the points that are drawn. length: entries of all lists. large: how
     many discs are left to the rasteriser. away: whether some that face away from the eye were left to a
-    second filling.
+    second filling. sent: how many were sent to pixels in place of lists.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._gpu = gpu
         self.tiles = (-(-size[0] // TILE), -(-size[1] // TILE))
-        self.length = self.large = 0
+        self.length = self.large = self.sent = 0
         self.away = False
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
@@ -76,19 +82,27 @@ class TileLists:
         bins = self._bins.nbytes + self._away_bins.nbytes
         return bins + sum(texture.buffer.size for texture in textures)
 
-    def fill(self, points: Points, splats: Splats, side: int = ALL, both: bool = False) -> bool:
+    def fill(
+        self,
+        points: Points,
+        splats: Splats,
+        side: int = ALL,
+        both: bool = False,
+        few_to: Surface | None = None,
+    ) -> bool:
         """List the discs of points for the bound view; False where the lists would grow too long.
 
         side: ALL; TOWARDS, those that face the eye; AWAY, the others that it found, in lists beside, unless
         they are hidden by what `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large
-        ones are counted but for AWAY. both: whether `run` goes over the tiles of both lists.
+        ones are counted but for AWAY. both: whether `run` goes over the tiles of both lists. few_to: an empty
+        surface, which takes the depths of discs of a few pixels; None: they are listed.
         """
         gpu, second = self._gpu, side == AWAY
         bins = self._away_bins if second else self._bins
         if not second:
             self._reserve(max(points.count, 1))
             self._rows = points.rows
-        self._buffer("large").write(struct.pack("4I", self.large if both else 0, 0, 0, 0))
+        self._buffer("large").write(struct.pack("5I", self.large if both else 0, 0, 0, 0, 0))
 
         def bind(program: Program) -> None:
             if not second:
@@ -98,20 +112,34 @@ class TileLists:
             for name in ("reach", "away"):
                 self._textures[name].bind(Texture[name.upper()])
             self._bind_storage("away")
+            if few_to is not None:
+                few_to.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
 
-        defines = {"SIDE": side, "TILE": TILE, **({} if second else points.defines)}
+        given = {} if second else points.defines
+        defines = {"SIDE": side, "TILE": TILE, "FEW": 0 if few_to is None else _FEW, "SENT": _SENT, **given}
         visits = Visits("surfels/tiles/cells.glsl", points.count, bind, defines, splats)
         bins.count(visits)
         with gpu.timers.measure("work"):
             self._find_work(bins, second, both)
             words = self._buffer("large").read(_LARGE_HEAD)
-            large, self.length, away, longest = struct.unpack("2I?3xI", words)
+            large, self.length, away, longest, sent = struct.unpack("5I", words)
             if not second:
-                self.large, self.away = large, away
+                self.large, self.away, self.sent = large, bool(away), sent
         if self.length > gpu.max_storage_bytes // 4 or longest > _LONGEST:
             return False
         bins.fill(visits, self.length)
         return True
+
+    def take_sent(self, points: Points, surface: Surface, splats: Splats) -> None:
+        """Find the points of the discs that were sent to pixels, whose depths the surface has."""
+
+        def bind(program: Program) -> None:
+            points.bind(program)
+            self._textures["reach"].bind(Texture.REACH)
+
+        defines = {"SENT": _SENT, **points.defines}
+        visits = Visits("surfels/scatter.glsl", points.count, bind, defines, splats)
+        take_items(self._gpu, visits, surface.depths, surface.rows)
 
     def _find_work(self, bins: Bins, second: bool, both: bool) -> None:
         """List the tiles that discs reach."""
@@ -218,7 +246,10 @@ def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int)
     First come those that face the eye, then those of the others that the first do not hide: of a closed
     surface next to none. farthest: as in `show`; where it is LIMIT, it is told in any case.
     """
-    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS)
+    few = points.count > _MANY * surface.size[0] * surface.size[1]
+    if few:
+        surface.clear()
+    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS, few)
     if lists is None:
         return False
     away = lists.away
@@ -241,14 +272,17 @@ def fill_away(points: Points, surface: Surface, lists: TileLists, splats: Splats
     return fits
 
 
-def tile_lists(points: Points, surface: Surface, splats: Splats, side: int = ALL) -> TileLists | None:
-    """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner."""
+def tile_lists(
+    points: Points, surface: Surface, splats: Splats, side: int = ALL, few: bool = False
+) -> TileLists | None:
+    """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner. few: discs
+    of a few pixels are on the surface, which was empty, and in no list."""
     reason = _unfit(points, surface)
     if not reason:
         lists = surface.keep(TileLists)
-        if not lists.fill(points, splats, side):
+        if not lists.fill(points, splats, side, few_to=surface if few else None):
             reason = f"too long lists, {lists.length:,} entries"
-        elif lists.large * _LARGE_COST > lists.length:
+        elif lists.large * _LARGE_COST > lists.length + lists.sent:
             reason = f"{lists.large:,} large splats"
     if reason:
         surface.stats.skipped["tiles"] = f"{reason}: all rasterised"
@@ -257,6 +291,9 @@ def tile_lists(points: Points, surface: Surface, splats: Splats, side: int = ALL
         surface.stats.skipped["large splats in tiles"] = f"{lists.large:,} rasterised"
     else:
         surface.stats.skipped["splat"] = "no splat is large"
+    if lists.sent:
+        surface.stats.skipped["lists of small splats"] = f"{lists.sent:,} sent to their pixels"
+        lists.take_sent(points, surface, splats)
     return lists
 
 
@@ -281,8 +318,8 @@ def show_with(
     """The nearest disc at each pixel of those listed and of large ones, which are rasterised. farthest: as in
     `show`."""
     if large is not None:
-        amplify(large, surface, FALLBACK, SURFEL, FRAGMENT, splats)
-    show(points, surface, lists, splats, found=large is not None, farthest=farthest)
+        amplify(large, surface, FALLBACK, SURFEL, FRAGMENT, splats, over=lists.sent > 0)
+    show(points, surface, lists, splats, found=large is not None or lists.sent > 0, farthest=farthest)
 
 
 def show(
