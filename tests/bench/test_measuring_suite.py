@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, reduce
 from itertools import product
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from scenes import sphere
 
+from viewer.analysis.pick import before_gap, pick
 from viewer.bench.measuring import (
     DRAWN,
     SCENES,
@@ -25,6 +27,7 @@ from viewer.bench.report.results import DISTANCES, write_row
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.subjects import Moment, Subject
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
+from viewer.gpu.surface import Surface
 from viewer.mesh.reference import first_hits, trace
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
@@ -62,6 +65,28 @@ def test_the_true_distance_is_within_what_is_said_in_95_percent(
     found = reduce(Distances.with_others, parts)
     assert np.isnan(found.uncertainty).mean() < 0.01
     assert 93 <= found.covered <= 98, [part.covered for part in parts]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("zoom", [1.0, 4.0])
+@pytest.mark.parametrize("scene", ["bunny", "armadillo", "dragon-100k"])
+def test_picks_of_voxels_are_on_the_surface(
+    draw: Callable[..., Surface], data_dir: Path, scene: str, zoom: float
+) -> None:
+    subject, moment = scanned(scene, data_dir)
+    off = []
+    for camera in zoomed(moment.truth, zoom, 2, SIZE, subject.up):
+        surface = draw(moment.pose.cloud, camera, SIZE, "voxels")
+        rows, columns = np.nonzero(surface.level == 0)
+        chosen = np.random.default_rng(1).integers(len(rows), size=100)
+        pixels = np.stack([columns[chosen], rows[chosen]], axis=1)
+        for (x, y), there in zip(
+            pixels.tolist(), first_hits(moment.truth, camera, SIZE, pixels + 0.5), strict=True
+        ):
+            picked = pick(surface, x, y, shown=before_gap(surface, x, y))
+            assert picked is not None
+            off.append(float(np.linalg.norm(picked.position - there)))
+    assert np.nanmedian(off) < 0.1 * moment.pose.spacing
 
 
 @pytest.mark.parametrize("name", DRAWN)
