@@ -118,6 +118,15 @@ def test_coordinates_keep_their_float64_precision() -> None:
     assert near.remainders is None
 
 
+def test_each_point_moved_by_its_own() -> None:
+    cloud = PointCloud.from_arrays(np.array([[1e7, 0, 0], [1e7 + 1 / 3, 1, 0], [3e7, 0, 1]]))
+    assert cloud.remainders is not None
+    by = np.array([[0.1, 0, 0], [-1 / 3, 0, 0], [0, 0, 5]])
+    moved = cloud.displaced(by)
+    assert moved.remainders is None
+    np.testing.assert_allclose(moved.world(), cloud.world() + by, rtol=0, atol=6e-8 * 2e7)
+
+
 def test_what_float32_offsets_hold_has_no_remainders() -> None:
     points = np.random.default_rng(3).random((1000, 3), np.float32) + np.float32(100)
     assert PointCloud.from_arrays(points).remainders is None

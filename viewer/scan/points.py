@@ -167,6 +167,13 @@ class PointCloud:
         viewpoint = None if self.viewpoint is None else self.viewpoint + by
         return replace(self, origin=self.origin + by, viewpoint=viewpoint)
 
+    def displaced(self, by: NDArray[np.floating]) -> PointCloud:
+        """Each point moved by its own (N, 3), scan units: as precise as float32 offsets are."""
+        offsets = self.positions + by
+        if self.remainders is not None:
+            offsets += self.remainders
+        return replace(self, positions=offsets.astype(np.float32), remainders=None)
+
     def splat_reach(self) -> NDArray[np.float32]:
         """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
         assert self.radii is not None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -69,8 +68,7 @@ def outside_sheets(scene: AnalyticScene, cloud: PointCloud) -> PointCloud:
 
 def _stretched(cube: Mesh, half: tuple[float, float, float]) -> Mesh:
     """The cube -1..1 as a box, half: half its edges."""
-    points = replace(cube.points, positions=(cube.points.positions * np.array(half)).astype(np.float32))
-    return Mesh(points, cube.faces)
+    return Mesh(cube.points.displaced(cube.points.positions * (np.array(half) - 1)), cube.faces)
 
 
 def _joined(meshes: Sequence[Mesh], scales: Sequence[float], shifts: Sequence[Rays]) -> Mesh:

@@ -61,8 +61,8 @@ def noisy(spacings: float) -> Change:
     def change(cloud: PointCloud, random: np.random.Generator) -> PointCloud:
         assert cloud.normals is not None
         offset = random.normal(scale=spacings * typical_spacing(cloud), size=len(cloud))
-        moved = cloud.positions + (offset[:, None] * cloud.normals).astype(np.float32)
-        return with_rows(replace(cloud, positions=moved), np.arange(len(cloud)))
+        moved = cloud.displaced((offset[:, None] * cloud.normals).astype(np.float32))
+        return with_rows(moved, np.arange(len(cloud)))
 
     return change
 

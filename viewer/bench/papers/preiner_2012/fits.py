@@ -8,7 +8,7 @@ points.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -122,7 +122,7 @@ def noisy(cloud: PointCloud, noise: float, seed: int) -> PointCloud:
         return cloud
     assert cloud.normals is not None
     by = np.random.default_rng(seed).normal(0, noise * typical_spacing(cloud), (len(cloud), 1))
-    return replace(cloud, positions=(cloud.positions + by * cloud.normals).astype(np.float32))
+    return cloud.displaced(by * cloud.normals)
 
 
 def at_silhouettes(
