@@ -165,6 +165,44 @@ def test_without_usable_normals_they_are_of_that_size(renderer: Renderer) -> Non
     assert known.max() < 5
 
 
+@pytest.mark.parametrize("copies", [1, 100])
+def test_stored_radii_are_enlarged_where_they_leave_gaps(renderer: Renderer, draw: Draw, copies: int) -> None:
+    """The scan's own that close the surface stay to the last bit, whatever the place of a few that do not."""
+    cloud = torus(3000)
+    gaps = found(renderer, cloud)
+    rows = np.tile(np.arange(3000), copies)
+    every = np.random.default_rng(2).random(3000)
+
+    def stored(radii: NDArray[np.float32]) -> PointCloud:
+        return with_rows(replace(cloud, radii=radii), rows)
+
+    def picture(cloud: PointCloud, radius: str) -> Surface:
+        return draw(cloud, CAMERA, (160, 120), "surfels", params={"radius": radius})
+
+    small = np.where(every < 0.5, 0.4, 1.3).astype(np.float32) * gaps
+    radii = found(renderer, stored(small))
+    np.testing.assert_allclose(radii, np.maximum(gaps, small)[rows], rtol=1e-5)
+    enlarged = picture(stored(small), "auto")
+    assert "radius" in enlarged.stats.chosen
+    assert "radius" not in picture(stored(small), "own").stats.chosen
+    no_radii = with_rows(cloud, rows)
+    assert (picture(no_radii, "auto").coverage > 0).sum() <= (enlarged.coverage > 0).sum()
+    large = np.where(every < 0.05, 0.4, 1.3).astype(np.float32) * gaps
+    assert not found(renderer, stored(large)).any()
+    kept, own = (picture(stored(large), radius) for radius in ("auto", "own"))
+    assert "radius" not in kept.stats.chosen
+    np.testing.assert_array_equal(kept.image(), own.image())
+    np.testing.assert_array_equal(kept.depth, own.depth)
+
+
+def test_radii_without_use_are_replaced(renderer: Renderer) -> None:
+    cloud = torus(3000)
+    gaps = found(renderer, cloud)
+    for useless in (0.0, -1.0, np.nan):
+        radii = np.where(np.arange(3000) % 2, np.float32(useless), np.float32(0.3) * gaps)
+        np.testing.assert_array_equal(found(renderer, replace(cloud, radii=radii)), gaps)
+
+
 def test_discs_close_a_body_of_uneven_density(renderer: Renderer, draw: Draw) -> None:
     """At most 0.3 % of the true silhouette is empty or shows what is behind; of one radius for all, more."""
     mesh = tessellation.torus_mesh()

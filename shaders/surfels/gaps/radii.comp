@@ -1,7 +1,6 @@
 // The radius at which a point's disc closes the gaps round it: how far the part of its tangent plane reaches that is
-// nearer to it than to any other point, the farthest corner of its Voronoi cell. In direction w that is the least
-// |d|^2 / (2 d.w) over the others at d. Copies, order and far points of the same list change nothing, so that lists
-// need no order.
+// nearer to it than to any other point, the farthest corner of its Voronoi cell. Copies, order and far points of the
+// same list change nothing, so that lists need no order.
 //
 // At a border a cell does not end; it counts as twice as far as it reaches to most sides. LISTED: invocations are of
 // the points in the list, else of slots. What cells cannot tell stays 0.
@@ -9,6 +8,7 @@
 #if LISTED
 #include "common/list.glsl"
 #endif
+#include "common/cell_reach.glsl"
 #include "common/tangent.glsl"
 #include "surfels/gaps/cell.glsl"
 
@@ -52,22 +52,18 @@ void main() {
     float len = length(n);
     n = len > 0.0 && len < UNKNOWN ? n / len : vec3(0.0, 0.0, 1.0);
     vec3 u = tangent_of(n), v = cross(n, u);
-    // The greatest d.w / |d|^2 in eight directions w, in cells: one over twice how far it reaches.
-    vec4 low = vec4(0.0), high = vec4(0.0);
+    clear_cell();
     ivec3 cell = cell_of(place);
     for (int z = -1; z <= 1; ++z)
         for (int y = -1; y <= 1; ++y) {
             int run = int(list_of(cell + ivec3(-1, y, z))), last = int(texelFetch(starts, run + 3).r);
             for (int j = int(texelFetch(starts, run).r); j < last; ++j) {
                 vec3 d = (texelFetch(slots, j).xyz - place) / cell_size;
-                vec2 near = vec2(dot(d, u), dot(d, v)) / max(dot(d, d), 1e-30);
-                vec4 along = vec4(near, (near.x + near.y) * 0.70710678, (near.x - near.y) * 0.70710678);
-                low = min(low, along);
-                high = max(high, along);
+                bound_cell(vec2(dot(d, u), dot(d, v)) / max(dot(d, d), 1e-30));
             }
         }
-    vec4 least = min(-low, high);
-    float most_sides = fourth(-low, high);
+    vec4 least = min(-lowest[0], highest[0]);
+    float most_sides = fourth(-lowest[0], highest[0]);
     float inverse = max(min(min(least.x, least.y), min(least.z, least.w)), most_sides / BORDER);
     float reach = 0.5 / max(inverse, 1e-30);
     if (reach <= KNOWN) radii[row] = reach * cell_size;

@@ -93,8 +93,8 @@ class Params:
     )
     radius: str = param(
         "auto",
-        "auto: the scan's own, else as large as the gaps round each point; own: estimated where the scan has "
-        "none; uniform: one for all",
+        "auto: the scan's own; where it has none, or they leave gaps, as large as the gaps round each point; "
+        "own: estimated where the scan has none; uniform: one for all",
         choices=("auto", "own", "uniform"),
         group="Splats",
     )
@@ -154,20 +154,21 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, float, bool]:
     """The points to draw, the radius of those without one of their own, and whether those are all known
     that they shall have: else one is for all, meanwhile."""
-    setting = frame.params.radius
-    if setting == "auto" and not pose.stored.remember(_has_radii):
+    own, known = frame.params.radius != "uniform", True
+    if frame.params.radius == "auto" and pose.stored.axes is None:
         gaps = pose.keep(GapRadii)
         known = gaps.find(pose, wait=frame.budget_ms is None)
+        own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
             points = Points.of(pose, surface, frame.share, use_radii=True)
             buffers = {**points.buffers, "radii": gaps.texels}
+            if own:
+                surface.stats.chosen["radius"] = "as large as gaps, of which the scan's leave some"
             return replace(points, buffers=buffers), gaps.usual, True
-        return Points.of(pose, surface, frame.share, use_radii=False), _uniform_radius(pose), known
-    own = setting != "uniform"
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)
     points = Points.of(pose, surface, frame.share, use_radii=own)
-    return points, 0.0 if suffices else _uniform_radius(pose), True
+    return points, 0.0 if suffices else _uniform_radius(pose), known
 
 
 def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:

@@ -5,12 +5,16 @@ smaller discs leave that corner open, larger ones show beside the outline. It go
 alone, so that it follows the density of the scan, and is found without a tree: points are listed by the cells
 of a grid, and each looks at those of the 27 cells around. Where a scan is much sparser than in most places,
 the search goes on with larger cells.
+
+Radii that a scan stores are held to this at a sample of its points. Where they leave gaps, they are enlarged.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +23,11 @@ from ...gpu import gl
 from ...gpu.bindings import Storage, Texture
 from ...gpu.bins import Bins
 from ...gpu.compact import IndexList, list_flagged
+from ...gpu.constants import UNKNOWN
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits
+from ...scan.points import PointCloud
 
 _LEAST, _WANTED, _MOST = 4.0, 6.0, 9.0  # points that share a point's cell, itself included
 _TRIALS = 12  # of a size of cells
@@ -29,10 +35,13 @@ _ROUNDS = 4
 _WIDER = 3.0  # times the cells of the round before
 _KNOWN = 0.6  # cells: the 27 around tell all of a radius of 0.5, and nearly always of one little larger
 _BORDER = 2.0  # times as far as a point's cell reaches to most sides: where it has no end
+_CELL = {"DIRECTIONS": 8, "KNOWN": _KNOWN, "BORDER": _BORDER}
 _ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out
-_SPARE = 1.2  # times the radii found: these go by eight directions, in a plane
+_SPARE = 1.2  # times the radii found: these go by some directions, in a plane
 _STRAY = 4.0  # usual radii: what is farther from all others is beside the surface
 _FEW = 2000  # one in so many may be left without a radius of its own
+_SAMPLE = 1 << 13  # points, about, at which stored radii are looked at
+_OPEN = 0.1  # of these: where more have too small a radius, the scan's leave gaps
 _AT_ONCE = 1 << 18  # points searched before something else may have its turn
 _SLOT = 16  # bytes
 
@@ -41,7 +50,8 @@ class GapRadii:
     """The radii of a pose's points; see the module. Made with `GpuPose.keep`.
 
     texels: a radius for each row, scan units, once all are found; 0 where a point is far from all others: it
-    is to be as large as usual. None where no point has any, or there are more points than the driver takes.
+    is to be as large as usual. None where no point has any, where there are more points than the driver
+    takes, and where the radii that the scan stores leave no gaps: else none is smaller than these.
     usual, largest: the radius that nine of ten do not exceed, and that none does.
     """
 
@@ -78,27 +88,22 @@ class GapRadii:
         return True
 
     def _find(self, pose: GpuPose) -> Generator[None, None, None]:
-        gpu, cloud, box = pose.gpu, pose.cloud, pose.bounds
-        search = _Search(gpu, pose.array("positions"), pose.array("normals"), len(cloud), box.high - box.low)
-        radii = yield from search.radii()
-        if radii is None:
-            rows, copies = _distinct(cloud.positions)
-            assert cloud.normals is not None
-            positions, normals = (
-                gl.BufferTexture(gpu.ctx.buffer(values[rows]), gl.RGB32F)
-                for values in (cloud.positions, cloud.normals)
-            )
-            search = _Search(gpu, positions, normals, len(rows), search.extent, distinct=True)
-            radii = yield from search.radii()
-            gpu.discard(positions, normals)
-            assert radii is not None
-            radii = radii[copies]
+        stored = _usable_radii(pose.stored)
+        with _searching(pose) as (search, rows, copies):
+            if stored is not None:
+                sample = _sample(pose.stored.positions[rows])
+                if not search.leave_gaps(stored[rows], sample):
+                    return
+            radii = (yield from search.radii())[copies]
         known = radii[radii > 0]
         if known.size:
-            self.usual = float(np.quantile(known, 0.9))
-            radii = np.where(radii > _STRAY * self.usual, np.float32(0), radii)
-            self.largest = float(radii.max())
-            self.texels = gl.BufferTexture(gpu.ctx.buffer(radii), gl.R32F)
+            usual = np.quantile(known, 0.9)
+            radii = np.where(radii > _STRAY * usual, np.float32(0), radii)
+            if stored is not None:
+                radii = np.maximum(radii, stored)
+                usual = np.quantile(radii[radii > 0], 0.9)
+            self.usual, self.largest = float(usual), float(radii.max())
+            self.texels = gl.BufferTexture(pose.gpu.ctx.buffer(radii), gl.R32F)
 
 
 @dataclass(frozen=True)
@@ -118,114 +123,164 @@ class _Grid:
         return cls(size, x, x * y, lists - 1)
 
 
-@dataclass(frozen=True, eq=False)
 class _Search:
-    """Search for radii. extent: the edges of the box round most of the points, (3,), scan units. distinct:
-    whether no two points are in one place."""
+    """Search for radii with one set of points.
 
-    gpu: Gpu
-    positions: gl.BufferTexture
-    normals: gl.BufferTexture
-    count: int
-    extent: NDArray[np.float64]
-    distinct: bool = False
+    crowded: whether copies of points may crowd cells of any size. extent: the edges of the box round most of
+    the points, (3,), scan units.
+    """
 
-    def radii(self) -> Generator[None, None, NDArray[np.float32] | None]:
-        """The radii (N,), 0 where a point is alone. None where copies of points may crowd cells of any size:
-        then each place is to count once."""
-        gpu = self.gpu
-        lists = 1 << max((self.count - 1).bit_length(), 8)
-        bins, unknown = Bins(gpu, lists + 2), IndexList(gpu, self.count)
-        radii = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * self.count), gl.R32F)
-        gl.clear_words(radii.buffer, 0)
-        try:
-            bins.reserve(self.count + self.count // 16)
-            grid, shared = self._fit(bins, lists)
-            if shared > _MOST and not self.distinct:
-                return None
-            visits = self._visits(grid)
-            yield from self._round(bins, grid, visits, radii, None)
-            for _ in range(1, _ROUNDS):
-                self._list_unknown(radii, unknown)
-                if len(unknown) * _FEW <= self.count:
-                    break
-                grid = _Grid.of(_WIDER * grid.cell_size, self.extent, lists)
-                visits = self._visits(grid, radii)
-                bins.count(visits)
-                yield from self._round(bins, grid, visits, radii, unknown)
-            return _SPARE * np.frombuffer(radii.buffer.read(), np.float32)
-        finally:
-            gpu.discard(bins, unknown, radii)
+    def __init__(
+        self,
+        gpu: Gpu,
+        positions: gl.BufferTexture,
+        normals: gl.BufferTexture,
+        count: int,
+        extent: NDArray[np.float64],
+    ) -> None:
+        self._gpu, self._positions, self._normals = gpu, positions, normals
+        self._count, self._extent = count, extent
+        self._lists = 1 << max((count - 1).bit_length(), 8)
+        self._bins, self._listed = Bins(gpu, self._lists + 2), IndexList(gpu, count)
+        self._radii = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * count), gl.R32F)
+        gl.clear_words(self._radii.buffer, 0)
+        self._bins.reserve(count + count // 16)
+        self._grid, shared = self._fit()
+        self.crowded = shared > _MOST
 
-    def _fit(self, bins: Bins, lists: int) -> tuple[_Grid, float]:
+    def release(self) -> None:
+        """Delete what it holds."""
+        self._gpu.discard(self._bins, self._listed, self._radii)
+
+    def leave_gaps(self, radii: NDArray[np.float32], sample: NDArray[np.uint32]) -> bool:
+        """Whether radii (N,), 0 where unknown, leave gaps, as far as a sample of the rows tells. To be asked
+        before `radii`."""
+        self._listed.write(sample)
+        for _ in self._round(self._grid, self._visits(self._grid), self._listed):
+            pass
+        reach = self._read()
+        known = (reach > 0) & (radii > 0)
+        return bool((radii < reach)[known].mean() > _OPEN) if known.any() else False
+
+    def radii(self) -> Generator[None, None, NDArray[np.float32]]:
+        """The radii (N,), 0 where a point is alone."""
+        grid = self._grid
+        yield from self._round(grid, self._visits(grid), None)
+        for _ in range(1, _ROUNDS):
+            self._list_unknown()
+            if len(self._listed) * _FEW <= self._count:
+                break
+            grid = _Grid.of(_WIDER * grid.cell_size, self._extent, self._lists)
+            visits = self._visits(grid, thinned=True)
+            self._bins.count(visits)
+            yield from self._round(grid, visits, self._listed)
+        return _SPARE * self._read()
+
+    def _read(self) -> NDArray[np.float32]:
+        return np.frombuffer(self._radii.buffer.read(), np.float32)
+
+    def _fit(self) -> tuple[_Grid, float]:
         """Find cells in which as many points are together as suits the search, and count; how many are."""
-        x, y, z = self.extent
-        surface = float(np.sqrt((x * y + y * z + z * x) / self.count))
-        size = 2 * surface or max(x, y, z) / self.count or 1.0
+        x, y, z = self._extent
+        surface = float(np.sqrt((x * y + y * z + z * x) / self._count))
+        size = 2 * surface or max(x, y, z) / self._count or 1.0
         for _ in range(_TRIALS):
-            grid = _Grid.of(size, self.extent, lists)
-            bins.count(self._visits(grid))
-            counts = np.diff(np.frombuffer(bins.starts.buffer.read(), np.uint32)).astype(np.float64)
+            grid = _Grid.of(size, self._extent, self._lists)
+            self._bins.count(self._visits(grid))
+            counts = np.diff(np.frombuffer(self._bins.starts.buffer.read(), np.uint32)).astype(np.float64)
             shared = float(np.square(counts).sum() / counts.sum())
-            if _LEAST <= shared <= _MOST or self.count < _MOST:
+            if _LEAST <= shared <= _MOST or self._count < _MOST:
                 break
             size *= float(np.sqrt(_WANTED / shared))
         return grid, shared
 
-    def _visits(self, grid: _Grid, radii: gl.BufferTexture | None = None) -> Visits:
-        """The visits of points to cells; of dense points some, by the radii that were found."""
+    def _visits(self, grid: _Grid, *, thinned: bool = False) -> Visits:
+        """The visits of points to cells. thinned: of dense points some, by the radii that were found."""
 
         def bind(_: Program) -> None:
-            self.positions.bind(Texture.POSITIONS)
-            if radii is not None:
-                radii.bind(Texture.RADII)
+            self._positions.bind(Texture.POSITIONS)
+            if thinned:
+                self._radii.bind(Texture.RADII)
 
-        defines = {"THINNED": int(radii is not None), "ENOUGH": _ENOUGH}
-        return Visits("surfels/gaps/cells.glsl", self.count, bind, defines, grid)
+        defines = {"THINNED": int(thinned), "ENOUGH": _ENOUGH}
+        return Visits("surfels/gaps/cells.glsl", self._count, bind, defines, grid)
 
-    def _list_unknown(self, radii: gl.BufferTexture, unknown: IndexList) -> None:
+    def _list_unknown(self) -> None:
         flags = "surfels/gaps/unknown.glsl"
-        list_flagged(self.gpu, flags, self.count, unknown, lambda _: radii.bind(Texture.RADII))
+        list_flagged(self._gpu, flags, self._count, self._listed, lambda _: self._radii.bind(Texture.RADII))
 
-    def _round(
-        self,
-        bins: Bins,
-        grid: _Grid,
-        visits: Visits,
-        radii: gl.BufferTexture,
-        unknown: IndexList | None,
-    ) -> Generator[None, None, None]:
+    def _round(self, grid: _Grid, visits: Visits, listed: IndexList | None) -> Generator[None, None, None]:
         """Search with one grid, whose visits are counted: for the points that are listed, or for all."""
-        gpu = self.gpu
-        length = bins.length()
+        gpu = self._gpu
+        bins, length = self._bins, self._bins.length()
         bins.fill(visits, length)
         slots = gl.BufferTexture(gpu.ctx.buffer(reserve=max(_SLOT * length, _SLOT)), gl.RGBA32F)
         try:
-            self.positions.bind(Texture.POSITIONS)
+            self._positions.bind(Texture.POSITIONS)
             bins.items.bind(Texture.LISTED)
             slots.buffer.bind_to_storage_buffer(Storage.SLOTS)
             gpu.dispatch(gpu.compute("surfels/gaps/arrange.comp"), length)
-            for first in range(0, length if unknown is None else 1, _AT_ONCE):
+            for first in range(0, length if listed is None else 1, _AT_ONCE):
                 if first:
                     yield
-                defines = {"LISTED": int(unknown is not None), "KNOWN": _KNOWN, "BORDER": _BORDER}
+                defines = {"LISTED": int(listed is not None), **_CELL}
                 program = gpu.compute("surfels/gaps/radii.comp", defines, params=grid)
                 for texels, unit in (
-                    (self.positions, Texture.POSITIONS),
-                    (self.normals, Texture.NORMALS),
+                    (self._positions, Texture.POSITIONS),
+                    (self._normals, Texture.NORMALS),
                     (slots, Texture.SLOTS),
                     (bins.starts, Texture.STARTS),
                 ):
                     texels.bind(unit)
-                radii.buffer.bind_to_storage_buffer(Storage.RADII)
+                self._radii.buffer.bind_to_storage_buffer(Storage.RADII)
                 with gpu.timers.measure("gaps"):
-                    if unknown is None:
+                    if listed is None:
                         gpu.set(program, first=first)
                         gpu.dispatch(program, min(_AT_ONCE, length - first))
                     else:
-                        unknown.run(program)
+                        listed.run(program)
         finally:
             gpu.discard(slots)
+
+
+@contextmanager
+def _searching(pose: GpuPose) -> Iterator[tuple[_Search, Any, Any]]:
+    """A search among a pose's points; the rows of these, and which of them is at each of the pose's rows."""
+    gpu, cloud, extent = pose.gpu, pose.cloud, pose.bounds.high - pose.bounds.low
+    held: tuple[gl.BufferTexture, ...] = ()
+    rows: Any = slice(None)
+    copies: Any = slice(None)
+    search = _Search(gpu, pose.array("positions"), pose.array("normals"), len(cloud), extent)
+    try:
+        if search.crowded:
+            rows, copies = _distinct(cloud.positions)
+            assert cloud.normals is not None
+            positions, normals = held = (
+                gl.BufferTexture(gpu.ctx.buffer(cloud.positions[rows]), gl.RGB32F),
+                gl.BufferTexture(gpu.ctx.buffer(cloud.normals[rows]), gl.RGB32F),
+            )
+            crowd, search = search, _Search(gpu, positions, normals, len(rows), extent)
+            gpu.discard(crowd)
+        yield search, rows, copies
+    finally:
+        gpu.discard(search, *held)
+
+
+def _usable_radii(cloud: PointCloud) -> NDArray[np.float32] | None:
+    """The radii that a scan stores for round splats, 0 where one is of no use; None where all are."""
+    if cloud.radii is None:
+        return None
+    usable = (cloud.radii > 0) & (cloud.radii < np.float32(UNKNOWN))
+    return np.where(usable, cloud.radii, np.float32(0)) if usable.any() else None
+
+
+def _sample(positions: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """Some rows, by where their points are (N, 3): whatever the order."""
+    bits = np.ascontiguousarray(positions).view(np.uint32)
+    mixed = (bits * np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], np.uint32)).sum(axis=1, dtype=np.uint32)
+    mixed = (mixed ^ mixed >> np.uint32(15)) * np.uint32(0x2C1B3C6D)
+    share = min(_SAMPLE / len(positions), 1.0)
+    return np.flatnonzero(mixed <= share * 0xFFFFFFFF).astype(np.uint32)
 
 
 def _distinct(positions: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
