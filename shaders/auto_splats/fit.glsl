@@ -1,4 +1,5 @@
 // The plane through a neighborhood by linear regression (Preiner 2012, 6), and its splat.
+#include "common/cell_reach.glsl"
 #include "common/color.glsl"
 #include "common/octahedron.glsl"
 #include "common/tangent.glsl"
@@ -21,11 +22,9 @@ const int LEAST_COUNT = 6;  // points that tell of a surface
 const float FAR = 3.0;
 const float MOST = 3.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
-// Directions in which a point's cell is measured; factor for what lies between them, and for splats that lean.
-const int DIRECTIONS = 12;
-const vec2 TURN = vec2(0.8660254, 0.5);
-const float BETWEEN = 1.15;
-const float LEAST_SHARE = 0.9, MOST_SHARE = 1.75;  // of the radius by share, bounds of that by the cell
+const float LEANING = 1.19;  // factor on how far a cell reaches, for splats that lean
+const float OPEN = 1.75;    // radii by share: a cell that reaches farther has no end there
+const float LEAST_SHARE = 0.9, MOST_SHARE = 1.39;  // of the radius by share, bounds of that by the cell
 const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good as in one pixel
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
@@ -116,6 +115,13 @@ bool is_outlier(Extent extent, float usual_radius, bool sparse) {
     return near_squared[1] > limit * limit || apart;
 }
 
+// The radius that closes a cell in four directions. bounds: one over twice how far it reaches.
+vec4 closing(vec4 bounds, float share) {
+    vec4 reach = 0.5 / max(bounds, 1e-9);
+    vec4 closed = min(LEANING * reach, vec4(MOST_SHARE * share));
+    return mix(closed, vec4(share), greaterThan(reach, vec4(OPEN * share)));
+}
+
 // The radius of a splat: how far the places reach that are nearer to the point than to any other one, its Voronoi cell in
 // the plane, so that splats leave no gap however uneven points lie; where the cell is open, as at borders, and at least about
 // as a point's share of the surface. Hidden neighbors have no splats: near ones, where points crowd the pixels, have no cell
@@ -126,22 +132,19 @@ float splat_radius(Extent extent, vec3 values, vec3 normal, float crowded, float
     // Directions turn with the scan: they are counted from the nearest neighbor's.
     vec3 beside = near_offsets[1] - dot(near_offsets[1], normal) * normal;
     vec3 u = dot(beside, beside) > 1e-12 ? normalize(beside) : tangent_of(normal), v = cross(normal, u);
-    vec3 near[K];  // in the plane, and half the squared distance there
+    clear_cell();
     int seen = 1;
     for (int k = 1; k < K; ++k) {
         bool counts = k < extent.count && ((near_rows[k] & 1u) == 0u || near_squared[k] > crowded * crowded);
         vec2 at = vec2(dot(near_offsets[k], u), dot(near_offsets[k], v));
         float squared = dot(at, at);
-        near[k] = vec3(at, counts && squared > 0.0 ? 0.5 * squared : UNKNOWN);
+        bound_cell(counts && squared > 0.0 ? at / squared : vec2(0.0));
         seen += int(counts);
     }
     float share = 2.0 * inversesqrt(float(seen)), reach = LEAST_SHARE * share;
-    vec2 direction = vec2(1.0, 0.0);
-    for (int i = 0; i < DIRECTIONS; ++i) {
-        float edge = UNKNOWN;
-        for (int k = 1; k < K; ++k) edge = min(edge, near[k].z / max(dot(near[k].xy, direction), 1e-9));
-        reach = max(reach, edge > MOST_SHARE * share ? share : edge * BETWEEN);
-        direction = mat2(TURN.x, TURN.y, -TURN.y, TURN.x) * direction;
+    for (int part = 0; part < PARTS; ++part) {
+        vec4 four = max(closing(highest[part], share), closing(-lowest[part], share));
+        reach = max(reach, max(max(four.x, four.y), max(four.z, four.w)));
     }
     return radius * reach;
 }

@@ -35,6 +35,7 @@ from .grids import COARSEST, FINEST_COARSE, Grids
 # Bytes of a pose's row, of a participant, of a point that is seen.
 _SPLAT, _LOOK, _SLOT, _FOUND = 12, 8, 16, 16
 _FIRST_BALL = 0.56  # that is searched, in usual radii: most neighborhoods are within
+_DIRECTIONS = 24  # in which the cells of points are measured
 _LANES = 32  # that search together for one point, of the few that are left
 _ENOUGH = 10  # points of a region that tell how dense they are
 # Participants at most, with those that others hide: 84 MB. And of a coarse cell: llvmpipe ends all loops of
@@ -333,6 +334,7 @@ class Neighborhoods:
             "HAS_COLORS": int(pose.cloud.colors is not None),
             "BY_SCANNER": int(search.by_scanner),
             "ADAPTIVE": int(search.adaptive),
+            "DIRECTIONS": _DIRECTIONS,
             "SCANNERS": len(pose.views) if search.by_scanner else 0,
         }
         with self._gpu.timers.measure("search"):
