@@ -3,7 +3,7 @@
 // same list change nothing, so that lists need no order.
 //
 // At a border a cell does not end; it counts as twice as far as it reaches to most sides. LISTED: invocations are of
-// the points in the list, else of slots. What cells cannot tell stays 0.
+// the points in the list, else of slots. ENDED: no radius at a border or on a line. What cells cannot tell stays 0.
 #include "common/item.glsl"
 #if LISTED
 #include "common/list.glsl"
@@ -64,7 +64,13 @@ void main() {
         }
     vec4 least = min(-lowest[0], highest[0]);
     float most_sides = fourth(-lowest[0], highest[0]);
-    float inverse = max(min(min(least.x, least.y), min(least.z, least.w)), most_sides / BORDER);
+    float farthest = min(min(least.x, least.y), min(least.z, least.w));
+#if ENDED
+    // Across a line of points both sides are far.
+    vec4 across = max(-lowest[0], highest[0]);
+    if (farthest < most_sides / BORDER || any(lessThan(across, across.zwxy / BORDER))) return;
+#endif
+    float inverse = max(farthest, most_sides / BORDER);
     float reach = 0.5 / max(inverse, 1e-30);
     if (reach <= KNOWN) radii[row] = reach * cell_size;
 }

@@ -153,10 +153,10 @@ class _Search:
         self._gpu.discard(self._bins, self._listed, self._radii)
 
     def leave_gaps(self, radii: NDArray[np.float32], sample: NDArray[np.uint32]) -> bool:
-        """Whether radii (N,), 0 where unknown, leave gaps, as far as a sample of the rows tells. To be asked
-        before `radii`."""
+        """Whether radii (N,), 0 where unknown, leave gaps, as far as a sample of the rows tells; at
+        borders and on lines none are known. To be asked before `radii`."""
         self._listed.write(sample)
-        for _ in self._round(self._grid, self._visits(self._grid), self._listed):
+        for _ in self._round(self._grid, self._visits(self._grid), self._listed, ended=True):
             pass
         reach = self._read()
         known = (reach > 0) & (radii > 0)
@@ -209,8 +209,11 @@ class _Search:
         flags = "surfels/gaps/unknown.glsl"
         list_flagged(self._gpu, flags, self._count, self._listed, lambda _: self._radii.bind(Texture.RADII))
 
-    def _round(self, grid: _Grid, visits: Visits, listed: IndexList | None) -> Generator[None, None, None]:
-        """Search with one grid, whose visits are counted: for the points that are listed, or for all."""
+    def _round(
+        self, grid: _Grid, visits: Visits, listed: IndexList | None, *, ended: bool = False
+    ) -> Generator[None, None, None]:
+        """Search with one grid, whose visits are counted: for the points that are listed, or for all. ended:
+        for those alone whose cell has an end on all sides."""
         gpu = self._gpu
         bins, length = self._bins, self._bins.length()
         bins.fill(visits, length)
@@ -223,7 +226,7 @@ class _Search:
             for first in range(0, length if listed is None else 1, _AT_ONCE):
                 if first:
                     yield
-                defines = {"LISTED": int(listed is not None), **_CELL}
+                defines = {"LISTED": int(listed is not None), "ENDED": int(ended), **_CELL}
                 program = gpu.compute("surfels/gaps/radii.comp", defines, params=grid)
                 for texels, unit in (
                     (self._positions, Texture.POSITIONS),
