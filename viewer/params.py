@@ -251,9 +251,6 @@ def _float(value: object) -> float | None:
 
 
 def _str(value: object) -> str | None:
-    """A bool is "on" or "off": of a choice that was a switch once."""
-    if isinstance(value, bool):
-        return "on" if value else "off"
     return value if isinstance(value, str) else None
 
 

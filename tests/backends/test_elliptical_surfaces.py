@@ -92,7 +92,7 @@ def test_the_far_side_of_what_is_thin_does_not_blend_in(surfels: Draw) -> None:
     camera, params = Camera((9.0, 5.0, 14.0), (0, 0, 0), fov_y=45), {"passes": "two", "enlarge": 1.0}
     cloud = ellipsoid(1600)
     both, front = (surfels(cloud, camera, SIZE, cull_back=cull_back, **params) for cull_back in (False, True))
-    deep = surfels(replace(cloud, radii=longer(cloud)), camera, SIZE, cull_back=False, **params)
+    deep = surfels(replace(cloud, radii=longer(cloud)), camera, SIZE, **params)
     covered = (both.row != NOTHING) & (front.row != NOTHING)
     away, away_if_deep = (np.abs(surface.color - front.color)[covered].mean() for surface in (both, deep))
     assert away_if_deep > 5 * away

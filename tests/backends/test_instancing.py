@@ -102,7 +102,7 @@ def test_splats_that_face_away_are_left_out_only_where_they_are_hidden(
     turned = np.where(np.random.default_rng(0).random((len(CLOUD), 1)) < 0.5, -1, 1).astype(np.float32)
     assert CLOUD.normals is not None
     other = replace(CLOUD, normals=CLOUD.normals * turned)
-    one, two = (surfels(cloud, camera, instancing="tiles", cull_back="off") for cloud in (CLOUD, other))
+    one, two = (surfels(cloud, camera, instancing="tiles") for cloud in (CLOUD, other))
     if projection == "perspective":
         assert_equal(one, two)
     # What the first found is read back as depths; the last bit may be lost on the way.
@@ -200,7 +200,7 @@ def test_lists_belong_to_the_surface_and_follow_the_poses(renderer: Renderer) ->
     sizes: list[int] = []
     for count in (100, 50_000, 60_000, 1000):
         pose = Pose(0, 0.0, "test", sphere(count))
-        params = backend("surfels").params({"instancing": "tiles", "cull_back": "off"})
+        params = backend("surfels").params({"instancing": "tiles"})
         render_frame(renderer, Request(pose, CAMERAS["perspective"], "surfels", params), surface)
         lists = surface.keep(TileLists)
         assert lists.length, "those that were drawn with"

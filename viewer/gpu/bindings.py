@@ -65,7 +65,6 @@ class Texture(IntEnum):
     AWAY_STARTS = auto()  # of discs that face away
     AWAY_LISTED = auto()
     DISCS = auto()  # of each row of a pose
-    MARKS = auto()  # of cells of a picture
     # Neighborhoods, beside splats.
     SLOTS = auto()  # participants in the order of their cells
     NEAR_TO = auto()
@@ -132,9 +131,6 @@ class Storage(IntEnum):
     AWAY = 6
     FARTHEST = 7
     NEAREST = 7
-    # Splats that face away, beside those of tiles.
-    MARKS = 0
-    TURNED = 1
     # Neighborhoods and their splats, beside a list.
     SPLATS = 0
     FOUND = 1

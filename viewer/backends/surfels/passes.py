@@ -24,7 +24,6 @@ from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from ...srgb import roots_from_bytes
 from .. import FrameView
-from .backs import seen
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import (
     ALL,
@@ -60,7 +59,6 @@ def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> N
     Where the first pass finds nothing, the nearest of the enlarged splats fills the pixel, but not beyond
     the outline.
     """
-    points, splats = seen(points, surface, feed, splats)
     gpu, target, feed = surface.gpu, surface.raster(), told_feed(points, feed, surface)
     with gpu.timers.measure("visibility"):
         target.clear()

@@ -17,9 +17,8 @@ class Splats:
 
     radius_scale: factor on radii. uniform_radius: scan units, of points without one of their own.
     least_radius: pixels; what the mask leaves of it reaches a pixel centre. cull_back: whether those that
-    face away are left out; trims: of these, those that are not seen between the others (backs.py).
-    mask_limit: squared distance from the centre, in radii, at which the mask is cut off. falloff: of the mask
-    exp(-falloff t), t the squared distance, 1 where it is cut off; at most 4.
+    face away are left out. mask_limit: squared distance from the centre, in radii, at which the mask is cut
+    off. falloff: of the mask exp(-falloff t), t the squared distance, 1 where it is cut off; at most 4.
 
     For blending: enlarge: factor on the splats of the second pass. epsilon: how far behind the visible splat
     others still count, in its radii. mean_share: of the mean, where splats of about a pixel are averaged; the
@@ -35,7 +34,6 @@ class Splats:
     enlarge: float
     epsilon: float
     mean_share: float = 0.0
-    trims: bool = False
 
     def larger(self, points: Points) -> Points:
         """The points as the second pass draws them."""

@@ -30,7 +30,6 @@ from ...gpu.compact import scan_words
 from ...gpu.context import Gpu, Program
 from ...gpu.scatter import Visits, take_items
 from ...gpu.surface import Surface
-from .backs import leave_out_unseen, seen
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
 TILE = 8  # pixels of a tile's edge
@@ -181,12 +180,6 @@ class TileLists:
         """Bind the forms of discs for shaders to change them."""
         self._bind_storage("forms")
 
-    def bind_away(self) -> None:
-        """Bind the discs that face away for shaders to leave some out: those of depth 0."""
-        for name in ("places", "away"):
-            self._textures[name].bind(Texture[name.upper()])
-        self._bind_storage("away")
-
     def start_again(self) -> None:
         """Empty, and bind, the list of tiles that are to be shown again."""
         self._buffer("again").write(struct.pack("4I", 0, 0, 1, 0))
@@ -244,7 +237,6 @@ class TileLists:
 def splat(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel: what `amplify` draws, up to rounding."""
     if not splat_first(points, surface, splats, DEPTH):
-        points, splats = seen(points, surface, FALLBACK, splats)
         amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
 
 
@@ -273,10 +265,7 @@ def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int)
 
 
 def fill_away(points: Points, surface: Surface, lists: TileLists, splats: Splats, both: bool = False) -> bool:
-    """List what faces away, as far as `Splats.trims` wants it; False where the rasteriser has to do it all.
-    both: as in `TileLists.fill`."""
-    if splats.trims:
-        leave_out_unseen(points, surface, splats, lists.bind_away)
+    """List what faces away; False where the rasteriser has to do it all. both: as in `TileLists.fill`."""
     fits = lists.fill(points, splats, AWAY, both)
     if not fits:
         surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"

@@ -22,7 +22,7 @@ from . import literal
 BACKEND, FEED = "surfels", "instancing"  # the parameter is called alike wherever there are feeds
 # As theirs: two passes, twice the splat in the second, back faces left out. One radius for all: others are in
 # a buffer of their own, which the feed of uniform buffers does not bring.
-_METHOD = {"passes": "two", "enlarge": 2.0, "cull_back": "on", "radius": "uniform"}
+_METHOD = {"passes": "two", "enlarge": 2.0, "cull_back": True, "radius": "uniform"}
 _STAND_INS = {
     "baseball": "crane",
     "basketball": "owlii",
