@@ -54,8 +54,8 @@ LIMITS = {
 }
 
 KEPT = {
-    "cull_back": "open scans, and eyes inside: 2.2 % of the pixels of the bunny, which has no base, show what "
-    "is behind; nothing that tells closed scans was both safe and faster (docs/surfels.md)"
+    "cull_back": "open scans, and eyes inside: 2.2 % of the pixels of the bunny, which has no base, show "
+    "what is behind; nothing that tells closed scans was both safe and faster (docs/surfels.md)"
 }
 
 _WAYS = ("tiles", *FEEDS)
