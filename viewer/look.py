@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError, shortened, unknown_name
-from .geometry import AXES
+from .geometry import up_vector
 from .params import param
 
 # Perceptually uniform and readable with colour-blindness; the tables are the library cmap's.
@@ -82,8 +82,7 @@ class Look:
     )  # fmt: skip
     up: str = param(
         "+y",
-        "The axis that points up, and that height is measured along",
-        choices=tuple(AXES),
+        "The axis that points up, and that height is measured along: ±x, ±y, ±z, or three numbers",
         group="Colour",
     )
     plain: str = param(
@@ -129,6 +128,7 @@ class Look:
     def __post_init__(self) -> None:
         rgba(self.plain, "plain")
         rgba(self.background, "background")
+        up_vector(self.up)
 
 
 @dataclass(frozen=True)

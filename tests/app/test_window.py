@@ -124,7 +124,7 @@ def shown(app: RunningApp) -> NDArray[np.uint8]:
 def bare(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Without the corners that the orientation cube and the scale bar lie over."""
     pixels = pixels[..., :3].copy()
-    pixels[:112, -112:] = pixels[-64:, :200] = 0
+    pixels[:150, -112:] = pixels[-64:, :200] = 0
     return pixels
 
 

@@ -250,6 +250,7 @@ _VIEW: Menu[App] = Menu("View", (
         ),
         Command("center", "Centre the point", lambda app: app.steering.center(), "Z", can=_has_camera),
         _FROM,
+        Listing("Up", lambda app: app.steering.ups()),
         Command(
             "orthographic", "Orthographic", lambda app: app.steering.switch_projection(), "O",
             is_on=lambda app: app.steering.is_orthographic, can=_has_camera,

@@ -30,13 +30,15 @@ class Click:
     picked: what is seen there, with its spacing; None where nothing is. Its `place` is where the surface is
     at the pixel, its `point` the point of the scan that is seen there, None where a hole is filled. pose:
     that the picture shows. through_gap: whether the very pixel shows something farther, through a gap.
-    motion: of the pose, see `Desk.lay`; places of `picked` are where it is moved to.
+    motion: of the pose, see `Desk.lay`; places of `picked` are where it is moved to. pixel: of the picture,
+    the one that shows the surface that is meant, (column, row).
     """
 
     picked: Picked | None
     pose: Pose
     through_gap: bool = False
     motion: Rigid = STILL
+    pixel: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True)

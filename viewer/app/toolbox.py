@@ -221,7 +221,7 @@ class Toolbox:
             return
         meant = before_gap(surface, *pixel)
         picked = pick(surface, *pixel, shown=meant)
-        click = Click(picked, request.pose, meant != pixel, request.layers.place)
+        click = Click(picked, request.pose, meant != pixel, request.layers.place, meant)
         self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, unknown_name
-from ..geometry import AXES
+from ..geometry import AXES, nearest_axis, vector
 from ..rigid import is_rigid
 from .colors import srgb8
 from .grid_normals import normals_of_grid
@@ -356,7 +356,7 @@ def up_axis(views: Sequence[RangeView]) -> str | None:
     if not views:
         return None
     up = np.mean([view.world_to_camera[1, :3] for view in views], axis=0)
-    nearest = max(AXES, key=lambda name: float(up @ AXES[name]))
+    nearest = nearest_axis(vector(up))
     return nearest if up @ AXES[nearest] > _LEAST_UPRIGHT else None
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bounds import Bounds
-from ..geometry import AXES, UP, up_vector
+from ..camera import Camera
+from ..geometry import UP, nearest_axis, up_vector, vector
 from .points import PointCloud, strided
 from .range_view import RangeView, up_axis
 
@@ -27,11 +28,11 @@ _FILLED, _TENTHS = (
     0.7,
     10,
 )  # of ground, the share of its cells that have points, and their number along a side
-_CELLS = 40  # along a side of the grid that tells whether one side alone was seen
+_EACH = 8  # points in a cell of the grid that tells whether one side alone was seen, in the mean
 _BAND = 0.04  # of the height: what touches the ground
 _BROAD = 0.4  # what it stands on, in shares of the spread of the whole
 _STEADY = 1.2  # how far the whole may be off the middle of what it stands on, in standard deviations of that
-_ONE_SIDED = 0.1  # of the depth: how far apart points in one line of sight are where one side was seen
+_DEEP, _FEW = 0.2, 0.35  # of all depths, in one line of sight; and of all points, that have another so far
 _SLENDER, _UPENDED = 4.0, 1.2  # heights of what stands upright, in lengths of its longer side
 _BEFORE = 0.2  # how far before all points a depth camera is, in lengths of their longest side
 _ASIDE = 0.6  # tangent of how far from the middle of its picture most may be
@@ -75,6 +76,15 @@ def first_elevation(bounds: Bounds, up: str) -> float:
     return FROM_ABOVE if is_low or (up == "+z" and _is_map(bounds)) else 0.0
 
 
+def upright_camera(camera: Camera, bounds: Bounds, aspect: float, up: str) -> Camera:
+    """All of the bounds seen upright from the front, ground from above, in a camera's projection. aspect:
+    width / height of the picture. up: as for `first_elevation`."""
+    return Camera.orbit(
+        bounds, 0.0, first_elevation(bounds, up), aspect=aspect, up=up,
+        fov_y=camera.fov_y, projection=camera.projection,
+    )  # fmt: skip
+
+
 def _is_map(bounds: Bounds) -> bool:
     """Whether east and north are far from zero, in metres or feet, and heights beside them are not."""
     east, north, height = np.abs(bounds.center)
@@ -90,7 +100,7 @@ def _of_pictures(views: Sequence[RangeView], points: NDArray[np.float64]) -> Upr
     if len(points) and all(view.kind == "height" for view in views):
         low, high = points.min(axis=0), points.max(axis=0)
         back = np.mean([view.world_to_camera[2, :3] for view in views], axis=0)
-        above = max(AXES, key=lambda name: float(back @ AXES[name]))
+        above = nearest_axis(vector(back))
         if first_elevation(Bounds(low, high), above):
             return Upright(above, "it is a map of heights", 0.95)
     return Upright(told, "its range images stand so", 0.95)
@@ -107,7 +117,7 @@ def _of_a_camera(points: NDArray[np.float64], normals: NDArray[np.float64] | Non
         return None
     rays = points[:, :2] / points[:, 2:]
     is_in_picture = (np.abs(np.median(rays, axis=0)) < _ASIDE).all()
-    is_seen_from_there = is_in_picture and _depth_of_sight(rays, points[:, 2]) < _ONE_SIDED
+    is_seen_from_there = is_in_picture and _is_one_sided(rays, points[:, 2])
     if normals is not None:
         is_seen_from_there |= bool(np.nanmean(normals[:, 2]) < -_FACING)
     return Upright("-y", "it was seen by a depth camera", 0.8) if is_seen_from_there else None
@@ -139,7 +149,7 @@ def _of_a_body(points: NDArray[np.float64], normals: object) -> Upright | None:
     points = points[((points > near.low) & (points < near.high)).all(axis=1)]
     if _stands(points, 1):
         return Upright(UP, "it stands so", 0.7)
-    if _depth_of_sight(points[:, :2], points[:, 2]) > _ONE_SIDED:  # else a relief, of a face perhaps
+    if not _is_one_sided(points[:, :2], points[:, 2]):  # a relief, of a face perhaps, stands otherwise
         if _stands(points, 2):
             return Upright("+z", "it stands so", 0.7)
         if high > _UPENDED * max(wide, deep) and _stands(points * (1, -1, 1), 1):
@@ -177,17 +187,15 @@ def _stands(points: NDArray[np.float64], axis: int) -> bool:
     return bool(breadth > _BROAD and off @ np.linalg.solve(below, off) < _STEADY**2)
 
 
-def _depth_of_sight(picture: NDArray[np.float64], depth: NDArray[np.float64]) -> float:
-    """How far apart the points of one cell of a picture are, as a rule, in shares of all depths: little where
-    one side alone was seen. picture: (N, 2) places in it, of any unit. Infinite where no cell has two."""
+def _is_one_sided(picture: NDArray[np.float64], depth: NDArray[np.float64]) -> bool:
+    """Whether points were seen from one side alone: few share a line of sight with one far before or behind.
+    picture: (N, 2) places in what is seen from there, of any unit. depth: (N,)."""
     low, high = picture.min(axis=0), picture.max(axis=0)
-    cells = ((picture - low) / np.where(high > low, high - low, 1) * _CELLS).astype(int).clip(0, _CELLS - 1)
-    cell = cells @ (_CELLS, 1)
-    nearest, farthest = np.full(_CELLS**2, np.inf), np.full(_CELLS**2, -np.inf)
+    side = max(int(np.sqrt(len(depth) / _EACH)), 1)
+    cells = ((picture - low) / np.where(high > low, high - low, 1) * side).astype(int).clip(0, side - 1)
+    cell = cells @ (side, 1)
+    nearest, farthest = np.full(side**2, np.inf), np.full(side**2, -np.inf)
     np.minimum.at(nearest, cell, depth)
     np.maximum.at(farthest, cell, depth)
-    several = np.bincount(cell, minlength=_CELLS**2) > 1
-    reach = float(np.ptp(depth))
-    if not several.any():
-        return np.inf
-    return float(np.median(farthest[several] - nearest[several])) / reach if reach else 0.0
+    is_shared = farthest[cell] - nearest[cell] > _DEEP * float(np.ptp(depth))
+    return bool(is_shared.mean() < _FEW)

@@ -74,9 +74,10 @@ class ScanSection:
         widgets.fact("Stored", _stored(pose))
 
     def _draw_up(self) -> None:
-        widgets.label("Up", "The axis of the scan that points up; heights are measured along it")
-        now = self.session.document.look.up
-        chosen = widgets.combo("up", now, tuple(AXES))
+        pose, now = self.playback.pose, self.session.document.look.up
+        why = f": {pose.upright.why}" if pose and pose.upright.up == now else ""
+        widgets.label("Up", f"The axis of the scan that points up{why}. Heights are measured along it.")
+        chosen = widgets.combo("up", now, tuple(AXES), {} if now in AXES else {now: "as picked"})
         if chosen != now:
             self.steering.set_up(chosen)
 

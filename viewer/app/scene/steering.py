@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 from ...bounds import Bounds
 from ...camera import Camera
-from ...geometry import UP
+from ...geometry import AXES, UP
 from ...scan.pods import first_camera
 from ...scan.pose import Pose
-from ...scan.upright import first_elevation
+from ...scan.upright import upright_camera
 from ..playing.playback import Playback
 from ..session import Session
 from . import navigation
@@ -86,13 +87,17 @@ class Steering:
             self._session.change("Look from there", camera=turned, pivot=None)
 
     def set_up(self, up: str) -> None:
-        """Say which axis of the scan is up, a name of `AXES`, and show all of it upright, from the front."""
+        """Say what is up in the scan, as `up_vector` takes it, and show all of it upright, from the front."""
         pose, camera = self._playback.pose, self._session.document.camera
         look = replace(self._session.document.look, up=up)
         if pose and camera:
-            bounds, aspect = self.bounds(pose), self._viewport.aspect
-            camera = navigation.view_from(0, first_elevation(bounds, up), camera, bounds, aspect, up)
+            camera = upright_camera(camera, self.bounds(pose), self._viewport.aspect, up)
         self._session.change("Turn upright", look=look, camera=camera, pivot=None)
+
+    def ups(self) -> Iterator[tuple[str, Callable[[], object], bool]]:
+        """Axes to choose from which is up: title, what it does, whether it is the one."""
+        for up in AXES:
+            yield up, partial(self.set_up, up), up == self._up
 
     def project(self, projection: str) -> None:
         """Show the same in a projection of `camera.PROJECTIONS`."""

@@ -12,7 +12,7 @@ from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
 from .. import notices, theme
-from . import cube, navigation
+from . import cube, navigation, up_menu
 from .canvas import ViewPlace
 
 if TYPE_CHECKING:
@@ -33,7 +33,14 @@ def draw(app: App) -> float:
     size, told = imgui.get_content_region_avail(), app.failures.told
     the_cube, has_cube = app.steering.cube, app.steering.cube.is_shown and not app.full_view.is_on
     cube.take_mouse(app.steering, app.document, size, has_cube)
-    if the_cube.under_mouse is not None:
+    on_menu = (
+        has_cube
+        and app.document.camera is not None
+        and up_menu.declare(
+            app.steering, app.document.look.up, size, lambda: app.commands.of["pick_up"].act(app)
+        )
+    )
+    if the_cube.under_mouse is not None or on_menu:
         imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
     imgui.invisible_button("view", size, _BUTTONS)
     with told("Looking what is under the mouse"):

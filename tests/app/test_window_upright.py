@@ -1,0 +1,93 @@
+"""Scans stand upright in the real window, by a guess or by one act; up belongs to each scan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_screen import PANEL, RunningApp, Screen, kept_of, running_app
+
+from viewer.app.scene.cube import cube_place
+from viewer.camera import Camera
+from viewer.geometry import up_vector
+
+EM = 15  # height of the font, pixels
+ROW = 22  # of a menu, pixels
+
+
+def person(up: int) -> np.ndarray:
+    """Somebody on a plate, as points, standing along an axis."""
+    rng = np.random.default_rng(2)
+    body = rng.uniform(-0.5, 0.5, (6000, 3)) * (0.4, 0.3, 1.7) + (0, 0, 0.85)
+    plate = rng.uniform(-0.5, 0.5, (3000, 3)) * (0.8, 0.7, 0.02)
+    return np.roll(np.concatenate([body, plate]), up - 2, axis=1)
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scans")
+    for name, axis in (("along_y", 1), ("along_z", 2)):
+        np.save(folder / f"{name}.npy", person(axis))
+    return folder
+
+
+@pytest.fixture
+def app(screen: Screen, tmp_path: Path, scans: Path) -> Iterator[RunningApp]:
+    with running_app(screen, tmp_path, scans / "along_y.npy", scans / "along_z.npy") as app:
+        yield app
+
+
+def camera_of(app: RunningApp) -> Camera:
+    return Camera.from_json(app.settle().camera)
+
+
+def below_cube(app: RunningApp) -> tuple[int, int]:
+    """The middle of the button below the orientation cube, on the screen."""
+    left, top, width, height = app.view()
+    x, y, _ = cube_place(width, height, EM) or pytest.fail("there is no cube")
+    return round(left + x), round(top + 2.02 * y + 0.7 * EM)
+
+
+def test_each_scan_stands_upright_by_itself_and_keeps_what_its_user_said(
+    app: RunningApp, tmp_path: Path, scans: Path
+) -> None:
+    assert camera_of(app).up == up_vector("+y")
+    app.screen.do("key", "Next")
+    assert app.told(r"Up is taken to be (\S+): (.*)\. ").groups() == ("+z", "it stands so")
+    assert camera_of(app).up == up_vector("+z")
+    app.choose(PANEL, "##up", "###-x")
+    assert camera_of(app).up == up_vector("-x")
+    app.screen.do("key", "Prior")
+    app.see(lambda state: state.scan.endswith("along_y.npy"))
+    assert camera_of(app).up == up_vector("+y"), "what was said of another scan is not said of this one"
+    app.screen.do("key", "Next")
+    app.see(lambda state: state.scan.endswith("along_z.npy"))
+    assert camera_of(app).up == up_vector("-x")
+    app.screen.do("key", "ctrl+q")
+    app.process.wait()
+    assert kept_of(tmp_path, scans / "along_z.npy").document.look.up == "-x"
+    assert kept_of(tmp_path, scans / "along_y.npy").document.look.up == "+y"
+
+
+def test_one_click_beside_the_cube_turns_the_view_upright(app: RunningApp) -> None:
+    before, (x, y) = camera_of(app), below_cube(app)
+    app.screen.do("mousemove", x, y, "sleep", 0.5)
+    app.settle()
+    app.screen.do("mousemove", x, y + EM + 6 * ROW, "sleep", 0.2, "click", 1)  # the last of the six
+    assert camera_of(app).up == up_vector("-z")
+    app.screen.do("mousemove", x, y, "sleep", 0.5, "mousemove", 300, 300, "sleep", 0.2)
+    app.screen.do("key", "ctrl+z")
+    assert camera_of(app) == before
+
+
+def test_a_surface_that_is_clicked_faces_up(app: RunningApp) -> None:
+    app.act("##MainMenuBar", ("menu_click", "View/###pick_up"))
+    left, top, width, height = app.view()
+    app.screen.do("mousemove", left + width // 2, top + height // 2, "sleep", 0.2, "click", 1)
+    turned = camera_of(app)
+    assert np.dot(turned.up, up_vector("+z")) > 0.99, "the chest is up now"
+    assert not app.state.clicking
+    app.screen.do("key", "ctrl+z")
+    assert camera_of(app).up == up_vector("+y")
