@@ -6,6 +6,7 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -91,3 +92,28 @@ def test_a_riddle_is_told_from_a_docstring(text: str, found: int) -> None:
 def test_docstrings_name_their_subject() -> None:
     found = {path: riddles(syntax) for path, syntax in modules()}
     assert not {path: told for path, told in found.items() if told}
+
+
+def frames_told(syntax: ast.Module) -> list[str]:
+    """The texts that tell the number of a frame without `frame_in_words`."""
+    texts = [
+        before.value
+        for node in ast.walk(syntax)
+        if isinstance(node, ast.JoinedStr)
+        for before, after in pairwise(node.values)
+        if isinstance(before, ast.Constant) and isinstance(after, ast.FormattedValue)
+    ]
+    return [text for text in texts if re.search(r"\bframe $", text, re.IGNORECASE)]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"), [("f'frame {n}'", 1), ("f'The Frame {n} is'", 1), ("f'{n} frames, frame_{n}'", 0)]
+)
+def test_frames_that_are_told(text: str, found: int) -> None:
+    assert len(frames_told(ast.parse(text))) == found
+
+
+def test_texts_count_frames_by_one_rule() -> None:
+    """A text that adds 1 by itself, or forgets to, is beside the others that a person reads."""
+    found = {path: told for path, syntax in modules() if (told := frames_told(syntax))}
+    assert list(found) == ["scan/times.py"], found

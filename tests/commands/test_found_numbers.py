@@ -70,7 +70,7 @@ def test_other_backends_name_the_one_that_finds_it(run: Run, refused: Callable[.
     points = (*SMALL, "--backend", "points")
     done = run("render", "two", "--all", *points, "--look", "color_by=slope", "-o", "%d.png")
     assert done.code == 0
-    assert "frame 0 (0.npz) has no 'slope', and is drawn in other colours" in done.err
+    assert "frame 1 (0.npz) has no 'slope', and is drawn in other colours" in done.err
 
 
 def test_backends_lists_them(run: Run) -> None:

@@ -285,7 +285,7 @@ def test_a_frame_without_the_scalar_is_named_and_drawn(
     done = run("render", "uneven", "-o", "b%d.png", *choice, *BY_Q)
     assert done.code == 0
     assert [line for line in done.err.splitlines() if "'q'" in line] == [
-        f"scan4d: uneven: frame {n} (f{n}.npz) has no 'q', and is drawn in other colours" for n in (0, 2)
+        f"scan4d: uneven: frame {n + 1} (f{n}.npz) has no 'q', and is drawn in other colours" for n in (0, 2)
     ]
     told = [Recording.load(Path(f"b{n}.png")).entries[0].look.color_by for n in range(3)]
     assert told == ["auto", "q", "auto"]
@@ -296,8 +296,8 @@ def test_a_frame_without_the_scalar_is_named_and_drawn(
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (("--pose", 2, *BY_Q), ["frame 2 (f2.npz)", "'q'", "height"]),
-        (("--pose", 0, *BY_Q), ["frame 0 (f0.npz)", "'q'", " p"]),
+        (("--pose", 2, *BY_Q), ["frame 3 (f2.npz)", "'q'", "height"]),
+        (("--pose", 0, *BY_Q), ["frame 1 (f0.npz)", "'q'", " p"]),
         (("--all", "--look", "color_by=r", *SMALL), ["uneven", "'r'", " p", " q"]),
         (("--poses", "0:3:2", *BY_Q), ["uneven", "'q'", " p"]),
     ],

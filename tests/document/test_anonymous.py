@@ -176,7 +176,7 @@ def test_range_views_stand_at_the_origin_without_their_names() -> None:
     pose = Pose.of(0, START, "jane.exr", (view,))
     request = Request(pose, Camera(eye=tuple(PLACE + np.array([0, 0, 5])), target=tuple(PLACE)), "points")
     made = anonymous_request(request, START).pose
-    assert (made.views[0].name, made.label, made.time) == ("pod 0", "frame 0", 0.0)
+    assert (made.views[0].name, made.label, made.time) == ("pod 0", "frame 1", 0.0)
     assert np.abs(made.cloud.bounds().center).max() < 0.1
     moved = made.views[0].positions() + middle_of(pose)
     assert np.allclose(moved, view.positions(), rtol=0, atol=1e-6)

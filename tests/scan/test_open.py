@@ -210,7 +210,7 @@ def test_an_npy_of_many_frames(tmp_path: Path) -> None:
             assert scan.times.tolist() == [0, 0.5, 1, 1.5]
             for pose, expected in zip(scan, positions, strict=True):
                 assert pose.cloud.world() == pytest.approx(expected)
-            assert scan.label(2) == "walk.npy frame 2"
+            assert scan.label(2) == "walk.npy frame 3"
 
 
 def test_an_npz_with_times(tmp_path: Path) -> None:

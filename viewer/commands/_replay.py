@@ -26,7 +26,7 @@ from ..output.marks import Legend, marks_of
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO, open_scan
 from ..scan.timeline import Timeline
-from ..scan.times import DEFAULT_FPS
+from ..scan.times import DEFAULT_FPS, frame_in_words
 from . import _drawing as drawing
 from ._console import warn
 from ._drawing import Plan
@@ -109,7 +109,7 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
                     if not _may_be_left_out(entry, timeline, entries):
                         raise
                     if str(error) != str(failed):
-                        warn(f"{timeline.name}: frame {entry.pose} is left out: {error}")
+                        warn(f"{timeline.name}: {frame_in_words(entry.pose)} is left out: {error}")
                     failed = error
                 else:
                     shown = _completed(entry, request, args, found, hash, timeline)

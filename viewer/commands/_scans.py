@@ -23,7 +23,7 @@ from ..scan import formats
 from ..scan.open import entries, open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from ..scan.times import TIMES_FILE
+from ..scan.times import TIMES_FILE, frame_in_words
 from ._console import warn
 
 _FRAMED = 5  # poses that a camera is fitted to
@@ -127,7 +127,7 @@ def told_up(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> str:
 
 def frame_title(timeline: Timeline, index: int) -> str:
     """A frame's number and file, for messages."""
-    return f"frame {index} ({timeline.label(index)})"
+    return f"{frame_in_words(index)} ({timeline.label(index)})"
 
 
 def first_readable(timeline: Timeline) -> Pose:

@@ -20,6 +20,7 @@ from ..scan.points import UNKNOWN_UNIT, PointCloud
 from ..scan.pose import Pose
 from ..scan.range_points import RangePoints
 from ..scan.range_view import RangeView
+from ..scan.times import frame_in_words
 from ..scan.units import is_length
 
 _STEPS = 256  # of the grid that the middle is on, at least, in the extent of a pose
@@ -50,7 +51,7 @@ def anonymous_pose(pose: Pose, start: float) -> Pose:
     else:
         points = pose.points.moved(views, -middle)
     time = round(pose.time - start, _DECIMALS)  # no rest of a large number tells that it was one
-    return Pose(pose.index, time, f"frame {pose.index}", points)
+    return Pose(pose.index, time, frame_in_words(pose.index), points)
 
 
 def middle_of(pose: Pose) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from ..camera import Camera
 from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
+from ..scan.times import frame_in_words
 
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 Box = tuple[float, float, float, float]  # left, top, right, bottom; pixels from the upper left corner
@@ -150,7 +151,7 @@ def swatches(look: Look) -> list[tuple[Color, str]]:
 
 def stamp(legend: Legend) -> str:
     """The frame, counted from 1, and its time."""
-    return f"Frame {legend.pose + 1} of {legend.count}, {legend.time:.3f} s"
+    return f"{frame_in_words(legend.pose).capitalize()} of {legend.count}, {legend.time:.3f} s"
 
 
 # --- where they are -------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from . import formats
 from .faces import Faces
 from .points import PointCloud
 from .pose import Scanned
-from .times import TIMES_FILE, read_times_csv
+from .times import TIMES_FILE, frame_in_words, read_times_csv
 
 FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces that all of them have
 
@@ -143,7 +143,7 @@ class MultiFrameFile:
         return self._count
 
     def label(self, index: int) -> str:
-        return f"{self.name} frame {index}"
+        return f"{self.name} {frame_in_words(index)}"
 
     def times(self) -> NDArray[np.float64] | None:
         return formats.read_times(self._path)

@@ -24,6 +24,7 @@ from .points import UNKNOWN_UNIT, PointCloud
 from .pose import Pose
 from .range_view import RangeView, in_one_unit
 from .sources import FrameSource
+from .times import frame_in_words
 
 _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 
@@ -317,7 +318,8 @@ class Timeline:
                     error = InputError("reading was cancelled", self._source.label(index), "Open it again")
                 if isinstance(error, InputError):
                     self._broken[index] = _at_rest(error)
-                    self.messages.append(ScanMessage("broken", f"frame {index} is left out: {error}", index))
+                    what = f"{frame_in_words(index)} is left out: {error}"
+                    self.messages.append(ScanMessage("broken", what, index))
                     error = copy.copy(self._broken[index])
             future.set_exception(error)
             return

@@ -20,6 +20,11 @@ DEFAULT_FPS = 25.0
 _LARGEST_STEP = 1000  # numbers further apart are dates or clock readings, not frame numbers
 
 
+def frame_in_words(index: int) -> str:
+    """A frame as every text tells it, counted from 1; poses, of the command line and Python, count from 0."""
+    return f"frame {index + 1}"
+
+
 def natural_key(name: str) -> tuple[list[str | int], str]:
     """Sorts names as a person would: 2 before 10, capitals beside small letters."""
     return _split(name.casefold()), name

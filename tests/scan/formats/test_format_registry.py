@@ -124,7 +124,7 @@ def test_frames_of_single_moment_files(tmp_path: Path) -> None:
     assert formats.frame_count(tmp_path / "one.xyz") == 1
     assert formats.read_times(tmp_path / "one.xyz") is None
     for frame in (1, -1):
-        with pytest.raises(InputError, match=f"has no frame {frame}. It holds 1"):
+        with pytest.raises(InputError, match=f"has no pose {frame}. It holds 1"):
             formats.read(tmp_path / "one.xyz", frame)
 
 
@@ -156,7 +156,7 @@ def test_out_of_memory_is_a_message(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "big.npz").write_bytes(b"x")
     monkeypatch.setattr(npz, "frame_count", lambda path: 3)
     monkeypatch.setattr(npz, "read", exhaust)
-    with pytest.raises(InputError, match=r"big\.npz, frame 2: cannot be read as NPZ: not enough memory"):
+    with pytest.raises(InputError, match=r"big\.npz, frame 3: cannot be read as NPZ: not enough memory"):
         formats.read(tmp_path / "big.npz", 2)
 
 

@@ -123,7 +123,7 @@ def test_reading_in_turn_reads_each_octree_once(scan: Path, monkeypatch: pytest.
 def test_opening_reads_headers_alone(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(svo, "from_bytes", lambda *_, **__: pytest.fail("a pose was read"))
     with open_scan(scan) as timeline:
-        assert (len(timeline), timeline.unit, timeline.label(3)) == (COUNT, "mm", "ball.svo frame 3")
+        assert (len(timeline), timeline.unit, timeline.label(3)) == (COUNT, "mm", "ball.svo frame 4")
         assert np.allclose(timeline.times, 0.5 + 0.1 * np.arange(COUNT))
 
 
@@ -154,7 +154,7 @@ def test_a_cut_inside_the_last_pose_breaks_that_one_alone(scan: Path, tmp_path: 
     (tmp_path / "cut.svo").write_bytes(scan.read_bytes()[:-5])
     with open_scan(tmp_path / "cut.svo") as timeline:
         assert len([*timeline]) == COUNT - 1
-        with pytest.raises(InputError, match=r"cut\.svo, frame 19: ends within level 7 of an octree's 7"):
+        with pytest.raises(InputError, match=r"cut\.svo, frame 20: ends within level 7 of an octree's 7"):
             timeline.pose(19)
 
 
@@ -169,7 +169,7 @@ def test_a_file_cut_within_a_header_opens_the_poses_before(scan: Path, tmp_path:
             told = [message.text for message in timeline.messages]
             assert len(told) == 1
             assert told[0].startswith(
-                f"frame {kept} is left out: {path}, frame {kept}: ends within the header"
+                f"frame {kept + 1} is left out: {path}, frame {kept + 1}: ends within the header"
             )
     path.write_bytes(data[:20])
     with pytest.raises(InputError, match="octree 0, at byte 0: ends within the header"):

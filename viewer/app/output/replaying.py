@@ -14,6 +14,7 @@ from ...document.anonymous import in_place, middle_of
 from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
 from ...errors import InputError
 from ...scan.pose import Pose
+from ...scan.times import frame_in_words
 from ..notices import Problem
 from ..session import known_as
 
@@ -68,7 +69,7 @@ class Replaying:
             return app.opening is not None
         timeline = app.playback.timeline
         if entry.pose in timeline.broken or entry.pose >= len(timeline):
-            app.note(f"Frame {entry.pose + 1} cannot be shown; it is left out.")
+            app.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown; it is left out.")
             self._next += 1
         elif (pose := timeline.ready(entry.pose)) is None:
             timeline.request(entry.pose)

@@ -6,6 +6,7 @@ import logging
 import math
 
 from ...analysis.pick import Picked
+from ...scan.times import frame_in_words
 from ..playing.playback import Playback
 from .viewport import Viewport
 
@@ -33,7 +34,7 @@ class Pointer:
         self.picked, self.words = picked, []
         if picked is not None and (request := self._viewport.request) is not None:
             pose = request.pose
-            frame = f"frame {pose.index + 1}/{len(self._playback.timeline)}"
+            frame = f"{frame_in_words(pose.index)}/{len(self._playback.timeline)}"
             self.words = describe_pick(picked, frame, self._playback.unit, self._viewport.bounds(pose).radius)
         log.debug("under the mouse: %s", "; ".join(self.words))
 

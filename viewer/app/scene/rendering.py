@@ -10,6 +10,7 @@ from ...backends import backends
 from ...look import Look, drawable
 from ...params import switches
 from ...scan.pose import Pose
+from ...scan.times import frame_in_words
 from ..playing.playback import Playback
 from ..session import Session, edit_name
 
@@ -42,7 +43,7 @@ class Rendering:
                 f"{name} is not found by {drawn_by.title}, but by {' and '.join(finders)}: "
                 "other colours are shown."
                 if finders
-                else f"Frame {pose.index + 1} has no {name} to colour by: "
+                else f"{frame_in_words(pose.index).capitalize()} has no {name} to colour by: "
                 "other colours are shown until a frame has it."
             )
 

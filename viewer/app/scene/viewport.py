@@ -17,6 +17,7 @@ from ...gpu.present import Presenter
 from ...gpu.surface import Surface
 from ...renderer import Renderer
 from ...scan.pose import Pose
+from ...scan.times import frame_in_words
 from ..failures import failure_in_words
 from .detail import Detail, Quality
 from .motion import Motion
@@ -270,6 +271,6 @@ def _problem(request: Request, error: Exception) -> Scan4DError:
     """Why there is no picture, as users read it."""
     if isinstance(error, Scan4DError):
         return error
-    problem = Scan4DError(failure_in_words(f"Drawing frame {request.pose.index + 1}", error))
+    problem = Scan4DError(failure_in_words(f"Drawing {frame_in_words(request.pose.index)}", error))
     problem.__cause__ = error
     return problem

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..faces import Faces
 from ..points import PointCloud
+from ..times import frame_in_words
 from .asset import rest_points
 from .motion import PERIOD, move
 
@@ -33,7 +34,7 @@ class DemoSource:
 
     def label(self, index: int) -> str:
         """The name of a pose."""
-        return f"demo {index:02d}"
+        return f"demo, {frame_in_words(index)}"
 
     def times(self) -> NDArray[np.float64]:
         """(T,) seconds."""

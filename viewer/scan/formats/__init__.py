@@ -37,6 +37,7 @@ from ..faces import Faces
 from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
+from ..times import frame_in_words
 from ..units import usable_unit
 from ._admission import admit
 
@@ -99,8 +100,8 @@ def read(path: Path | str, frame: int = 0) -> Scanned:
     module = _readable(path)
     frames = frame_count(path)
     if not 0 <= frame < frames:
-        raise InputError(f"has no frame {frame}", path, f"It holds {frames}, counted from 0")
-    where = path if frames == 1 else f"{path}, frame {frame}"
+        raise InputError(f"has no pose {frame}", path, f"It holds {frames}, counted from 0")
+    where = path if frames == 1 else f"{path}, {frame_in_words(frame)}"
     with one_message(where, f"cannot be read as {module.TITLE}"):
         return _with_points(module.read(path, frame))
 
@@ -134,7 +135,7 @@ def frames(path: Path | str) -> Callable[[int], Scanned]:
         opened = module.Frames(path)
 
     def read_frame(frame: int) -> Scanned:
-        with one_message(f"{path}, frame {frame}", failed):
+        with one_message(f"{path}, {frame_in_words(frame)}", failed):
             return _with_points(opened.read(frame))
 
     return read_frame

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from ....analysis.measure import End, Reading
 from ....scan.points import UNKNOWN_UNIT
+from ....scan.times import frame_in_words
 from ... import widgets
 from ...ui import Ui
 from .words import distance_words, snap_words
@@ -77,7 +78,7 @@ def _end_words(end: End, unit: str) -> str:
     seen = f", filled from level {end.level}" if end.level else ""
     seen += ", at an outline: it may be the surface before or behind" if end.at_outline else ""
     sure = "" if end.uncertainty is None else f" ± {end.uncertainty:.2g}"
-    return f"{what}, frame {end.frame + 1}: {place}{sure} {unit}, spacing {spacing}{seen}"
+    return f"{what}, {frame_in_words(end.frame)}: {place}{sure} {unit}, spacing {spacing}{seen}"
 
 
 def _draw_outlets(measuring: Tool, ui: Ui) -> None:
