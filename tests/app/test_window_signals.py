@@ -94,6 +94,17 @@ def test_settings_are_kept_while_a_scan_plays(screen: Screen, tmp_path: Path, sc
         app.see(lambda state: state.pictures > before + 1)
 
 
+def test_that_software_draws_is_told_once(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    told = []
+    for _ in range(2):
+        with running_app(screen, tmp_path, scan) as app:
+            screen.do("key", "ctrl+q")
+            assert app.process.wait(PATIENCE) == 0
+            told.append([note for note in app.notes if "Drawn in software" in note])
+    devices = settings(tmp_path)["slow_devices"]
+    assert [len(notes) for notes in told] == [len(devices), 0], "nothing is told of a graphics card"
+
+
 @pytest.mark.slow
 def test_what_a_killed_window_had_recorded_is_saved_at_the_next_start(
     screen: Screen, tmp_path: Path, scan: Path

@@ -148,8 +148,10 @@ class App:
         self.browser: Browser = Browser(
             self.session, self.scans, self.sessions, self.open, self.replayer.replay
         )
-        if self.renderer.gpu.software:
-            self.note(f"Drawn in software ({self.renderer.gpu.device}); a graphics card is faster.")
+        self._slow_devices = remembered.slow_devices
+        if (gpu := self.renderer.gpu).software and gpu.device not in self._slow_devices:
+            self._slow_devices = (*self._slow_devices, gpu.device)
+            self.note(f"Drawn in software ({gpu.device}); a graphics card is faster.")
         self._start(opened)
 
     # --- commands ---------------------------------------------------------------------
@@ -275,7 +277,7 @@ class App:
             marks=self.marks.shown, cube=self.steering.cube.is_shown,
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
-            panel=self.panel.chosen,
+            panel=self.panel.chosen, slow_devices=self._slow_devices,
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------

@@ -82,7 +82,8 @@ class Settings:
     its `Params`. marks: over the view. cube: whether the orientation cube is shown. turn_seconds: of the
     turntable. export, export_marks: of the export dialog. recent: the scans opened last, newest first.
     places: what earlier versions kept here of each scan, whose documents have files of their own now.
-    panel: its width, and which of its sections are open.
+    panel: its width, and which of its sections are open. slow_devices: those of which the user was told that
+    they draw in software.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
     """
 
@@ -101,6 +102,7 @@ class Settings:
     recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
     places: Mapping[str, SavedSession] = field(default_factory=dict)
     panel: PanelChoices = field(default_factory=PanelChoices)
+    slow_devices: tuple[str, ...] = ()
     tools: Annotated[Mapping[str, Mapping[str, Any]], ReadBy(_read_tools)] = field(default_factory=dict)
 
     @classmethod
