@@ -174,7 +174,7 @@ def cell_reaches(
     normals: NDArray[np.floating],
     shares: NDArray[np.bool_],
 ) -> tuple[Floats, Floats]:
-    """How far each point's Voronoi cell reaches in the plane of its normal, in 12 directions, (M, 12), over
+    """How far each point's Voronoi cell reaches in the plane of its normal, in 24 directions, (M, 24), over
     the neighbourhood's radius, inf where it is open; and the radius of a point's share, (M,), in that unit.
 
     normals: (M, 3), unit. shares: (M, K), the neighbours that cells are between. Directions are counted from
@@ -189,7 +189,7 @@ def cell_reaches(
     second = np.cross(normals, first)
     across = np.stack([np.einsum("mki,mi->mk", offsets, axis) for axis in (first, second)], axis=-1)
     squared = (across**2).sum(axis=-1)
-    angles = np.arange(12) * np.pi / 6
+    angles = np.arange(24) * np.pi / 12
     along = across @ np.array([np.cos(angles), np.sin(angles)])
     beyond = shares & (squared > 0) & (np.arange(squared.shape[1]) > 0)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -33,7 +33,7 @@ RULES = {"growth": 4.0, "alone": 8.0}  # by default
 LEAST_COUNT, CERTAIN, TURNED = 6, 0.08, 12.0  # of adaptive planes: points, radians, degrees
 EXACT = 4e-6  # of a radius: some roundings of float32
 # Bounds of splats in radii of a point's share, and the factor on what cells reach.
-LEAST_SHARE, MOST_SHARE, BETWEEN = 0.9, 1.75, 1.15
+LEAST_SHARE, MOST_SHARE, OPEN, LEANING = 0.9, 1.39, 1.75, 1.19
 CROWDED = 4.0  # pixels within which hidden neighbours have no cell
 DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
 
@@ -120,9 +120,10 @@ def test_splats_reach_as_far_as_cells(name: str) -> None:
     crowded = CROWDED * pixel_sizes(scene, found.rows)[:, None]
     shared = belongs & ~(hidden & (true.distances <= crowded))
     edges, shares = cell_reaches(scene.cloud, found.rows, true, found.normals, shared)
-    is_open = edges > MOST_SHARE * shares[:, None]
-    reach = np.maximum(np.where(is_open, shares[:, None], BETWEEN * edges).max(axis=1), LEAST_SHARE * shares)
-    near_limit = (np.abs(edges / shares[:, None] - MOST_SHARE) < 0.01).any(axis=1)
+    share = shares[:, None]
+    closing = np.where(edges > OPEN * share, share, np.minimum(LEANING * edges, MOST_SHARE * share))
+    reach = np.maximum(closing.max(axis=1), LEAST_SHARE * shares)
+    near_limit = (np.abs(edges / share - OPEN) < 0.01).any(axis=1)
     values = planes(scene.cloud, found.rows, true).values
     on_line = values[:, 1] <= 2e-5 * values[:, 2]
     near_limit |= (hidden & np.isclose(true.distances, crowded, rtol=1e-4)).any(axis=1)

@@ -21,7 +21,8 @@ class Grids:
     Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
     pixels round the picture whose points take part. unit: factor on places, a power of two.
     typical: radius of neighborhoods as points are dense in the picture, pixels; typical_in_space: as they are
-    over a body of the scan's size, a rough one, scan units. culls, growth, alone, drops:
+    over a body of the scan's size, a rough one, scan units; widest: from which on splats grow no more, scan
+    units. culls, growth, alone, drops:
     as `Search` has them.
     """
 
@@ -37,6 +38,7 @@ class Grids:
     unit: float
     typical: float
     typical_in_space: float
+    widest: float
 
     @classmethod
     def of(
@@ -47,6 +49,7 @@ class Grids:
         unit: float,
         typical: float = 1.0,
         typical_in_space: float = 0.0,
+        widest: float = 0.0,
     ) -> Grids:
         """The grids over a picture of a size, pixels. unit and what is typical: as above."""
         fine_shift = min(max(round(math.log2(_FINE * typical)), 0), _COARSEST_FINE)
@@ -64,6 +67,7 @@ class Grids:
             unit,
             typical,
             typical_in_space,
+            widest,
         )
 
     @property

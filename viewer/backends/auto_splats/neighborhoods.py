@@ -29,6 +29,7 @@ from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
 from ...scan.range_points import RangePoints
+from ...scan.spacing import spacings
 from ...view import View
 from .grids import COARSEST, FINEST_COARSE, Grids
 
@@ -43,6 +44,7 @@ _ENOUGH = 10  # points of a region that tell how dense they are
 MOST_NEIGHBORS = 32  # loops over more are not unrolled, and take far longer
 MOST_PARTICIPANTS, _LARGEST_CROWD = 1 << 22, 6000
 _BLOCK = 8  # pixels along an edge, of which the farthest is known where points may be late
+_SPARSE, _WIDEST = 0.9, 1.5  # quantile that tells sparse parts; their radii from which on splats grow no more
 _SPARE = 4  # times the room that is needed, beyond which it is given up
 
 
@@ -215,7 +217,9 @@ class Neighborhoods:
                 break
             shift = wanted
         in_space = _typical_radius(pose, search.k)
-        self._grids = grids = Grids.of(self._size, shift, search, _unit(pose), radius, in_space)
+        self._grids = grids = Grids.of(
+            self._size, shift, search, _unit(pose), radius, in_space, _widest_radius(pose, search.k)
+        )
         for name in ("near to", "farthest"):
             self._reserve(name, 4 * grids.coarse_cells, gl.R32F)
         with self._gpu.timers.measure("planes"):
@@ -387,6 +391,13 @@ def _unit(pose: GpuPose) -> float:
 def _typical_radius(pose: GpuPose, k: int) -> float:
     """The radius of neighborhoods of k if points lay evenly on a ball of the scan's size, scan units."""
     return 2 * pose.bounds.radius * math.sqrt(k / max(len(pose.cloud), 1))
+
+
+def _widest_radius(pose: GpuPose, k: int) -> float:
+    """The radius of neighborhoods of k where points are sparser than nearly everywhere, scan units: what is
+    farther apart, as returns of a lidar from far away, is no surface that splats could close."""
+    sparse = float(np.quantile(spacings(pose.cloud), _SPARSE))
+    return _WIDEST * sparse * math.sqrt(k / math.pi)
 
 
 def _scanners(cloud: PointCloud, points: RangePoints) -> NDArray[np.float32]:
