@@ -24,6 +24,7 @@ LEVEL_COLORS = ("#56b4e9", "#009e73", "#f0e442", "#e69f00", "#cc79a7")
 HOLE_COLOR = "#ff0000"
 HOLE_REACH = 8  # pixels: half of the widest gaps that count as holes, which are as wide as a pixel of level 4
 _UNMAPPED = {"color_by": tuple(name for name in COLOR_BY if name not in ("depth", "height"))}
+_UNRANGED = {"color_by": (*_UNMAPPED["color_by"], "depth")}  # where it depends on the view
 COLOR_WORDS = {
     "auto": "The scan's own",
     "own": "Its colours",
@@ -40,6 +41,7 @@ LIGHT_WORDS = {
     "head": "From the viewer",
     "fixed": "From a fixed side",
 }
+RANGE_WORDS = {"sequence": "All frames", "frame": "Each frame"}
 _FIXED, _FLAT = {"light": ("fixed",)}, {"light": ("flat",)}
 _EYE_DOME = {"eye_dome": (None, True)}
 
@@ -72,6 +74,12 @@ class Look:
         unless=_UNMAPPED,
         basic=True,
     )
+    range: str = param(
+        "sequence",
+        "Whose values the colour map spans, but for ends that are given: of all frames, so that a colour is "
+        "the same value in each, or of each frame",
+        choices=tuple(RANGE_WORDS), words=RANGE_WORDS, group="Colour", unless=_UNRANGED, basic=True,
+    )  # fmt: skip
     low: float | None = param(
         None, "Value at the map's start; auto: from the data",
         type=float, group="Colour", unless=_UNMAPPED, basic=True,
@@ -170,6 +178,24 @@ def drawable(look: Look, scalars: Collection[str], found: Collection[str] = ()) 
     scan may differ in their scalars, and backends in what they find."""
     has_source = look.color_by in COLOR_BY or _number(look, scalars, found) is not None
     return look if has_source else replace(look, color_by="auto")
+
+
+def is_open_range(look: Look) -> bool:
+    """Whether an end of the colour map is still to be found over all frames."""
+    has_range = look.color_by not in _UNRANGED["color_by"]
+    return has_range and look.range == "sequence" and None in (look.low, look.high)
+
+
+def with_range(look: Look, found: tuple[float, float] | None) -> Look:
+    """The look with what was found over all frames for its open ends; None: each frame's own range holds."""
+    if not is_open_range(look):
+        return look
+    if found is None:
+        return replace(look, range="frame")
+    low, high = found
+    return replace(
+        look, low=low if look.low is None else look.low, high=high if look.high is None else look.high
+    )
 
 
 def unnamed(look: Look, scalars: Collection[str]) -> Look:

@@ -128,6 +128,7 @@ def shown(app: App) -> dict[str, Any]:
         "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),
+        "range_note": app.ranging.words(),
         "undoes": app.session.history.undoes,
         "redoes": app.session.history.redoes,
     }
@@ -135,6 +136,7 @@ def shown(app: App) -> dict[str, Any]:
         state |= {
             "frame": viewport.request.pose.index,
             "backend": surface.stats.backend,
+            "color_range": surface.color_range,
             "pixels": surface.size,
             "points": len(viewport.request.pose.cloud) - surface.stats.left_out,
         }

@@ -17,10 +17,12 @@ from written import bits, film, picture
 import viewer
 from viewer import frame
 from viewer.camera import Camera
+from viewer.document.recording import Recording
 from viewer.gpu.surface import NOTHING
 from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan import formats
+from viewer.scan.points import PointCloud
 
 
 def test_a_picture_is_what_the_library_draws(run: Run, scans: Path, tmp_path: Path) -> None:
@@ -315,3 +317,35 @@ def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
     ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--stats", tmp_path / "s.json")
     assert run(*ball, "--repeat", 4).code == 0
     assert drawn == [False] * (2 + 4) + [True] * 4
+
+
+def test_one_colour_is_one_value_in_all_frames(run: Run, tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    positions = rng.uniform(-1, 1, (4000, 3)) * [1, 1, 0]
+    for index in range(3):
+        values = np.full(4000, index, np.float32)
+        values[:400] = 0.5  # the same in all
+        (tmp_path / "scan").mkdir(exist_ok=True)
+        cloud = PointCloud.from_arrays(positions, scalars={"shift": values})
+        formats.write(tmp_path / "scan" / f"{index}.npz", cloud)
+    arguments = [
+        "render",
+        tmp_path / "scan",
+        *SMALL,
+        "--backend",
+        "points",
+        "--look",
+        "color_by=shift",
+        "light=flat",
+    ]
+    assert run(*arguments, "--all", "-o", tmp_path / "all%d.png").code == 0
+    looks = [Recording.load(tmp_path / f"all{index}.png").entries[0].look for index in range(3)]
+    assert {(look.low, look.high) for look in looks} == {(0, 2)}
+    assert run("render", "--replay", tmp_path / "all1.png", "-o", tmp_path / "again.png").code == 0
+    assert np.array_equal(picture(tmp_path / "again.png"), picture(tmp_path / "all1.png"))
+
+    assert run(*arguments, "--pose", "1", "-o", tmp_path / "one.png").code == 0
+    assert Recording.load(tmp_path / "one.png").entries[0].look.range == "frame"
+    assert run(*arguments, "range=frame", "--all", "-o", tmp_path / "own%d.png").code == 0
+    assert np.array_equal(picture(tmp_path / "own1.png"), picture(tmp_path / "one.png"))
+    assert not np.array_equal(picture(tmp_path / "own1.png"), picture(tmp_path / "all1.png"))

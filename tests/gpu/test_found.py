@@ -17,7 +17,6 @@ from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, fallback, render_frame
-from viewer.gpu.pose import robust_range
 from viewer.gpu.surface import Surface
 from viewer.look import COLOR_BY, Look, ValueKind, color_table
 from viewer.output.export import write_picture
@@ -25,6 +24,7 @@ from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.scan.ranges import robust_range
 
 Draw = Callable[..., Surface]
 SIZE = (300, 201)  # wider than what ranges are found from

@@ -21,6 +21,7 @@ from viewer.output.marks import (
     marked,
     number,
     quantity,
+    range_note,
     round_length,
     scale_bar,
     stamp,
@@ -228,6 +229,19 @@ def test_the_range_is_the_one_that_was_shaded_with(draw: Callable[..., Surface])
     assert surface.color_range is not None
     assert 1e7 < surface.color_range[0] < 1e7 + 0.1 < 1e7 + 0.9 < surface.color_range[1] < 1e7 + 1
     assert draw(cloud, Camera.orbit(cloud.bounds())).color_range is None
+
+
+def test_the_colour_bar_says_where_its_range_is_from() -> None:
+    height = replace(LEGEND, look=Look(color_by="height"), count=8)
+    assert range_note(height) == ""
+    assert range_note(replace(height, range_note="range of 2 of 8 frames")) == "range of 2 of 8 frames"
+    own = replace(height, look=Look(color_by="height", range="frame", low=1.0))
+    assert range_note(own) == "range of this frame"
+    assert range_note(replace(own, count=1)) == "", "which all frames have"
+    assert range_note(replace(own, look=replace(own.look, high=2.0))) == "", "which is given"
+    plain = marked(gray(), replace(height, marks=Marks(color_bar=True)), VALUES)
+    told = marked(gray(), replace(own, marks=Marks(color_bar=True)), VALUES)
+    assert changed(told)[1] < changed(plain)[1], "a line more"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (10, 8), (3, 100), (100, 3), (20, 20)])

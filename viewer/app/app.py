@@ -44,6 +44,7 @@ from .output.replaying import Replayer
 from .panel import Panel
 from .playing.ahead import Ahead
 from .playing.playback import Playback
+from .playing.ranging import Ranging
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
 from .scene.full_view import FullView
@@ -64,8 +65,9 @@ log = logging.getLogger(__name__)
 class App:
     """All that the window shows and can do. Panels read it and call its commands.
 
-    session: what the user has chosen. playback: the scan. ahead: has its poses prepared. renderer: what is on
-    the GPU. viewport: the 3D view. marks: what lies over it. rendering: which backend draws it.
+    session: what the user has chosen. playback: the scan. ahead: has its poses prepared. ranging: of colours,
+    over its frames. renderer: what is on the GPU. viewport: the 3D view. marks: what lies over it. rendering:
+    which backend draws it.
     steering: what moves its camera. pointer: what the mouse points at in it. bookmarks: cameras to go
     back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
@@ -106,6 +108,7 @@ class App:
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         self.ahead: Ahead = Ahead(self.session, self.playback, self.renderer)
+        self.ranging: Ranging = Ranging(self.session)
         self.commands = Commands()
         self.tools: Toolbox = Toolbox(
             self.session, self.playback, self.viewport, self.failures, self.note, window.touch,
@@ -130,7 +133,7 @@ class App:
             remembered.turn_seconds, up is not None, self.note,
         )  # fmt: skip
         self.marks: ViewMarks = ViewMarks(
-            self.session, self.playback, self.viewport, self.steering, remembered.marks
+            self.session, self.playback, self.viewport, self.steering, self.ranging, remembered.marks
         )
         self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
         self.full_view: FullView = FullView(window, self.keys, self.note)
@@ -313,6 +316,7 @@ class App:
     def _start(self, opened: Opened) -> None:
         timeline, self.session.hash_found, left, problem, session = opened
         timeline.finish = self._find_facts
+        self.ranging.begin(timeline)
         if problem:
             self.note(problem)
         if session is not None:
@@ -371,6 +375,7 @@ class App:
             ("Exporting", self.exporting.close),
             ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop
             ("Opening", self._opening.cancel),
+            ("Ranging", self.ranging.close),
             ("Reading", self.playback.close),
             ("Drawing", self.viewport.release),
             ("Preparing", self.renderer.release),

@@ -22,11 +22,13 @@ class Laid:
     Of numbers that have one name those count that were laid last. A pose is moved by one tool's place after
     the other's, in the order in which they were laid.
 
-    names: of the numbers that were found over the poses shown since something was laid last.
+    names: of the numbers that were found over the poses shown since something was laid last. version: another
+    one after each time that something was laid or taken away.
     """
 
     def __init__(self) -> None:
         self.names: set[str] = set()
+        self.version = 0
         self._by_tool: dict[str, tuple[NumbersOf, PlaceOf]] = {}
         self._replayed: tuple[int, Rigid] | None = None
         self._found: tuple[Pose, Layers] | None = None
@@ -74,6 +76,7 @@ class Laid:
         """Forget what was replayed and found."""
         self._replayed = self._found = None
         self.names = set()
+        self.version += 1
 
     def _merged(self, pose: Pose) -> Layers:
         scalars: dict[str, NDArray[np.generic]] = {}

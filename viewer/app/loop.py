@@ -98,6 +98,7 @@ class Loop:
             ("Replaying", lambda: app.replayer.advance(now)),
             ("Preparing", app.ahead.advance),
             ("Playing", lambda: app.playback.advance(now)),
+            ("Ranging", lambda: app.ranging.advance(now, not (app.moving or app.playback.waiting))),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
             ("Keeping the history", lambda: app.settle(now)),
@@ -146,7 +147,7 @@ class Loop:
         app.steering.settle(pose)
         playing, held = app.playback.player.playing, app.steering.moves
         app.rendering.tell_missing(pose)
-        request = app.document.request(pose, app.session.laid.layers(pose))
+        request = app.ranging.ranged(app.document.request(pose, app.session.laid.layers(pose)))
         drew = app.viewport.draw(request, playing=playing, held=held)
         if drew and app.viewport.problem is not None:
             app.failures.tell("Drawing", app.viewport.problem)

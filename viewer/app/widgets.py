@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -32,17 +32,21 @@ def edit(
     defaults: T,
     choices: Mapping[str, Mapping[str, str]] | None = None,
     hidden: Collection[str] = (),
+    now: Mapping[str, Any] | None = None,
+    rows: Mapping[str, Callable[[T], T]] | None = None,
 ) -> T:
     """A row for each parameter that matters beside the others: label, widget, and what resets it where it is
     not its default; those that are not basic under "Advanced", which is closed at first, and the headings of
     their groups. The same object while nothing is edited.
 
     choices: words to choose from and their titles, for parameters that declare none. hidden: names of
-    parameters that stand elsewhere.
+    parameters that stand elsewhere. now: the values that "auto" stands for now, which parameters begin with
+    that are not automatic any more. rows: what declares the rows of parameters that have their own, by name.
     """
+    more = _More(choices or {}, now or {}, rows or {})
     shown = [one for one in describe(type(values)) if one.matters(values) and one.name not in hidden]
     basic = [one for one in shown if one.basic]
-    values = _edit_rows(basic, values, defaults, choices or {})
+    values = _edit_rows(basic, values, defaults, more)
     if len(basic) < len(shown) and imgui.tree_node_ex(f"Advanced##{type(values).__qualname__}", _NO_PUSH):
         group = ""
         for parameter in shown:
@@ -51,27 +55,44 @@ def edit(
             if parameter.group != group:
                 group = parameter.group
                 imgui.separator_text(group)
-            values = _edit_rows([parameter], values, defaults, choices or {})
+            values = _edit_rows([parameter], values, defaults, more)
     return values
 
 
-def _edit_rows(
-    parameters: Iterable[Parameter], values: T, defaults: T, choices: Mapping[str, Mapping[str, str]]
-) -> T:
+class _More(NamedTuple):
+    """Arguments of `edit` on what the declaration of parameters does not say."""
+
+    choices: Mapping[str, Mapping[str, str]]
+    now: Mapping[str, Any]
+    rows: Mapping[str, Callable[[Any], Any]]
+
+
+def _edit_rows(parameters: Iterable[Parameter], values: T, defaults: T, more: _More) -> T:
     for parameter in parameters:
+        if parameter.name in more.rows:
+            imgui.push_id(parameter.name)
+            values = more.rows[parameter.name](values)
+            imgui.pop_id()
+            continue
         old, default = (getattr(each, parameter.name) for each in (values, defaults))
-        new = _edit_row(parameter, old, default, choices.get(parameter.name, parameter.words))
+        words = more.choices.get(parameter.name, parameter.words)
+        new = _edit_row(parameter, old, default, words, more.now.get(parameter.name))
         if new != old:
             values = replace(values, **{parameter.name: new})  # type: ignore[type-var]
     return values
 
 
-def _edit_row(parameter: Parameter, value: Any, default: Any, words: Mapping[str, str]) -> Any:
-    """Declare the row of a parameter; returns its value, edited or not."""
+def _edit_row(
+    parameter: Parameter, value: Any, default: Any, words: Mapping[str, str], now: Any = None
+) -> Any:
+    """Declare the row of a parameter; returns its value, edited or not. now: that "auto" stands for."""
     imgui.push_id(parameter.name)
     gutter = imgui.get_frame_height()
     label(parameter.title, _in_words(parameter), gutter)
-    new = _edit_optional(parameter, value, gutter) if parameter.optional else _edit(parameter, value, words)
+    if parameter.optional:
+        new = _edit_optional(parameter, value, gutter, now)
+    else:
+        new = _edit(parameter, value, words)
     if value != default:
         imgui.same_line(imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x - gutter)
         text = _value_in_words(default, words)
@@ -134,11 +155,11 @@ def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, st
     return current
 
 
-def _edit_optional(parameter: Parameter, value: Any, gutter: float) -> Any:
+def _edit_optional(parameter: Parameter, value: Any, gutter: float, now: Any) -> Any:
     """A box for "auto", and the widget beside it where that is not ticked."""
     toggled, auto = imgui.checkbox("auto", value is None)
     if toggled:
-        value = None if auto else parameter.type(parameter.low or 0)
+        value = None if auto else parameter.type(now if now is not None else parameter.low or 0)
     if value is not None:
         imgui.same_line()
         imgui.set_next_item_width(-1 - gutter)

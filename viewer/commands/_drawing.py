@@ -17,10 +17,11 @@ from ..errors import InputError
 from ..frame import Request, backend_for
 from ..gpu.context import headless
 from ..gpu.surface import Surface
-from ..look import COLOR_BY, Look, drawable
+from ..look import COLOR_BY, Look, drawable, is_open_range, with_range
 from ..output.export import numbered
 from ..output.marks import Legend
 from ..renderer import Renderer
+from ..scan.ranges import ValueRanges
 from ..scan.timeline import Timeline
 from ..scan.times import typical_rate
 from ._scans import frame_title
@@ -96,6 +97,17 @@ def check_color_source(
     if drawn_by is not None:
         where = timeline.name if len(indices) > 1 else frame_title(timeline, indices[0])
         raise missing_source(look.color_by, drawn_by, scalars, where)
+
+
+def ranged(look: Look, timeline: Timeline, indices: Sequence[int]) -> Look:
+    """The look with the range over these poses together for the ends that it leaves open; of one pose, its
+    own. All are read for it where there are several."""
+    poses = list(dict.fromkeys(indices))
+    if len(poses) == 1 or not is_open_range(look):
+        return with_range(look, None)
+    ranges = ValueRanges(len(poses))
+    ranges.gather(timeline, look, poses)
+    return with_range(look, ranges.range(look))
 
 
 def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> float:

@@ -144,6 +144,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
             look = replace(look, up=up)
         claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
         drawing.check_color_source(look, timeline, indices, args.backend)
+        look = drawing.ranged(look, timeline, indices)
         fps = drawing.film_rate(timeline, indices, args.fps)
         salt = new_salt() if args.anonymous else None
         hash = fingerprint(timeline.files, salt) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None

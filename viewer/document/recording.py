@@ -159,6 +159,9 @@ class Entry:
 
         where: it stands, for messages. Raises InputError for whatever is wrong in it.
         """
+        look = data.get("look")
+        if isinstance(look, dict) and "range" not in look:
+            data = {**data, "look": {"range": "frame", **look}}  # as it was before there was a choice
         entry = structured(cls, data, where)
         params = structured(find_backend(entry.backend).module.Params, entry.params, f"{where}, params")
         return replace(entry, params=params)

@@ -22,6 +22,7 @@ from ..scan.points import PointCloud, strided
 from ..scan.pose import Pose
 from ..scan.range_points import RangePoints
 from ..scan.range_view import RangeView
+from ..scan.ranges import robust_range
 from . import gl
 from .context import Gpu, Workspace
 from .range_samples import RangeSamples
@@ -380,13 +381,3 @@ def as_float32(values: NDArray, zero: float = 0.0) -> NDArray[np.float32]:
     """Numbers relative to `zero` as the GPU holds them; those beyond its range are infinite there."""
     with np.errstate(over="ignore"):
         return (values - zero).astype(np.float32)
-
-
-def robust_range(values: NDArray) -> tuple[float, float]:
-    """The 2 % and 98 % quantiles of the finite values (N,), as float64; (0, 1) where there is none."""
-    finite = values.astype(np.float64)
-    finite = finite[np.isfinite(finite)]
-    if not len(finite):
-        return 0.0, 1.0
-    low, high = (float(v) for v in np.quantile(finite, [0.02, 0.98]))
-    return (low, high) if high > low else (float(finite.min()), float(finite.max()))

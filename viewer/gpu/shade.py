@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..geometry import up_vector
 from ..look import HOLE_COLOR, HOLE_REACH, LEVEL_COLORS, Look, color_table, rgba, value_source
+from ..scan.ranges import robust_range
 from . import gl
 from .bindings import Storage, Texture
 from .blocks import Mat4, Vec4
 from .context import Gpu
-from .pose import robust_range
 from .surface import Surface
 
 # How shade.comp names where a colour, a number and the light come from.

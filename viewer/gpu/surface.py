@@ -17,6 +17,7 @@ from ..look import Look, ValueKind, rgba, value_source
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
+from ..scan.ranges import robust_range
 from ..srgb import linear_from_bytes
 from ..view import View
 from . import gl
@@ -26,7 +27,7 @@ from .compact import IndexList, list_covered
 from .constants import EMPTY, NO_DEPTH, NOTHING
 from .context import Gpu, Resource, Workspace
 from .counts import count_points
-from .pose import GpuPose, as_float32, robust_range
+from .pose import GpuPose, as_float32
 from .sample import sample_of
 from .view import ViewBlock
 

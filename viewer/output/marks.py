@@ -67,7 +67,8 @@ def marks_of(names: Sequence[str] | None) -> Marks:
 class Legend:
     """The words and numbers that the marks of a picture show.
 
-    unit: of length. pose: its index, of `count`. time: the pose's, seconds.
+    unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
+    says of its numbers.
     """
 
     marks: Marks
@@ -77,6 +78,7 @@ class Legend:
     pose: int
     count: int
     time: float
+    range_note: str = ""
 
 
 class MarkPainter(Protocol):
@@ -137,6 +139,13 @@ def number(value: float, span: float) -> str:
     digits = min(max(math.floor(math.log10(abs(value))) + 2 - magnitude, 2), _MOST_DIGITS)
     scientific = f"{value:.{digits}e}"
     return plain if len(plain) <= len(scientific) + 1 else scientific
+
+
+def range_note(legend: Legend) -> str:
+    """Words on where the range of colours is from, where it is not that of all frames or given."""
+    look = legend.look
+    is_own = look.range == "frame" and None in (look.low, look.high) and look.color_by != "depth"
+    return legend.range_note or ("range of this frame" if is_own and legend.count > 1 else "")
 
 
 def swatches(look: Look) -> list[tuple[Color, str]]:
@@ -233,15 +242,19 @@ def _draw_color_bar(
     """Draw it lower right; returns where it begins at the top, pixels."""
     em = painter.em
     title = _shortened(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
+    note = _shortened(painter, range_note(legend), _TEXT_SHARE * size[0])
     told = ticks(*values, kind)
     widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in told)
+    widest = max(widest, painter.width(title), painter.width(note))
     height = min(_MAP_HEIGHT * em, 0.6 * size[1])
     right, bottom = round(size[0] - _MARGIN * em), round(size[1] - _MARGIN * em)
-    left = round(right - max(widest, painter.width(title)) - 2 * _PAD * em)
-    top = round(bottom - height - (2.5 + 2 * _PAD) * em)
+    left = round(right - widest - 2 * _PAD * em)
+    top = round(bottom - height - (2.5 + (1 + _GAP if note else 0) + 2 * _PAD) * em)
     painter.box((left, top, right, bottom), PLATE)
     left += round(_PAD * em)
     painter.text(left, top + round(_PAD * em), title)
+    if note:
+        painter.text(left, top + round((_PAD + 1 + _GAP) * em), note)
     foot = bottom - round((_PAD + 0.5) * em)
     colors = color_table(legend.look.color_map)
     painter.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)

@@ -167,8 +167,7 @@ class Timeline:
         """
         index = self._checked_index(index)
         with self._state:
-            if self._closed:
-                raise ValueError("the timeline is closed")
+            self._check_open()
             if index in self._broken:
                 raise copy.copy(self._broken[index])
             if (held := self._held(index)) is not None:
@@ -178,6 +177,23 @@ class Timeline:
         if begun is None:
             self._load(index, future)
         return future.result()
+
+    def visit(self, index: int) -> Pose:
+        """One pose as `pose` gives it, for who goes through all frames: one that is read for this takes no
+        place in memory, and nothing else is found of it. Raises InputError likewise."""
+        index = self._checked_index(index)
+        with self._state:
+            self._check_open()
+            if index in self._broken:
+                raise copy.copy(self._broken[index])
+            held, begun = self._held(index), self._loading.get(index)
+        if held is not None or begun is not None:
+            return held or begun.result()  # type: ignore[union-attr]
+        try:
+            return self._read(index)
+        except InputError as error:
+            with self._state:
+                raise self._note_broken(index, error) from None
 
     def ready(self, index: int) -> Pose | None:
         """The pose if it is in memory, else None at once."""
@@ -232,6 +248,18 @@ class Timeline:
         if not 0 <= index < len(self):
             raise InputError(f"there is no pose {index}", self.name, f"It has the poses 0 to {len(self) - 1}")
         return index
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError("the timeline is closed")
+
+    def _note_broken(self, index: int, error: InputError) -> InputError:
+        """Note why a frame cannot be read, once; returns the error to raise. Runs locked."""
+        if index not in self._broken:
+            self._broken[index] = _at_rest(error)
+            what = f"{frame_in_words(index)} is left out: {error}"
+            self.messages.append(ScanMessage("broken", what, index))
+        return copy.copy(self._broken[index])
 
     def _held(self, index: int) -> Pose | None:
         if self._in_use is not None and self._in_use.index == index:
@@ -317,10 +345,7 @@ class Timeline:
                 if isinstance(error, Cancelled) and self._is_given_up:
                     error = InputError("reading was cancelled", self._source.label(index), "Open it again")
                 if isinstance(error, InputError):
-                    self._broken[index] = _at_rest(error)
-                    what = f"{frame_in_words(index)} is left out: {error}"
-                    self.messages.append(ScanMessage("broken", what, index))
-                    error = copy.copy(self._broken[index])
+                    error = self._note_broken(index, error)
             future.set_exception(error)
             return
         with self._state:

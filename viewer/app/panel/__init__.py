@@ -62,7 +62,9 @@ class Panel:
         if pose is not None:
             for title, is_revealed, declare in app.tools.sections():
                 self._section(title, lambda declare=declare: declare(ui), is_revealed=is_revealed)  # type: ignore[misc]
-            self._section("Appearance", lambda: appearance.draw(app.session, app.rendering, pose, ui))
+            self._section(
+                "Appearance", lambda: appearance.draw(app.session, app.rendering, app.viewport, pose, ui)
+            )
             self._section("Views", lambda: views.draw(app.steering, app.document.camera, app.bookmarks, ui))
             self._section("Renderer", lambda: renderer.draw(app.session, app.rendering, pose))
             self._section("Statistics", lambda: self._draw_statistics(app), is_open=False)

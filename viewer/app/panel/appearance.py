@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
 from ...backends import backend
 from ...files import printable
-from ...look import COLOR_BY, COLOR_WORDS, Look, drawable
+from ...look import COLOR_BY, COLOR_WORDS, RANGE_WORDS, Look, drawable
 from ...params import in_words
 from .. import widgets
 from ..ui import Ui
@@ -17,20 +19,48 @@ from ..ui import Ui
 if TYPE_CHECKING:
     from ...scan.pose import Pose
     from ..scene.rendering import Rendering
+    from ..scene.viewport import Viewport
     from ..session import Session
 
+_FIXED = "fixed"  # both ends are given
 
-def draw(session: Session, rendering: Rendering, pose: Pose, ui: Ui) -> None:
+
+def draw(session: Session, rendering: Rendering, viewport: Viewport, pose: Pose, ui: Ui) -> None:
     """Declare the section."""
     look = session.document.look
     names = session.laid.layers(pose).names(pose.overview.scalars)
-    colors = _colors(look, names, backend(session.document.chosen(pose)[0]).values)
-    rendering.edit_look(widgets.edit(look, Look(up=look.up), {"color_by": colors}, hidden=("up",)))
+    found = backend(session.document.chosen(pose)[0]).values
+    colors = _colors(look, names, found)
+    is_found = look.color_by in found and look.color_by not in names
+    shown = viewport.surface.color_range if viewport.surface is not None and viewport.is_there else None
+    edited = widgets.edit(
+        look, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
+        dict(zip(("low", "high"), shown or (), strict=False)), {"range": partial(_edit_range, shown)},
+    )  # fmt: skip
+    rendering.edit_look(edited)
     imgui.begin_disabled(rendering.is_default)
     if imgui.button("Back to the usual", ui.button_size(1)):
         rendering.reset()
     imgui.end_disabled()
     ui.tooltip("Appearance and renderer as of a scan that was never open", "reset")
+
+
+def _edit_range(shown: tuple[float, float] | None, look: Look) -> Look:
+    """Declare what chooses the ends of the colour map: of all frames, of each, or as they are now.
+
+    shown: where it begins and ends in the picture; None: nowhere.
+    """
+    help = "range: what the colours span. Fixed keeps what that is now, to be changed below"
+    widgets.label("Range", help, imgui.get_frame_height())
+    now = look.range if None in (look.low, look.high) else _FIXED
+    titles = RANGE_WORDS | ({_FIXED: "Fixed"} if shown or now == _FIXED else {})
+    chosen = widgets.combo("value", now, list(titles), titles)
+    if chosen == now:
+        return look
+    if chosen == _FIXED:
+        low, high = shown or (0.0, 1.0)
+        return replace(look, low=low, high=high)
+    return replace(look, range=chosen, low=None, high=None)
 
 
 def _colors(look: Look, scalars: Collection[str], found: Collection[str]) -> dict[str, str]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...output import marks
 from ...output.marks import Box, Color, Legend, Marks
 from ..playing.playback import Playback
+from ..playing.ranging import Ranging
 from ..session import Session
 from .steering import Steering
 from .viewport import Viewport
@@ -23,10 +24,16 @@ class ViewMarks:
     """The marks over the view. shown: which of them are, by the user's choice."""
 
     def __init__(
-        self, session: Session, playback: Playback, viewport: Viewport, steering: Steering, shown: Marks
+        self,
+        session: Session,
+        playback: Playback,
+        viewport: Viewport,
+        steering: Steering,
+        ranging: Ranging,
+        shown: Marks,
     ) -> None:
         self._session, self._playback, self._viewport = session, playback, viewport
-        self._steering = steering
+        self._steering, self._ranging = steering, ranging
         self.shown = shown
 
     def toggle(self, name: str) -> None:
@@ -40,7 +47,9 @@ class ViewMarks:
         if camera is None or request is None or surface is None or not self._viewport.is_there:
             return
         pose, unit, count = request.pose, self._playback.unit, len(self._playback.timeline)
-        told = Legend(self.shown, camera, surface.look, unit, pose.index, count, float(pose.time))
+        told = Legend(
+            self.shown, camera, surface.look, unit, pose.index, count, float(pose.time), self._ranging.words()
+        )  # fmt: skip
         corner = imgui.get_window_pos()
         canvas = _View(corner)
         marks.draw(canvas, (size.x, size.y), told, surface.color_range, surface.value_kind)

@@ -90,7 +90,9 @@ class Rendering:
     def edit_look(self, look: Look) -> None:
         """Draw with another look; edits of one field without a pause are one step."""
         if look != self._session.document.look:
-            name = edit_name(self._session.document.look, look)
+            before = self._session.document.look
+            is_range = replace(before, range=look.range, low=look.low, high=look.high) == look
+            name = "Change range" if is_range else edit_name(before, look)
             self._session.change(name, merge=name, look=look)
 
     def switch_look(self, name: str) -> None:

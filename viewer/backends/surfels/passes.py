@@ -19,9 +19,9 @@ from ...gpu.amplify import Points, draw_shapes, told_feed
 from ...gpu.bindings import Texture
 from ...gpu.constants import BEHIND
 from ...gpu.context import Gpu
-from ...gpu.pose import robust_range
 from ...gpu.surface import Surface
 from ...scan.points import PointCloud
+from ...scan.ranges import robust_range
 from ...srgb import roots_from_bytes
 from .. import FrameView
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
