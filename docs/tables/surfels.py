@@ -2,12 +2,13 @@
 
     python docs/tables/surfels.py [NAME ...]
 
-All but `costs` and `speed` give the same figures on any machine with the same driver. `pods`, `sphere` and
-`ellipses` need no data folder.
+All but `costs`, `speed` and the times of `near_and_far` give the same figures on any machine with the same
+driver. `pods`, `sphere` and `ellipses` need no data folder.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -242,10 +243,54 @@ def speed() -> str:
     }
     rows = []
     for name, cloud in clouds.items():
-        for cull_back in (False, True):
-            times = [f"{ms:.0f} ms" for ms in _least(cloud, size, list(ways.values()), cull_back)]
-            rows.append([name, "culled" if cull_back else "", *times])
-    return markdown_table(["scene", "back faces", *ways], rows, left=("scene", "back faces"))
+        pose, camera = _on_gpu(cloud), Camera.orbit(cloud.bounds(), 30, 15, aspect=size[0] / size[1])
+        for culled in (False, True):
+            usual = {"instancing": "tiles", "cull_back": culled}
+            times = _least([_drawing(pose, camera, size, {**usual, **way})[0] for way in ways.values()])
+            one, two, enlarged = times[:3]
+            ratios = [f"{enlarged / least:.1f}" for least in (two, one)]
+            cells = [*(f"{ms:.0f} ms" for ms in times), *ratios]
+            rows.append([name, "culled" if culled else "", *cells])
+    head = ["scene", "back faces", *ways, "`two`, 2 : `two`, 1", "`two`, 2 : `one`"]
+    return markdown_table(head, rows, left=("scene", "back faces"))
+
+
+def near_and_far() -> str:
+    """Processor time of one pass by the rasteriser and by tiles; how many points these sent to their pixels,
+    and how many pixels show another point."""
+    small, large = (480, 320), (960, 640)
+    along, low = Camera((0.2, 0.1, 0), (0.1, 0, -1), fov_y=60), Camera((0, 0.06, 1), (0, 0.03, 0), fov_y=60)
+    end, close = Camera((0, 0, 9), (0, 0, 0), fov_y=40), Camera((0, 0, 1.3), (0, 0, 0), fov_y=60)
+    hall, more = (PointCloud.from_arrays(**samples.hall(count)) for count in (600_000, 1_800_000))
+    scenes = [
+        ("round hall", hall, along, small),
+        ("round hall", hall, along, large),
+        ("round hall", more, along, large),
+        ("hills seen along", PointCloud.from_arrays(**samples.hills(3_000_000)), low, large),
+        ("ellipsoid 1:6 from its end", long_ellipsoid(1_000_000), end, small),
+        ("sphere from close by", even_sphere(3_000_000), close, large),
+    ]
+    rows = []
+    for name, cloud, camera, size in scenes:
+        pose = _on_gpu(cloud)
+        ways = [_drawing(pose, camera, size, {"passes": "one", "instancing": way}) for way in ("gs", "tiles")]
+        times = [f"{ms:.0f} ms" for ms in _least([draw for draw, _ in ways])]
+        by_quads, by_tiles = (surface for _, surface in ways)
+        sent = by_tiles.stats.skipped.get("lists of small splats", "").partition(" ")[0].replace(",", "")
+        others = np.count_nonzero(by_quads.row != by_tiles.row)
+        title = f"{name}, {spaced(len(cloud))}"
+        rows.append([title, f"{size[0]}x{size[1]}", *times, spaced(int(sent or 0)), spaced(others)])
+    head = ["scene", "size", "rasterised", "tiles", "points sent", "other points"]
+    return markdown_table(head, rows, left=("scene", "size"))
+
+
+def long_ellipsoid(count: int) -> PointCloud:
+    """Six times as long along z as wide, its points dense at the ends."""
+    arrays = samples.on_sphere(count)
+    normals = arrays["normals"] / [1.0, 1.0, 6.0]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    radii = arrays["radii"] * 6**0.5  # as large as the area of a point in the mean
+    return PointCloud.from_arrays(arrays["positions"] * [1.0, 1.0, 6.0], normals=normals, radii=radii)
 
 
 def costs() -> str:
@@ -272,20 +317,28 @@ def costs() -> str:
     return markdown_table(["scan", *ways], rows, left=("scan",))
 
 
-def _least(cloud: PointCloud, size: tuple[int, int], ways: list[dict], cull_back: bool) -> list[float]:
-    gpu = renderer().gpu
-    pose, surface = GpuPose(gpu, Pose(0, 0.0, "", cloud)), Surface(gpu, size)
-    camera = Camera.orbit(cloud.bounds(), 30, 15, aspect=size[0] / size[1])
+def _on_gpu(cloud: PointCloud) -> GpuPose:
+    return GpuPose(renderer().gpu, Pose(0, 0.0, "", cloud))
+
+
+def _drawing(
+    pose: GpuPose, camera: Camera, size: tuple[int, int], params: dict[str, object]
+) -> tuple[Callable[[], object], Surface]:
+    """What draws a pose, and onto what."""
+    surface = Surface(renderer().gpu, size)
     surface.start(pose, View.of(camera, size, pose.origin, pose.bounds))
-    least = [np.inf] * len(ways)
+    return partial(SURFELS.draw, pose, FrameView(surface.view, SURFELS.params(params)), surface), surface
+
+
+def _least(works: Sequence[Callable[[], object]]) -> list[float]:
+    """Processor time of each over two cores, ms: the least of three, in turns."""
+    least = [np.inf] * len(works)
     for turn in range(4):
-        for number, params in enumerate(ways):
-            chosen = SURFELS.params({"instancing": "tiles", "cull_back": cull_back, **params})
-            work = partial(SURFELS.draw, pose, FrameView(surface.view, chosen), surface)
+        for number, work in enumerate(works):
             ms = processor_ms(work) / 2
             least[number] = min(least[number], ms) if turn else np.inf
     return least
 
 
 if __name__ == "__main__":
-    remeasure_tables(PAGE, defaults, costs, pods, sphere, flicker, ellipses, speed)
+    remeasure_tables(PAGE, defaults, costs, pods, sphere, flicker, ellipses, speed, near_and_far)

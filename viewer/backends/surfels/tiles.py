@@ -4,8 +4,8 @@ No atomics on pixels: a tile's pixels keep the nearest disc in registers, so tha
 does not matter. Splats that are too large for lists go through the rasteriser, in either pass, and tiles
 go on from what that found or added up; where any is large, all tiles are worked on.
 
-Where the nearest alone is wanted of many more points than there are pixels, as in a scan that is near and
-far at once, discs of a few pixels are sent to these, by atomics: lists of them would be very long.
+Where the nearest alone is wanted and a list would be too long, as in a scan that is near and far at once,
+discs of a few pixels are sent to these, by atomics, and the others listed.
 
 What faces away comes second: first the discs that face the eye are listed and shown, then those of the
 others that some tile they reach lets through, going by the farthest depth it shows. Of a closed surface
@@ -36,7 +36,6 @@ TILE = 8  # pixels of a tile's edge
 _MOST_TILES = 2048  # along an edge of the picture: what cells.glsl's words have bits for
 _DISC_BYTES = 16  # of a point in each of two buffers
 _FEW = 4  # pixels of the box of a disc that is sent to them: a square that the smallest discs fit into
-_MANY = 2.0  # points a pixel, from which on that is done: of fewer, lists take less
 _SENT = f"{1 << 27}u"  # what cells.glsl says in place of the tiles that such a disc reaches: none, one high
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
@@ -246,10 +245,7 @@ def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int)
     First come those that face the eye, then those of the others that the first do not hide: of a closed
     surface next to none. farthest: as in `show`; where it is LIMIT, it is told in any case.
     """
-    few = points.count > _MANY * surface.size[0] * surface.size[1]
-    if few:
-        surface.clear()
-    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS, few)
+    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS, sends=True)
     if lists is None:
         return False
     away = lists.away
@@ -273,14 +269,21 @@ def fill_away(points: Points, surface: Surface, lists: TileLists, splats: Splats
 
 
 def tile_lists(
-    points: Points, surface: Surface, splats: Splats, side: int = ALL, few: bool = False
+    points: Points, surface: Surface, splats: Splats, side: int = ALL, sends: bool = False
 ) -> TileLists | None:
-    """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner. few: discs
-    of a few pixels are on the surface, which was empty, and in no list."""
+    """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner.
+
+    sends: where they are too long, discs of a few pixels are in none, but on the surface, which nothing else
+    is on then.
+    """
     reason = _unfit(points, surface)
     if not reason:
         lists = surface.keep(TileLists)
-        if not lists.fill(points, splats, side, few_to=surface if few else None):
+        fits = lists.fill(points, splats, side)
+        if sends and not fits:
+            surface.clear()
+            fits = lists.fill(points, splats, side, few_to=surface)
+        if not fits:
             reason = f"too long lists, {lists.length:,} entries"
         elif lists.large * _LARGE_COST > lists.length + lists.sent:
             reason = f"{lists.large:,} large splats"

@@ -99,6 +99,28 @@ def rings(count: int, around: int) -> Arrays:
     }
 
 
+def hall(count: int) -> Arrays:
+    """The wall of a round hall about the z axis, one in radius, from z = -0.5 to -60, covered by chance.
+
+    From its near end it is near and far at once. One normal in ten points out of the hall.
+    """
+    rng = np.random.default_rng(3)
+    turn, down = rng.uniform(0, 2 * np.pi, count), rng.uniform(0.5, 60, count)
+    outward = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    normals = outward * np.where(rng.random(count) < 0.9, -1, 1)[:, None]
+    return _points(outward - np.outer(down, [0.0, 0.0, 1.0]), normals, np.sqrt(2 * np.pi * 60 / count))
+
+
+def hills(count: int) -> Arrays:
+    """The square -1..1 of x and z with hills along y, 0.04 high, evenly covered."""
+    x, z = (2 * evenly(np.arange(count)) - 1).T
+    y = 0.02 * (1 + np.sin(9 * x) * np.cos(9 * z))
+    slope_x, slope_z = 0.18 * np.cos(9 * x) * np.cos(9 * z), -0.18 * np.sin(9 * x) * np.sin(9 * z)
+    normals = np.stack([-slope_x, np.ones(count), -slope_z], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return _points(np.stack([x, y, z], axis=1), normals, np.sqrt(4 / count))
+
+
 def line(count: int, end: tuple[float, float, float]) -> Arrays:
     """Points on the line from -end to end, facing +z."""
     positions = np.linspace(-1, 1, count)[:, None] * np.array(end)
