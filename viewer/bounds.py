@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,13 @@ class Bounds:
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+
+    @classmethod
+    def around(cls, several: Sequence[Bounds]) -> Bounds:
+        """The smallest box around some, at least one."""
+        return cls(
+            np.min([one.low for one in several], axis=0), np.max([one.high for one in several], axis=0)
+        )
 
     @property
     def center(self) -> NDArray[np.float64]:

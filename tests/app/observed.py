@@ -25,6 +25,7 @@ from imgui_bundle import imgui
 from viewer.analysis.measure import Measurement, Reading, reading_of
 from viewer.app import run
 from viewer.app.app import App
+from viewer.app.scene.view import words_over
 from viewer.document.measurements import Measurements
 from viewer.document.schema import plain
 
@@ -118,6 +119,7 @@ def shown(app: App) -> dict[str, Any]:
         "is_recording": app.capture.recorder is not None,
         "pointed": app.pointer.words,
         "unit": app.playback.unit,
+        "words": words_over(app),
         "theme": app.theme,
         "is_replaying": app.replayer.replaying is not None,
         "is_export_open": app.exporting.is_open,

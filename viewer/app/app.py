@@ -328,7 +328,7 @@ class App:
         self.scans.opened(self.session.scan)
         if self._unit:
             self.session.amend(unit=self._unit)
-        self.steering.begin_scan()
+        self.steering.begin_scan(timeline)
         self.tools.abandon()
 
     def take_up(self, session: SavedSession) -> None:
@@ -376,6 +376,7 @@ class App:
             ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop
             ("Opening", self._opening.cancel),
             ("Ranging", self.ranging.close),
+            ("Looking around", self.steering.extent.close),
             ("Reading", self.playback.close),
             ("Drawing", self.viewport.release),
             ("Preparing", self.renderer.release),

@@ -249,6 +249,10 @@ _VIEW: Menu[App] = Menu("View", (
             icon=icons.ICON_FA_EXPAND,
         ),
         Command("center", "Centre the point", lambda app: app.steering.center(), "Z", can=_has_camera),
+        Command(
+            "follow", "Follow the subject", lambda app: app.steering.toggle_following(), "Shift+F",
+            is_on=lambda app: app.steering.follows, can=_has_frames,
+        ),
         _FROM,
         Listing("Up", lambda app: app.steering.ups()),
         Command(

@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-import numpy as np
-
 from ..bounds import Bounds
 from ..errors import InputError
 from ..files import absolute, printable, whole_file
@@ -111,7 +109,7 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
             boxes.append(timeline.pose(index).bounds)
     if not boxes:  # there may be a readable one between
         return next(read_poses(timeline, indices)).bounds
-    return Bounds(np.min([b.low for b in boxes], axis=0), np.max([b.high for b in boxes], axis=0))
+    return Bounds.around(boxes)
 
 
 def told_up(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> str:

@@ -8,16 +8,21 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...bounds import Bounds
 from ...camera import Camera
-from ...geometry import AXES, UP
+from ...geometry import AXES, UP, vector
 from ...scan.pods import first_camera
 from ...scan.pose import Pose
+from ...scan.timeline import Timeline
 from ...scan.upright import upright_camera
 from ..playing.playback import Playback
 from ..session import Session
 from . import navigation
 from .cube import OrientationCube
+from .extent import Extent
 from .pointed import Pointer
 from .turntable import Turntable
 from .viewport import Viewport
@@ -29,7 +34,7 @@ class Steering:
     """Moves the camera of the document.
 
     gesture: what a drag in the view does, None without one. cube, turntable: how the view is turned, beside
-    drags in it.
+    drags in it. extent: what it is fitted to. follows: whether it goes with the subject from frame to frame.
     """
 
     def __init__(
@@ -49,6 +54,10 @@ class Steering:
         self.gesture: str | None = None
         self.cube: OrientationCube = OrientationCube(cube)
         self.turntable: Turntable = Turntable(turn_seconds)
+        self.extent: Extent = Extent()
+        self.follows: bool = False
+        self._followed: Pose | None = None  # where the camera is with the subject
+        self._first: Camera | None = None  # that a scan was first shown with
         self._is_checked, self._up_is_told, self._note = False, up_is_told, note
         self._wheeled = -math.inf  # by the clock, when the wheel was turned last
 
@@ -71,18 +80,24 @@ class Steering:
         """The robust bounds of a pose, where tools move it to."""
         return self._session.laid.layers(pose).place.bounds(self._viewport.bounds(pose))
 
+    def whole(self, pose: Pose) -> Bounds:
+        """The bounds of all frames together, as far as they are known; of the pose alone where tools move it,
+        or the view goes with the subject."""
+        is_moved = not self._session.laid.layers(pose).place.is_identity
+        return self.bounds(pose) if is_moved or self.follows else self.extent.around(self.bounds(pose))
+
     def fit(self) -> None:
-        """Show all of the current pose, from the same side."""
+        """Show all of the scan, from the same side."""
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
-            fitted = camera.fit(self.bounds(pose), self._viewport.aspect)
+            fitted = camera.fit(self.whole(pose), self._viewport.aspect)
             self._session.change("Fit", camera=fitted, pivot=None)
 
     def look_from(self, azimuth: float, elevation: float) -> None:
-        """Show all of the current pose from a direction in degrees, such as those of `navigation.VIEWS`."""
+        """Show all of the scan from a direction in degrees, such as those of `navigation.VIEWS`."""
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
-            bounds, aspect = self.bounds(pose), self._viewport.aspect
+            bounds, aspect = self.whole(pose), self._viewport.aspect
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
             self._session.change("Look from there", camera=turned, pivot=None)
 
@@ -91,7 +106,7 @@ class Steering:
         pose, camera = self._playback.pose, self._session.document.camera
         look = replace(self._session.document.look, up=up)
         if pose and camera:
-            camera = upright_camera(camera, self.bounds(pose), self._viewport.aspect, up)
+            camera = upright_camera(camera, self.whole(pose), self._viewport.aspect, up)
         self._session.change("Turn upright", look=look, camera=camera, pivot=None)
 
     def ups(self) -> Iterator[tuple[str, Callable[[], object], bool]]:
@@ -120,6 +135,10 @@ class Steering:
         if picked and camera:
             self._session.change("Centre the point", camera=camera.centered(picked.place), pivot=picked.place)
 
+    def toggle_following(self) -> None:
+        """Go with the subject from now on, or stay."""
+        self.follows, self._followed = not self.follows, self._playback.pose
+
     def toggle_turntable(self) -> None:
         """Turn the view round the subject from now on, or stop."""
         if self.turntable.is_on:
@@ -128,10 +147,14 @@ class Steering:
             self.turntable.start(time.monotonic())
 
     def advance(self, now: float) -> bool:
-        """Turn the view as far as the turntable has; whether it did."""
-        document = self._session.document
+        """Turn the view as far as the turntable has, and show the scan whole once it is known how far it
+        reaches, if the view is still the first; whether it has changed."""
+        pose, document = self._playback.pose, self._session.document
         if document.camera is None:
             return False
+        if self.extent.take_visited() and pose is not None and document.camera is self._first:
+            self._session.amend(camera=self._first_camera(pose))
+            return True
         turned = self.turntable.turned(document.camera, document.pivot, now)
         self._session.change("Turntable", merge="turntable", camera=turned)
         return turned is not document.camera
@@ -157,7 +180,6 @@ class Steering:
         at first, what is up is guessed of the pose, unless the user told, and told where it is not the usual.
         """
         camera = self._session.document.camera
-        bounds, aspect = self.bounds(pose), self._viewport.aspect
         if not self._is_checked:
             self._is_checked = True
             if camera is None and not self._up_is_told:
@@ -166,13 +188,35 @@ class Steering:
                     self._note(
                         f"Up is taken to be {pose.upright.up}: {pose.upright.why}. Change it beside the cube."
                     )
-            if camera is not None and not navigation.shows(camera, bounds, aspect):
+            if camera is not None and not navigation.shows(camera, self.bounds(pose), self._viewport.aspect):
                 camera = None
+            self.extent.visit()
         if camera is None:
-            is_moved = not self._session.laid.layers(pose).place.is_identity
-            views = () if is_moved else pose.views
-            self._session.amend(camera=first_camera(views, bounds, aspect, self._up))
+            self._first = self._first_camera(pose)
+            self._session.amend(camera=self._first)
+        elif self.follows and self._followed is not None and pose is not self._followed:
+            self._go_with(camera, pose, self._followed)
+        self._followed = pose
 
-    def begin_scan(self) -> None:
+    def _first_camera(self, pose: Pose) -> Camera:
+        """The camera that a scan is first shown with."""
+        is_moved = not self._session.laid.layers(pose).place.is_identity
+        views = () if is_moved else pose.views
+        return first_camera(views, self.whole(pose), self._viewport.aspect, self._up)
+
+    def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
+        """Move the camera, and what it turns about, as far as the subject has gone since another pose."""
+        by = self._center(pose) - self._center(before)
+        pivot = self._session.document.pivot
+        self._session.amend(camera=camera.moved(by), pivot=pivot and vector(np.add(pivot, by)))
+
+    def _center(self, pose: Pose) -> NDArray[np.float64]:
+        """The middle of a subject, (3,) in the world: far outliers do not move it."""
+        middle = np.median(pose.sample, axis=0) + pose.origin
+        return self._session.laid.place(pose.index).points(middle)
+
+    def begin_scan(self, timeline: Timeline) -> None:
         """Take in that another scan is shown from now on."""
-        self._is_checked = False
+        self._is_checked = self.follows = False
+        self._followed = self._first = None
+        self.extent.begin(timeline)

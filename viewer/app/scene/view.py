@@ -55,7 +55,7 @@ def draw(app: App) -> float:
             cube.draw(the_cube, app.document, app.palette, size)
     with told("Scale bar and colour bar"):
         app.marks.draw(size)
-    text = printable(_note(app) or "")
+    text = printable(words_over(app) or "")
     head = _draw_note(text, size) if text else _draw_prompt(app.tools.prompt, size)
     app.notices.draw(size)
     if app.capture.recorder is not None:
@@ -152,7 +152,7 @@ def _gesture(io: imgui.IO) -> str:
     return "pan" if io.mouse_down[2] or io.key_shift else "orbit"
 
 
-def _note(app: App) -> str | None:
+def words_over(app: App) -> str | None:
     """The words over the picture: why it is not what was asked for."""
     playback = app.playback
     if app.viewport.problem:
@@ -162,11 +162,19 @@ def _note(app: App) -> str | None:
     if playback.pose is None:
         return str(playback.problem) if playback.problem else None
     if playback.player.playing or playback.pose.index == app.session.index:
-        return None
+        return _words_on_nothing(app)
     if playback.problem:
         return f"{playback.problem}\n{playback.pose.label} is shown instead."
     doing = "Loading" if playback.timeline.ready(app.session.index) is None else "Preparing"
     return f"{doing} {playback.timeline.label(app.session.index)} ..."
+
+
+def _words_on_nothing(app: App) -> str | None:
+    """The words over a picture at rest that shows no point at all: how to come back."""
+    counts, key = app.counting.counts, app.keys.of["fit"]
+    if counts is None or counts["drawn"] or app.playback.pose is None or not app.playback.pose.count:
+        return None
+    return "Nothing is in view" + (f": press {key} to show all" if key else "")
 
 
 def _draw_note(text: str, size: ImVec2) -> float:

@@ -42,7 +42,7 @@ def _framed(subject: Subject) -> Bounds:
     """The box around a few moments of a subject."""
     indices = sorted(set(np.linspace(0, subject.moments - 1, _FRAMED).astype(int)))
     boxes = [subject.moment(int(index)).truth.bounds for index in indices]
-    return Bounds(np.min([box.low for box in boxes], axis=0), np.max([box.high for box in boxes], axis=0))
+    return Bounds.around(boxes)
 
 
 def _footprint(pod: Camera) -> float:
