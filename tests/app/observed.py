@@ -122,6 +122,8 @@ def shown(app: App) -> dict[str, Any]:
         "words": words_over(app),
         "theme": app.theme,
         "is_replaying": app.replayer.replaying is not None,
+        "is_browser_open": app.browser.is_open,
+        "refusal": app.browser.refusal,
         "is_export_open": app.exporting.is_open,
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,

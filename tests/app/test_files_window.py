@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from depth_folders import write_color, write_depth, write_matrix
-from virtual_screen import PATIENCE, RunningApp, Screen, kept_of, running_app
+from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app
 
 from viewer.app.settings import FILE, load
+from viewer.scan.open import DEMO
 
 
 @pytest.fixture
@@ -163,3 +168,104 @@ def test_a_folder_of_range_images_plays_upright(screen: Screen, tmp_path: Path, 
     with running_app(screen, tmp_path, scene) as app:
         assert app.settle().camera["up"] == [0, -1, 0]
         close(app)
+
+
+def broken(folder: Path, count: int) -> Path:
+    """Files that are no scans by the names of scans."""
+    folder.mkdir(parents=True)
+    for number in range(count):
+        (folder / f"{number}.npy").write_bytes(b"nothing")
+    return folder
+
+
+def test_the_dialog_says_at_the_field_what_cannot_be_opened(
+    screen: Screen, tmp_path: Path, study: Path
+) -> None:
+    damaged = broken(tmp_path / "damaged", 3)
+    with running_app(screen, tmp_path, study / "two.npy") as app:
+        ctrl(app, "o")
+        app.see(is_browser_open=True)
+        app.settle()
+        for path, why in (
+            (study / "missing.ply", r"missing\.ply: no such file"),
+            (damaged / "1.npy", r"1\.npy"),
+            (damaged / "%d.npy", "none of its 3 frames can be read"),
+        ):
+            screen.do("key", "Tab", "sleep", 0.2, "key", "ctrl+a", "type", "--delay", 15, path)
+            app.settle()
+            screen.do("key", "Return")
+            state = app.see(lambda state, why=why: re.search(why, state.refusal))
+            assert state.is_browser_open
+            assert state.scan == str(study / "two.npy")
+            app.settle()
+            assert app.notes == [note for note in app.notes if "Cannot" not in note], "told in one place"
+            screen.do("key", "Escape", "sleep", 0.2)  # the field lets go of the keys
+            app.settle()
+            if not app.state.is_browser_open:
+                ctrl(app, "o")
+                app.see(is_browser_open=True)
+                app.settle()
+        screen.do("type", "thr")
+        app.settle()
+        screen.do("key", "Return")
+        app.see(scan=str(study / "three.npy"), is_browser_open=False)
+        close(app)
+
+
+def test_a_folder_that_cannot_be_read_leaves_the_open_scan(
+    screen: Screen, tmp_path: Path, study: Path
+) -> None:
+    damaged = broken(tmp_path / "damaged", 3)
+    with running_app(screen, tmp_path, study / "one") as app:
+        screen.do("key", "Right")
+        app.see(frame=1)
+        before = app.settle()
+        app.drop(damaged)
+        app.told("Cannot open: damaged: none of its 3 frames can be read")
+        after = app.settle()
+        assert (after.scan, after.frame) == (str(study / "one"), 1)
+        assert (after.camera, after.document) == (before.camera, before.document)
+        np.save(damaged / "2.npy", np.random.default_rng(0).random((500, 3)))
+        app.drop(damaged)
+        app.see(scan=str(damaged), frame=2)
+        close(app)
+
+
+def test_what_cannot_be_read_at_the_start_is_told_over_the_demo_or_the_next(
+    screen: Screen, tmp_path: Path, study: Path
+) -> None:
+    damaged = broken(tmp_path / "damaged", 2)
+    with running_app(screen, tmp_path, damaged / "0.npy") as app:
+        app.told(r"Cannot open: \S+0\.npy: cannot be read as NPY")
+        app.see(scan=DEMO, is_idle=True)
+        assert len([note for note in app.notes if "0.npy" in note]) == 1
+        close(app)
+    with running_app(screen, tmp_path, damaged) as app:
+        app.told("Cannot open: damaged: none of its 2 frames")
+        app.see(scan=DEMO, is_idle=True)
+        close(app)
+    with running_app(screen, tmp_path, tmp_path / "missing.ply") as app:
+        app.told(r"Cannot open: \S+missing\.ply: no such file")
+        assert app.state.scan == DEMO
+        close(app)
+    with running_app(screen, tmp_path, damaged / "0.npy", study / "two.npy") as app:
+        app.told(r"Cannot open: \S+0\.npy")
+        app.see(scan=str(study / "two.npy"), is_idle=True)
+        close(app)
+
+
+def test_the_command_line_opens_the_window_on_what_cannot_be_read(screen: Screen, tmp_path: Path) -> None:
+    (tmp_path / "bad.npz").write_text("no scan")
+    command = [sys.executable, "-m", "viewer.cli", "view", "bad.npz"]
+    env = {**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(tmp_path / "config")}
+    with subprocess.Popen(command, env=env, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        search = ["xdotool", "search", "--name", "demo.* - Scan4D"]
+        while subprocess.run(search, env=screen.env, capture_output=True).returncode:
+            assert process.poll() is None
+            time.sleep(0.1)
+        process.terminate()
+        _, told = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
+    assert "bad.npz: cannot be read as NPZ" in told
+    ended = subprocess.run(command, env={**env, "DISPLAY": ""}, cwd=tmp_path, capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout) == (2, "")

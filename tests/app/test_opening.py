@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewer.app.files.opening import Opening, find_facts
+from viewer.app.files.opening import Opening, find_facts, read_from
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
 from viewer.errors import InputError, Scan4DError
@@ -169,3 +169,31 @@ def test_large_poses_come_with_what_drawing_asks_of_them() -> None:
         find_facts(Pose(0, 0.0, "x", cloud))
     assert large.bounds() is large.bounds()
     assert [(_spacings,) in cloud._facts for cloud in (small, large)] == [False, True]
+
+
+def test_a_folder_that_cannot_be_read_at_all_is_refused_in_one_message(tmp_path: Path) -> None:
+    scan = save(tmp_path / "scan")
+    for number in range(3):
+        (scan / f"{number}.npy").write_bytes(b"nothing")
+    opened: list[Timeline] = []
+
+    def open_it() -> Timeline:
+        opened.append(open_scan(scan))
+        return opened[0]
+
+    opening = Opening()
+    opening.start("scan", "scan", no_session, open_it)
+    with pytest.raises(InputError, match=r"scan: none of its 3 frames can be read\. The first: \S+0\.npy"):
+        taken(opening)
+    assert is_closed(opened[0])
+
+
+def test_a_scan_begins_with_the_next_frame_that_can_be_read(tmp_path: Path) -> None:
+    scan = save(tmp_path / "scan", 4)
+    for broken in (0, 1, 3):
+        (scan / f"{broken}.npy").write_bytes(b"nothing")
+    for begin, order in ((0, {0, 1}), (3, {3, 0, 1})):
+        with open_scan(scan) as timeline:
+            assert read_from(timeline, begin) == 2
+            assert set(timeline.broken) == order
+            assert timeline.ready(2) is not None

@@ -30,7 +30,7 @@ def looked(scans: Scans) -> None:
 def test_steps_go_through_what_was_named_together_and_round_its_end(names: list[str]) -> None:
     opened: list[str] = []
     session = Session(names[0])
-    scans = Scans(session, pytest.fail, opened.append, names, ())
+    scans = Scans(session, pytest.fail, pytest.fail, opened.append, names, ())
     scans.opened(names[0])
     looked(scans)
     assert (scans.listed, scans.are_together) == (names, True)
@@ -45,7 +45,7 @@ def test_steps_go_through_what_was_named_together_and_round_its_end(names: list[
 
 def test_those_opened_lately_are_told_without_the_open_one_and_what_is_gone(names: list[str]) -> None:
     session = Session(names[0])
-    scans = Scans(session, pytest.fail, pytest.fail, names[:1], (names[1], names[2]))
+    scans = Scans(session, pytest.fail, pytest.fail, pytest.fail, names[:1], (names[1], names[2]))
     Path(names[2]).unlink()
     scans.opened(names[0])
     looked(scans)

@@ -254,9 +254,9 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
 
 
 def view(screen: Screen, home: Path, *words: object) -> subprocess.CompletedProcess[str]:
-    """`scan4d view` until it ends, which it does not where a window opens."""
+    """`scan4d view` until it ends, without a display."""
     command = [sys.executable, "-m", "viewer.cli", "view", *map(str, words)]
-    env = {**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(home)}
+    env = {**screen.env, "PYTHONPATH": str(ROOT), "XDG_CONFIG_HOME": str(home), "DISPLAY": ""}
     return subprocess.run(command, env=env, capture_output=True, text=True, cwd=home)
 
 

@@ -178,3 +178,17 @@ def test_a_folder_of_range_images_is_one_scan(tmp_path: Path) -> None:
     assert rows(folder) == [("whole", "bunny", 1), ("file", "model.npy", 1)]
     (folder / "b.npz").unlink()
     assert rows(tmp_path) == [("folder", "bunny", 0)]
+
+
+def test_sizes_and_dates_are_told(tmp_path: Path) -> None:
+    for number in range(3):
+        np.save(tmp_path / f"f{number}.npy", np.zeros((10 * number + 1, 3)))
+        os.utime(tmp_path / f"f{number}.npy", (0, 1000 + number))
+    np.save(tmp_path / "other.npy", np.zeros((5, 3)))
+    (tmp_path / "inner").mkdir()
+    told = {one.title: (one.size, one.changed) for one in list_folder(tmp_path)}
+    sizes = [os.path.getsize(tmp_path / f"f{number}.npy") for number in range(3)]
+    assert told["f0.npy to f2.npy"] == (sum(sizes), 1002)
+    assert told["f1.npy"] == (sizes[1], 1001)
+    assert told["inner"][0] is None
+    assert told["inner"][1] == os.path.getmtime(tmp_path / "inner")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..document.saved_session import SavedSession
+    from ..errors import InputError
     from ..scan.timeline import Timeline
     from .app import App
 
@@ -23,25 +24,26 @@ def run(
     replay: Path | None = None,
     watch: Callable[[App], None] | None = None,
     session: SavedSession | None = None,
+    refused: InputError | None = None,
 ) -> int:
     """Open a window on the first of the scans and return 0 when it is closed, by a signal too.
 
     scans: as a user names them (see `named_scans`); the others can be chosen in the window, which tells
-    what is wrong with those that cannot be opened. up: the up axis; None: as a scan was left.
+    what is wrong with those that cannot be opened. The demo is shown where none can.
+    up: the up axis; None: as a scan was left.
     opened: the first of the scans, where that is open already; the window closes it. device: has no effect
     on a window, which says so. replay: a recording to show first. session: to open the first scan with.
-    watch: called at the end of each turn of the window's loop, with the app as it is then. Raises InputError
-    where no scan can be opened, NoOpenGLError without a window.
+    watch: called at the end of each turn of the window's loop, with the app as it is then. refused: what was
+    wrong with what the user named, to be told. Raises NoOpenGLError without a window.
     """
     from ..geometry import up_vector
     from ..scan.listing import named_scans
-    from ..scan.open import open_scan
+    from ..scan.open import DEMO, open_scan
 
     if up is not None:
         up_vector(up)
     found, problems = named_scans(scans)
-    if not found:
-        raise problems[0]
+    found = found or [DEMO]
     timeline = opened or open_scan(found[0], unit, fps)
     from .closing import Signals
 
@@ -63,7 +65,7 @@ def run(
             try:
                 for note in notes:
                     app.note(note)
-                app.scans.tell(problems)
+                app.scans.tell([refused, *problems] if refused else problems)
                 app.capture.find_unfinished()
                 in_background(Task("Tidying"), remove_leftovers)
                 if device is not None:

@@ -24,7 +24,7 @@ from ..errors import InputError, Scan4DError
 from ..folders import user_folder
 from ..gpu.context import Gpu
 from ..renderer import Renderer
-from ..scan.open import open_scan
+from ..scan.open import DEMO, open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Task, in_background
@@ -34,6 +34,7 @@ from .failures import Failures
 from .files.browser import Browser
 from .files.keeping import Keeping
 from .files.opening import Opened, Opening, begin, find_facts
+from .files.preview import Previewer
 from .files.scans import Scans, title
 from .files.sessions import Sessions
 from .help import Help
@@ -101,6 +102,7 @@ class App:
         self.failures = Failures(self.note)
         self._up, self._unit, self._fps = up, unit, fps
         self._told: set[str] = set()  # what could not be read of documents
+        self._has_begun = self._looks_further = False  # whether a frame of any scan was shown, or looked for
         opened = begin(timeline, lambda: self._kept(scans[0]), session)
         document = remembered.document if up is None else remembered.document.with_up(up)
         self.session: Session = Session(scans[0], document, remembered.pace, opened.left)
@@ -118,10 +120,11 @@ class App:
         for problem in problems:
             self.note(problem)
         self.help: Help = Help(self.commands, self.keys, self.notices, self.renderer.gpu)
-        self.scans: Scans = Scans(self.session, self.note, self.open, scans, remembered.recent)
+        self.scans: Scans = Scans(self.session, self.note, self.refuse, self.open, scans, remembered.recent)
         self.sessions: Sessions = Sessions(
-            self.session, self.playback, self.note, self.open, self.take_up, lambda at: self.browser.show(at)
-        )
+            self.session, self.playback, self.note, self.refuse, self.open, self.take_up,
+            lambda at: self.browser.show(at),
+        )  # fmt: skip
         self._opening = Opening()
         self.keeping = Keeping(
             self.session, self.playback, self.note, self.remembered, remembered, user_folder() / settings.FILE
@@ -149,8 +152,9 @@ class App:
             self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting, self.note
         )
         self.browser: Browser = Browser(
-            self.session, self.scans, self.sessions, self.open, self.replayer.replay
-        )
+            self.session, self.scans, self.sessions, self._opening, self.open, self.replayer.replay,
+            Previewer(window.ctx),
+        )  # fmt: skip
         self._slow_devices = remembered.slow_devices
         if (gpu := self.renderer.gpu).software and gpu.device not in self._slow_devices:
             self._slow_devices = (*self._slow_devices, gpu.device)
@@ -297,11 +301,14 @@ class App:
 
     def take_opened(self) -> None:
         """Show the scan that has been opened, where one has."""
+        asked = self._opening.scan
         try:
             opened = self._opening.take()
         except Scan4DError as error:
-            self.note(Problem(f"Cannot open: {error}"))
+            self.refuse(f"Cannot open: {error}")
             self.scans.look(self.session.scan)
+            if not self._has_begun and asked is not None:  # else nothing would be shown
+                self.open(self.scans.after(asked) or DEMO)
             return
         if opened is not None:
             scan, begun = opened
@@ -311,10 +318,11 @@ class App:
             self.session.turn_to(scan, begun.left, self._up)
             self._start(begun)
             self.playback.begin(begun.timeline, begun.first)
+            self.browser.opened()
             log.debug("opened %s", scan)
 
     def _start(self, opened: Opened) -> None:
-        timeline, self.session.hash_found, left, problem, session = opened
+        timeline, self.session.hash_found, _, left, problem, session = opened
         timeline.finish = self._find_facts
         self.ranging.begin(timeline)
         if problem:
@@ -333,6 +341,7 @@ class App:
 
     def take_up(self, session: SavedSession) -> None:
         """Show the open scan as a session has it."""
+        self.browser.opened()
         self.tools.abandon()
         self.session.take_up(session)
         self.seek(min(session.pose, len(self.playback.timeline) - 1))
@@ -350,10 +359,26 @@ class App:
             self.capture.tell_later(partial(_words_of_change, saved.hash, self.session.hash_found))
 
     def pass_on_messages(self) -> None:
-        """Tell what the timeline has to say."""
-        for message in self.playback.timeline.messages[self._messages_read :]:
-            self._messages_read += 1
+        """Tell what the timeline has to say.
+
+        Where the frame that the window began with cannot be read, another one is looked for, as where any
+        other scan is opened.
+        """
+        messages = self.playback.timeline.messages[self._messages_read :]
+        self._messages_read += len(messages)
+        self._has_begun = self._has_begun or self.playback.pose is not None
+        if not self._has_begun and not self._looks_further and self.playback.problem is not None:
+            self._looks_further = True
+            self.open(self.session.scan)
+            self._messages_read = len(self.playback.timeline.messages)
+            return
+        for message in messages:
             self.note(message.text)
+
+    def refuse(self, problem: str) -> None:
+        """Tell why what the user asked for was not opened: in the dialog, where that waits for it."""
+        if not self.browser.refused(problem):
+            self.note(Problem(problem))
 
     def place_view(self, place: tuple[int, int, int, int]) -> None:
         """Take in where the 3D view is: left, bottom, width, height in pixels from the lower left."""

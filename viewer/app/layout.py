@@ -40,7 +40,7 @@ def draw(app: App) -> Place:
         ("Problems", lambda: app.notices.draw_problems(*place, app.palette.broken)),
         ("The list of work", lambda: app.tasks.draw(place, head)),
         ("Help", app.help.draw),
-        ("The dialog that opens scans", app.browser.draw),
+        ("The dialog that opens scans", lambda: app.browser.draw(app.palette.broken)),
         ("The dialog that saves sessions", app.sessions.saving.draw),
         ("The export dialog", lambda: export_dialog.draw(app.exporting, app.quit)),
         ("Dialogs of tools", app.tools.draw_dialogs),

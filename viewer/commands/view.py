@@ -49,18 +49,28 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Open the window, or play without one."""
-    named = _named(args.scans or [DEMO])
-    scans, problems = named_scans(named.scans)
-    if not scans:
-        raise problems[0]
     with ExitStack() as opened:
-        # What is wrong is told before anything is drawn.
-        timelines = [opened.enter_context(open_timeline(args, scan)) for scan in scans]
+        refused: InputError | None = None
+        problems: list[InputError] = []
+        try:  # what is wrong is told before anything is drawn
+            named = _named(args.scans or [DEMO])
+            scans, problems = named_scans(named.scans)
+            if not scans:
+                raise problems[0]
+            timelines = [opened.enter_context(open_timeline(args, scan)) for scan in scans]
+        except InputError as error:
+            if display() is None:
+                raise
+            refused, named = error, _Named([DEMO])  # a file manager has no terminal: the window tells it
+            timelines = [opened.enter_context(open_timeline(args, DEMO))]
+            warn(str(error))
         try:
-            return _open_window(args, named, timelines[0])
+            return _open_window(args, named, timelines[0], refused)
         except NoOpenGLError as error:
             if args.fallback is None:
                 raise
+            if refused is not None:
+                raise refused from error
             tell(f"No window: {error.what}. Playing into {args.fallback} instead.")
         for problem in problems:
             warn(str(problem))
@@ -102,7 +112,7 @@ def _scan_of_session(session: SavedSession, path: Path) -> str:
     return scan
 
 
-def _open_window(args: Namespace, named: _Named, first: Timeline) -> int:
+def _open_window(args: Namespace, named: _Named, first: Timeline, refused: InputError | None) -> int:
     if display() is None:
         raise NoOpenGLError(
             "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)",
@@ -113,7 +123,7 @@ def _open_window(args: Namespace, named: _Named, first: Timeline) -> int:
     remove_leftovers()
     return app.run(
         named.scans, opened=first, unit=args.unit, fps=args.fps, up=args.up, device=args.device,
-        replay=named.replay, session=named.session,
+        replay=named.replay, session=named.session, refused=refused,
     )  # fmt: skip
 
 

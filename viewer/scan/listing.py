@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import os
 import re
+import stat
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,12 +28,15 @@ class Listed:
 
     path: as `open_scan` takes it. title: its name for people. kind: "whole" is the folder itself.
     frames: that it plays; 1 for a file, which may hold several, and 0 for a folder that is no scan.
+    size: in bytes, of a folder None. changed: when it was last, seconds since 1970, None where nothing tells.
     """
 
     path: str
     title: str
     kind: Literal["whole", "folder", "sequence", "file"]
     frames: int
+    size: int | None = None
+    changed: float | None = None
 
 
 def is_there(scan: str) -> bool:
@@ -53,19 +57,33 @@ def list_folder(folder: Path | str) -> list[Listed]:
     count, own = _frames(folder)
     if own:
         files = [file for file in files if file not in own and file.suffix.lower() not in formats.NOTES]
-    all_of_it = Listed(str(folder), f"All of {folder.resolve().name or folder}", "whole", count)
-    whole = [all_of_it] if count > 1 or own else []
+    title = f"All of {folder.resolve().name or folder}"
+    whole = [Listed(str(folder), title, "whole", count, *_stated([folder]))] if count > 1 or own else []
     sequences = [
-        Listed(pattern, _with_range(members), "sequence", len(members))
+        Listed(pattern, _with_range(members), "sequence", len(members), *_stated(members))
         for pattern, members in _sequences(files).items()
         if not (whole and len(members) == len(files))
     ]
     return [
         *whole,
-        *(Listed(str(entry), entry.name, "folder", _frames(entry)[0]) for entry in folders),
+        *(
+            Listed(str(entry), entry.name, "folder", _frames(entry)[0], *_stated([entry]))
+            for entry in folders
+        ),
         *sequences,
-        *(Listed(str(file), file.name, "file", 1) for file in files),
+        *(Listed(str(file), file.name, "file", 1, *_stated([file])) for file in files),
     ]
+
+
+def _stated(paths: Sequence[Path]) -> tuple[int | None, float | None]:
+    """The bytes of files together, None of a folder, and when the last of them was changed, None where
+    nothing tells."""
+    stated = []
+    for path in paths:
+        with suppress(OSError):
+            stated.append(os.stat(path))
+    size = None if any(stat.S_ISDIR(one.st_mode) for one in stated) else sum(one.st_size for one in stated)
+    return size, max((one.st_mtime for one in stated), default=None)
 
 
 def scans_beside(scan: str) -> list[str]:

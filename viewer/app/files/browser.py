@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
@@ -16,15 +17,19 @@ from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed, list_folder
 from ...scan.open import DEMO
 from ...task import Task, in_background
-from .. import widgets
+from .. import theme, widgets
 from ..session import Session, known_as
+from .opening import Opening
+from .places import KnownPlace, known_places
+from .preview import Previewer
 from .scans import Scans, title
 from .sessions import Sessions
 
 _TITLE = "Open a scan"
-_SIZE = ImVec2(54.0, 34.0)  # in heights of the font
-_KNOWN_SHARE = 0.3  # of the width
-_ICON_ROOM, _COUNT_ROOM = 1.6, 6.5  # in heights of the font
+_SIZE = ImVec2(72.0, 36.0)  # in heights of the font
+_KNOWN_SHARE, _PREVIEW_SHARE = 0.2, 0.26  # of the width
+_ICON_ROOM, _COUNT_ROOM, _DATE_ROOM = 1.6, 5.5, 5.5  # in heights of the font
+_LINGERS = 0.15  # seconds that a row is chosen before its scan is read
 _PAGE = 10  # rows
 _HINT = "Files, folders and recordings can also be dropped onto the window."
 _ICONS = {
@@ -34,22 +39,37 @@ _ICONS = {
 
 
 class Browser:
-    """The folder that the dialog shows, and what is chosen in it. A folder is listed beside the window."""
+    """The folder that the dialog shows, and what is chosen in it. A folder is listed beside the window.
+
+    It stays open until what was chosen is open, and tells why that cannot be.
+
+    is_open: whether the dialog is. refusal: why what was chosen could not be opened, in words.
+    """
 
     def __init__(
         self,
         session: Session,
         scans: Scans,
         sessions: Sessions,
+        opening: Opening,
         open: Callable[[str], None],
         replay: Callable[[Path], None],
+        previewer: Previewer,
     ) -> None:
-        """open: opens a scan that was opened before. replay: shows a recording."""
-        self._session, self._scans, self._sessions = session, scans, sessions
-        self._open_again, self._replay = open, replay
+        """opening: what opens scans. open: opens a scan that was opened before. replay: shows a recording."""
+        self._session, self._scans, self._sessions, self._opening = session, scans, sessions, opening
+        self._open_again, self._replay, self._previewer = open, replay, previewer
         self._folder = working_folder()
         self._asked = False  # to be opened
-        self._rows: list[Listed] = []
+        self.is_open = self._is_done = False
+        self._asks_for: str | None = None  # what is being opened
+        self.refusal = ""  # why that could not be
+        self._all: list[Listed] = []  # in the folder
+        self._rows: list[Listed] = []  # those whose names have the filter in them
+        self._filter = ""
+        self._places: list[KnownPlace] = []
+        self._looking: Future[list[KnownPlace]] | None = None
+        self._chosen_at = 0.0  # by the clock, when another row was chosen
         self._problem: str | None = None
         self._listing: Future[list[Listed]] | None = None
         self._chosen = 0  # row
@@ -59,7 +79,8 @@ class Browser:
 
     def show(self, folder: Path | None = None) -> None:
         """Open the dialog on a folder; None: that of the open scan, that scan chosen."""
-        self._asked = True
+        self._asked, self._asks_for = True, None
+        self._looking = in_background(Task("Looking for disks"), known_places)
         if folder is not None:
             self._go(folder)
             return
@@ -69,49 +90,92 @@ class Browser:
 
     @property
     def waits(self) -> bool:
-        """Whether a folder is being listed."""
-        return self._listing is not None
+        """Whether a folder is being listed, or a preview drawn."""
+        lingers = self.is_open and time.monotonic() - self._chosen_at < 2 * _LINGERS
+        return self._listing is not None or self._previewer.waits or lingers
+
+    def opened(self) -> None:
+        """Take in that a scan was opened: the dialog closes where it waited for one."""
+        self._is_done = self._asks_for is not None
+        self._asks_for = None
+
+    def refused(self, problem: str) -> bool:
+        """Take in why nothing was opened; whether the dialog waited for that, and tells it."""
+        if self._asks_for is None:
+            return False
+        self._asks_for, self.refusal = None, problem
+        return True
 
     def advance(self) -> bool:
-        """Take in the folder's list; whether it has come."""
+        """Take in the folder's list and the preview; whether anything has come."""
+        if self._looking is not None and self._looking.done():
+            looking, self._looking = self._looking, None
+            self._places = [] if looking.exception() else looking.result()
+        changed = self._previewer.advance()
+        if self.is_open and time.monotonic() - self._chosen_at > _LINGERS:
+            row = self._row
+            self._previewer.ask(row.path if row is not None and row.frames else None)
+        return self._take_list() or changed
+
+    def _take_list(self) -> bool:
         if self._listing is None or not self._listing.done():
             return False
         listing, self._listing = self._listing, None
         try:
-            self._rows, self._problem = listing.result(), None
+            self._all, self._problem = listing.result(), None
         except Exception as error:  # whatever a file system brings, the window stays
-            self._rows, self._problem = [], str(error)
-        paths = [row.path for row in self._rows]
-        self._chosen = paths.index(self._select) if self._select in paths else 0
-        self._scroll = True
+            self._all, self._problem = [], str(error)
+        self._narrow(self._filter)
         return True
 
-    def draw(self) -> None:
-        """Declare the dialog where it is open."""
+    @property
+    def _row(self) -> Listed | None:
+        """The row that is chosen."""
+        return self._rows[self._chosen] if self._rows else None
+
+    def _narrow(self, filter: str) -> None:
+        """List what has this in its name, in any case; the row that was chosen stays so where it is there."""
+        row = self._row
+        chosen = self._select or (row.path if row else "")
+        self._filter, self._select = filter, ""
+        self._rows = [one for one in self._all if filter.strip().lower() in one.title.lower()]
+        paths = [one.path for one in self._rows]
+        self._choose(paths.index(chosen) if chosen in paths else 0, scroll=True)
+
+    def _choose(self, number: int, scroll: bool = False) -> None:
+        self._chosen, self._scroll, self._chosen_at = number, scroll, time.monotonic()
+
+    def draw(self, color: int) -> None:
+        """Declare the dialog where it is open. color: 0xRRGGBB, of what tells that something went wrong."""
         if self._asked:
             imgui.open_popup(_TITLE)
-            self._asked = False
+            self._asked, self._is_done, self.refusal = False, False, ""
         em, display = imgui.get_font_size(), imgui.get_io().display_size
         size = ImVec2(min(_SIZE.x * em, 0.94 * display.x), min(_SIZE.y * em, 0.9 * display.y))
         imgui.set_next_window_size(size, imgui.Cond_.always)
         imgui.set_next_window_pos(display * 0.5, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
         flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_resize
         is_open, stays = imgui.begin_popup_modal(_TITLE, True, flags)
+        self.is_open = is_open
         if is_open:
-            self._draw_inside()
+            self._draw_inside(color)
             if not stays or imgui.is_key_pressed(imgui.Key.escape):
+                self._give_up()
+            if self._is_done:
                 imgui.close_current_popup()
+                self._is_done = False
             imgui.end_popup()
         elif not self._asked:
-            self._sessions.homeless = None  # the user gave up
+            self._sessions.homeless, self._asks_for = None, None  # the user gave up
+            self._previewer.ask(None)
 
     # --- what the user does -----------------------------------------------------------
 
     def _go(self, folder: Path, select: str = "") -> None:
         """Show a folder."""
         self._folder, self._select = folder, select
-        self._text = str(folder)
-        self._rows, self._problem, self._chosen = [], None, 0
+        self._text, self.refusal, self._filter = str(folder), "", ""
+        self._all, self._rows, self._problem, self._chosen = [], [], None, 0
         self._listing = in_background(Task("Listing a folder"), lambda: list_folder(folder))
 
     def _go_up(self) -> None:
@@ -125,7 +189,14 @@ class Browser:
         elif self._text.strip():
             self._open(path)
 
+    def _give_up(self) -> None:
+        """Close the dialog; what it waits for is not opened."""
+        if self._asks_for is not None:
+            self._opening.cancel()
+        imgui.close_current_popup()
+
     def _open(self, scan: str) -> None:
+        self._asks_for, self.refusal = scan, ""
         if is_session(Path(scan)):
             self._sessions.open(Path(scan))
         elif (session := self._sessions.homeless) is not None:
@@ -134,7 +205,6 @@ class Browser:
             self._replay(Path(scan))
         else:
             self._scans.open([scan])
-        imgui.close_current_popup()
 
     def _take(self, row: Listed) -> None:
         """Open a scan, or go into a folder that is none."""
@@ -145,19 +215,47 @@ class Browser:
 
     # --- widgets ----------------------------------------------------------------------
 
-    def _draw_inside(self) -> None:
+    def _draw_inside(self, color: int) -> None:
         self._take_keys()  # before the field for the path lets go of them
         self._draw_path()
+        if self.refusal:
+            imgui.push_style_color(imgui.Col_.text, theme.packed(color))
+            imgui.text(icons.ICON_FA_TRIANGLE_EXCLAMATION)
+            imgui.pop_style_color()
+            imgui.same_line()
+            imgui.text_wrapped(printable(self.refusal))
         foot = imgui.get_frame_height_with_spacing() + imgui.get_style().item_spacing.y
         width = imgui.get_content_region_avail().x
         imgui.begin_child("known", ImVec2(_KNOWN_SHARE * width, -foot), imgui.ChildFlags_.borders)
         self._draw_known()
         imgui.end_child()
         imgui.same_line()
-        imgui.begin_child("folder", ImVec2(0, -foot), imgui.ChildFlags_.borders)
+        preview = _PREVIEW_SHARE * width + imgui.get_style().item_spacing.x
+        imgui.begin_child("folder", ImVec2(-preview, -foot), imgui.ChildFlags_.borders)
+        self._draw_filter()
+        imgui.begin_child("rows")
         self._draw_rows()
         imgui.end_child()
+        imgui.end_child()
+        imgui.same_line()
+        imgui.begin_child("preview", ImVec2(0, -foot))
+        self._draw_preview()
+        imgui.end_child()
         self._draw_foot()
+
+    def _draw_filter(self) -> None:
+        imgui.set_next_item_width(-1)
+        changed, text = imgui.input_text_with_hint("##filter", "Filter: type a part of a name", self._filter)
+        if changed:
+            self._narrow(text)
+
+    def _draw_preview(self) -> None:
+        self._previewer.draw_picture()
+        if (row := self._row) is not None:
+            imgui.text_wrapped(printable(row.title))
+            imgui.text_wrapped(printable(self._previewer.words))
+            told = [size_in_words(row.size), date_in_words(row.changed, "%Y-%m-%d %H:%M")]
+            imgui.text_disabled(", ".join(filter(None, told)))
 
     def _draw_path(self) -> None:
         if widgets.icon_button(icons.ICON_FA_ARROW_UP, "The folder above (Backspace)"):
@@ -171,7 +269,18 @@ class Browser:
             self._enter_text()
 
     def _draw_known(self) -> None:
-        """Declare the lists of what can be opened at once, wherever it is."""
+        """Declare the places to look in, and the lists of what can be opened at once, wherever it is."""
+        imgui.text_disabled("Places")
+        for place in self._places:
+            if imgui.selectable(f"{place.icon}  {place.title}###{place.title}", place.folder == self._folder)[
+                0
+            ]:
+                self._go(place.folder)
+            widgets.tooltip(printable(str(place.folder)))
+        is_demo = self._session.scan == DEMO
+        if imgui.selectable(f"{icons.ICON_FA_CUBE}  Demo scan###Demo scan", is_demo)[0]:
+            self._open_known(DEMO)
+        imgui.spacing()
         scans = self._scans
         if scans.are_together:
             self._draw_names("Opened together", scans.listed)
@@ -185,15 +294,18 @@ class Browser:
             name = widgets.fitted(title(scan), imgui.get_content_region_avail().x)
             is_open = known_as(scan) == known_as(self._session.scan)
             if imgui.selectable(f"{name}##{number}", is_open)[0]:
-                self._open_again(scan)
-                imgui.close_current_popup()
+                self._open_known(scan)
             widgets.tooltip(printable(scan))
         if not scans:
             imgui.text("none")
         imgui.pop_id()
 
+    def _open_known(self, scan: str) -> None:
+        self._asks_for, self.refusal = scan, ""
+        self._open_again(scan)
+
     def _take_keys(self) -> None:
-        """Arrows choose, Enter opens, Backspace goes up; not while a path is typed."""
+        """Arrows choose, Enter opens, Backspace goes up, letters filter; not while a field takes them."""
         if imgui.is_any_item_active():
             return
         last = len(self._rows) - 1
@@ -202,9 +314,13 @@ class Browser:
             (imgui.Key.page_down, _PAGE), (imgui.Key.page_up, -_PAGE),
         ):  # fmt: skip
             if imgui.is_key_pressed(key) and self._rows:
-                self._chosen, self._scroll = min(max(self._chosen + by, 0), last), True
-        row = self._rows[self._chosen] if self._rows else None
-        if _is_pressed(imgui.Key.backspace, imgui.Key.left_arrow):
+                self._choose(min(max(self._chosen + by, 0), last), scroll=True)
+        row = self._row
+        if typed := _typed():
+            self._narrow(self._filter + typed)
+        elif self._filter and imgui.is_key_pressed(imgui.Key.backspace):
+            self._narrow(self._filter[:-1])
+        elif _is_pressed(imgui.Key.backspace, imgui.Key.left_arrow):
             self._go_up()
         elif row and row.kind == "folder" and _is_pressed(imgui.Key.right_arrow):
             self._go(Path(row.path))
@@ -213,7 +329,8 @@ class Browser:
 
     def _draw_rows(self) -> None:
         if not self._rows:
-            told = "Reading ..." if self._listing else self._problem or "There are no scans here."
+            nothing = f"No name here has '{self._filter}' in it." if self._all else "There are no scans here."
+            told = "Reading ..." if self._listing else self._problem or nothing
             imgui.text_wrapped(printable(told))
             return
         clipper = imgui.ListClipper()
@@ -245,7 +362,7 @@ class Browser:
                 self._go(Path(row.path))
         imgui.pop_id()
         if clicked:
-            self._chosen = number
+            self._choose(number)
             if imgui.is_mouse_double_clicked(0):
                 self._take(row)
 
@@ -256,28 +373,60 @@ class Browser:
         imgui.align_text_to_frame_padding()
         beside(_ICONS[row.kind])
         imgui.same_line(left + _ICON_ROOM * em)
-        room = width - (_ICON_ROOM + _COUNT_ROOM) * em
+        room = width - (_ICON_ROOM + _COUNT_ROOM + _DATE_ROOM) * em
         imgui.text(widgets.fitted(printable(row.title), room))
-        imgui.same_line(left + width - _COUNT_ROOM * em)
-        beside(f"{row.frames} frames" if row.frames > 1 else "")
+        imgui.same_line(left + width - (_COUNT_ROOM + _DATE_ROOM) * em)
+        beside(f"{row.frames} frames" if row.frames > 1 else size_in_words(row.size))
+        imgui.same_line(left + width - _DATE_ROOM * em)
+        beside(date_in_words(row.changed))
 
     def _draw_foot(self) -> None:
-        row = self._rows[self._chosen] if self._rows else None
+        row = self._row
         goes = row is not None and not row.frames
         texts = ("Go there" if goes else "Open", "Cancel")
         padding, gap = imgui.get_style().frame_padding.x, imgui.get_style().item_spacing.x
         room = sum(imgui.calc_text_size(text).x + 2 * padding for text in texts) + gap
         left = imgui.get_content_region_avail().x - room
         imgui.align_text_to_frame_padding()
-        imgui.text_disabled(widgets.fitted(_HINT, left - gap))
+        waits = self._asks_for is not None
+        told = f"Opening {printable(title(self._asks_for))} ..." if self._asks_for is not None else _HINT
+        imgui.text_disabled(widgets.fitted(told, left - gap))
         imgui.same_line(imgui.get_cursor_start_pos().x + left)
-        imgui.begin_disabled(row is None)
+        imgui.begin_disabled(row is None or waits)
         if imgui.button(texts[0]) and row is not None:
             self._take(row)
         imgui.end_disabled()
         imgui.same_line()
         if imgui.button(texts[1]):
-            imgui.close_current_popup()
+            self._give_up()
+
+
+def size_in_words(size: int | None) -> str:
+    """A number of bytes as users read it, "1.2 MB"; nothing for None."""
+    if size is None:
+        return ""
+    number = float(size)
+    for unit in ("B", "kB", "MB", "GB"):
+        if number < 1000 or unit == "GB":
+            break
+        number /= 1000
+    return f"{number:.0f} {unit}" if unit == "B" or number >= 10 else f"{number:.1f} {unit}"
+
+
+def date_in_words(changed: float | None, form: str = "%Y-%m-%d") -> str:
+    """A moment, seconds since 1970, as the local date; nothing for None, or beyond the calendar."""
+    try:
+        return "" if changed is None else time.strftime(form, time.localtime(changed))
+    except (OverflowError, ValueError, OSError):
+        return ""
+
+
+def _typed() -> str:
+    """The letters that were typed since the frame before."""
+    io = imgui.get_io()
+    if io.key_ctrl or io.key_alt:
+        return ""
+    return "".join(chr(letter) if isinstance(letter, int) else letter for letter in io.input_queue_characters)
 
 
 def _is_pressed(*keys: imgui.Key) -> bool:

@@ -40,22 +40,17 @@ def find_facts(pose: Pose, of_points: bool = False, is_first: bool = False) -> N
 class Opened(NamedTuple):
     """A scan that can be shown.
 
-    hash: its `fingerprint`, which takes a moment for a large file. left: how it was left, None where it was
-    never open. problem: why that cannot come back. session: what the user opens it with, None where that is
-    the scan alone.
+    hash: its `fingerprint`, which takes a moment for a large file. first: the frame to begin with. left: how
+    it was left, None where it was never open. problem: why that cannot come back. session: what the user
+    opens it with, None where that is the scan alone.
     """
 
     timeline: Timeline
     hash: Future[str | None]
+    first: int
     left: SavedSession | None = None
     problem: str | None = None
     session: SavedSession | None = None
-
-    @property
-    def first(self) -> int:
-        """The frame to begin with."""
-        begins = self.session or self.left
-        return 0 if begins is None else min(begins.pose, len(self.timeline) - 1)
 
 
 Find = Callable[[], SavedSession | None]  # how a scan was left; it may raise InputError
@@ -70,7 +65,9 @@ def begin(timeline: Timeline, find: Find, session: SavedSession | None = None) -
         left = find()
     except InputError as error:
         problem = str(error)
-    return Opened(timeline, hash, left, problem, session)
+    begins = session or left
+    first = 0 if begins is None else min(begins.pose, len(timeline) - 1)
+    return Opened(timeline, hash, first, left, problem, session)
 
 
 class Opening:
@@ -126,21 +123,39 @@ def _close_unclaimed(future: Future[Opened]) -> None:
 
 
 def _opened(begin_it: Callable[[], Opened]) -> Opened:
-    """A scan whose frame that is to be shown is in memory and whose hash is known.
+    """A scan of which a frame is in memory, the one to begin with or the next that can be read, and whose
+    hash is known.
 
-    Raises InputError where it has no frame that can be shown.
+    Raises InputError where it has no frame that can be read.
     """
     opened = begin_it()
     timeline = opened.timeline
     try:
-        checkpoint()
-        timeline.pose(opened.first)
-    except InputError:
-        if len(timeline) == 1:
-            timeline.close()
-            raise
-    except Cancelled:
+        opened = opened._replace(first=read_from(timeline, opened.first))
+    except (InputError, Cancelled):
         timeline.close()
         raise
     wait([opened.hash])
     return opened
+
+
+def read_from(timeline: Timeline, first: int) -> int:
+    """The first frame from one on, round the end, that can be read; it is in memory then.
+
+    Raises InputError where none can: that of the first one tried, which tells of how many.
+    """
+    count = len(timeline)
+    problem: InputError | None = None
+    for tried in range(count):
+        checkpoint(tried / count if tried else None)
+        index = (first + tried) % count
+        try:
+            timeline.pose(index)
+        except InputError as error:
+            problem = problem or error
+        else:
+            return index
+    assert problem is not None  # a timeline has a frame
+    if count == 1:
+        raise problem
+    raise InputError(f"none of its {count} frames can be read. The first: {problem}", timeline.name)

@@ -34,12 +34,14 @@ class Scans:
         self,
         session: Session,
         note: Callable[[str], None],
+        refuse: Callable[[str], None],
         open: Callable[[str], None],
         together: Sequence[str],
         recent: Sequence[str],
     ) -> None:
-        """open: opens a scan. together: what the user named at the start, at least one."""
-        self._session, self._note, self._open = session, note, open
+        """refuse: tells why nothing is opened. open: opens a scan. together: what the user named at the
+        start, at least one."""
+        self._session, self._note, self._refuse, self._open = session, note, refuse, open
         self.listed: list[str] = []
         self.are_together = False
         self._place = ""  # in the list: what was asked for last
@@ -53,11 +55,15 @@ class Scans:
         """Open the first of what the user names together, and list them all; looked at beside the window."""
         self._naming = in_background(Task("Looking for scans"), lambda: named_scans(names))
 
-    def tell(self, problems: Sequence[InputError]) -> None:
-        """Tell in one message what cannot be opened."""
+    def tell(self, problems: Sequence[InputError], is_all: bool = False) -> None:
+        """Tell in one message what cannot be opened. is_all: whether nothing else was asked for."""
         if problems:
             others = f" {len(problems) - 1} others cannot be opened either." if len(problems) > 1 else ""
-            self._note(Problem(f"Cannot open: {problems[0]}.{others}"))
+            text = f"Cannot open: {problems[0]}.{others}"
+            if is_all:
+                self._refuse(text)
+            else:
+                self._note(Problem(text))
 
     def opened(self, scan: str) -> None:
         """Take in that a scan was opened. The list stays where that is in it, else it is made anew."""
@@ -88,7 +94,7 @@ class Scans:
         """Take in what was found; whether there was anything."""
         if self._naming is not None and self._naming.done():
             (scans, problems), self._naming = self._naming.result(), None
-            self.tell(problems)
+            self.tell(problems, is_all=not scans)
             if scans:
                 self._together = list(dict.fromkeys(scans))
                 self._open(scans[0])
@@ -104,6 +110,11 @@ class Scans:
             place = self._place if self._place in self.listed else self.listed[0]
             self._place = self.listed[(self.listed.index(place) + count) % len(self.listed)]
             self._open(self._place)
+
+    def after(self, scan: str) -> str | None:
+        """The scan that the user named behind one of those named together; None where that is the last."""
+        later = self.listed[self.listed.index(scan) + 1 :] if scan in self.listed else []
+        return later[0] if later and self.are_together else None
 
     @property
     def lately(self) -> list[str]:

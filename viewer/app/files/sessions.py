@@ -11,7 +11,6 @@ from ...errors import InputError
 from ...files import free_file, printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
-from ..notices import Problem
 from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
 from ..session import Session, known_as
@@ -29,13 +28,15 @@ class Sessions:
         session: Session,
         playback: Playback,
         note: Callable[[str], None],
+        refuse: Callable[[str], None],
         open: Callable[[str, SavedSession], None],
         take_up: Callable[[SavedSession], None],
         ask: Callable[[Path], None],
     ) -> None:
-        """open: opens a scan with a session. take_up: shows the open one so. ask: for one in a folder."""
+        """refuse: tells why nothing is opened. open: opens a scan with a session. take_up: shows the open one
+        so. ask: for one in a folder."""
         self._session, self._playback, self._note = session, playback, note
-        self._open, self._take_up, self._ask = open, take_up, ask
+        self._refuse, self._open, self._take_up, self._ask = refuse, open, take_up, ask
         about = "View, look, renderer, bookmarks, measurements; the scan itself stays where it is"
         self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save)
         self.homeless: SavedSession | None = None
@@ -55,7 +56,7 @@ class Sessions:
             session = SavedSession.load(path)
             scan = place_of(session.scan, path)
         except InputError as error:
-            self._note(Problem(str(error)))
+            self._refuse(str(error))
             return
         if is_there(scan):
             self.open_with(session, scan)
@@ -66,7 +67,6 @@ class Sessions:
 
     def open_with(self, session: SavedSession, scan: str) -> None:
         """Open a scan with a session; at once where it is the open one."""
-        self.homeless = None
         if known_as(scan) == known_as(self._session.scan):
             self._take_up(session)
         else:

@@ -138,8 +138,9 @@ class Replayer:
         try:
             self.replaying = Replaying(path)
         except InputError as error:
-            self._app.note(Problem(str(error)))
+            self._app.refuse(str(error))
             return
+        self._app.browser.opened()
         self._app.playback.player.pause()
         self._app.steering.turntable.stop()
 
