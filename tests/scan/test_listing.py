@@ -192,3 +192,39 @@ def test_sizes_and_dates_are_told(tmp_path: Path) -> None:
     assert told["f1.npy"] == (sizes[1], 1001)
     assert told["inner"][0] is None
     assert told["inner"][1] == os.path.getmtime(tmp_path / "inner")
+
+
+def test_a_folder_of_scans_that_are_no_frames_of_one_is_a_list(tmp_path: Path) -> None:
+    sizes = {"bunny.npy": 3000, "dragon_1.npy": 9000, "horse_48.npy": 1000}
+    for name, count in sizes.items():
+        np.save(tmp_path / name, np.ones((count, 3)))
+    files = [str(tmp_path / name) for name in sizes]
+    assert named_scans([str(tmp_path)]) == (files, [])
+    assert rows(tmp_path) == [("file", name, 1) for name in sizes]
+    assert ("folder", tmp_path.name, 0) in rows(tmp_path.parent), "gone into, not played"
+    assert named_scans([str(tmp_path / "*.npy")]) == ([str(tmp_path / "*.npy")], []), "as its user says"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        {"f1.npy": 10, "f2.npy": 9000, "f10.npy": 100},  # alike but for numbers, whatever their sizes
+        {"before.npy": 1000, "after.npy": 1200},  # not alike, of about one size
+        {"f1.npy": 10, "f2.npy": 900, "f3.npy": 10, "other.npy": 10},
+        {"alone.npy": 10},
+    ],
+)
+def test_frames_are_a_film_where_names_or_sizes_are_alike(names: dict[str, int], tmp_path: Path) -> None:
+    for name, count in names.items():
+        np.save(tmp_path / name, np.ones((count, 3)))
+    assert named_scans([str(tmp_path)]) == ([str(tmp_path)], [])
+
+
+@pytest.mark.parametrize("kind", ["sequences", "range"])
+def test_real_folders_are_films_or_range_scans(kind: str, data_dir: Path) -> None:
+    for folder in sorted(path for path in (data_dir / kind).iterdir() if path.is_dir()):
+        try:
+            find_source(folder)
+        except InputError:
+            continue
+        assert named_scans([str(folder)])[0] == [str(folder)]

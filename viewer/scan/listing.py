@@ -6,6 +6,7 @@ import glob
 import os
 import re
 import stat
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,8 +18,11 @@ from ..files import absolute
 from . import formats
 from .open import DEMO, entries, find_source, folder_frames, matches
 from .range_folders import find_range_frames
+from .sources import FileSequence
 from .times import TIMES_FILE, frame_numbers, natural_key
 
+_UNLIKE = 2.0  # times the size of the smallest file: frames of one scan differ less
+_DIGITS = re.compile("[0-9]+")
 _NUMBERED = re.compile(r"(.*?)([0-9]+)([^0-9]*)")
 
 
@@ -106,19 +110,34 @@ def scans_beside(scan: str) -> list[str]:
 def named_scans(names: Iterable[str]) -> tuple[list[str], list[InputError]]:
     """The scans among a user's names that can be opened, and what is wrong with the others.
 
-    A folder that is no scan itself stands for the scans in it.
+    A folder that is no scan itself, or a collection, stands for the scans in it.
     """
     scans: list[str] = []
     problems: list[InputError] = []
     for name in names:
         try:
-            find_source(name)
+            source = find_source(name)
+            if os.path.isdir(name) and isinstance(source, FileSequence) and is_collection(source.files):
+                raise InputError("holds scans that are no frames of one", name)
             scans.append(name)
         except InputError as problem:
             inner, wrong = named_scans(_inside(Path(name)))
             scans += inner
             problems += wrong if inner else [problem]
     return scans, problems
+
+
+def is_collection(files: Sequence[Path]) -> bool:
+    """Whether files are scans of their own rather than frames of one: most of their names differ by more than
+    numbers, and their sizes by far."""
+    patterns = Counter(_DIGITS.sub("0", file.name) for file in files)
+    if len(files) < 2 or 2 * max(patterns.values()) > len(files):
+        return False
+    try:
+        sizes = [file.stat().st_size for file in files]
+    except OSError:
+        return False
+    return max(sizes) > _UNLIKE * min(sizes)
 
 
 def as_one_scan(files: Sequence[str]) -> str | None:
@@ -158,10 +177,14 @@ def _scan_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _frames(folder: Path) -> tuple[int, set[Path]]:
-    """How many frames a folder plays as one scan, 0 where it is none, and the files of its range images."""
+    """How many frames a folder plays as one scan, 0 where it is none or a collection, and the files of its
+    range images."""
     try:
         found = find_range_frames(folder)
-        return (len(folder_frames(folder)), set()) if found is None else (len(found), set(found.files))
+        if found is not None:
+            return len(found), set(found.files)
+        frames = folder_frames(folder)
+        return 0 if is_collection(frames) else len(frames), set()
     except InputError:
         return 0, set()
 
