@@ -166,6 +166,17 @@ class Camera:
         right = right / length
         return np.stack([right, np.cross(back, right), back])
 
+    def place_in_picture(self, point: Vector) -> tuple[float, float] | None:
+        """The place of a point in the picture, in its heights: to the right of and above its centre; None
+        behind the eye."""
+        right, up, back = self.rotation() @ np.subtract(point, self.eye)
+        if back >= 0:
+            return None
+        height = self.view_height
+        if self.projection == "perspective":
+            height *= -back / self.distance
+        return float(right / height), float(up / height)
+
     def clip_range(self) -> tuple[float, float]:
         """(near, far) along the view axis, scan units: what is outside is not drawn.
 

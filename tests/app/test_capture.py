@@ -58,7 +58,7 @@ def app() -> Any:
         note=told.append,
         viewport=picture,
         session=session,
-        playback=SimpleNamespace(unit="mm"),
+        playback=SimpleNamespace(unit="mm", timeline=[POSE]),
     )
 
 
@@ -77,7 +77,7 @@ def colour_by_a_layer(app: Any) -> None:
 
 
 def test_what_cannot_be_drawn_again_is_not_recorded(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
     capture.toggle_recording()
     colour_by_a_layer(app)
     capture.note_shown()
@@ -100,7 +100,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
     app.viewport.request = replace(app.viewport.request, pose=bare)
     with closing(open_scan("demo")) as timeline:
         playback = SimpleNamespace(unit="mm", timeline=timeline)
-        capture = Capture(app.session, playback, app.viewport, app.note)
+        capture = Capture(app.session, playback, app.viewport, app.note, Marks)
         exporting = Exporting(
             app.session, playback, app.viewport, app.note, capture.shown,
             Choices(what="frames", folder=str(tmp_path), name="a"), Marks(),
@@ -112,10 +112,11 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
 
 
 def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
     app.session.hash_found.set_result(None)
     image = np.zeros((48, 64, 3), np.uint8)
-    app.viewport.surface, app.viewport.finish = SimpleNamespace(image=lambda: image), lambda: None
+    app.viewport.surface = SimpleNamespace(image=lambda: image, color_range=None, value_kind=None)
+    app.viewport.finish = lambda: None
     capture.screenshot()
     colour_by_a_layer(app)
     capture.screenshot()
@@ -131,7 +132,7 @@ def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) 
 def test_a_journal_that_failed_goes_when_the_recording_is_saved(
     app: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
     capture.toggle_recording()
 
     def full(*_: object) -> None:
@@ -152,7 +153,7 @@ def test_a_journal_that_failed_goes_when_the_recording_is_saved(
 
 
 def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Path) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
     capture.toggle_recording()
     (tmp_path / "work").rmdir()  # then the working folder is the user's own
     capture.toggle_recording()
@@ -164,7 +165,7 @@ def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Pa
 def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
     app: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
     capture.toggle_recording()
 
     def full(*_: object) -> None:
@@ -181,7 +182,7 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
 
 
 def test_closing_waits_for_no_question(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
     answered = threading.Event()
     capture.tell_later(lambda: str(answered.wait()))
     capture.close()  # or else for ever

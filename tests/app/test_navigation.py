@@ -80,21 +80,21 @@ def test_focusing_on_a_point_keeps_the_picture(camera: Camera) -> None:
     others = np.random.default_rng(0).uniform(-1, 1, (20, 3))
     for other in others:
         assert pixel(focused, other) == pytest.approx(pixel(camera, other))
-    right, up = navigation.place_in_picture(focused, point)
+    right, up = focused.place_in_picture(point)
     assert at_target_depth(focused, right, up) == pytest.approx(point), "at the target's depth"
     # And so zooming and panning hold on to it.
     for moved, shift in [
         (navigation.wheel(focused, 3, (right, up), 1.0), (0, 0)),
         (navigation.pan(focused, 0.1, 0.2), (0.1, 0.2)),
     ]:
-        assert navigation.place_in_picture(moved, point) == pytest.approx((right + shift[0], up + shift[1]))
+        assert moved.place_in_picture(point) == pytest.approx((right + shift[0], up + shift[1]))
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_centring_a_point_keeps_direction_and_scale(camera: Camera) -> None:
     point = (0.5, -0.3, 0.8)
     centered = camera.centered(point)
-    assert navigation.place_in_picture(centered, point) == pytest.approx((0, 0), abs=1e-12)
+    assert centered.place_in_picture(point) == pytest.approx((0, 0), abs=1e-12)
     assert centered.rotation() == pytest.approx(camera.rotation())
     assert centered.view_height == pytest.approx(camera.focused(point).view_height)
     behind = tuple(np.array(camera.eye) + camera.rotation()[2])
@@ -105,7 +105,7 @@ def test_a_point_behind_the_eye_is_no_pivot() -> None:
     camera = CAMERAS[0]
     behind = np.array(camera.eye) + camera.rotation()[2]
     assert camera.focused(tuple(behind)) == camera
-    assert navigation.place_in_picture(camera, tuple(behind)) is None
+    assert camera.place_in_picture(tuple(behind)) is None
     far = Camera(eye=(1e7, 1e7, 1e7), target=(1e7 - 1, 1e7 - 1e-3, 1e7))
     beside = (1e7, float(np.nextafter(1e7, 0)), 1e7)
     assert far.focused(beside) == far, "nor one that rounding puts into the eye"
@@ -114,7 +114,7 @@ def test_a_point_behind_the_eye_is_no_pivot() -> None:
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_place_is_the_pixel_in_heights(camera: Camera) -> None:
     for point in np.random.default_rng(1).uniform(-1, 1, (20, 3)):
-        right, up = navigation.place_in_picture(camera, tuple(point))
+        right, up = camera.place_in_picture(tuple(point))
         assert pixel(camera, point) == pytest.approx([150 + 200 * right, 100 - 200 * up])
 
 

@@ -38,6 +38,7 @@ FULL = Settings(
     look=Look(light="fixed", azimuth=12, background="#102030"),
     pace=Pace(speed=0.5, reverse=True, loop=False),
     marks=Marks(stamp=True),
+    marks_in_files=False,
     cube=False,
     turn_seconds=24.0,
     export=Choices(what="turntable", width=640, anonymous=True),

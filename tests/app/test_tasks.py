@@ -13,7 +13,6 @@ from test_window import Screenshot, on_screen, shown
 from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
 
 from viewer.analysis.pick import pick
-from viewer.app.scene import navigation
 from viewer.gpu.surface import EMPTY, Surface
 from viewer.scan import formats
 from viewer.scan.open import open_scan
@@ -83,7 +82,7 @@ class Person:
     def pixel(self, position: tuple[float, float, float]) -> tuple[int, int]:
         """Where a position is in the picture."""
         _, _, width, height = self.app.view()
-        place = navigation.place_in_picture(self.look().camera, position)
+        place = self.look().camera.place_in_picture(position)
         assert place is not None
         return int(width / 2 + place[0] * height), int(height / 2 - place[1] * height)
 
@@ -172,7 +171,7 @@ def test_set_b_turn_pan_and_find_nose_eye_and_ear(person: Person) -> None:
         person.turn_wheel(8)
         person.press("z")
         eye = person.look().camera
-        assert navigation.place_in_picture(eye, LEFT_EYE) == pytest.approx((0, 0), abs=0.03)
+        assert eye.place_in_picture(LEFT_EYE) == pytest.approx((0, 0), abs=0.03)
         assert eye.view_height < 0.5 * start.view_height
         assert person.sees(LEFT_EYE, within=3)
         person.task = "B6"

@@ -17,14 +17,17 @@ from hostile_values import variants
 from scenes import sphere
 from written import bits, film, picture
 
+from viewer.analysis.measure import End, Measurement
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.recording import Entry, Recording, fingerprint, matrix_of
 from viewer.errors import InputError
 from viewer.frame import render_frame
+from viewer.geometry import vector
 from viewer.gpu.surface import Surface
-from viewer.look import Look
+from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
+from viewer.output.marks import LINE_COLOR, Marks
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan import formats
@@ -102,6 +105,41 @@ def test_a_picture_tells_its_scan_and_the_scans_hash(run: Run) -> None:
     assert (ball.scan, ball.hash) == ("ball.npz", fingerprint([Path("ball.npz")]))
     assert (pose.scan, pose.pose, pose.time, pose.size) == ("sequence", 1, 0.04, (96, 64))
     assert pose.hash == fingerprint(sorted(Path("sequence").iterdir()))
+
+
+def test_measurements_are_drawn_again_follow_their_points_and_stand_in_anonymous_pictures(run: Run) -> None:
+    """From cheek to cheek of the demo, in its first frame; the points have moved by frame 6."""
+    with open_scan("demo") as timeline:
+        first = timeline.pose(0)
+        low, high, places = first.bounds.low, first.bounds.high, first.cloud.world()
+        ends = []
+        for share in (0.2, 0.8):
+            wanted = low + (high - low) * np.array([share, 0.45, 0.8])
+            row = int(np.linalg.norm(places - wanted, axis=1).argmin())
+            ends.append(End(0, 0.0, vector(places[row]), "surface", row, 3.0, 0))
+        camera = Camera.orbit(first.bounds, 0, 0, aspect=1.5)
+    measured = entry(
+        scan="demo", camera=camera, size=(384, 256), marks=Marks(measurements=True),
+        measurements=(Measurement(ends[0], ends[1]),), backend="points", look=Look(),
+    )  # fmt: skip
+    later = replace(measured, pose=5, time=0.2, at=0.2)
+    Recording((measured, later)).save(Path("a.json"))
+    assert run("render", "--replay", "a.json", "-o", "p%d.png").code == 0
+    assert run("render", "--replay", "a.json", "--anonymous", "-o", "q%d.png").code == 0
+    ink = np.array(rgba(LINE_COLOR), int)
+    for number, shown in enumerate((measured, later)):
+        named = picture(Path(f"p{number}.png"))
+        assert run("render", "--replay", f"p{number}.png", "-o", "again.png", "--force").code == 0
+        assert np.array_equal(picture(Path("again.png")), named)
+        assert run("render", "demo", "--replay", f"q{number}.png", "-o", "again.png", "--force").code == 0
+        assert np.array_equal(picture(Path("again.png")), picture(Path(f"q{number}.png")))
+        lines = [
+            np.abs(each.astype(int) - ink).max(axis=2) < 40
+            for each in (named, picture(Path(f"q{number}.png")))
+        ]
+        assert lines[0].sum() > 100
+        assert np.array_equal(*lines)
+        assert Recording.load(Path(f"p{number}.png")).entries[0].measurements == shown.measurements
 
 
 def test_every_entry_of_a_recording_is_drawn_at_its_size(run: Run) -> None:
@@ -389,4 +427,4 @@ def test_no_recording_is_an_internal_error(choice: list[str], renderer: Renderer
             with suppress(InputError):
                 while render_frame(renderer, usable.request(timeline.pose(0)), surface):
                     pass
-                marked(surface.image(), usable.legend(timeline), surface.color_range)
+                marked(surface.image(), usable.legend(timeline, timeline.pose(0)), surface.color_range)

@@ -15,9 +15,11 @@ from viewer.camera import Camera
 from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from viewer.output.marks import (
     INK,
+    LINE_COLOR,
     PLATE,
     Legend,
     Marks,
+    MeasuredLine,
     marked,
     number,
     quantity,
@@ -193,6 +195,36 @@ def test_the_colours_of_the_bar_are_those_of_the_surface(draw: Callable[..., Sur
     assert (stripe[rows[-1]] == shown[0]).all()
     nearest = np.abs(stripe[rows].astype(int) - shown[1]).sum(axis=1).argmin()
     assert abs(nearest - len(rows) / 2) <= 1
+
+
+def test_measured_lines_go_from_end_to_end_and_their_texts_keep_off_each_other() -> None:
+    """One near the upper edge, and four at one place, whose texts would hide each other."""
+    ends = (-3.0, -4.9, 0.0), (3.0, -4.9, 0.0)
+    lines = [
+        MeasuredLine(ends, (0, 0), "1:  6 mm"),
+        *(MeasuredLine(((-2, 0, 0), (2, 1, 0)), (0, 0), "4.1 mm"),) * 4,
+    ]
+    told = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=tuple(lines)), None)
+    color = np.array(rgba(LINE_COLOR), int)
+    there = np.abs(told.astype(int) - color).max(axis=2) <= 2
+    for x, y in ((-3, -4.9), (3, -4.9), (-2, 0), (2, 1)):
+        assert there[round(180 - 36 * y - 0.5), round(320 + 36 * x - 0.5)], "its end"
+    assert there[round(180 + 36 * 4.9), 240:400].mean() > 0.9, "all along, but where a text is"
+    dark = (told[..., :3] < 40).all(axis=2)  # of plates
+    columns = dark[:, 318]
+    assert (np.diff(columns.astype(int)) == 1).sum() >= 4, "plates one above the other"
+    faint = [replace(line, hidden=True) for line in lines]
+    hidden = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=tuple(faint)), None)
+    assert not (np.abs(hidden.astype(int) - color).max(axis=2) <= 2).any()
+    bare = marked(gray(), replace(LEGEND, marks=Marks(scale_bar=True), lines=tuple(lines)), None)
+    assert (bare == with_marks(scale_bar=True)).all(), "lines are a mark of their own"
+
+
+def test_what_is_behind_the_eye_is_no_line() -> None:
+    camera = Camera(eye=(0, 0, 5), target=(0, 0, 0), up=(0, 1, 0))
+    line = MeasuredLine(((0, 0, 0), (1, 0, 6)), (0, 0), "behind")
+    legend = replace(LEGEND, marks=Marks(measurements=True), camera=camera, lines=(line,))
+    assert (marked(gray(), legend, None) == gray()).all()
 
 
 def test_levels_and_holes_have_a_swatch_each_in_the_colour_that_is_shown() -> None:

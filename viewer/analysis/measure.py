@@ -30,6 +30,7 @@ from .pick import SURE, Neighbor, Picked, largest_deviation
 
 _DECIMALS = (-6, 12)  # that a number is written out with
 _COVERED = "(95 %)"  # of cases in which the true distance is within what ± says
+_SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is before what it hides
 _SAME = 1e-14  # share of coordinates that rounding changes
 _TURNING = 4  # points that tell how a place turns and how well they do
 
@@ -234,6 +235,15 @@ def _carried(
     off = (now - after) - (was - before) @ turned.T
     free = 3 * len(was) - 6  # of the coordinates, six make the motion
     return after + turned @ (position - before), turned, math.sqrt(float((off**2).sum()) / free)
+
+
+def end_slack(end: End, radius: float) -> float:
+    """How far before an end the surface may be that is its own, scan units, for `is_seen`.
+
+    radius: of the scan, scan units.
+    """
+    spacings, share = _SLACK
+    return spacings * (end.spacing or 0) + share * radius + (end.uncertainty or 0)
 
 
 def distance_in_words(distance: float, uncertainty: float | None, unit: str) -> str:

@@ -136,13 +136,16 @@ class App:
             remembered.turn_seconds, up is not None, self.note,
         )  # fmt: skip
         self.marks: ViewMarks = ViewMarks(
-            self.session, self.playback, self.viewport, self.steering, self.ranging, remembered.marks
-        )
+            self.session, self.playback, self.viewport, self.steering, self.ranging, remembered.marks,
+            remembered.marks_in_files,
+        )  # fmt: skip
         self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
         self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
         self.panel = Panel(remembered.panel)
-        self.capture: Capture = Capture(self.session, self.playback, self.viewport, self.note)
+        self.capture: Capture = Capture(
+            self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files
+        )
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(
             self.session, self.playback, self.viewport, self.note, self.capture.shown,
@@ -281,7 +284,7 @@ class App:
         """The settings that are to come back at the next start."""
         return Settings.of(
             self.session, window=self.window.place, theme=self.theme, text_scale=self.window.text_scale,
-            marks=self.marks.shown, cube=self.steering.cube.is_shown,
+            marks=self.marks.shown, marks_in_files=self.marks.in_files, cube=self.steering.cube.is_shown,
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
             panel=self.panel.chosen, slow_devices=self._slow_devices,

@@ -276,7 +276,13 @@ _VIEW: Menu[App] = Menu("View", (
             is_on=lambda app: app.steering.cube.is_shown,
         ),
     ),
-    (_mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C")),
+    (
+        _mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C"),
+        Command(
+            "marks_in_files", "Save pictures with these and measurements",
+            lambda app: app.marks.toggle_in_files(), is_on=lambda app: app.marks.in_files,
+        ),
+    ),
     (
         *(_look_switch(parameter) for parameter in describe(Look) if parameter.key),
         Command(

@@ -79,9 +79,10 @@ class Settings:
     """The choices that outlive the window.
 
     window: None until it was open once. backend: None for the scan's own default. params: backend ->
-    its `Params`. marks: over the view. cube: whether the orientation cube is shown. turn_seconds: of the
-    turntable. export, export_marks: of the export dialog. recent: the scans opened last, newest first.
-    places: what earlier versions kept here of each scan, whose documents have files of their own now.
+    its `Params`. marks: over the view. marks_in_files: whether saved pictures have them. cube: whether the
+    orientation cube is shown. turn_seconds: of the turntable. export, export_marks: of the export dialog.
+    recent: the scans opened last, newest first. places: what earlier versions kept here of each scan, whose
+    documents have files of their own now.
     panel: its width, and which of its sections are open. slow_devices: those of which the user was told that
     they draw in software.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
@@ -95,6 +96,7 @@ class Settings:
     look: Look = field(default_factory=Look)
     pace: Pace = field(default_factory=Pace)
     marks: Marks = legend.SHOWN_FIRST
+    marks_in_files: bool = True
     cube: bool = True
     turn_seconds: TurnTime = turntable.USUAL
     export: Choices = field(default_factory=Choices)

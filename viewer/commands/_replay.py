@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ..document.anonymous import anonymous_pose, anonymous_request
+from ..document.anonymous import anonymous_measurements, anonymous_pose, anonymous_request
 from ..document.recording import (
     Entry,
     Recording,
@@ -113,9 +113,12 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
                     failed = error
                 else:
                     shown = _completed(entry, request, args, found, hash, timeline)
+                    if shown.measurements and timeline.one_topology is None and len(timeline) > 1:
+                        with suppress(InputError):  # two frames tell whether these follow their points
+                            timeline.pose((entry.pose + 1) % len(timeline))
             if failed is None:
                 drawn = True
-                yield number, request, shown, shown.legend(timeline)
+                yield number, request, shown, shown.legend(timeline, request.pose)
         if failed and not drawn:
             raise failed
     finally:
@@ -147,7 +150,15 @@ def _completed(
         return shown
     time = float(request.pose.time)
     place = matrix_of(request.layers.place)
-    return replace(shown, time=time, camera=request.camera, look=request.look, place=place).without_names()
+    if entry.anonymous:
+        measurements = entry.measurements
+    else:
+        measurements = anonymous_measurements(
+            entry.measurements, timeline.pose(entry.pose), timeline.times[0]
+        )
+    return replace(
+        shown, time=time, camera=request.camera, look=request.look, measurements=measurements, place=place
+    ).without_names()
 
 
 def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:

@@ -156,7 +156,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
                     request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
                 entry = entry.without_names() if args.anonymous else entry
-                yield shot.number, request, entry, entry.legend(timeline)
+                yield shot.number, request, entry, entry.legend(timeline, request.pose)
 
         yield Plan(len(shots), size, fps, pictures())
 

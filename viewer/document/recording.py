@@ -31,6 +31,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from .. import __version__
+from ..analysis.measure import Measurement, distance_in_words, end_slack, reading_of
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError, shortened
@@ -38,7 +39,7 @@ from ..files import open_plain, whole_file
 from ..frame import Request
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
-from ..output.marks import Legend, Marks
+from ..output.marks import Legend, Marks, MeasuredLine
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import DEMO, searches_folders
@@ -85,8 +86,9 @@ class Entry:
     scan: as the user named it, None where it is anonymous. hash: of its files (see `fingerprint`), None
     where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
     params: the backend's own `Params`. marks: what is drawn over it. unit: of length, as marks have it;
-    None for the scan's own. place: the matrix that the scan is moved by, None where it is not. anonymous:
-    whether camera, time, look and place are those of the scan as `anonymous_request` has it. at: seconds
+    None for the scan's own. measurements: to draw over it, as they were made. place: the matrix that the
+    scan is moved by, None where it is not. anonymous: whether camera, time, look, measurements and place are
+    those of the scan as `anonymous_request` has it. at: seconds
     since the recording began; entries that differ in it alone are equal.
     """
 
@@ -101,6 +103,7 @@ class Entry:
     look: Look
     marks: Marks = field(default_factory=Marks)
     unit: Unit | None = None
+    measurements: tuple[Measurement, ...] = ()
     place: Matrix | None = None
     anonymous: bool = False
     at: Stamp = field(default=0.0, compare=False)
@@ -114,12 +117,15 @@ class Entry:
         size: tuple[int, int],
         unit: str,
         marks: Marks | None = None,
+        measurements: tuple[Measurement, ...] = (),
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
+        measurements: kept where the marks show them.
+
         Raises InputError where its colours come from a layer: these numbers are in no file.
         """
-        layers = request.layers
+        layers, marks = request.layers, marks or Marks()
         names = layers.names(request.pose.overview.scalars)
         source = value_source(drawable(request.look, names), names)
         if source in layers.scalars:
@@ -127,8 +133,8 @@ class Entry:
             raise InputError(what, hint="It can be drawn again in other colours")
         return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
-            request.camera, str(request.backend), request.params, request.look, marks or Marks(), unit,
-            matrix_of(layers.place),
+            request.camera, str(request.backend), request.params, request.look, marks, unit,
+            measurements if marks.measurements else (), matrix_of(layers.place),
         )  # fmt: skip
 
     def request(self, pose: Pose) -> Request:
@@ -141,10 +147,18 @@ class Entry:
         """The motion of `place`."""
         return STILL if self.place is None else Rigid(np.array(self.place))
 
-    def legend(self, timeline: Timeline) -> Legend:
-        """Texts of the marks. timeline: the scan's."""
+    def legend(self, timeline: Timeline, pose: Pose) -> Legend:
+        """Texts and lines of the marks. timeline: the scan's. pose: that is drawn.
+
+        Measurements follow their points as far as the frames read so far tell that they can.
+        """
         unit = timeline.unit if self.unit is None else self.unit
-        return Legend(self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time)
+        lines: tuple[MeasuredLine, ...] = ()
+        if self.measurements and self.marks.measurements:
+            lines = measured_lines(self.measurements, pose, timeline.one_topology, self.motion, unit)
+        return Legend(
+            self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time, lines
+        )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
         """A JSON object, without `at`. before: leave out what is as it was there."""
@@ -174,6 +188,20 @@ class Entry:
     def description(self) -> str:
         """The JSON text that a picture carries."""
         return json.dumps(_head() | self.to_json())
+
+
+def measured_lines(
+    measurements: Sequence[Measurement], pose: Pose, one_topology: bool | None, place: Rigid, unit: str
+) -> tuple[MeasuredLine, ...]:
+    """Lines of measurements as they stand in a pose. one_topology, place: as of `reading_of`."""
+    lines = []
+    for number, measurement in enumerate(measurements, 1):
+        there = reading_of(measurement, pose, one_topology, place).measurement
+        words = distance_in_words(there.distance, there.uncertainty, unit)
+        first, second = there.ends
+        slack = end_slack(first, pose.bounds.radius), end_slack(second, pose.bounds.radius)
+        lines.append(MeasuredLine((first.position, second.position), slack, f"{number}:  {words}"))
+    return tuple(lines)
 
 
 def matrix_of(place: Rigid) -> Matrix | None:

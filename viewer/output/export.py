@@ -13,7 +13,9 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -22,6 +24,7 @@ from zlib import Z_RLE
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.pick import is_seen
 from ..errors import InputError, explained
 from ..files import open_plain, whole_file
 from ..look import Look, rgba
@@ -129,8 +132,17 @@ def write_png(image: NDArray[np.uint8], path: Path | str, description: str | Non
 
 
 def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
-    image = surface.image()
-    return image if legend is None else marked(image, legend, surface.color_range, surface.value_kind)
+    shown = None if legend is None else with_hidden(legend, surface)
+    return marked(surface.image(), shown, surface.color_range, surface.value_kind)
+
+
+def with_hidden(legend: Legend, surface: Surface) -> Legend:
+    """The legend whose lines tell what the surface hides of them."""
+    lines = (
+        replace(line, hidden=not all(map(partial(is_seen, surface), line.ends, line.slack)))
+        for line in legend.lines
+    )
+    return replace(legend, lines=tuple(lines))
 
 
 def read_description(path: Path) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
+from ..geometry import Vector
 from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
@@ -21,8 +22,10 @@ from ..scan.times import frame_in_words
 
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 Box = tuple[float, float, float, float]  # left, top, right, bottom; pixels from the upper left corner
+Spot = tuple[float, float]  # to the right and down, the same
 
 INK: Color = (245, 245, 245, 255)
+LINE_COLOR = "#58d6f0"  # of measurements, in the window as well
 _MEASURED: Color = (150, 150, 150, 255)
 PLATE: Color = (0, 0, 0, 170)  # light on dark, so that it is read on any picture
 _LINES = 45  # of text that are as high as a picture
@@ -36,6 +39,8 @@ _MARGIN, _PAD, _GAP = 0.8, 0.5, 0.35
 _TICK, _LINE = 0.5, 0.14  # height of a scale bar's ends, thickness of its line
 _MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
 _SWATCH_LINE = 1.4  # from one swatch to the next
+_MEASURED_LINE, _END = 0.11, 0.28  # thickness of a measured line, radius of its ends
+_FAINT = 0.35  # opacity of a line that is hidden
 
 
 @dataclass(frozen=True)
@@ -50,9 +55,10 @@ class Marks:
         "The colour map and its numbers, where the look colours by a number; colours of levels and holes",
     )
     stamp: bool = param(False, "Number of the frame, and its time")
+    measurements: bool = param(False, "Measured distances, as they stand in the frame")
 
     def __bool__(self) -> bool:
-        return self.scale_bar or self.color_bar or self.stamp
+        return self.scale_bar or self.color_bar or self.stamp or self.measurements
 
 
 MARKS = tuple(parameter.name for parameter in describe(Marks))
@@ -64,11 +70,25 @@ def marks_of(names: Sequence[str] | None) -> Marks:
 
 
 @dataclass(frozen=True)
+class MeasuredLine:
+    """A measured distance in a picture.
+
+    ends: two places, scan units. slack: of each, how far before it the surface may be that is its own, scan
+    units. text: that stands beside it. hidden: whether something is before one of its ends.
+    """
+
+    ends: tuple[Vector, Vector]
+    slack: tuple[float, float]
+    text: str
+    hidden: bool = False
+
+
+@dataclass(frozen=True)
 class Legend:
     """The words and numbers that the marks of a picture show.
 
     unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
-    says of its numbers.
+    says of its numbers. lines: that were measured.
     """
 
     marks: Marks
@@ -79,6 +99,7 @@ class Legend:
     count: int
     time: float
     range_note: str = ""
+    lines: tuple[MeasuredLine, ...] = ()
 
 
 class MarkPainter(Protocol):
@@ -286,6 +307,53 @@ def _draw_stamp(painter: MarkPainter, size: tuple[float, float], legend: Legend)
     painter.text(left + _PAD * em, top + _PAD * em, text)
 
 
+def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend) -> None:
+    """Draw the measured lines, each with its text on a plate beside it, off the plates before; what has an
+    end behind the eye is left out."""
+    drawn = [(line, places) for line in legend.lines if (places := _places(line, legend.camera, size))]
+    for line, places in drawn:
+        opacity = _FAINT if line.hidden else 1.0
+        for color, more in ((0, 0, 0, 0.6 * opacity), 2), ((*rgba(LINE_COLOR)[:3], opacity), 0):
+            painter.stroke(*places, _MEASURED_LINE * painter.em + more, color)
+            for place in places:
+                painter.stroke(place, place, 2 * _END * painter.em + more, color)
+    taken: list[Box] = []
+    for line, places in drawn:
+        text = _shortened(painter, line.text, size[0] - 2 * _PAD * painter.em)
+        taken.append(_free_box(painter, text, places, size, taken))
+        painter.box(taken[-1], PLATE)
+        painter.text(taken[-1][0] + _PAD * painter.em, taken[-1][1] + _PAD * painter.em, text)
+
+
+def _places(line: MeasuredLine, camera: Camera, size: tuple[float, float]) -> tuple[Spot, Spot] | None:
+    """The ends in a picture of this size; None where one is behind the eye."""
+    found = [camera.place_in_picture(end) for end in line.ends]
+    width, height = size
+    there = [(width / 2 + place[0] * height, height / 2 - place[1] * height) for place in found if place]
+    return (there[0], there[1]) if len(there) == 2 else None
+
+
+def _free_box(
+    painter: MarkPainter, text: str, places: tuple[Spot, Spot], size: tuple[float, float], taken: list[Box]
+) -> Box:
+    """A box for a text beside the middle of a line: within the picture, and off all that is taken where there
+    is room."""
+    em = painter.em
+    width, height = painter.width(text) + 2 * _PAD * em, (1 + 2 * _PAD) * em
+    (x, y), (other_x, other_y) = places
+    left = min(max((x + other_x - width) / 2, 0.0), max(size[0] - width, 0.0))
+    rise = abs(other_y - y) * min(0.5 * width / max(abs(other_x - x), 1), 0.5)  # of the line, below the box
+    above = (y + other_y) / 2 - rise - height - _GAP * em
+    steps = [step * sign * (height + _GAP * em) for step in range(len(taken) + 2) for sign in (-1, 1)]
+    tops = [min(max(above + step, 0.0), max(size[1] - height, 0.0)) for step in steps]
+    boxes = [(left, top, left + width, top + height) for top in tops]
+    return next((box for box in boxes if not any(_overlap(box, other) for other in taken)), boxes[0])
+
+
+def _overlap(one: Box, other: Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
 def _shortened(painter: MarkPainter, text: str, room: float) -> str:
     if painter.width(text) <= room:
         return text
@@ -299,7 +367,7 @@ def _shortened(painter: MarkPainter, text: str, room: float) -> str:
 
 def marked(
     image: NDArray[np.uint8],
-    legend: Legend,
+    legend: Legend | None,
     values: tuple[float, float] | None,
     kind: ValueKind | None = None,
 ) -> NDArray[np.uint8]:
@@ -309,10 +377,12 @@ def marked(
     """
     from PIL import Image
 
-    if not legend.marks:
+    if legend is None or not legend.marks:
         return image
     below = Image.fromarray(image)
     painter = _Overlay(below.size)
+    if legend.marks.measurements:
+        _draw_lines(painter, below.size, legend)
     draw(painter, below.size, legend, values, kind)
     return np.asarray(Image.alpha_composite(below, painter.image))
 
@@ -337,6 +407,28 @@ class _Overlay:
         # Capitals and digits stand 0.71 em high: in the middle of the line.
         self._draw.text((round(left), round(top + 0.855 * self.em)), text, INK, self._font, anchor="ls")
 
+    def stroke(self, start: Spot, stop: Spot, width: float, color: tuple[float, float, float, float]) -> None:
+        """Draw a line with round ends, smooth at its edges; a disc where it has no length. color: bytes, and
+        opacity from 0 to 1."""
+        from PIL import Image
+
+        reach = width / 2 + 1
+        reach, wide, high = width / 2 + 1, *self.image.size
+        left, right = _pixels(start[0], stop[0], reach, wide)
+        top, bottom = _pixels(start[1], stop[1], reach, high)
+        if left >= right or top >= bottom:
+            return
+        x = np.arange(left, right, dtype=np.float32) + 0.5 - start[0]
+        y = np.arange(top, bottom, dtype=np.float32)[:, None] + 0.5 - start[1]
+        across, down = stop[0] - start[0], stop[1] - start[1]
+        along = np.clip((x * across + y * down) / max(across**2 + down**2, 1e-9), 0, 1)  # share of its length
+        away = np.hypot(x - along * across, y - along * down)
+        covered = np.clip(width / 2 + 0.5 - away, 0, 1)
+        pixels = np.empty((*covered.shape, 4), np.uint8)
+        pixels[...] = (*color[:3], 0)
+        pixels[..., 3] = np.round(255 * color[3] * covered)
+        self.image.alpha_composite(Image.fromarray(pixels), (left, top))
+
     def box(self, box: Box, color: Color) -> None:
         left, top, right, bottom = map(round, box)
         if left < right and top < bottom:  # else the picture is too small for it
@@ -351,3 +443,8 @@ class _Overlay:
         rows = colors[np.linspace(len(colors) - 1, 0, bottom - top).round().astype(int)]
         stripe = np.repeat(rows[:, None], right - left, axis=1)
         self.image.paste(Image.fromarray(np.ascontiguousarray(stripe)), (left, top))
+
+
+def _pixels(one: float, other: float, reach: float, extent: int) -> tuple[int, int]:
+    """The first pixel and the one after the last of a stroke from one place to another, in a picture."""
+    return max(0, math.floor(min(one, other) - reach)), min(extent, math.ceil(max(one, other) + reach))

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...document.journal import Journal, journal_folder, journals, saved, written
+from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
 from ...errors import InputError, explained
 from ...files import free_file, working_folder
-from ...output.export import write_png
+from ...output.export import with_hidden, write_png
+from ...output.marks import Marks, marked
 from ...task import Task, in_background
 from ..failures import failure_in_words
 from ..notices import Problem
@@ -35,8 +37,15 @@ class Capture:
     """
 
     def __init__(
-        self, session: Session, playback: Playback, viewport: Viewport, note: Callable[[str], None]
+        self,
+        session: Session,
+        playback: Playback,
+        viewport: Viewport,
+        note: Callable[[str], None],
+        marks: Callable[[], Marks],
     ) -> None:
+        """marks: brings those that what is saved has."""
+        self._marks = marks
         self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
         self.last: Path | None = None
@@ -45,15 +54,19 @@ class Capture:
         self._looking: list[Future[str]] = []  # the same of what writes nothing
         self._naming = Lock()  # one free name at a time
 
-    def shown(self) -> Entry | None:
+    def shown(self, marks: Marks | None = None) -> Entry | None:
         """The entry that says what the picture shows, None where there is none.
 
-        Raises InputError where its colours are by numbers that no file has.
+        marks: over it; None: those that what is saved has. Raises InputError where its colours are by numbers
+        that no file has.
         """
         session, viewport, request = self._session, self._viewport, self._viewport.request
         if not viewport.is_there or request is None:
             return None
-        return Entry.of(request, session.scan, session.hash, viewport.size, self._playback.unit)
+        return Entry.of(
+            request, session.scan, session.hash, viewport.size, self._playback.unit,
+            self._marks() if marks is None else marks, session.document.part(Measurements).all,
+        )  # fmt: skip
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""
@@ -67,7 +80,11 @@ class Capture:
         except InputError as error:
             entry = None
             self._note(Problem(f"The picture cannot be replayed: {error}"))
-        work = partial(self._save_picture, surface.image(), entry, self._session.hash_found)
+        legend = None
+        if entry is not None and self._viewport.request is not None:
+            legend = with_hidden(entry.legend(self._playback.timeline, self._viewport.request.pose), surface)
+        finish = partial(marked, surface.image(), legend, surface.color_range, surface.value_kind)
+        work = partial(self._save_picture, finish, entry, self._session.hash_found)
         self._saving.append(in_background(Task("Saving"), work))
 
     # --- recording --------------------------------------------------------------------
@@ -144,8 +161,11 @@ class Capture:
         for journal in journals():
             self._saving.append(in_background(Task("Saving"), partial(_saved_late, journal)))
 
-    def _save_picture(self, image: NDArray[np.uint8], entry: Entry | None, hash: Future[str | None]) -> str:
-        """Write it under the next free name, with the entry's text and the scan's hash, which this waits for.
+    def _save_picture(
+        self, finish: Callable[[], NDArray[np.uint8]], entry: Entry | None, hash: Future[str | None]
+    ) -> str:
+        """Write the image that `finish` brings under the next free name, with the entry's text and the scan's
+        hash, which this waits for.
 
         Returns what to tell.
         """
@@ -153,7 +173,7 @@ class Capture:
         with self._naming:
             path = free_file(working_folder(), ".png")
             try:
-                write_png(image, path, text)
+                write_png(finish(), path, text)
             except Exception as error:  # whatever a folder brings, the window stays
                 return failure_in_words(f"Saving {path}", error)
         return f"Saved {path}"

@@ -19,7 +19,12 @@ _TITLE, _LEAVING = "Export", "Close Scan4D?"
 _WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Frames, one after the other"}
 _FORMATS = {PNG: "PNG pictures", EXR: "EXR: the surface behind the picture", MP4: "MP4 film"}
 _SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
-_MARKS = {"scale_bar": "Scale bar", "color_bar": "Colour bar", "stamp": "Frame and time"}
+_MARKS = {
+    "scale_bar": "Scale bar",
+    "color_bar": "Colour bar",
+    "stamp": "Frame and time",
+    "measurements": "Measurements",
+}
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
 
 

@@ -43,11 +43,11 @@ class Exporting:
         playback: Playback,
         viewport: Viewport,
         note: Callable[[str], None],
-        shown: Callable[[], Entry | None],
+        shown: Callable[[Marks], Entry | None],
         choices: Choices,
         marks: Marks,
     ) -> None:
-        """shown: brings what the picture shows."""
+        """shown: brings what the picture shows, with these marks."""
         self._session, self._playback, self._viewport = session, playback, viewport
         self._note, self._shown = note, shown
         self.choices = choices
@@ -141,7 +141,7 @@ class Exporting:
     def _entry(self) -> Entry | None:
         """The entry of what the picture shows; where that cannot be drawn again, the user is told why."""
         try:
-            return self._shown()
+            return self._shown(self.marks)
         except InputError as error:
             self._note(Problem(f"Cannot export: {error}"))
         return None

@@ -9,7 +9,6 @@ from imgui_bundle import ImVec2, imgui
 from ...camera import Camera
 from ...geometry import Vector
 from .. import theme
-from . import navigation
 from .labels import Box, Line, free_place, usual_place
 
 _OUTLINE = 0x000000  # so that what is light is seen on any surface
@@ -33,7 +32,7 @@ class ViewPlace:
 
     def on_screen(self, position: Vector) -> ImVec2 | None:
         """A place of the scan on the screen; None behind the eye. position: float64, scan units."""
-        place = navigation.place_in_picture(self.camera, position)
+        place = self.camera.place_in_picture(position)
         if place is None:
             return None
         return self.corner + self.size * 0.5 + ImVec2(place[0] * self.size.y, -place[1] * self.size.y)

@@ -21,7 +21,10 @@ _STEPS = 32  # of a colour bar; colours between them are blended
 
 
 class ViewMarks:
-    """The marks over the view. shown: which of them are, by the user's choice."""
+    """The marks over the view.
+
+    shown: which of them are, by the user's choice. in_files: whether saved pictures and recordings have them.
+    """
 
     def __init__(
         self,
@@ -31,10 +34,21 @@ class ViewMarks:
         steering: Steering,
         ranging: Ranging,
         shown: Marks,
+        in_files: bool,
     ) -> None:
         self._session, self._playback, self._viewport = session, playback, viewport
         self._steering, self._ranging = steering, ranging
         self.shown = shown
+        self.in_files: bool = in_files
+
+    @property
+    def of_files(self) -> Marks:
+        """The marks of saved pictures and recordings: as the view has them, or none."""
+        return replace(self.shown, measurements=True) if self.in_files else Marks()
+
+    def toggle_in_files(self) -> None:
+        """Have pictures saved with the marks of the view, or bare."""
+        self.in_files = not self.in_files
 
     def toggle(self, name: str) -> None:
         """Show one of `marks.MARKS` or hide it."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...bounds import Bounds
 from ...camera import Camera
 from ...geometry import Vector
@@ -36,17 +34,6 @@ def view_from(
     return Camera.orbit(
         bounds, azimuth, elevation, aspect=aspect, up=up, fov_y=camera.fov_y, projection=camera.projection
     )
-
-
-def place_in_picture(camera: Camera, point: Vector) -> tuple[float, float] | None:
-    """The place of a point in the picture: to the right of and above its centre; None behind the eye."""
-    right, up, back = camera.rotation() @ np.subtract(point, camera.eye)
-    if back >= 0:
-        return None
-    height = camera.view_height
-    if camera.projection == "perspective":
-        height *= -back / camera.distance
-    return float(right / height), float(up / height)
 
 
 def shows(camera: Camera, bounds: Bounds, aspect: float) -> bool:

@@ -135,7 +135,7 @@ def _pixel(app: App) -> tuple[int, int]:
 
 def _draw_pivot(camera: Camera, pivot: Vector, size: ImVec2) -> None:
     """A ring round the point that the view turns about."""
-    place = navigation.place_in_picture(camera, pivot)
+    place = camera.place_in_picture(pivot)
     if place is None:
         return
     center = imgui.get_item_rect_min() + size * 0.5 + ImVec2(place[0] * size.y, -place[1] * size.y)

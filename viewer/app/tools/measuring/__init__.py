@@ -9,7 +9,7 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ....analysis.measure import End, Measurement, Reading, reading_of, save_table, table, to_text
+from ....analysis.measure import End, Measurement, Reading, end_slack, reading_of, save_table, table, to_text
 from ....analysis.pick import is_seen
 from ....document.measurements import Measurements
 from ....errors import InputError
@@ -27,7 +27,6 @@ from .words import distance_words
 log = logging.getLogger(__name__)
 TITLE = "Measurements"
 _LONGEST_UNIT = 16  # letters
-_SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is before what it hides
 
 
 class Tool:
@@ -171,9 +170,7 @@ class Tool:
             self._seen = shown, {}
         known = self._seen[1]
         if end not in known:
-            spacings, share = _SLACK
-            slack = spacings * (end.spacing or 0) + share * self.desk.viewport.bounds(shown.pose).radius
-            slack += end.uncertainty or 0
+            slack = end_slack(end, self.desk.viewport.bounds(shown.pose).radius)
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 
 from ....analysis.measure import End, Reading
+from ....output.marks import LINE_COLOR
 from ...scene.canvas import Canvas, Label, ViewPlace
 from .words import distance_words
 
 if TYPE_CHECKING:
     from . import Tool
 
-_COLOR = 0x58D6F0
+_COLOR = int(LINE_COLOR[1:], 16)
 _DIM = 0.35  # opacity where an end is not seen
 
 
