@@ -62,6 +62,10 @@ def app() -> Any:
     )
 
 
+def no_film(recording: Recording, path: Path) -> None:
+    raise AssertionError(path)
+
+
 def turn(app: Any) -> None:
     """Show another picture."""
     request = app.viewport.request
@@ -77,7 +81,7 @@ def colour_by_a_layer(app: Any) -> None:
 
 
 def test_what_cannot_be_drawn_again_is_not_recorded(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
     capture.toggle_recording()
     colour_by_a_layer(app)
     capture.note_shown()
@@ -100,7 +104,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
     app.viewport.request = replace(app.viewport.request, pose=bare)
     with closing(open_scan("demo")) as timeline:
         playback = SimpleNamespace(unit="mm", timeline=timeline)
-        capture = Capture(app.session, playback, app.viewport, app.note, Marks)
+        capture = Capture(app.session, playback, app.viewport, app.note, Marks, no_film)
         exporting = Exporting(
             app.session, playback, app.viewport, app.note, capture.shown,
             Choices(what="frames", folder=str(tmp_path), name="a"), Marks(),
@@ -112,7 +116,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
 
 
 def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
     app.session.hash_found.set_result(None)
     image = np.zeros((48, 64, 3), np.uint8)
     app.viewport.surface = SimpleNamespace(image=lambda: image, color_range=None, value_kind=None)
@@ -132,7 +136,7 @@ def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) 
 def test_a_journal_that_failed_goes_when_the_recording_is_saved(
     app: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
     capture.toggle_recording()
 
     def full(*_: object) -> None:
@@ -153,7 +157,7 @@ def test_a_journal_that_failed_goes_when_the_recording_is_saved(
 
 
 def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Path) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
     capture.toggle_recording()
     (tmp_path / "work").rmdir()  # then the working folder is the user's own
     capture.toggle_recording()
@@ -165,7 +169,7 @@ def test_a_recording_goes_where_there_is_room(app: Any, tmp_path: Path, home: Pa
 def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
     app: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
     capture.toggle_recording()
 
     def full(*_: object) -> None:
@@ -182,7 +186,7 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
 
 
 def test_closing_waits_for_no_question(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks)
+    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
     answered = threading.Event()
     capture.tell_later(lambda: str(answered.wait()))
     capture.close()  # or else for ever

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("imgui_bundle")
 
 from viewer.app.help import has_words, in_columns
-from viewer.app.notices import Notices, Problem
+from viewer.app.notices import Notices, Offer, Problem
 
 
 def texts(notices: Notices, now: float) -> list[str]:
@@ -55,6 +55,17 @@ def test_problems_are_sent_away_one_by_one_or_all_by_escape() -> None:
     notices.on_escape()
     assert texts(notices, now) == []
     assert [notice.text for notice in notices.all] == ["one", "two", "three"]
+
+
+def test_an_offer_stays_until_another_one_about_the_same() -> None:
+    notices = Notices()
+    notices.tell(Offer("saved one", {"Film": list}, "recording"))
+    notices.tell(Offer("it has changed", {"Reload": list}, "scan"))
+    later = time.monotonic() + 3600
+    assert texts(notices, later) == ["saved one", "it has changed"]
+    notices.tell(Offer("saved two", {"Film": list}, "recording"))
+    assert texts(notices, later) == ["it has changed", "saved two"]
+    assert len(notices.all) == 3, "all are in the log"
 
 
 def test_columns_of_the_keys_are_about_as_long_and_keep_their_order() -> None:

@@ -19,7 +19,7 @@ from written import film
 
 from viewer.document.recording import Recording
 from viewer.look import color_table
-from viewer.output.marks import INK
+from viewer.output.marks import INK, Marks
 from viewer.scan import formats
 from viewer.scan.formats.exr import write_views
 
@@ -123,6 +123,30 @@ def test_the_colour_bar_shows_the_map(app: RunningApp) -> None:
     assert len(places) > 30
     assert (np.diff(places) <= 0).all(), "high is at the top"
     assert all(np.abs(table[place] - color).max() <= 8 for place, color in zip(places, colored, strict=True))
+
+
+def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: Path) -> None:
+    """With the marks of the view; the recording is saved before that."""
+    app.screen.do("key", "r")
+    app.see(is_recording=True)
+    for key in ("Right", "Right"):
+        app.screen.do("key", key)
+        app.settle()
+    app.screen.do("key", "r")
+    recording = Path(app.told(r"Recorded .* s\.  Saved (.+\.json)$")[1])
+    entries = Recording.load(recording).entries
+    assert [entry.pose for entry in entries] == [0, 1, 2]
+    assert {entry.marks for entry in entries} == {Marks(True, True, False, True)}
+    app.act("problems", ("item_click", "$$0/Save as film"))
+    out = Path(app.told(r"Saved (.+\.mp4)")[1])
+    frames, _ = film(out)
+    width, height = app.view()[2:]
+    assert frames[0].shape[:2] == (height + height % 2, width + width % 2)
+    assert (np.abs(frames[0][-60:, :90].astype(int) - INK[:3]).max(axis=2) < 60).any(), "the scale bar"
+    app.screen.do("key", "Home", "key", "Escape")
+    app.settle()
+    for path in (recording, out):
+        path.unlink()
 
 
 def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:

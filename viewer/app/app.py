@@ -144,8 +144,9 @@ class App:
         self.counting = Counting()
         self.panel = Panel(remembered.panel)
         self.capture: Capture = Capture(
-            self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files
-        )
+            self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
+            lambda *film: self.exporting.film(*film),
+        )  # fmt: skip
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(
             self.session, self.playback, self.viewport, self.note, self.capture.shown,

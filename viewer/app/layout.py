@@ -37,7 +37,7 @@ def draw(app: App) -> Place:
         ))  # fmt: skip
     place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
     for name, draw_part in (
-        ("Problems", lambda: app.notices.draw_problems(*place, app.palette.broken)),
+        ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken)),
         ("The list of work", lambda: app.tasks.draw(place, head)),
         ("Help", app.help.draw),
         ("The dialog that opens scans", lambda: app.browser.draw(app.palette.broken)),

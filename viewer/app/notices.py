@@ -1,11 +1,12 @@
-"""What the user is told: short notes over the picture that go by themselves, problems that stay until they
-are sent away, and a log of all."""
+"""What the user is told: short notes over the picture that go by themselves, problems and offers that stay
+until they are sent away, and a log of all."""
 
 from __future__ import annotations
 
 import logging
 import math
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -31,15 +32,37 @@ class Problem(str):
     """A text that tells what went wrong: it stays until the user sends it away."""
 
 
+class Offer(str):
+    """A text with buttons: it stays until the user presses one, or sends it away.
+
+    choices: what each does by its title. about: what it is about; another offer on that takes its place.
+    """
+
+    choices: Mapping[str, Callable[[], object]]
+    about: str
+
+    def __new__(cls, text: str, choices: Mapping[str, Callable[[], object]], about: str) -> Offer:
+        """An offer with this text."""
+        offer = super().__new__(cls, text)
+        offer.choices, offer.about = choices, about
+        return offer
+
+
 @dataclass(frozen=True)
 class Notice:
     """One message. at: when it came, local time. until: by the clock, when it goes. is_problem: whether it
-    tells what went wrong."""
+    tells what went wrong. offer: with the buttons that it has, None without any."""
 
     text: str
     at: datetime
     until: float
     is_problem: bool = False
+    offer: Offer | None = None
+
+    @property
+    def stays(self) -> bool:
+        """Whether it stays until the user sends it away."""
+        return self.is_problem or self.offer is not None
 
 
 class Notices:
@@ -51,22 +74,24 @@ class Notices:
         self._foot = 0.0  # height of the problems over the picture
 
     def tell(self, text: str) -> None:
-        """Show a message for as long as it takes to read, a `Problem` until it is sent away, and keep it in
-        the log."""
-        is_problem, text = isinstance(text, Problem), printable(text)
+        """Show a message for as long as it takes to read, a `Problem` or an `Offer` until it is sent away,
+        and keep it in the log."""
+        is_problem, offer = isinstance(text, Problem), text if isinstance(text, Offer) else None
+        text = printable(text)
         log.info("%s", text)
         seconds, per_letter = _LASTS
-        until = math.inf if is_problem else time.monotonic() + seconds + per_letter * len(text)
-        self.all = [self._gone(each) if is_problem and each.text == text else each for each in self.all]
-        self.all.append(Notice(text, datetime.now(), until, is_problem))
+        until = math.inf if is_problem or offer else time.monotonic() + seconds + per_letter * len(text)
+        new = Notice(text, datetime.now(), until, is_problem, offer)
+        self.all = [self._gone(each) if _replaces(new, each) else each for each in self.all]
+        self.all.append(new)
         del self.all[:-_MOST_KEPT]
         self.count += 1
 
     def shown(self, now: float) -> list[Notice]:
-        """Notices to show over the picture, the oldest first: the last few, and the last few problems."""
-        there = [notice for notice in self.all[-_MOST_SHOWN:] if notice.until > now and not notice.is_problem]
-        problems = [notice for notice in self.all if notice.is_problem and notice.until > now]
-        return problems[-_MOST_SHOWN:] + there
+        """Notices to show over the picture, the oldest first: the last few, and the last few that stay."""
+        there = [notice for notice in self.all[-_MOST_SHOWN:] if notice.until > now and not notice.stays]
+        staying = [notice for notice in self.all if notice.stays and notice.until > now]
+        return staying[-_MOST_SHOWN:] + there
 
     def next_change(self, now: float) -> float:
         """Seconds until one of those shown goes; infinite where none does by itself."""
@@ -91,18 +116,19 @@ class Notices:
         pad = ImVec2(0.8 * em, 0.5 * em)
         bottom = size.y - _FOOT * em - self._foot
         for notice in reversed(self.shown(time.monotonic())):
-            if notice.is_problem:
+            if notice.stays:
                 continue
             extent = imgui.calc_text_size(notice.text, wrap_width=wrap)
             corner = ImVec2((size.x - extent.x) / 2, bottom - extent.y)
             draw_text(notice.text, corner, extent, wrap, pad)
             bottom = corner.y - 2 * pad.y - 0.4 * em
 
-    def draw_problems(self, left: float, top: float, width: float, height: float, color: int) -> None:
-        """Declare a window with the problems, over the 3D view. color: 0xRRGGBB, of the mark beside each."""
-        problems = [notice for notice in self.shown(time.monotonic()) if notice.is_problem]
+    def draw_staying(self, left: float, top: float, width: float, height: float, color: int) -> None:
+        """Declare a window with problems and offers, over the 3D view. color: 0xRRGGBB, of the mark beside
+        each problem."""
+        staying = [notice for notice in self.shown(time.monotonic()) if notice.stays]
         self._foot = 0.0
-        if not problems:
+        if not staying:
             return
         em = imgui.get_font_size()
         foot = ImVec2(left + width / 2, top + height - 0.5 * _FOOT * em)
@@ -111,28 +137,47 @@ class Notices:
         imgui.begin("problems", None, _STILL)
         buttons = 2 * imgui.get_frame_height() + 3 * em
         wrap = max(10 * em, min(_WIDTH * em, width - buttons - 5 * em))
-        for number, notice in enumerate(problems):
+        for number, notice in enumerate(staying):
             imgui.push_id(number)
-            self._draw_problem(notice, wrap, color)
+            self._draw_staying(notice, wrap, color)
             imgui.pop_id()
         self._foot = imgui.get_window_size().y
         imgui.end()
 
-    def _draw_problem(self, notice: Notice, wrap: float, color: int) -> None:
-        imgui.push_style_color(imgui.Col_.text, theme.packed(color))
-        imgui.text(icons.ICON_FA_TRIANGLE_EXCLAMATION)
-        imgui.pop_style_color()
+    def _draw_staying(self, notice: Notice, wrap: float, color: int) -> None:
+        if notice.is_problem:
+            imgui.push_style_color(imgui.Col_.text, theme.packed(color))
+            imgui.text(icons.ICON_FA_TRIANGLE_EXCLAMATION)
+            imgui.pop_style_color()
+        else:
+            imgui.text(icons.ICON_FA_CIRCLE_INFO)
         imgui.same_line()
         start = imgui.get_cursor_pos_x()
         imgui.push_text_wrap_pos(start + wrap)
         imgui.text_unformatted(notice.text)
         imgui.pop_text_wrap_pos()
         imgui.same_line(start + wrap + imgui.get_style().item_spacing.x)
-        if imgui.button("Copy"):
-            imgui.set_clipboard_text(notice.text)
-        imgui.same_line()
+        if notice.is_problem:
+            if imgui.button("Copy"):
+                imgui.set_clipboard_text(notice.text)
+            imgui.same_line()
         if widgets.icon_button(icons.ICON_FA_XMARK, "Send it away (Esc)"):
             self.send_away(notice)
+        if notice.offer is not None:
+            imgui.set_cursor_pos_x(start)
+            for title, act in notice.offer.choices.items():
+                if imgui.button(title):
+                    self.send_away(notice)
+                    act()
+                imgui.same_line()
+            imgui.new_line()
+
+
+def _replaces(new: Notice, former: Notice) -> bool:
+    """Whether a message is not to be shown any longer beside another."""
+    if new.offer is not None and former.offer is not None:
+        return new.offer.about == former.offer.about
+    return new.is_problem and former.text == new.text
 
 
 def draw_text(text: str, corner: ImVec2, extent: ImVec2, wrap: float, pad: ImVec2) -> None:

@@ -18,11 +18,11 @@ from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
 from ...errors import InputError, explained
 from ...files import free_file, working_folder
-from ...output.export import with_hidden, write_png
+from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.marks import Marks, marked
 from ...task import Task, in_background
 from ..failures import failure_in_words
-from ..notices import Problem
+from ..notices import Offer, Problem
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -43,9 +43,10 @@ class Capture:
         viewport: Viewport,
         note: Callable[[str], None],
         marks: Callable[[], Marks],
+        film: Callable[[Recording, Path], object],
     ) -> None:
-        """marks: brings those that what is saved has."""
-        self._marks = marks
+        """marks: brings those that what is saved has. film: makes one of a recording, under this name."""
+        self._marks, self._film = marks, film
         self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
         self.last: Path | None = None
@@ -106,25 +107,30 @@ class Capture:
         recorder, self.recorder = self.recorder, None
         journal, self._journal = self._journal, None
         if len(recorder):
-            self._note(self._save_recording(recorder.finish(now), journal))
+            self._save_recording(recorder.finish(now), journal)
         else:
             self._note("Nothing was shown while recording.")
             if journal is not None:
                 journal.remove()
 
-    def _save_recording(self, recording: Recording, journal: Journal | None) -> str:
-        """Save a recording; what to tell of it. journal: what is there of it already."""
+    def _save_recording(self, recording: Recording, journal: Journal | None) -> None:
+        """Save a recording, and offer a film of it. journal: what is there of it already."""
         try:
-            self.last = written(recording, working_folder())
+            path = self.last = written(recording, working_folder())
         except Exception as error:  # whatever a folder brings, the window stays
             words = failure_in_words("Saving the recording", error)
-            if journal is None:
-                return words
-            journal.leave()
-            return f"{words} What was recorded until then is kept, and saved at the next start."
+            if journal is not None:
+                journal.leave()
+                words += " What was recorded until then is kept, and saved at the next start."
+            self._note(Problem(words))
+            return
         if journal is not None:
             journal.remove()
-        return f"Saved {self.last}"
+        choices = {
+            "Save as film": lambda: self._film(recording, path.with_suffix(FILM_SUFFIX)),
+            "Keep the recording alone": lambda: None,
+        }
+        self._note(Offer(f"Recorded {recording.seconds:.1f} s.  Saved {path}", choices, "recording"))
 
     def note_shown(self) -> None:
         """Take down what is shown where that is being recorded; where that cannot be, the recording ends."""

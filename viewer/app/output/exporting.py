@@ -8,15 +8,17 @@ from concurrent.futures import Future
 from concurrent.futures import wait as wait_for
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from ...document.recording import Entry
+from ...document.recording import Entry, Recording
 from ...document.render_job import Made, make
 from ...errors import InputError
 from ...files import working_folder
 from ...output.marks import Marks
 from ...scan.inputs import found_among, scan_inputs
+from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
-from ..notices import Problem
+from ..notices import Offer, Problem
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -130,12 +132,22 @@ class Exporting:
         self.is_open, self.replaced = False, []
         pivot, place = self._session.document.pivot, self._session.laid.place
         recording = export_plan.recording(choices, shown, self.marks, timeline.times, pivot, place)
-        out, rate, anonymous = choices.out(), self.rate, choices.anonymous
-        numbers = choices.numbers(self.count)
-        task = self.task = Task(f"Exporting {choices.name}")
-        self._work = in_background(
-            task, lambda: make(task, recording, out, rate, anonymous, numbers, replaced=there)
-        )
+        rate, numbers = self.rate, choices.numbers(self.count)
+        self._begin(choices.name, recording, choices.out(), rate, choices.anonymous, numbers, replaced=there)
+
+    def film(self, recording: Recording, out: Path) -> None:
+        """Make a film of a recording, of the size that the view had. out: under another name where that is
+        taken."""
+        if self.task is None:
+            self._begin(out.name, recording, out, DEFAULT_FPS, False)
+        else:
+            again = {"Save as film": lambda: self.film(recording, out)}
+            self._note(Offer("An export is running: wait for it, or cancel it.", again, "recording"))
+
+    def _begin(self, name: str, recording: Recording, out: Path, *how: Any, **more: Any) -> None:
+        """Have a process make pictures or a film. how, more: as `make` takes them."""
+        task = self.task = Task(f"Exporting {name}")
+        self._work = in_background(task, lambda: make(task, recording, out, *how, **more))
         log.debug("exporting %s", out)
 
     def _entry(self) -> Entry | None:
