@@ -157,7 +157,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
         hands.measure(60)
         hands.press("o", "ctrl+b", "b")
         done = app.settle()
-        time.sleep(1.5)
+        time.sleep(1.0)
         app.process.send_signal(signal.SIGKILL)
         app.process.wait()
     kept = kept_of(tmp_path, scan)

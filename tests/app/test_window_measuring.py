@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -145,6 +146,13 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
             assert (row["frame_1"], row["id_1"], row["id_2"]) == (str(frame + 1), "34", "128")
             place = [float(row[f"{axis}_2"]) for axis in "xyz"]
             assert math.dist(place, frames[frame][128]) < 2 * CLICK
+
+        ctrl(screen, "z")
+        expect_reading(app)
+        for told in ("Read 1 measurements.", "Read 0 measurements, 1 were there already"):
+            app.drop(tmp_path / "table.csv")
+            app.told(re.escape(told))
+            expect_reading(app, distances[1])
 
         ctrl(screen, "o")
         app.settle()

@@ -30,7 +30,7 @@ _BEHIND = (
 _WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
 _AROUND = 3, 64  # pixels, at least and at most, in which points are looked for
 _SPACINGS = 3.0  # in which they are looked for: two dozen points
-_FOLLOWED = 8  # of them are kept, to follow
+FOLLOWED = 8  # of them are kept, to follow
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def _told(
     ]
     deeper = surface.layers.place.directions(surface.view.along(pixel)) * found.deviation
     off = np.column_stack([*(side / np.sqrt(12) for side in aside), deeper])
-    kept = found.used[:_FOLLOWED]
+    kept = found.used[:FOLLOWED]
     offsets = surface.layers.place.points(points[kept] + surface.view.origin) - position
     neighbors = (Neighbor(id, vector(offset)) for id, offset in zip(ids[kept].tolist(), offsets, strict=True))
     return off @ off.T, tuple(neighbors)

@@ -157,7 +157,7 @@ class App:
         )
         self.browser: Browser = Browser(
             self.session, self.scans, self.sessions, self._opening, self.open, self.replayer.replay,
-            Previewer(window.ctx),
+            self.tools.take_file, Previewer(window.ctx),
         )  # fmt: skip
         self._slow_devices = remembered.slow_devices
         if (gpu := self.renderer.gpu).software and gpu.device not in self._slow_devices:

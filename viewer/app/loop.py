@@ -116,7 +116,14 @@ class Loop:
 
     def _take_dropped(self) -> None:
         app = self._app
-        dropping.take(app.window.take_dropped(), app.scans, app.sessions, app.replayer.replay, app.note)
+        dropping.take(
+            app.window.take_dropped(),
+            app.scans,
+            app.sessions,
+            app.replayer.replay,
+            app.tools.take_file,
+            app.note,
+        )
 
     def _draw(self) -> None:
         app, start = self._app, time.perf_counter()

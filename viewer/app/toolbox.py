@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ..analysis.pick import before_gap, pick
@@ -223,6 +224,14 @@ class Toolbox:
         picked = pick(surface, *pixel, shown=meant)
         click = Click(picked, request.pose, meant != pixel, request.layers.place, meant)
         self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
+
+    def take_file(self, path: Path) -> bool:
+        """Whether a file that the user opens or drops is a tool's, which takes it."""
+        return any(
+            self._ask(slot, lambda tool: tool.on_file(path), self.note)
+            for slot in self._slots.values()
+            if slot.has("on_file")
+        )
 
     @property
     def is_under_way(self) -> bool:

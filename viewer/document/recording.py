@@ -157,7 +157,7 @@ class Entry:
         if self.measurements and self.marks.measurements:
             lines = measured_lines(self.measurements, pose, timeline.one_topology, self.motion, unit)
         return Legend(
-            self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time, lines
+            self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time, lines=lines
         )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:

@@ -54,11 +54,14 @@ class Browser:
         opening: Opening,
         open: Callable[[str], None],
         replay: Callable[[Path], None],
+        take_file: Callable[[Path], bool],
         previewer: Previewer,
     ) -> None:
-        """opening: what opens scans. open: opens a scan that was opened before. replay: shows a recording."""
+        """opening: what opens scans. open: opens a scan that was opened before. replay: shows a recording.
+        take_file: has a tool take a file that is its own."""
         self._session, self._scans, self._sessions, self._opening = session, scans, sessions, opening
         self._open_again, self._replay, self._previewer = open, replay, previewer
+        self._take_file = take_file
         self._folder = working_folder()
         self._asked = False  # to be opened
         self.is_open = self._is_done = False
@@ -203,6 +206,8 @@ class Browser:
             self._sessions.open_with(session, scan)
         elif is_recording(Path(scan)):
             self._replay(Path(scan))
+        elif self._take_file(Path(scan)):
+            pass
         else:
             self._scans.open([scan])
 

@@ -18,15 +18,18 @@ def take(
     scans: Scans,
     sessions: Sessions,
     replay: Callable[[Path], None],
+    take_file: Callable[[Path], bool],
     note: Callable[[str], None],
 ) -> None:
     """Open what was dropped together: a whole sequence as one scan, else the first, and the others listed.
 
-    A recording or a picture is replayed, a session is opened where it was dropped alone. paths: none where
-    nothing was dropped.
+    A recording or a picture is replayed, a session is opened, a tool's file is taken by it where it was
+    dropped alone. paths: none where nothing was dropped. take_file: has a tool take one that is its own.
     """
     if len(paths) == 1 and is_session(Path(paths[0])):
         sessions.open(Path(paths[0]))
+        return
+    if len(paths) == 1 and take_file(Path(paths[0])):
         return
     told = [path for path in paths if os.path.isfile(path) and is_recording(Path(path))]
     if told and len(paths) == 1:

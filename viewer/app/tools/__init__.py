@@ -22,6 +22,7 @@ The Tool has any of
     prompt()                what to say at the top of the view while it has the clicks
     on_click(click)         a click in the view while it has the clicks (`desk.take_clicks`); False: it is not
                             taken, and a double click turns the view about what is there, as without a tool
+    on_file(path)           a file was opened or dropped; True: it is this tool's, and no scan
     on_escape()             Escape was pressed; True: that has ended something
     is_under_way()          whether something has begun that is in no document yet: undo takes that back first
     abandon()               let go of it: for undo, and since another scan or document is shown from now on

@@ -34,7 +34,7 @@ class DemoSource:
 
     def label(self, index: int) -> str:
         """The name of a pose."""
-        return f"demo, {frame_in_words(index)}"
+        return frame_in_words(index)
 
     def times(self) -> NDArray[np.float64]:
         """(T,) seconds."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ....analysis.measure import End, Measurement, Reading, end_slack, reading_of, save_table, table, to_text
+from ....analysis.measured_table import is_measurement_table, read_measurements
 from ....analysis.pick import is_seen
 from ....document.measurements import Measurements
 from ....errors import InputError
@@ -196,6 +199,28 @@ class Tool:
         save_table(file, self._table())
         self.desk.note(f"Saved {file}")
 
+    def on_file(self, path: Path) -> bool:
+        """Add the measurements of a table that was saved of this scan, but those that are there; whether the
+        file is such a table."""
+        if not is_measurement_table(path):
+            return False
+        pose, timeline = self.desk.pose, self.desk.timeline
+        if pose is not None and not self.desk.motion(pose).is_identity:
+            self.desk.note("The scan is moved by a tool: put it back first, then open the table again.")
+            return True
+        work = partial(read_measurements, path, timeline.name, self.desk.unit, len(timeline), timeline.pose)
+        self.desk.run(f"Reading {path.name}", work, self._add)
+        return True
+
+    def _add(self, read: Sequence[Measurement]) -> None:
+        known = {_places(measurement) for measurement in self.made.all}
+        new = tuple(measurement for measurement in read if _places(measurement) not in known)
+        if new:
+            self.desk.change("Read measurements", Measurements((*self.made.all, *new)))
+            self.desk.reveal()
+        there = f", {len(read) - len(new)} were there already" if len(new) < len(read) else ""
+        self.desk.note(f"Read {len(new)} measurements{there}.")
+
     def _table(self) -> list[list[object]]:
         """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
         rows: list[tuple[int, Reading]] = []
@@ -204,6 +229,12 @@ class Tool:
             if reading.measurement != made:
                 rows.append((number, reading))
         return table(rows, self.desk.timeline.name, self.desk.unit)
+
+
+def _places(measurement: Measurement) -> tuple[object, ...]:
+    """The frames and places of the ends, to a millionth of their distance: what tells it from others."""
+    digits = 6 - math.floor(math.log10(measurement.distance or 1))
+    return tuple((end.frame, *(round(x, digits) for x in end.position)) for end in measurement.ends)
 
 
 def _place_words(end: End) -> tuple[str, str]:

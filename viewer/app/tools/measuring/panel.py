@@ -89,6 +89,7 @@ def _draw_outlets(measuring: Tool, ui: Ui) -> None:
     imgui.same_line()
     if imgui.button("Save CSV...", third):
         measuring.ask_to_save()
+    widgets.tooltip("Opening or dropping the file brings them back")
     imgui.same_line()
     if imgui.button("Clear", third):
         measuring.clear()
