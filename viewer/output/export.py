@@ -132,8 +132,10 @@ def write_png(image: NDArray[np.uint8], path: Path | str, description: str | Non
 
 
 def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
-    shown = None if legend is None else with_hidden(legend, surface)
-    return marked(surface.image(), shown, surface.color_range, surface.value_kind)
+    image = surface.image()
+    if legend is None:
+        return image
+    return marked(image, with_hidden(legend, surface), surface.color_range, surface.value_kind)
 
 
 def with_hidden(legend: Legend, surface: Surface) -> Legend:

@@ -206,8 +206,9 @@ class Browser:
             self._sessions.open_with(session, scan)
         elif is_recording(Path(scan)):
             self._replay(Path(scan))
+            self.opened()
         elif self._take_file(Path(scan)):
-            pass
+            self.opened()
         else:
             self._scans.open([scan])
 
