@@ -14,9 +14,11 @@ void take_pixels(ivec4 pixels, uint row) {
     for (int y = pixels.y; y < pixels.w; ++y)
         for (int x = pixels.x; x < pixels.z; ++x) {
             vec2 off = vec2(x, y) + 0.5 - center;
-            precise float here = key.x + (key.y * off.x + key.z * off.y);
-            float edge = view_perspective ? here * here : 1.0;
-            if (form.x * off.x * off.x + off.y * (2.0 * form.y * off.x + form.z * off.y) > edge) continue;
+            // The same numbers as surfels/tiles/nearest.glsl finds, where other discs of the picture are drawn so.
+            precise float column = key.x + key.y * off.x, here = column + key.z * off.y;
+            precise float shape = form.x * off.x * off.x;
+            shape += off.y * (2.0 * form.y * off.x + form.z * off.y);
+            if (shape > (view_perspective ? here * here : 1.0)) continue;
             float depth = linear_depth(here);
             if (in_depth_range(depth)) take_pixel(uint(y * view_size.x + x), floatBitsToUint(depth), row);
         }

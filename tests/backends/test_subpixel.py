@@ -194,7 +194,7 @@ def test_a_lone_one_is_shown_in_its_plane_within_a_pixel_of_its_point(draw: Draw
     positions = np.stack([np.linspace(-0.9, 0.9, 18), 0.3 * np.sin(np.arange(18.0)), 0 * tilts], axis=1)
     normals = np.stack([np.sin(tilts), 0 * tilts, np.cos(tilts)], axis=1)
     cloud = PointCloud.from_arrays(positions, normals=normals, radii=np.full(18, 1e-5))
-    surface = surfels(draw, cloud, Camera((0, 0, 4), (0, 0, 0)), instancing=instancing)
+    surface = surfels(draw, cloud, Camera((0, 0, 4), (0, 0, 0)), instancing=instancing, radius="own")
     y, x = np.nonzero(surface.row != NOTHING)
     rows, depth = surface.row[y, x], surface.depth[y, x].astype(np.float64)
     assert len(np.unique(rows)) >= 12

@@ -472,9 +472,9 @@ def _arranged() -> Iterator[Row]:
         return lambda shot: shot.picked(order(np.arange(len(shot)), 1000))
 
     def few() -> PointView:
-        """Splats that reach so few tiles that these have room for a thousand of each."""
-        shot = _body(300)
-        return shot.given(radii=shot.arrays["radii"] / 3)
+        """Splats that leave no gaps, and reach so few tiles that these have room for a thousand of each."""
+        shot = PointView(wall(10, 8, spacing=0.25, wave=0.3), Camera((1.0, 0.5, 5.0)))
+        return shot.filled("radii", 0.21)
 
     def bare() -> PointView:
         """The same spacing everywhere: whatever is looked at to estimate it."""
@@ -483,6 +483,8 @@ def _arranged() -> Iterator[Row]:
     # Sums of a thousand copies exceed the 24 bits of float32, which is what a rasteriser adds.
     yield Row("points x1000, one after the other", few, copied(np.repeat), EXACT, summed=FLOAT32)
     yield Row("points x1000, all over again", few, copied(np.tile), EXACT, summed=FLOAT32)
+    # Lists of tiles overflow here, and some points hide others.
+    yield Row("points of a body x1000", partial(_body, 300), copied(np.repeat), FLOAT32)
     yield Row("points x1000 without radii", bare, copied(np.repeat), FLOAT32)
 
     def at_one_place() -> PointView:

@@ -33,8 +33,7 @@ KEPT = {
     "the fastest",
 }
 LIMITS = {
-    "points x1000, one after the other": Limit(0.012, _HIDDEN_COPIES),
-    "points x1000, all over again": Limit(0.012, _HIDDEN_COPIES),
+    "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
     "1x1 pixels": Limit(0.0, _BY_PICTURE),
     "8192x1 pixels": Limit(0.0, _BY_PICTURE),
     "collinear points end on, perspective": Limit(0.03, NO_SPACING),
