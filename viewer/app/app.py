@@ -32,6 +32,7 @@ from . import keys, settings, theme
 from .commands import Commands
 from .failures import Failures
 from .files.browser import Browser
+from .files.changes import Changes
 from .files.keeping import Keeping
 from .files.opening import Opened, Opening, begin, find_facts
 from .files.preview import Previewer
@@ -72,6 +73,7 @@ class App:
     steering: what moves its camera. pointer: what the mouse points at in it. bookmarks: cameras to go
     back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
+    changes: of the open one's files.
     keeping: keeps what is to come back at the next start.
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
     and films at other sizes.
@@ -159,6 +161,7 @@ class App:
             self.session, self.scans, self.sessions, self._opening, self.open, self.replayer.replay,
             self.tools.take_file, Previewer(window.ctx),
         )  # fmt: skip
+        self.changes: Changes = Changes(self.session, self.note, self.open)
         self._slow_devices = remembered.slow_devices
         if (gpu := self.renderer.gpu).software and gpu.device not in self._slow_devices:
             self._slow_devices = (*self._slow_devices, gpu.device)
@@ -329,6 +332,7 @@ class App:
         timeline, self.session.hash_found, _, left, problem, session = opened
         timeline.finish = self._find_facts
         self.ranging.begin(timeline)
+        self.changes.begin(timeline)
         if problem:
             self.note(problem)
         if session is not None:

@@ -93,6 +93,7 @@ class Loop:
             ("Listing scans", app.scans.advance),
             ("Listing a folder", app.browser.advance),
             ("Keeping", lambda: app.keeping.advance(now)),
+            ("Looking for changes", lambda: app.changes.advance(now)),
             ("Exporting", app.exporting.advance),
             ("Saving", app.capture.advance),
             ("Replaying", lambda: app.replayer.advance(now)),

@@ -28,6 +28,7 @@ from .place import Place, reachable
 
 _GL = (4, 3)
 _SIZE = (1600, 1000)
+_LEAST = (640, 420)  # times the display's scale; in less, menus and timeline are cut
 _SCREEN_SHARE = 0.9  # that a window takes at most
 _SETTLE_FRAMES = 3  # until ImGui has taken in an event: press, release, layout
 _TOOLTIP_DELAY = 0.6  # seconds; ImGui shows tooltips a moment after the last event
@@ -69,6 +70,8 @@ class Window(GlfwWindow):
         self._restore(place)
         # On a scaled display it is larger than asked for, which moderngl-window does not notice.
         self._width, self._height = glfw.get_window_size(self._window)
+        width, height = (round(side * self._display_scale) for side in _LEAST)
+        glfw.set_window_size_limits(self._window, width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self.exit_key = self.fullscreen_key = None
         glfw.set_window_attrib(self._window, glfw.AUTO_ICONIFY, False)  # a full screen beside others stays
         self.text_scale = 1.0
@@ -213,8 +216,7 @@ class Window(GlfwWindow):
 
     def _set_scale(self) -> None:
         """Follow the display that the window is on, and the user's choice."""
-        display = glfw.get_window_content_scale(self._window)[0] / self.pixel_ratio
-        if (scale := display * self.text_scale) != self._scale:
+        if (scale := self._display_scale * self.text_scale) != self._scale:
             self._scale = scale
             theme.set_sizes(scale)
             self.touch()
@@ -233,6 +235,11 @@ class Window(GlfwWindow):
         self.ctx.screen.use()
         self.ctx.viewport = (0, 0, *self.buffer_size)
         self.ctx.clear(*theme.rgb(color))
+
+    @property
+    def _display_scale(self) -> float:
+        """The scale of the display that the window is on, in ImGui's coordinates."""
+        return glfw.get_window_content_scale(self._window)[0] / self.pixel_ratio
 
     @property
     def pixel_ratio(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
+from ...scan.times import frame_in_words
 from .. import theme, widgets
 from .player import SPEEDS
 
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
 
 _SPEED_WIDTH = 4.6  # in heights of the font
 _SHORTEST_TRACK = 8.0
+_BAR = (0.12, 0.4)  # of the track's height, where the frames are
+_TICKS = 0.5  # where their numbers begin
+_TICK_TEXT = 0.75  # heights of the font
+_TICK_ROOM = 7.0  # from one to the next at least, in heights of their text
 _GAP = "    "  # between what is said of the place under the mouse
 
 
@@ -114,15 +120,21 @@ def _report(playback: Playback) -> str:
 
 
 def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> None:
-    """Draw the frames over time: cached ones coloured, broken ones red. A press or a drag goes there."""
+    """Draw the frames over time: cached ones coloured, broken ones red, and seconds. A press or a drag goes
+    there; what is under the mouse is told."""
     size = ImVec2(width, imgui.get_frame_height())
     if size.x < 1:
         return
     imgui.invisible_button("track", size)
     track = _Track(playback.player.edges, imgui.get_item_rect_min(), size)
+    timeline, frame = playback.timeline, playback.player.frame_at(track.time(imgui.get_mouse_pos().x))
     if imgui.is_item_active() or imgui.is_item_deactivated():
-        frame = playback.player.frame_at(track.time(imgui.get_mouse_pos().x))
         playback.seek(frame, time.monotonic())
+    if len(timeline) > 1:
+        if imgui.is_item_hovered():
+            words = [frame_in_words(frame), timeline.label(frame)]
+            imgui.set_tooltip("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words))))
+        track.seconds(float(timeline.times[0]))
     track.bar(0, len(playback.timeline), palette.frame[0])
     for run in playback.timeline.cached():
         track.bar(run.start, run.stop, palette.cached)
@@ -150,16 +162,41 @@ class _Track:
     def bar(self, start: int, stop: int, color: int) -> None:
         """Mark a run of frames, at least two pixels wide."""
         left, right = self.x(self.edges[start]), self.x(self.edges[stop])
-        top, bottom = self.corner.y + 0.32 * self.size.y, self.corner.y + 0.68 * self.size.y
+        top, bottom = (self.corner.y + share * self.size.y for share in _BAR)
         corners = ImVec2(left, top), ImVec2(max(right, left + 2), bottom)
         self.draw_list.add_rect_filled(*corners, theme.packed(color))
+
+    def seconds(self, first: float) -> None:
+        """Mark round times below the bar, with as many numbers as there is room for. first: of the first
+        frame, which the scan's times may begin at."""
+        size, font = _TICK_TEXT * imgui.get_font_size(), imgui.get_font()
+        duration = float(self.edges[-1])
+        step = tick_step(duration, self.size.x / (_TICK_ROOM * size))
+        decimals = max(0, -math.floor(math.log10(step)))
+        top, middle = (self.corner.y + share * self.size.y for share in (_BAR[1], _TICKS))
+        color = imgui.get_color_u32(imgui.Col_.text_disabled)
+        for number in range(math.ceil(first / step), math.floor((first + duration) / step) + 1):
+            x, text = self.x(number * step - first), f"{number * step:.{decimals}f} s"
+            self.draw_list.add_line(ImVec2(x, top), ImVec2(x, middle), color)
+            wide = imgui.calc_text_size(text).x * _TICK_TEXT
+            left = min(max(x - wide / 2, self.corner.x), self.corner.x + self.size.x - wide)
+            self.draw_list.add_text(font, size, ImVec2(left, middle), color, text)
 
     def head(self, index: int, color: int) -> None:
         """Mark the middle of the current frame."""
         x = (self.x(self.edges[index]) + self.x(self.edges[index + 1])) / 2
         half = 0.14 * self.size.y
-        corners = ImVec2(x - half, self.corner.y), ImVec2(x + half, self.corner.y + self.size.y)
+        bottom = self.corner.y + (_BAR[0] + _BAR[1]) * self.size.y
+        corners = ImVec2(x - half, self.corner.y), ImVec2(x + half, bottom)
         self.draw_list.add_rect_filled(*corners, theme.packed(color), half)
+
+
+def tick_step(duration: float, most: float) -> float:
+    """Seconds from one tick to the next: 1, 2 or 5 times a power of ten, so that there are at most so many in
+    the duration, or one where that is less."""
+    least = duration / max(most, 1.0)
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least)
 
 
 def _pointed(words: list[str], room: float) -> str:
