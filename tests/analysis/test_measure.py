@@ -285,6 +285,20 @@ def test_a_table_for_the_clipboard_has_tabs() -> None:
     assert [len(line.split("\t")) for line in text.splitlines()] == [len(COLUMNS)] * 2
 
 
+def test_a_table_tells_lengths_in_the_unit_that_it_names() -> None:
+    reading = reading_of(measured(moved(0), 0, 1), moved(0), True)
+    metres, millimetres = (
+        dict(zip(COLUMNS, table([(1, reading)], "scan", unit, factor)[1], strict=True))
+        for unit, factor in (("m", 1.0), ("mm", 1000.0))
+    )
+    lengths = {"distance", "x_1", "y_1", "z_1", "spacing_1", "x_2", "y_2", "z_2", "spacing_2"}
+    assert (metres["unit"], millimetres["unit"]) == ("m", "mm")
+    for name in lengths:
+        assert millimetres[name] == 1000.0 * metres[name], name
+    for name in set(COLUMNS) - lengths - {"unit", "uncertainty", "uncertainty_1", "uncertainty_2"}:
+        assert millimetres[name] == metres[name], name
+
+
 def test_a_csv_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         save_table(tmp_path / "no folder" / "a.csv", [["a"]])

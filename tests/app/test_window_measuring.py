@@ -84,8 +84,8 @@ def clipboard(screen: Screen) -> str:
 
 
 def name_unit(app: RunningApp, name: str) -> None:
-    """Type into the field for the unit."""
-    app.act(PANEL, ("item_input_value", "##unit", name))
+    """Say how long one unit of the scan is."""
+    app.choose(PANEL, "##unit", f"###{name}")
     app.see(unit=name)
 
 

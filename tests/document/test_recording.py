@@ -114,6 +114,7 @@ def test_an_anonymous_description_tells_neither_scan_nor_a_unit_of_its_own() -> 
     assert (whole["scan"], whole["anonymous"]) == ("knot", False)
     assert told == whole | {"scan": None, "anonymous": True}
     assert replace(FIRST, unit="jane").without_names().unit == "units"
+    assert replace(FIRST, shown_unit="m").without_names().shown_unit == "m"
 
 
 def test_the_recorder_notes_what_changes_and_when() -> None:

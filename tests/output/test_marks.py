@@ -91,6 +91,22 @@ def test_an_orthographic_scale_bar_is_as_long_as_it_says() -> None:
     assert scale_bar(replace(FLAT, height=1e-4), SIZE)[0] == pytest.approx(2e-5)
 
 
+def test_a_scale_bar_in_another_unit_is_round_in_that() -> None:
+    assert scale_bar(FLAT, SIZE, 1000) == (2000, 72)
+    inches, pixels = scale_bar(FLAT, SIZE, 1 / 0.0254)
+    assert inches == 100
+    assert pixels == pytest.approx(72 * 100 * 0.0254 / 2)
+
+
+def test_the_colour_bar_tells_lengths_in_the_unit_that_is_shown() -> None:
+    def bar(color_by: str, factor: float) -> NDArray[np.uint8]:
+        legend = replace(LEGEND, marks=Marks(color_bar=True), look=Look(color_by=color_by), factor=factor)
+        return marked(gray(), legend, VALUES)
+
+    assert (bar("height", 1000) != bar("height", 1)).any()
+    assert (bar("temperature", 1000) == bar("temperature", 1)).all(), "which is no length"
+
+
 def test_a_perspective_scale_bar_is_right_at_the_depth_of_the_target(draw: Callable[..., Surface]) -> None:
     camera = Camera(eye=(0, 0, 50), target=(0, 0, 10), fov_y=40)
     length, pixels = scale_bar(camera, SIZE)

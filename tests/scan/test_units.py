@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from range_scenes import sphere_view
 
+from viewer.bounds import Bounds
 from viewer.errors import InputError
 from viewer.scan import formats
+from viewer.scan.guessed_unit import guess_unit
 from viewer.scan.open import open_scan
 from viewer.scan.range_view import RangeView, merge
-from viewer.scan.units import checked_unit, conversion, usable_unit
+from viewer.scan.units import UNIT_WORDS, Scale, checked_unit, conversion, is_length, usable_unit
 
 
 def views(unit: str, other: str | None = None) -> tuple[RangeView, ...]:
@@ -92,3 +94,24 @@ def test_units_that_are_no_lengths_are_told_and_taken_as_they_are(tmp_path: Path
         radii = np.linalg.norm(scan.pose(1).cloud.world(), axis=1)
         np.testing.assert_allclose(radii, 1, rtol=0, atol=1e-3)
         assert scan.messages[0].text == "f1.exr is in ells, the scan in mm: other units are taken as they are"
+
+
+def test_lengths_are_told_in_another_unit_where_both_are_known() -> None:
+    assert Scale.of("m", "mm") == Scale("mm", pytest.approx(1000))
+    assert Scale.of("mm", "in") == Scale("in", pytest.approx(1 / 25.4))
+    assert Scale.of("m", None) == Scale("m")
+    assert Scale.of("units", "mm") == Scale("units"), "nobody knows how long these are"
+    assert all(map(is_length, UNIT_WORDS))
+
+
+@pytest.mark.parametrize(
+    ("edges", "up", "guess"),
+    [
+        ((0.18, 0.25, 0.2), "+y", "m"), ((0.5, 1.8, 0.3), "+y", "m"), ((500, 1800, 300), "+y", "mm"),
+        ((180, 250, 200), "+y", "mm"), ((30.0, 20.0, 1.5), "+z", "m"), ((20, 25, 18), "+y", None),
+    ],
+)  # fmt: skip
+def test_a_unit_is_guessed_of_the_size(edges: tuple[float, float, float], up: str, guess: str | None) -> None:
+    half = np.array(edges) / 2
+    found = guess_unit(Bounds(-half, half), up)
+    assert (found and found[0]) == guess

@@ -246,10 +246,15 @@ def end_slack(end: End, radius: float) -> float:
     return spacings * (end.spacing or 0) + share * radius + (end.uncertainty or 0)
 
 
-def distance_in_words(distance: float, uncertainty: float | None, unit: str) -> str:
-    """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm (95 %)"."""
+def distance_in_words(distance: float, uncertainty: float | None, unit: str, factor: float = 1.0) -> str:
+    """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm (95 %)".
+
+    unit, factor: that it is told in, and how many of it one unit of the scan is.
+    """
+    distance *= factor
     if not uncertainty:
         return f"{distance:.6g} {unit}"
+    uncertainty *= factor
     power = math.floor(math.log10(uncertainty))
     decimals = (
         -power if float(f"{uncertainty:.0e}") >= 2 * 10.0**power else 1 - power
@@ -269,12 +274,15 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def table(readings: Sequence[tuple[int, Reading]], scan: str, unit: str) -> list[list[object]]:
+def table(
+    readings: Sequence[tuple[int, Reading]], scan: str, unit: str, factor: float = 1.0
+) -> list[list[object]]:
     """A row of `COLUMNS` and one for each reading, with all digits; None: unknown.
 
-    readings: a measurement's number and what it reads. Frames count from 1, as in the window.
+    readings: a measurement's number and what it reads. unit, factor: that lengths are told in, and how many
+    of it one unit of the scan is. Frames count from 1, as in the window.
     """
-    return [list(COLUMNS), *(_row(number, reading, scan, unit) for number, reading in readings)]
+    return [list(COLUMNS), *(_row(number, reading, scan, unit, factor) for number, reading in readings)]
 
 
 def to_text(rows: Iterable[Iterable[object]], separator: str = ",") -> str:
@@ -290,19 +298,22 @@ def save_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
         temporary.write_text(to_text(rows), encoding="utf-8", newline="")
 
 
-def _row(number: int, reading: Reading, scan: str, unit: str) -> list[object]:
+def _row(number: int, reading: Reading, scan: str, unit: str, factor: float) -> list[object]:
+    def told(length: float | None) -> float | None:
+        return None if length is None else factor * length
+
     measurement = reading.measurement
-    row = [scan, number, measurement.distance, measurement.uncertainty, unit, reading.motion]
+    row = [scan, number, told(measurement.distance), told(measurement.uncertainty), unit, reading.motion]
     for end in measurement.ends:
         row += [
             end.frame + 1,
             end.time,
             end.id,
-            *end.position,
+            *map(told, end.position),
             end.snapped,
-            end.spacing,
+            told(end.spacing),
             end.level,
-            end.uncertainty,
+            told(end.uncertainty),
         ]
     return row
 

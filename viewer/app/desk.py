@@ -13,6 +13,7 @@ from ..document.part import Part
 from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
+from ..scan.units import Scale
 from ..task import Task, in_background
 from .laid import NumbersOf, PlaceOf
 from .scene.viewport import Viewport
@@ -95,6 +96,11 @@ class Desk:
     def unit(self) -> str:
         """The unit of length: as the user calls it, else as the scan tells, else "units"."""
         return self._toolbox.playback.unit
+
+    @property
+    def scale(self) -> Scale:
+        """How lengths are told: in the unit that the user wants to see, and how many of it one unit is."""
+        return self._toolbox.playback.scale
 
     @property
     def viewport(self) -> Viewport:

@@ -72,10 +72,10 @@ class Document:
     along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for the scan's
     default, which also stands in for one that is not there. params: backend's name -> its `Params`, kept when
     another backend is chosen. unit: what the user calls the scan's unit of length, None where the scan tells
-    or nobody does. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool
-    that is not there, what its file said. unread: fields that are not known here or could not be read -> what
-    the file said, which is written again; so is what was made anew of params and parts, under names such as
-    "parts.measurements".
+    or nobody does. shown_unit: that lengths are told in, None for the scan's own. bookmarks: cameras to go
+    back to. parts: name -> what a tool keeps (see `Part`); of a tool that is not there, what its file said.
+    unread: fields that are not known here or could not be read -> what the file said, which is written again;
+    so is what was made anew of params and parts, under names such as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.
@@ -87,6 +87,7 @@ class Document:
     backend: Word | None = None
     params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
     unit: Unit | None = None
+    shown_unit: Unit | None = None
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
     unread: Values = field(default_factory=dict)

@@ -6,7 +6,7 @@ A recording is a JSON file, an entry a line:
     "format": 1, "version": "0.1.0", "seconds": 2.4, "entries": [
     {"at": 0.0, "scan": "knot", "hash": ..., "pose": 0, "time": 0.0, "size": [1280, 720], "camera": {...},
      "backend": "points", "params": {...}, "look": {...}, "marks": {...}, "unit": "mm",
-     "place": null, "anonymous": false},
+     "shown_unit": null, "place": null, "anonymous": false},
     {"at": 0.52, "pose": 1, "time": 0.04}
     ]}
 
@@ -45,6 +45,7 @@ from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import DEMO, searches_folders
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
+from ..scan.units import Scale
 from .anonymous import anonymous_unit
 from .schema import (
     DAMAGED,
@@ -85,10 +86,10 @@ class Entry:
 
     scan: as the user named it, None where it is anonymous. hash: of its files (see `fingerprint`), None
     where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
-    params: the backend's own `Params`. marks: what is drawn over it. unit: of length, as marks have it;
-    None for the scan's own. measurements: to draw over it, as they were made. place: the matrix that the
-    scan is moved by, None where it is not. anonymous: whether camera, time, look, measurements and place are
-    those of the scan as `anonymous_request` has it. at: seconds
+    params: the backend's own `Params`. marks: what is drawn over it. unit: of length, None for the scan's
+    own. measurements: to draw over it, as they were made. shown_unit: that marks tell lengths in, None for
+    `unit`. place: the matrix that the scan is moved by, None where it is not. anonymous: whether camera,
+    time, look, measurements and place are those of the scan as `anonymous_request` has it. at: seconds
     since the recording began; entries that differ in it alone are equal.
     """
 
@@ -104,6 +105,7 @@ class Entry:
     marks: Marks = field(default_factory=Marks)
     unit: Unit | None = None
     measurements: tuple[Measurement, ...] = ()
+    shown_unit: Unit | None = None
     place: Matrix | None = None
     anonymous: bool = False
     at: Stamp = field(default=0.0, compare=False)
@@ -118,6 +120,7 @@ class Entry:
         unit: str,
         marks: Marks | None = None,
         measurements: tuple[Measurement, ...] = (),
+        shown_unit: str | None = None,
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
@@ -134,7 +137,7 @@ class Entry:
         return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
-            measurements if marks.measurements else (), matrix_of(layers.place),
+            measurements if marks.measurements else (), shown_unit, matrix_of(layers.place),
         )  # fmt: skip
 
     def request(self, pose: Pose) -> Request:
@@ -152,12 +155,13 @@ class Entry:
 
         Measurements follow their points as far as the frames read so far tell that they can.
         """
-        unit = timeline.unit if self.unit is None else self.unit
+        scale = Scale.of(timeline.unit if self.unit is None else self.unit, self.shown_unit)
         lines: tuple[MeasuredLine, ...] = ()
         if self.measurements and self.marks.measurements:
-            lines = measured_lines(self.measurements, pose, timeline.one_topology, self.motion, unit)
+            lines = measured_lines(self.measurements, pose, timeline.one_topology, self.motion, scale)
         return Legend(
-            self.marks, self.camera, self.look, unit, self.pose, len(timeline), self.time, lines=lines
+            self.marks, self.camera, self.look, scale.unit, self.pose, len(timeline), self.time,
+            lines=lines, factor=scale.factor,
         )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
@@ -182,8 +186,10 @@ class Entry:
 
     def without_names(self) -> Entry:
         """The entry as an anonymous picture tells it, of a scan that is as `anonymous_request` has it."""
-        unit = None if self.unit is None else anonymous_unit(self.unit)
-        return replace(self, scan=None, unit=unit, anonymous=True)
+        unit, shown = (
+            None if name is None else anonymous_unit(name) for name in (self.unit, self.shown_unit)
+        )
+        return replace(self, scan=None, unit=unit, shown_unit=shown, anonymous=True)
 
     def description(self) -> str:
         """The JSON text that a picture carries."""
@@ -191,13 +197,13 @@ class Entry:
 
 
 def measured_lines(
-    measurements: Sequence[Measurement], pose: Pose, one_topology: bool | None, place: Rigid, unit: str
+    measurements: Sequence[Measurement], pose: Pose, one_topology: bool | None, place: Rigid, scale: Scale
 ) -> tuple[MeasuredLine, ...]:
     """Lines of measurements as they stand in a pose. one_topology, place: as of `reading_of`."""
     lines = []
     for number, measurement in enumerate(measurements, 1):
         there = reading_of(measurement, pose, one_topology, place).measurement
-        words = distance_in_words(there.distance, there.uncertainty, unit)
+        words = distance_in_words(there.distance, there.uncertainty, scale.unit, scale.factor)
         first, second = there.ends
         slack = end_slack(first, pose.bounds.radius), end_slack(second, pose.bounds.radius)
         lines.append(MeasuredLine((first.position, second.position), slack, f"{number}:  {words}"))

@@ -88,7 +88,7 @@ class Legend:
     """The words and numbers that the marks of a picture show.
 
     unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
-    says of its numbers. lines: that were measured.
+    says of its numbers. lines: that were measured. factor: how many of `unit` one unit of the scan is.
     """
 
     marks: Marks
@@ -100,6 +100,7 @@ class Legend:
     time: float
     range_note: str = ""
     lines: tuple[MeasuredLine, ...] = ()
+    factor: float = 1.0
 
 
 class MarkPainter(Protocol):
@@ -129,23 +130,30 @@ def round_length(most: float) -> float:
     return max((factor * power for factor in (1, 2, 5) if factor * power <= most), default=power)
 
 
-def scale_bar(camera: Camera, size: tuple[float, float]) -> tuple[float, float]:
-    """A round length in scan units, and how many pixels it takes at the depth of the camera's target.
+def scale_bar(camera: Camera, size: tuple[float, float], factor: float = 1.0) -> tuple[float, float]:
+    """A round length, and how many pixels it takes at the depth of the camera's target.
 
-    It takes at most a sixth of the picture's width. size: (width, height), pixels.
+    It takes at most a sixth of the picture's width. size: (width, height), pixels. factor: from scan units to
+    those that the length is in.
     """
     width, height = size
-    length = round_length(_BAR_SHARE * width * camera.view_height / height)
-    return length, length * height / camera.view_height
+    view_height = factor * camera.view_height
+    length = round_length(_BAR_SHARE * width * view_height / height)
+    return length, length * height / view_height
 
 
 def quantity(look: Look, unit: str, kind: ValueKind | None = None) -> str:
     """The number that the look colours by, with its unit where it is a length. kind: of what a backend
     finds."""
-    if kind is not None or look.color_by in ("depth", "height"):
-        is_length = kind is None or kind.is_length
-        return look.color_by.replace("_", " ").capitalize() + (f" ({unit})" if is_length else "")
+    if kind is not None or _is_length(look, kind):
+        unit_words = f" ({unit})" if _is_length(look, kind) else ""
+        return look.color_by.replace("_", " ").capitalize() + unit_words
     return "Value" if look.color_by.startswith("#") else look.color_by
+
+
+def _is_length(look: Look, kind: ValueKind | None) -> bool:
+    """Whether the number that the look colours by is one in the scan's unit. kind: as for `quantity`."""
+    return look.color_by in ("depth", "height") if kind is None else kind.is_length
 
 
 def number(value: float, span: float) -> str:
@@ -220,14 +228,14 @@ def draw(
 def scale_bar_box(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> Box:
     """The place of the scale bar's plate."""
     em = painter.em
-    _, pixels = scale_bar(legend.camera, size)
+    _, pixels = scale_bar(legend.camera, size, legend.factor)
     width = max(round(pixels), painter.width(_scale_text(painter, size, legend))) + 2 * _PAD * em
     left, bottom = round(_MARGIN * em), round(size[1] - _MARGIN * em)
     return left, bottom - round((1 + _GAP + _TICK + 2 * _PAD) * em), left + width, bottom
 
 
 def _scale_text(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> str:
-    length, _ = scale_bar(legend.camera, size)
+    length, _ = scale_bar(legend.camera, size, legend.factor)
     return _shortened(painter, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
 
 
@@ -235,7 +243,7 @@ def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Leg
     em = painter.em
     box = left, top, right, bottom = scale_bar_box(painter, size, legend)
     painter.box(box, PLATE)
-    text, pixels = _scale_text(painter, size, legend), round(scale_bar(legend.camera, size)[1])
+    text, pixels = _scale_text(painter, size, legend), round(scale_bar(legend.camera, size, legend.factor)[1])
     painter.text((left + right - painter.width(text)) / 2, top + _PAD * em, text)
     start, foot = round((left + right - pixels) / 2), round(bottom - _PAD * em)
     line, tick = max(1, round(_LINE * em)), max(2, round(_TICK * em))
@@ -264,7 +272,8 @@ def _draw_color_bar(
     em = painter.em
     title = _shortened(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
     note = _shortened(painter, range_note(legend), _TEXT_SHARE * size[0])
-    told = ticks(*values, kind)
+    factor = legend.factor if _is_length(legend.look, kind) else 1.0
+    told = ticks(factor * values[0], factor * values[1], kind)
     widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in told)
     widest = max(widest, painter.width(title), painter.width(note))
     height = min(_MAP_HEIGHT * em, 0.6 * size[1])

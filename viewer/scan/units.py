@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ..errors import InputError, shortened
 
 LONGEST_NAME = 40  # characters
+# Units to choose from, as people call them.
+UNIT_WORDS = {"µm": "µm", "mm": "mm", "cm": "cm", "m": "m", "km": "km", "in": "inch", "ft": "foot"}
 
 _METRES = {
     "nm": 1e-9, "µm": 1e-6, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3,
@@ -36,3 +40,18 @@ def conversion(given: str, wanted: str) -> float | None:
         return 1.0
     from_metres, to_metres = (_METRES.get(name.strip().replace("\u03bc", "µ")) for name in (given, wanted))
     return None if from_metres is None or to_metres is None else from_metres / to_metres
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How lengths of a scan are told. unit: in which unit. factor: how many of it one unit of the scan is."""
+
+    unit: str
+    factor: float = 1.0
+
+    @classmethod
+    def of(cls, unit: str, shown: str | None) -> Scale:
+        """The scale of a scan in this unit whose lengths are to be shown in another; None: in its own, as
+        where one of the two is no known length."""
+        factor = None if shown is None else conversion(unit, shown)
+        return cls(unit) if shown is None or factor is None else cls(shown, factor)

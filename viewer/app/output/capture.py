@@ -67,6 +67,7 @@ class Capture:
         return Entry.of(
             request, session.scan, session.hash, viewport.size, self._playback.unit,
             self._marks() if marks is None else marks, session.document.part(Measurements).all,
+            session.document.shown_unit,
         )  # fmt: skip
 
     def screenshot(self) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
-from imgui_bundle import imgui
 
 from ...files import printable
 from ...geometry import AXES
+from ...scan.guessed_unit import guess_unit
+from ...scan.points import UNKNOWN_UNIT
+from ...scan.units import UNIT_WORDS, is_length
 from .. import widgets
 from ..files.scans import title
 
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
     from ..scene.steering import Steering
     from ..session import Session
 
+_OWN = "own"  # the unit that the scan has
 _ATTRIBUTES = {"colors": "colours", "normals": "normals", "radii": "radii"}
 
 
@@ -44,6 +48,7 @@ class ScanSection:
             widgets.tooltip(printable(self.session.scan))
         if self.playback.pose is not None:
             self._draw_facts(self.playback.pose)
+            self._draw_unit(self.playback.pose)
             self._draw_up()
 
     def _draw_scans(self) -> None:
@@ -69,9 +74,37 @@ class ScanSection:
         dropped = f" ({pose.dropped:,} dropped)" if pose.dropped else ""
         widgets.fact("Points", f"{pose.count:,}{dropped}")
         bounds = self.steering.bounds(pose)
-        size = " x ".join(f"{edge:.4g}" for edge in bounds.high - bounds.low)
-        widgets.fact("Size", f"{size} {self.playback.unit}")
+        scale = self.playback.scale
+        size = " x ".join(f"{scale.factor * edge:.4g}" for edge in bounds.high - bounds.low)
+        widgets.fact("Size", f"{size} {scale.unit}")
         widgets.fact("Stored", _stored(pose))
+
+    def _draw_unit(self, pose: Pose) -> None:
+        """Declare what chooses the unit of length, a guess where nobody has told it, and what lengths are
+        shown in."""
+        told, document = self.playback.timeline.unit, self.session.document
+        own = "not known" if told == UNKNOWN_UNIT else f"{told}, as the scan tells"
+        names = [*UNIT_WORDS, *([document.unit] if document.unit and document.unit not in UNIT_WORDS else [])]
+        titles = {_OWN: own} | {name: UNIT_WORDS.get(name, name) for name in names}
+        widgets.label("1 unit is", "How long one unit of the scan's coordinates is. It stays with the scan.")
+        chosen = widgets.combo("unit", document.unit or _OWN, list(titles), titles)
+        guess = guess_unit(self.steering.bounds(pose), document.look.up)
+        if told == UNKNOWN_UNIT and document.unit is None and guess is not None:
+            widgets.label("")
+            if imgui.button(f"Is it {guess[0]}?###accept", ImVec2(-1, 0)):
+                chosen = guess[0]
+            widgets.tooltip(f"In {guess[0]} it is as large as {guess[1]}. A click says so.")
+        if chosen != (document.unit or _OWN):
+            self.session.change("Tell the unit", unit=None if chosen == _OWN else chosen)
+        if not is_length(self.playback.unit):
+            return
+        shown = {_OWN: UNIT_WORDS.get(self.playback.unit, self.playback.unit)}
+        shown |= {name: word for name, word in UNIT_WORDS.items() if name != self.playback.unit}
+        now = self.playback.scale.unit if self.playback.scale.unit != self.playback.unit else _OWN
+        widgets.label("Lengths in", "The unit that lengths are shown, drawn and saved in")
+        wanted = widgets.combo("shown_unit", now, list(shown), shown)
+        if wanted != now:
+            self.session.change("Show lengths in another unit", shown_unit=None if wanted == _OWN else wanted)
 
     def _draw_up(self) -> None:
         pose, now = self.playback.pose, self.session.document.look.up

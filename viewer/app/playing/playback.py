@@ -10,6 +10,7 @@ from typing import Any
 from ...errors import InputError
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
+from ...scan.units import Scale
 from ..session import Session
 from .player import Player
 
@@ -49,6 +50,11 @@ class Playback:
     def unit(self) -> str:
         """The scan's unit of length: as the user calls it, else as the scan tells, else "units"."""
         return self.session.document.unit or self.timeline.unit
+
+    @property
+    def scale(self) -> Scale:
+        """How lengths are told."""
+        return Scale.of(self.unit, self.session.document.shown_unit)
 
     @property
     def problem(self) -> InputError | None:

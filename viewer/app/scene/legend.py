@@ -60,9 +60,10 @@ class ViewMarks:
         camera = self._session.document.camera
         if camera is None or request is None or surface is None or not self._viewport.is_there:
             return
-        pose, unit, count = request.pose, self._playback.unit, len(self._playback.timeline)
+        pose, scale, count = request.pose, self._playback.scale, len(self._playback.timeline)
         told = Legend(
-            self.shown, camera, surface.look, unit, pose.index, count, float(pose.time), self._ranging.words()
+            self.shown, camera, surface.look, scale.unit, pose.index, count, float(pose.time),
+            self._ranging.words(), factor=scale.factor,
         )  # fmt: skip
         corner = imgui.get_window_pos()
         canvas = _View(corner)

@@ -29,7 +29,6 @@ from .words import distance_words
 
 log = logging.getLogger(__name__)
 TITLE = "Measurements"
-_LONGEST_UNIT = 16  # letters
 
 
 class Tool:
@@ -159,7 +158,7 @@ class Tool:
             self._followed = ""
             if readings:
                 self.desk.note("Not all frames have the same points: measurements stay fixed in space.")
-        told = [f"{distance_words(reading, self.desk.unit)}, {reading.motion}" for reading in readings]
+        told = [f"{distance_words(reading, self.desk.scale)}, {reading.motion}" for reading in readings]
         if told != self._told:
             self._told = told
             log.debug("measurements: %s", "; ".join(told) or "none")
@@ -176,12 +175,6 @@ class Tool:
             slack = end_slack(end, self.desk.viewport.bounds(shown.pose).radius)
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
-
-    def name_unit(self, text: str) -> None:
-        """Call the scan's unit of length so; an empty text leaves it unknown."""
-        name = "".join(letter for letter in text if letter.isprintable())[:_LONGEST_UNIT]
-        self.desk.change("Name unit", merge="unit", unit=name.strip() or None)
-        log.debug("unit %s", self.desk.unit)
 
     # --- out of the window ------------------------------------------------------------
 
@@ -228,7 +221,8 @@ class Tool:
             rows.append((number, Reading(made, reading.fixed)))
             if reading.measurement != made:
                 rows.append((number, reading))
-        return table(rows, self.desk.timeline.name, self.desk.unit)
+        scale = self.desk.scale
+        return table(rows, self.desk.timeline.name, scale.unit, scale.factor)
 
 
 def _places(measurement: Measurement) -> tuple[object, ...]:

@@ -47,7 +47,7 @@ def _draw_one(
     seen = view.box.clipped(there[0], there[-1]) if there else None
     if seen is None:
         return None
-    lines = [f"{number}:  {distance_words(reading, measuring.desk.unit)}"]
+    lines = [f"{number}:  {distance_words(reading, measuring.desk.scale)}"]
     if len(measuring.desk.timeline) > 1:
         lines.append(reading.motion)
     return Label(lines, seen, alpha < 1)

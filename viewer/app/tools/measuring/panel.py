@@ -1,4 +1,4 @@
-"""Measurements in the panel: their list, the unit of length, and the dialog that saves them."""
+"""Measurements in the panel: their list, and what to do with them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ....analysis.measure import End, Reading
-from ....scan.points import UNKNOWN_UNIT
 from ....scan.times import frame_in_words
+from ....scan.units import Scale
 from ... import widgets
 from ...ui import Ui
 from .words import distance_words, snap_words
@@ -26,7 +26,6 @@ def draw(measuring: Tool, ui: Ui) -> None:
     imgui.same_line()
     measuring.filled = imgui.checkbox("Allow filled", measuring.filled)[1]
     widgets.tooltip("Also take places where the renderer has filled a hole, and no point was measured")
-    _draw_unit(measuring)
     for number, reading in enumerate(measuring.readings()):
         imgui.push_id(number)
         if _draw_row(measuring, number, reading):
@@ -36,22 +35,12 @@ def draw(measuring: Tool, ui: Ui) -> None:
         _draw_outlets(measuring, ui)
 
 
-def _draw_unit(measuring: Tool) -> None:
-    widgets.label("Unit", "Of length. Where the scan does not tell, say it once; it stays with the scan")
-    if measuring.desk.timeline.unit != UNKNOWN_UNIT:
-        imgui.text(measuring.desk.unit)
-        return
-    changed, text = imgui.input_text_with_hint("##unit", UNKNOWN_UNIT, measuring.desk.document.unit or "")
-    if changed:
-        measuring.name_unit(text)
-
-
 def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
     """Number and distance, what the ends snapped to below; whether it is to be deleted."""
     right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
-    imgui.text(f"{number + 1}:  {distance_words(reading, measuring.desk.unit)}")
-    widgets.tooltip(_details(reading, measuring.desk.unit))
+    imgui.text(f"{number + 1}:  {distance_words(reading, measuring.desk.scale)}")
+    widgets.tooltip(_details(reading, measuring.desk.scale))
     imgui.same_line(right - 1.3 * imgui.get_frame_height())
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
     words = snap_words(reading)
@@ -63,22 +52,22 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
     return is_deleted
 
 
-def _details(reading: Reading, unit: str) -> str:
+def _details(reading: Reading, scale: Scale) -> str:
     """A text that tells both ends in full."""
-    ends = [_end_words(end, unit) for end in reading.measurement.ends]
+    ends = [_end_words(end, scale) for end in reading.measurement.ends]
     if reading.measurement.uncertainty is None:
         return "\n".join([*ends, "How sure it is, is not known: measure anew"])
     return "\n".join([*ends, "± covers the true distance in 95 % of cases: points around, pixels, following"])
 
 
-def _end_words(end: End, unit: str) -> str:
+def _end_words(end: End, scale: Scale) -> str:
     what = "surface" if end.id is None else f"at point {end.id}"
-    place = ", ".join(f"{v:.9g}" for v in end.position)
-    spacing = "unknown" if end.spacing is None else f"{end.spacing:.3g} {unit}"
+    place = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
+    spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"
     seen = f", filled from level {end.level}" if end.level else ""
     seen += ", at an outline: it may be the surface before or behind" if end.at_outline else ""
-    sure = "" if end.uncertainty is None else f" ± {end.uncertainty:.2g}"
-    return f"{what}, {frame_in_words(end.frame)}: {place}{sure} {unit}, spacing {spacing}{seen}"
+    sure = "" if end.uncertainty is None else f" ± {scale.factor * end.uncertainty:.2g}"
+    return f"{what}, {frame_in_words(end.frame)}: {place}{sure} {scale.unit}, spacing {spacing}{seen}"
 
 
 def _draw_outlets(measuring: Tool, ui: Ui) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from ....analysis.measure import Reading, distance_in_words
+from ....scan.units import Scale
 
 
-def distance_words(reading: Reading, unit: str) -> str:
+def distance_words(reading: Reading, scale: Scale) -> str:
     """The distance and its uncertainty."""
-    return distance_in_words(reading.measurement.distance, reading.measurement.uncertainty, unit)
+    measurement = reading.measurement
+    return distance_in_words(measurement.distance, measurement.uncertainty, scale.unit, scale.factor)
 
 
 def snap_words(reading: Reading) -> str:

@@ -1,0 +1,68 @@
+"""The unit of a scan in the window: guessed, told by one click, and another one to show lengths in."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import sphere
+from test_window_measuring import clipboard, ctrl
+from virtual_screen import PANEL, RunningApp, Screen, running_app
+
+from viewer.scan import formats
+
+
+@pytest.fixture
+def app(screen: Screen, tmp_path: Path) -> Iterator[RunningApp]:
+    """The window on a ball of a quarter of a unit, as a head in metres is."""
+    ball = sphere(20_000)
+    points = ball.world() * 0.125 / np.abs(ball.world()).max()
+    formats.write(tmp_path / "head.npz", type(ball).from_arrays(points, normals=ball.normals))
+    folder = tmp_path / "config" / "scan4d"
+    folder.mkdir(parents=True)
+    (folder / "keys.toml").write_text('[keys]\ncopy_measurements = "Ctrl+C"\n')
+    with running_app(screen, tmp_path, tmp_path / "head.npz") as app:
+        yield app
+    assert "Traceback" not in app.log()
+
+
+def place(app: RunningApp) -> list[float]:
+    """The position that the line below the picture tells."""
+    return [float(number) for number in app.state.pointed[0].partition(" ±")[0].split(", ")]
+
+
+def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp) -> None:
+    assert app.state.unit == "units", "a guess is nothing before somebody agrees"
+    app.act(PANEL, ("item_click", "###accept"))
+    app.see(unit="m")
+    left, top, width, height = app.view()
+    middle = left + width // 2, top + height // 2
+    app.screen.do("mousemove", *middle)
+    app.see(lambda state: state.pointed and state.pointed[0].endswith(" m"))
+    metres = place(app)
+    app.choose(PANEL, "##shown_unit", "###mm")
+    app.screen.do("mousemove", left, top, "sleep", 0.2, "mousemove", *middle)
+    app.see(lambda state: state.pointed and state.pointed[0].endswith(" mm"))
+    assert place(app) == pytest.approx([1000 * number for number in metres], abs=0.01)
+
+    app.screen.do("key", "m")
+    app.see(clicking="measuring")
+    for x in (-width // 12, width // 12):
+        app.screen.do("mousemove", middle[0] + x, middle[1], "sleep", 0.2, "click", 1)
+        app.settle()
+    made = app.see(lambda state: state.measurements).measurements[0]
+    assert made["distance"] < 0.25, "it is kept in units of the scan"
+    ctrl(app.screen, "c")
+    app.told("Copied")
+    row = next(csv.DictReader(io.StringIO(clipboard(app.screen)), delimiter="\t"))
+    assert row["unit"] == "mm"
+    assert float(row["distance"]) == pytest.approx(1000 * made["distance"])
+    ctrl(app.screen, "z")
+    ctrl(app.screen, "z")
+    assert app.settle().document["shown_unit"] is None
+    ctrl(app.screen, "z")
+    app.see(unit="units")

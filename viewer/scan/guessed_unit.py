@@ -1,0 +1,32 @@
+"""Which unit a scan is in, where nothing tells: guessed of its size, for a user to agree with."""
+
+from __future__ import annotations
+
+from ..bounds import Bounds
+from .units import conversion
+from .upright import first_elevation
+
+# What is scanned: how long it is in metres, at least and below what; and in which units that is usual.
+_SUBJECTS = (
+    ("m", 0.03, 0.12, "what fits into a hand"),
+    ("m", 0.12, 0.45, "a head or a hand"),
+    ("m", 0.45, 3.0, "a body"),
+    ("m", 3.0, 12.0, "a room"),
+    ("mm", 0.12, 0.45, "a head or a hand"),
+    ("mm", 0.45, 3.0, "a body"),
+)
+
+
+def guess_unit(bounds: Bounds, up: str) -> tuple[str, str] | None:
+    """The unit that a scan of this size is likely to be in, and what it is of then; None where nothing tells.
+
+    up: as `first_elevation` takes it, which tells ground: that is surveyed in metres.
+    """
+    if first_elevation(bounds, up):
+        return "m", "ground"
+    size = float((bounds.high - bounds.low).max())
+    for unit, least, most, what in _SUBJECTS:
+        metres = conversion(unit, "m")
+        if metres is not None and least <= size * metres < most:
+            return unit, what
+    return None
