@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -26,6 +26,7 @@ from ..rigid import STILL, Rigid
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import nearest_row, spacing_at
+from ..task import checkpoint
 from .pick import SURE, Neighbor, Picked, largest_deviation
 
 _DECIMALS = (-6, 12)  # that a number is written out with
@@ -185,6 +186,31 @@ def reading_of(
             return Reading(measurement, f"point {end.id} is missing in this frame")
         moved.append(followed)
     return Reading(Measurement(*moved), None)
+
+
+def readings_in_frames(
+    made: Sequence[Measurement], count: int, pose_of: Callable[[int], Pose], one_topology: bool | None
+) -> list[tuple[int, Reading]]:
+    """Each measurement by its number from 1: as it was made, then, where it follows its points, as it stands
+    in each other frame, in their order.
+
+    count: of frames. pose_of: gives one by its index. Frames that cannot be read are left out. A task that is
+    cancelled ends it.
+    """
+    found: list[list[Reading]] = [[Reading(one, None)] for one in made]
+    for index in range(count):
+        checkpoint()
+        try:
+            pose = pose_of(index)
+        except InputError:
+            continue
+        for readings, measurement in zip(found, made, strict=True):
+            reading = reading_of(measurement, pose, one_topology)
+            if index == measurement.second.frame or reading.fixed:
+                readings[0] = Reading(measurement, reading.fixed)
+            else:
+                readings.append(reading)
+    return [(number, reading) for number, readings in enumerate(found, 1) for reading in readings]
 
 
 def _followed(end: End, pose: Pose, place: Rigid) -> End | None:

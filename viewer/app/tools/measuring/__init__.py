@@ -11,7 +11,17 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ....analysis.measure import End, Measurement, Reading, end_slack, reading_of, save_table, table, to_text
+from ....analysis.measure import (
+    End,
+    Measurement,
+    Reading,
+    end_slack,
+    reading_of,
+    readings_in_frames,
+    save_table,
+    table,
+    to_text,
+)
 from ....analysis.measured_table import is_measurement_table, read_measurements
 from ....analysis.pick import is_seen
 from ....document.measurements import Measurements
@@ -188,9 +198,21 @@ class Tool:
         self.saving.ask(free_file(working_folder(), ".csv"))
 
     def _save(self, file: Path) -> None:
-        refuse_input(file, self.desk.timeline)
-        save_table(file, self._table())
-        self.desk.note(f"Saved {file}")
+        timeline, pose = self.desk.timeline, self.desk.pose
+        refuse_input(file, timeline)
+        is_still = pose is None or self.desk.motion(pose).is_identity
+        if not (timeline.one_topology and len(timeline) > 1 and is_still):
+            save_table(file, self._table())
+            self.desk.note(f"Saved {file}")
+            return
+        made, unit = self.made.all, self.desk.unit
+
+        def save_all_frames() -> None:
+            rows = readings_in_frames(made, len(timeline), timeline.visit, one_topology=True)
+            save_table(file, table(rows, timeline.name, unit))
+
+        told = f"Saved {file}, in all {len(timeline)} frames"
+        self.desk.run(f"Saving {file.name}", save_all_frames, lambda _: self.desk.note(told))
 
     def on_file(self, path: Path) -> bool:
         """Add the measurements of a table that was saved of this scan, but those that are there; whether the
