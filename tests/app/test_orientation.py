@@ -84,3 +84,11 @@ def test_names_are_never_mirrored_nor_upside_down(camera: Camera) -> None:
 def test_names_say_which_faces_meet() -> None:
     assert orientation.name((0, 1, 0)) == "top"
     assert orientation.name((1, -1, 1)) == "front, left, bottom"
+
+
+@pytest.mark.parametrize("up", ["+y", "-y", "+z"])
+@pytest.mark.parametrize("front", [0.0, 90.0, -30.0])
+def test_the_cube_shows_its_front_from_where_the_front_is(up: str, front: float) -> None:
+    camera = Camera.orbit(BOUNDS, front, 0, up=up)
+    np.testing.assert_allclose(orientation.rotation(camera, up, front), np.eye(3), atol=1e-12)
+    assert orientation.azimuth_of(camera, up) == pytest.approx(front)

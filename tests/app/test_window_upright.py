@@ -82,6 +82,17 @@ def test_one_click_beside_the_cube_turns_the_view_upright(app: RunningApp) -> No
     assert camera_of(app) == before
 
 
+def test_a_side_can_be_the_front(app: RunningApp, tmp_path: Path, scans: Path) -> None:
+    app.screen.do("key", "ctrl+3")
+    left = camera_of(app)
+    app.act("##MainMenuBar", ("menu_click", "View/###set_front"))
+    app.screen.do("key", "ctrl+4", "key", "ctrl+1")
+    assert camera_of(app).eye == pytest.approx(left.eye)
+    app.screen.do("key", "ctrl+q")
+    app.process.wait()
+    assert kept_of(tmp_path, scans / "along_y.npy").document.front == pytest.approx(90)
+
+
 def test_a_surface_that_is_clicked_faces_up(app: RunningApp) -> None:
     app.act("##MainMenuBar", ("menu_click", "View/###pick_up"))
     left, top, width, height = app.view()

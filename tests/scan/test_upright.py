@@ -53,7 +53,6 @@ REAL = {
     "odd/pts_ptx_txt/autzen.pts": "+z from above",
     "demo": "+y",
 }
-RNG = np.random.default_rng(5)
 
 
 @pytest.mark.parametrize("scan", REAL)
@@ -68,9 +67,10 @@ def test_real_scans_are_upright(scan: str, data_dir: Path) -> None:
 
 def box(size: tuple[float, float, float], center: tuple[float, float, float]) -> NDArray[np.float64]:
     """4000 points on the surface of a box."""
-    points = RNG.uniform(-0.5, 0.5, (4000, 3))
-    axis = RNG.integers(0, 3, 4000)
-    points[np.arange(4000), axis] = RNG.choice([-0.5, 0.5], 4000)
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-0.5, 0.5, (4000, 3))
+    axis = rng.integers(0, 3, 4000)
+    points[np.arange(4000), axis] = rng.choice([-0.5, 0.5], 4000)
     return points * size + center
 
 
@@ -97,6 +97,40 @@ def test_who_stands_is_upright(up: str, factor: int) -> None:
         assert told.confidence > 0.5
 
 
+def ball(size: tuple[float, float, float], center: tuple[float, float, float]) -> NDArray[np.float64]:
+    """2000 points on an ellipsoid."""
+    rng = np.random.default_rng(6)
+    away = rng.normal(size=(2000, 3))
+    return away / np.linalg.norm(away, axis=1, keepdims=True) / 2 * size + center
+
+
+@pytest.mark.parametrize("up", ["+y", "+z"])
+@pytest.mark.parametrize("front", [0.0, 90.0, 180.0, -90.0])
+def test_people_are_seen_from_where_their_toes_point(front: float, up: str) -> None:
+    legs = [ball((0.15, 0.15, 1.0), (side, 0, 0.5)) for side in (-0.12, 0.12)]
+    feet = [box((0.1, 0.25, 0.06), (side, -0.1, 0.03)) for side in (-0.12, 0.12)]
+    body = [ball((0.9, 0.2, 0.7), (0, 0, 1.2)), ball((0.2, 0.2, 0.25), (0, 0, 1.65))]
+    points = np.concatenate([*legs, *feet, *body])
+    turn = np.radians(front)
+    points[:, :2] = points[:, :2] @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    if up == "+y":
+        points = points[:, [0, 2, 1]] * (1, 1, -1)
+    told = guess_up(PointCloud.from_arrays(points))
+    assert (told.up, told.front) == (up, front)
+
+
+@pytest.mark.parametrize(("head", "front"), [(-1, 0.0), (1, 180.0)])
+def test_animals_are_seen_from_where_their_head_is(head: int, front: float) -> None:
+    legs = [ball((0.1, 0.1, 0.8), (x, y, 0.4)) for x in (-0.12, 0.12) for y in (-0.5, 0.5)]
+    hooves = [box((0.1, 0.1, 0.03), (x, y, 0.015)) for x in (-0.12, 0.12) for y in (-0.5, 0.5)]
+    points = np.concatenate([*legs, *hooves, ball((0.5, 1.6, 0.5), (0, 0, 1))])
+    points = np.concatenate([points, ball((0.2, 0.5, 0.3), (0, head, 1.5))])
+    told = guess_up(PointCloud.from_arrays(points))
+    assert (told.up, told.front) == ("+z", front)
+    aside = guess_up(PointCloud.from_arrays(points[:, [1, 0, 2]]))
+    assert (aside.up, aside.front) == ("+z", 0.0), "its side tells more"
+
+
 def seen_from_zero(height: float) -> NDArray[np.float64]:
     """What a depth camera at zero sees of somebody before a wall: y down, z away from it."""
     across, down = np.meshgrid(np.linspace(-0.5, 0.5, 90), np.linspace(-0.4, 0.4, 70))
@@ -115,7 +149,7 @@ def test_what_a_depth_camera_saw_has_y_down() -> None:
 
 @pytest.mark.parametrize("up", ["+z", "+y"])
 def test_what_is_wide_and_low_lies_on_the_ground(up: str) -> None:
-    hills = RNG.uniform(-50, 50, (5000, 3))
+    hills = np.random.default_rng(7).uniform(-50, 50, (5000, 3))
     hills[:, 2] = 4 * np.sin(hills[:, 0] / 9) * np.cos(hills[:, 1] / 7)
     told = guess_up(PointCloud.from_arrays(hills[:, TURNED[up]]))
     assert (told.up, told.confidence > 0.5) == (up, True)
@@ -125,7 +159,7 @@ def test_what_is_wide_and_low_lies_on_the_ground(up: str) -> None:
 
 @pytest.mark.parametrize("count", [2, 5000])
 def test_map_coordinates_have_z_up(count: int) -> None:
-    steep = np.add(RNG.uniform(0, 300, (count, 3)), (512_000, 5_403_000, 350))
+    steep = np.add(np.random.default_rng(7).uniform(0, 300, (count, 3)), (512_000, 5_403_000, 350))
     told = guess_up(PointCloud.from_arrays(steep))
     assert told.up == "+z"
     assert first_elevation(Bounds(steep.min(axis=0), steep.max(axis=0)), "+z") == 35
@@ -134,7 +168,7 @@ def test_map_coordinates_have_z_up(count: int) -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 99])
 def test_few_points_tell_nothing(count: int) -> None:
-    told = guess_up(PointCloud.from_arrays(RNG.normal(size=(count, 3)) * (1, 1, 9)))
+    told = guess_up(PointCloud.from_arrays(np.random.default_rng(7).normal(size=(count, 3)) * (1, 1, 9)))
     assert (told.up, told.confidence < 0.5) == ("+y", True)
 
 

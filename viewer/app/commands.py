@@ -256,6 +256,9 @@ _VIEW: Menu[App] = Menu("View", (
         _FROM,
         Listing("Up", lambda app: app.steering.ups()),
         Command(
+            "set_front", "This side is the front", lambda app: app.steering.set_front(), can=_has_camera
+        ),
+        Command(
             "orthographic", "Orthographic", lambda app: app.steering.switch_projection(), "O",
             is_on=lambda app: app.steering.is_orthographic, can=_has_camera,
         ),

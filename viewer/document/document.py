@@ -72,10 +72,11 @@ class Document:
     along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for the scan's
     default, which also stands in for one that is not there. params: backend's name -> its `Params`, kept when
     another backend is chosen. unit: what the user calls the scan's unit of length, None where the scan tells
-    or nobody does. shown_unit: that lengths are told in, None for the scan's own. bookmarks: cameras to go
-    back to. parts: name -> what a tool keeps (see `Part`); of a tool that is not there, what its file said.
-    unread: fields that are not known here or could not be read -> what the file said, which is written again;
-    so is what was made anew of params and parts, under names such as "parts.measurements".
+    or nobody does. shown_unit: that lengths are told in, None for the scan's own. front: degrees that the
+    front of the scan is turned about what is up. bookmarks: cameras to go back to. parts: name -> what a tool
+    keeps (see `Part`); of a tool that is not there, what its file said. unread: fields that are not known
+    here or could not be read -> what the file said, which is written again; so is what was made anew of
+    params and parts, under names such as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.
@@ -88,6 +89,7 @@ class Document:
     params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
     unit: Unit | None = None
     shown_unit: Unit | None = None
+    front: float = 0.0
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
     unread: Values = field(default_factory=dict)
@@ -165,7 +167,7 @@ class Document:
             return turned
         above = np.array(self.camera.up)
         is_upright = above @ up_vector(up) >= _UPRIGHT * np.linalg.norm(above)
-        return turned if is_upright else replace(turned, camera=None, pivot=None)
+        return turned if is_upright else replace(turned, camera=None, pivot=None, front=0.0)
 
     def for_another(self, up: str = UP) -> Document:
         """The document that a scan begins with which is opened after this one: drawn alike, all else anew.

@@ -19,20 +19,22 @@ _LEAST_SINE = 0.3  # of the angle between what is up and where a camera that is 
 _WIDEST = 120.0  # field of view, degrees
 
 
-def first_camera(views: Sequence[RangeView], bounds: Bounds, aspect: float, up: str = UP) -> Camera:
+def first_camera(
+    views: Sequence[RangeView], bounds: Bounds, aspect: float, up: str = UP, front: float = 0.0
+) -> Camera:
     """A camera that sees what the pods see: from the place of one alone, with its field of view; in the mean
     direction of several, or above heights, as near as shows the bounds whole. Where there is no pod, or they
     look from all around or straight down on ground, it looks from the front, on ground from above.
 
     aspect: width / height of the picture. up: the scan's, kept to unless it is along the view axis, or nearly
-    what is up in the picture of one pod alone.
+    what is up in the picture of one pod alone. front: degrees that the scan's is turned about it.
     """
     axes = np.mean([view.world_to_camera[:3, :3] for view in views] or np.zeros((1, 3, 3)), axis=0)
     _, pods_up, back = axes
     upright, elevation = np.array(up_vector(up)), first_elevation(bounds, up)
     looks_down = elevation > 0 and back @ upright > 1 - _LEAST_SINE
     if np.linalg.norm(axes, axis=1).min() < _AGREE or looks_down:
-        return Camera.orbit(bounds, elevation=elevation, aspect=aspect, up=up)
+        return Camera.orbit(bounds, front, elevation, aspect=aspect, up=up)
     if len(views) == 1 and views[0].kind != "height":
         keeps_up = pods_up @ upright > _UPRIGHT
         return _camera_of_pod(views[0], aspect, vector(pods_up if keeps_up else upright))

@@ -6,15 +6,16 @@ ground, and what a body stands on. Nobody measures with x up, so that only y and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bounds import Bounds
 from ..camera import Camera
-from ..geometry import UP, nearest_axis, up_vector, vector
+from ..geometry import UP, front_vector, nearest_axis, up_vector, vector
 from .points import PointCloud, strided
 from .range_view import RangeView, up_axis
 
@@ -34,6 +35,9 @@ _BROAD = 0.4  # what it stands on, in shares of the spread of the whole
 _STEADY = 1.2  # how far the whole may be off the middle of what it stands on, in standard deviations of that
 _DEEP, _FEW = 0.2, 0.35  # of all depths, in one line of sight; and of all points, that have another so far
 _SLENDER, _UPENDED = 4.0, 1.2  # heights of what stands upright, in lengths of its longer side
+_FLAT, _TALL = 0.6, 0.9  # depths of a body in its widths; heights of people in these
+_KNEE, _NECK = 0.2, 0.9  # where legs end and heads begin, in heights
+_TOES, _HEAD = 0.1, 0.3  # how far these are ahead at least, in depths of people and lengths of animals
 _BEFORE = 0.2  # how far before all points a depth camera is, in lengths of their longest side
 _ASIDE = 0.6  # tangent of how far from the middle of its picture most may be
 _FACING = 0.5  # cosine between its view axis and what faces it, in the mean
@@ -43,13 +47,15 @@ _FACING = 0.5  # cosine between its view axis and what faces it, in the mean
 class Upright:
     """An up axis, and what tells it.
 
-    up: a name of `AXES`. why: in words. confidence: 0..1, how likely it is right; below 0.5
+    up: a name of `AXES`. front: degrees that the front is turned about it, see `front_vector`: the azimuth to
+    look from. why: in words. confidence: 0..1, how likely it is right; below 0.5
     nothing tells it.
     """
 
     up: str
     why: str
     confidence: float
+    front: float = 0.0
 
 
 _UNTOLD = Upright(UP, "nothing tells otherwise", 0.4)
@@ -148,13 +154,35 @@ def _of_a_body(points: NDArray[np.float64], normals: object) -> Upright | None:
     near = body.grown(0.5 * max(wide, high, deep))
     points = points[((points > near.low) & (points < near.high)).all(axis=1)]
     if _stands(points, 1):
-        return Upright(UP, "it stands so", 0.7)
+        return _facing(points, Upright(UP, "it stands so", 0.7))
     if not _is_one_sided(points[:, :2], points[:, 2]):  # a relief, of a face perhaps, stands otherwise
         if _stands(points, 2):
-            return Upright("+z", "it stands so", 0.7)
+            return _facing(points, Upright("+z", "it stands so", 0.7))
         if high > _UPENDED * max(wide, deep) and _stands(points * (1, -1, 1), 1):
             return Upright("-y", "it stands so", 0.6)
     return Upright("+z", "it is slender", 0.6) if deep > _SLENDER * max(wide, high) else None
+
+
+def _facing(points: NDArray[np.float64], told: Upright) -> Upright:
+    """Add the front that a body tells: an animal's head is far ahead, unless it is seen from its side, which
+    tells more; people are less deep than wide, and their toes point ahead."""
+    above, ahead = np.array(up_vector(told.up)), np.array(front_vector(told.up))
+    height, across = points @ above, points @ np.column_stack([ahead, np.cross(above, ahead)])
+    low, high = np.quantile(height, [0.003, 0.997])
+    level = (height - low) / (high - low)
+    edges = np.ptp(np.quantile(across, [0.02, 0.98], axis=0), axis=0)
+    parts = across[level < _BAND], across[(level > 2 * _BAND) & (level < _KNEE)], across[level > _NECK]
+    if min(map(len, parts)) == 0 or edges.min() > _FLAT * edges.max():
+        return told
+    toes, legs, head = (part.mean(axis=0) for part in parts)
+    long, deep = int(edges.argmax()), int(edges.argmin())
+    of_head = float((head - across.mean(axis=0))[long] / edges[long])
+    if abs(of_head) > _HEAD:
+        return told if long == 1 else replace(told, front=0.0 if of_head > 0 else 180.0)
+    of_toes = float((toes - legs)[deep] / edges[deep])
+    if abs(of_toes) < _TOES or high - low < _TALL * edges[long]:
+        return told
+    return replace(told, front=math.copysign(90.0, of_toes) if deep == 1 else 0.0 if of_toes > 0 else 180.0)
 
 
 def _body(points: NDArray[np.float64], share: float = 0.02) -> Bounds:

@@ -70,7 +70,7 @@ def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: b
         return
     x, y, half = where
     mouse = imgui.get_mouse_pos() - imgui.get_window_pos() - ImVec2(x, y)
-    turned = orientation.rotation(camera, document.look.up)
+    turned = orientation.rotation(camera, document.look.up, document.front)
     under = orientation.part_at(turned, mouse.x / half, -mouse.y / half)
     if under is None and not cube.is_held:
         return
@@ -99,7 +99,7 @@ def draw(cube: OrientationCube, document: Document, palette: theme.Palette, size
     if document.camera is None or where is None:
         return
     x, y, half = where
-    turned = orientation.rotation(document.camera, document.look.up)
+    turned = orientation.rotation(document.camera, document.look.up, document.front)
     _Drawing(cube, palette, turned, imgui.get_window_pos() + ImVec2(x, y), half).draw()
 
 

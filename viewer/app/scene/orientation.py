@@ -25,10 +25,23 @@ FACES: dict[str, Direction] = {
 _INNER = 0.6  # half the width of what belongs to a face itself; edges and corners lie round it
 
 
-def rotation(camera: Camera, up: str) -> NDArray[np.float64]:
-    """The rotation from the cube's axes to the picture's right, up and backward, (3, 3). up: the scan's."""
-    above, front = np.array(up_vector(up), float), np.array(front_vector(up), float)
-    return camera.rotation() @ np.column_stack([np.cross(above, front), above, front])
+def rotation(camera: Camera, up: str, front: float = 0.0) -> NDArray[np.float64]:
+    """The rotation from the cube's axes to the picture's right, up and backward, (3, 3). up: the scan's.
+    front: degrees that its front is turned about that."""
+    above, ahead = np.array(up_vector(up), float), np.array(front_vector(up), float)
+    left, turn = np.cross(above, ahead), math.radians(front)
+    axes = [
+        math.cos(turn) * left - math.sin(turn) * ahead,
+        above,
+        math.cos(turn) * ahead + math.sin(turn) * left,
+    ]
+    return camera.rotation() @ np.column_stack(axes)
+
+
+def azimuth_of(camera: Camera, up: str) -> float:
+    """The azimuth in degrees that a camera looks from, as `Camera.orbit` takes it. up: the scan's."""
+    left, _, ahead = rotation(camera, up)[2]
+    return math.degrees(math.atan2(left, ahead))
 
 
 def part_at(turned: NDArray[np.float64], right: float, up: float) -> Direction | None:

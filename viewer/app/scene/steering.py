@@ -20,7 +20,7 @@ from ...scan.timeline import Timeline
 from ...scan.upright import upright_camera
 from ..playing.playback import Playback
 from ..session import Session
-from . import navigation
+from . import navigation, orientation
 from .cube import OrientationCube
 from .extent import Extent
 from .pointed import Pointer
@@ -98,6 +98,7 @@ class Steering:
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
             bounds, aspect = self.whole(pose), self._viewport.aspect
+            azimuth += self._session.document.front
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
             self._session.change("Look from there", camera=turned, pivot=None)
 
@@ -107,7 +108,12 @@ class Steering:
         look = replace(self._session.document.look, up=up)
         if pose and camera:
             camera = upright_camera(camera, self.whole(pose), self._viewport.aspect, up)
-        self._session.change("Turn upright", look=look, camera=camera, pivot=None)
+        self._session.change("Turn upright", look=look, camera=camera, pivot=None, front=0.0)
+
+    def set_front(self) -> None:
+        """Say that the scan is seen from the front now."""
+        if camera := self._session.document.camera:
+            self._session.change("Set front", front=orientation.azimuth_of(camera, self._up))
 
     def ups(self) -> Iterator[tuple[str, Callable[[], object], bool]]:
         """Axes to choose from which is up: title, what it does, whether it is the one."""
@@ -183,7 +189,8 @@ class Steering:
         if not self._is_checked:
             self._is_checked = True
             if camera is None and not self._up_is_told:
-                self._session.amend(look=replace(self._session.document.look, up=pose.upright.up))
+                look = replace(self._session.document.look, up=pose.upright.up)
+                self._session.amend(look=look, front=pose.upright.front)
                 if pose.upright.up != UP:
                     self._note(
                         f"Up is taken to be {pose.upright.up}: {pose.upright.why}. Change it beside the cube."
@@ -202,7 +209,8 @@ class Steering:
         """The camera that a scan is first shown with."""
         is_moved = not self._session.laid.layers(pose).place.is_identity
         views = () if is_moved else pose.views
-        return first_camera(views, self.whole(pose), self._viewport.aspect, self._up)
+        front = self._session.document.front
+        return first_camera(views, self.whole(pose), self._viewport.aspect, self._up, front)
 
     def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
         """Move the camera, and what it turns about, as far as the subject has gone since another pose."""

@@ -56,5 +56,7 @@ def _draw_ways(steering: Steering, pick: Callable[[], object]) -> None:
         if imgui.menu_item(f"{title} is up###{title}", "", is_on)[0]:
             act()
     imgui.separator()
+    if imgui.menu_item("This side is the front###front", "", False)[0]:
+        steering.set_front()
     if imgui.menu_item("A surface faces up...###pick", "", False)[0]:
         pick()

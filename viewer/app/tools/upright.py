@@ -46,6 +46,7 @@ class Tool:
             look=replace(self.desk.document.look, up=up),
             camera=upright_camera(camera, bounds, self.desk.viewport.aspect, up),
             pivot=None,
+            front=0.0,
         )
         self.desk.leave_clicks()
         log.debug("up is %s", up)
