@@ -87,7 +87,7 @@ def test_ellipses_are_drawn_round_where_so_asked(draw: Draw, way: str, passes: s
     splats, camera = Packed.of(ELLIPSES), CAMERAS["perspective"]
     given = {"instancing": way, "two": passes == "two"}
     one = splatted(draw, ELLIPSES, splats, camera, elliptical=False, **given)
-    params = {"instancing": way, "passes": passes, "enlarge": 1.0}
+    params = {"instancing": way, "passes": passes, "enlarge": 1.0, "radius": "own"}
     own = draw(splats.on(ELLIPSES, elliptical=False), camera, SIZE, "surfels", LOOK, params)
     assert_agree(one, own, 0.002)
 
@@ -104,7 +104,14 @@ def test_rows_that_are_not_listed_have_no_splat(draw: Draw, way: str, passes: st
         colors=CLOUD.colors[rows],  # type: ignore[index]
         radii=CLOUD.radii[rows],  # type: ignore[index]
     )
-    own = draw(few, camera, SIZE, "surfels", LOOK, {"instancing": way, "passes": passes, "enlarge": 1.0})
+    own = draw(
+        few,
+        camera,
+        SIZE,
+        "surfels",
+        LOOK,
+        {"instancing": way, "passes": passes, "enlarge": 1.0, "radius": "own"},
+    )
     np.testing.assert_array_equal(one.row == NOTHING, own.row == NOTHING)
     covered = one.row != NOTHING
     assert (rows[own.row[covered]] != one.row[covered]).mean() < 2e-3

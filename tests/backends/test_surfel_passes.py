@@ -231,8 +231,16 @@ def test_every_level_comes_back(draw: Draw, instancing: str, passes: str) -> Non
             radii=np.full(len(places), 0.45),
         )
         surface = surfels(
-            draw, cloud, camera, size, Look(light="flat"), instancing=instancing, passes=passes, enlarge=1
-        )
+            draw,
+            cloud,
+            camera,
+            size,
+            Look(light="flat"),
+            instancing=instancing,
+            passes=passes,
+            enlarge=1,
+            radius="own",
+        )  # fmt: skip
         owns = surface._read_texels("color", np.uint8)[..., :3]
         for level in range(256):
             pixel = int(6 * (x[level] + 8)), int(6 * (8 - y[level]))
@@ -253,7 +261,7 @@ def test_means_are_those_of_linear_light(draw: Draw, instancing: str) -> None:
         colors=np.repeat(pairs.reshape(-1, 1), 3, axis=1),
         radii=np.full(512, 0.45),
     )
-    surface = surfels(draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=1)
+    surface = surfels(draw, cloud, camera, size, instancing=instancing, passes="two", enlarge=1, radius="own")
     mean = bytes_from_linear(linear_from_bytes(pairs).mean(axis=0)).astype(int)
     middles = surface._read_texels("color", np.uint8)[
         (5 * (8 - y)).astype(int), (5 * (x + 8)).astype(int), 0
