@@ -240,3 +240,52 @@ def test_the_rate_is_what_was_shown_lately(started: Callable) -> None:
         shown(playback, 3 + step / 5 + 0.002)  # drawn late: five pictures a second
     assert playback.rate == pytest.approx(5)
     assert playback.dropped == 4 + 18 * 3
+
+
+def test_playing_keeps_to_the_chosen_frames_round_their_ends(started: Callable) -> None:
+    playback, _ = started(all_read=True)
+    for index, is_last in ((3, False), (5, True)):
+        playback.set_end(is_last, index)
+    assert playback.session.document.span == (3, 5)
+    assert shown(playback, 0.0) == 0, "what is shown stays"
+    playback.toggle(1.0)
+    assert [shown(playback, 1.05 + step / 10) for step in range(7)] == [3, 4, 5, 3, 4, 5, 3]
+    assert [playback.after(5, step) for step in range(4)] == [5, 3, 4, 5]
+    playback.change(1.66, reverse=True)
+    assert [shown(playback, 1.75 + step / 10) for step in range(4)] == [5, 4, 3, 5]
+    playback.change(2.06, reverse=False, loop=False)
+    seen = [shown(playback, 2.15 + step / 10) for step in range(4)]
+    assert seen[-1] == 5
+    assert not playback.player.playing, "it ends with the last of them"
+    playback.step(1, 3.0)
+    assert playback.session.index == 6, "steps go anywhere"
+    playback.clear_span()
+    playback.change(3.0, loop=True)
+    playback.toggle(3.0)
+    assert [shown(playback, 3.05 + step / 10) for step in range(6)] == [6, 7, 8, 9, 0, 1]
+
+
+def test_an_end_that_passes_the_other_takes_it_along(started: Callable) -> None:
+    playback, _ = started(all_read=True)
+    playback.set_end(True, 4)
+    shown(playback, 0.0)
+    playback.set_end(False, 7)
+    assert playback.session.document.span == (7, 7)
+    shown(playback, 0.1)
+    playback.set_end(True, 2)
+    assert playback.session.document.span == (2, 2)
+    shown(playback, 0.2)
+    playback.set_end(False, 0)
+    shown(playback, 0.3)
+    playback.set_end(True, 9)
+    assert playback.session.document.span is None, "all of them"
+
+
+def test_chosen_frames_that_a_shorter_scan_has_not_are_left_out(started: Callable) -> None:
+    playback, _ = started(count=4, all_read=True)
+    playback.session.change("Choose", span=(2, 9))
+    playback.toggle(0.0)
+    assert [shown(playback, 0.05 + step / 10) for step in range(4)] in ([2, 3, 2, 3], [0, 2, 3, 2])
+    playback.session.change("Choose", span=(6, 9))
+    shown(playback, 1.0)
+    assert playback.span == range(4)

@@ -91,7 +91,7 @@ def replayed(folder: Path, *arguments: object) -> None:
 
 
 def listed(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()} - {"jane_doe", "config", "log"}
+    return {path.name for path in folder.iterdir()} - {"jane_doe", "config", "state", "log"}
 
 
 def corner(app: RunningApp, right: bool) -> NDArray[np.uint8]:
@@ -147,6 +147,28 @@ def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: 
     app.settle()
     for path in (recording, out):
         path.unlink()
+
+
+def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, folder: Path) -> None:
+    app.screen.do("key", "Home", "key", "Right", "key", "i", "key", "Right", "key", "Right", "key", "shift+i")
+    assert app.settle().document["span"] == [1, 3]
+    before = app.state.pictures
+    app.screen.do("key", "space")
+    app.see(lambda _: len(app.pictures(before)) > 6)
+    app.screen.do("key", "space")
+    app.settle()
+    assert {state.frame for state in app.pictures(before)} == {1, 2, 3}
+    dialog = Dialog(app)
+    dialog.choose("what", "###frames")
+    dialog.enter("width", 96)
+    dialog.enter("height", 64)
+    dialog.enter("name", "chosen")
+    dialog.export()
+    app.told(r"Saved 3 pictures, .*chosen_0002.png to chosen_0004.png")
+    for path in folder.glob("chosen_*.png"):
+        path.unlink()
+    app.screen.do("key", "alt+i", "key", "Home", "key", "Escape")
+    assert app.settle().document["span"] is None
 
 
 def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:

@@ -107,6 +107,13 @@ def _pace(name: str, title: str, key: str) -> Command[App]:
     )  # fmt: skip
 
 
+def _end(name: str, title: str, key: str, is_last: bool) -> Command[App]:
+    """Chooses the frame that is shown as the first or the last that is played."""
+    return Command(
+        name, title, lambda app: app.playback.set_end(is_last, app.session.index), key, can=_has_frames
+    )
+
+
 def _view(number: int, side: str) -> Command[App]:
     title = side.capitalize()
     return Command(
@@ -318,6 +325,14 @@ _PLAYBACK: Menu[App] = Menu("Playback", (
         Command("slower", "Slower", lambda app: app.change_speed(-1), "[", repeats=True, can=_has_frames),
         Command("faster", "Faster", lambda app: app.change_speed(1), "]", repeats=True, can=_has_frames),
         Command("speed_1", "Speed 1x", lambda app: app.change_pace(speed=1.0), "Backspace", can=_has_frames),
+    ),
+    (
+        _end("span_first", "Begin with this frame", "I", is_last=False),
+        _end("span_last", "End with this frame", "Shift+I", is_last=True),
+        Command(
+            "span_all", "Play all frames", lambda app: app.playback.clear_span(), "Alt+I",
+            can=lambda app: app.document.span is not None,
+        ),
     ),
     (
         _pace("loop", "Loop", "L"),

@@ -17,10 +17,23 @@ from ..look import Look
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Pose
 from .part import Part
-from .schema import DAMAGED, ReadBy, Unit, Values, Word, is_object, structured, unread, usable
+from .schema import (
+    DAMAGED,
+    Kind,
+    PoseNumber,
+    ReadBy,
+    Unit,
+    Values,
+    Word,
+    is_object,
+    structured,
+    unread,
+    usable,
+)  # fmt: skip
 
 P = TypeVar("P", bound=Part)
 _UPRIGHT = 0.999  # cosine between a camera's up and the scan's
+Span = Annotated[tuple[PoseNumber, PoseNumber], Kind("two frames in order", lambda ends: ends[0] <= ends[1])]
 
 
 @dataclass(frozen=True)
@@ -73,9 +86,10 @@ class Document:
     default, which also stands in for one that is not there. params: backend's name -> its `Params`, kept when
     another backend is chosen. unit: what the user calls the scan's unit of length, None where the scan tells
     or nobody does. shown_unit: that lengths are told in, None for the scan's own. front: degrees that the
-    front of the scan is turned about what is up. bookmarks: cameras to go back to. parts: name -> what a tool
-    keeps (see `Part`); of a tool that is not there, what its file said. unread: fields that are not known
-    here or could not be read -> what the file said, which is written again; so is what was made anew of
+    front of the scan is turned about what is up. span: the first and the last frame that playing keeps to,
+    None for all. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool
+    that is not there, what its file said. unread: fields that are not known here or could not be read -> what
+    the file said, which is written again; so is what was made anew of
     params and parts, under names such as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
@@ -90,6 +104,7 @@ class Document:
     unit: Unit | None = None
     shown_unit: Unit | None = None
     front: float = 0.0
+    span: Span | None = None
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
     unread: Values = field(default_factory=dict)

@@ -61,7 +61,7 @@ class Exporting:
         self.task: Task | None = None
         self._work: Future[Made] | None = None
         self._suggested = ""
-        self._scan = ""
+        self._span: tuple[str, tuple[int, int] | None] | None = None  # of a scan, that was suggested
 
     @property
     def can(self) -> bool:
@@ -93,9 +93,10 @@ class Exporting:
         if self._entry() is None:
             return
         choices = self.choices
-        if self._scan != self._session.scan:
-            self._scan = self._session.scan
-            choices = replace(choices, first=1, last=None)
+        if (span := (self._session.scan, self._session.document.span)) != self._span:
+            self._span = span
+            first, last = span[1] or (0, None)
+            choices = replace(choices, first=first + 1, last=None if last is None else last + 1)
         if not choices.folder or "folder" in self.problems():
             choices = replace(choices, folder=str(working_folder()))
         if choices.name in ("", self._suggested):

@@ -42,17 +42,15 @@ class Ahead:
         """The frames to prepare, the most urgent first; while playing in real time those that would be late
         come after all others, the latest last."""
         playback, session = self._playback, self._session
-        player, count, index = playback.player, len(playback.timeline), session.index
+        player, count, index = playback.player, len(playback.span), session.index
         if not player.playing:
             return [index]
         late = 0
         if not session.pace.every_frame:
             late = min(math.ceil(self._renderer.latency * player.rate), count - 1)
         steps = [*range(late, min(late + _REACH, count)), *reversed(range(late))]
-        frames = [index + step * session.pace.direction for step in steps]
-        if not session.pace.loop:
-            return [frame for frame in frames if 0 <= frame < count]
-        return [frame % count for frame in frames]
+        frames = [playback.after(index, step) for step in steps]
+        return [frame for frame in frames if frame is not None]
 
     @property
     def ready(self) -> int:
@@ -60,12 +58,12 @@ class Ahead:
         playback = self._playback
         if not playback.player.playing:
             return 0
-        for step in range(1, min(_REACH, len(playback.timeline))):
-            index = (self._session.index + step * self._session.pace.direction) % len(playback.timeline)
-            pose = playback.timeline.ready(index)
+        for step in range(1, min(_REACH, len(playback.span))):
+            index = playback.after(self._session.index, step)
+            pose = None if index is None else playback.timeline.ready(index)
             if pose is None or not self.is_prepared(pose):
                 return step - 1
-        return min(_REACH, len(playback.timeline)) - 1
+        return min(_REACH, len(playback.span)) - 1
 
     def _request(self, pose: Pose) -> Request | None:
         """The picture to draw of a pose, without layers: nothing is prepared of them, and they are found for
@@ -76,8 +74,7 @@ class Ahead:
         """How many frames playing shows before a pose; 0 for all while it does not play."""
         if not self._playback.player.playing:
             return 0
-        steps = (pose.index - self._session.index) * self._session.pace.direction
-        return steps % len(self._playback.timeline)
+        return self._playback.steps_to(pose.index, self._session.index)
 
 
 def _how(document: Document) -> tuple[Any, ...]:

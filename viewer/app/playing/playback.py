@@ -25,7 +25,8 @@ class Playback:
     playing, it is the latest one that is there. dropped: readable frames that were not there
     at their time, since playing began; none where every frame is shown. jumps: how often it went elsewhere
     than playing would. is_prepared: whether a pose can be drawn as it is to be; until then the one before
-    stays.
+    stays. player: plays the frames that the document keeps to, `span`. whole: all frames, which steps go
+    through.
     """
 
     def __init__(self, timeline: Timeline, session: Session, first: int = 0) -> None:
@@ -38,7 +39,8 @@ class Playback:
     def begin(self, timeline: Timeline, first: int = 0) -> None:
         """Show another scan from now on, paused at one of its frames; the one before stays open."""
         self.timeline = timeline
-        self.player = Player(timeline.times, self.session.pace)
+        self.player = self.whole = Player(timeline.times, self.session.pace)
+        self.span = range(len(timeline))
         self.pose: Pose | None = None
         self.dropped = 0
         self._shown: deque[float] = deque()  # when poses were, lately
@@ -68,18 +70,67 @@ class Playback:
 
     def toggle(self, now: float) -> None:
         """Play from the current frame, or pause. now: seconds of the clock."""
+        self._keep_to(self._chosen(), now)
         if self.player.playing:
             self.player.pause()
         else:
             self.dropped = 0
             self._shown.clear()
-            self.session.index = self.player.play(self.session.index, now)
-            self._read_ahead()
+            self._play(now)
+
+    def _play(self, now: float) -> None:
+        self.session.index = self.span[self.player.play(self._in_span(self.session.index), now)]
+        self._read_ahead()
+
+    def _in_span(self, index: int) -> int:
+        """The place of a frame among those that are played, of the one that comes first where it is none."""
+        if index in self.span:
+            return index - self.span.start
+        return len(self.span) - 1 if self.session.pace.reverse else 0
+
+    def _chosen(self) -> range:
+        """The frames to play: those that the document keeps to, as many of them as there are."""
+        count, ends = len(self.timeline), self.session.document.span
+        if ends is None or ends[0] >= count:
+            return range(count)
+        return range(ends[0], min(ends[1] + 1, count))
+
+    def _keep_to(self, span: range, now: float) -> None:
+        """Play these frames from now on."""
+        if span != self.span:
+            was_playing, self.span = self.player.playing, span
+            self.player = Player(self.timeline.times[span.start : span.stop], self.session.pace)
+            if was_playing:
+                self._play(now)
+
+    def set_end(self, is_last: bool, index: int) -> None:
+        """Begin playing with a frame, or end with it; the other end goes along where it would be passed."""
+        span = self._chosen()
+        ends = (min(span[0], index), index) if is_last else (index, max(span[-1], index))
+        whole = (0, len(self.timeline) - 1)
+        self.session.change("Choose frames", merge="span", span=None if ends == whole else ends)
+
+    def clear_span(self) -> None:
+        """Play all frames again."""
+        self.session.change("Choose all frames", span=None)
+
+    def after(self, index: int, steps: int) -> int | None:
+        """The frame that playing shows so many steps after one; None where it has come to its end by then."""
+        step = self._in_span(index) + steps * self.session.pace.direction
+        if not (self.session.pace.loop or 0 <= step < len(self.span)):
+            return None
+        return self.span[step % len(self.span)]
+
+    def steps_to(self, index: int, start: int) -> int:
+        """How many steps after one frame playing shows another, round the end."""
+        both = self._in_span(index) - self._in_span(start)
+        return both * self.session.pace.direction % len(self.span)
 
     def change(self, now: float, **changes: Any) -> None:
         """Change fields of the `Pace`; playing goes on from the frame shown."""
         self.session.pace = replace(self.session.pace, **changes)
         self.player.change(self.session.pace, now)
+        self.whole.pace = self.session.pace
         self._shown.clear()
         if self.player.playing:
             self._read_ahead()
@@ -91,19 +142,20 @@ class Playback:
         self.session.index = index
         self.jumps += 1
         self.timeline.request(index)
-        self.player.enter(index, now)
+        self.player.enter(self._in_span(index), now)
 
     def step(self, count: int, now: float) -> None:
         """Pause, and go some frames on."""
         self.player.pause()
-        self.seek(self.player.step(self.session.index, count), now)
+        self.seek(self.whole.step(self.session.index, count), now)
 
     def advance(self, now: float) -> None:
         """Take in what time and the timeline's worker have brought."""
+        self._keep_to(self._chosen(), now)
         late = self.waiting
         if late and self.session.pace.every_frame:
-            self.player.enter(self.session.index, now)  # its time begins when it is there
-        if frames := self.player.due(now):
+            self.player.enter(self._in_span(self.session.index), now)  # its time begins when it is there
+        if frames := [self.span[frame] for frame in self.player.due(now)]:
             missed = ([self.session.index] if late else []) + frames[:-1]
             self.dropped += len([frame for frame in missed if frame not in self.timeline.broken])
             self.session.index = frames[-1]
@@ -132,9 +184,10 @@ class Playback:
         if shown is None:
             return self.timeline.ready(wanted)
         in_time = self.player.playing and not pace.every_frame
-        late = (wanted - shown.index) * pace.direction % len(self.timeline) if in_time else 1
+        late = self.steps_to(wanted, shown.index) if in_time else 1
         for steps in range(max(late, 1)):
-            pose = self.timeline.ready((wanted - steps * pace.direction) % len(self.timeline))
+            place = self._in_span(wanted) - steps * pace.direction
+            pose = self.timeline.ready(self.span[place % len(self.span)] if steps else wanted)
             if pose is not None and (pose is shown or self.is_prepared(pose)):
                 return pose
         return None

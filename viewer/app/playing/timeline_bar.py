@@ -25,6 +25,8 @@ _SPEED_WIDTH = 4.6  # in heights of the font
 _SHORTEST_TRACK = 8.0
 _BAR = (0.12, 0.4)  # of the track's height, where the frames are
 _TICKS = 0.5  # where their numbers begin
+_HANDLE = 0.2  # half the width of what sets an end
+_FIRST, _LAST = 1, 2
 _TICK_TEXT = 0.75  # heights of the font
 _TICK_ROOM = 7.0  # from one to the next at least, in heights of their text
 _GAP = "    "  # between what is said of the place under the mouse
@@ -126,10 +128,16 @@ def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> Non
     if size.x < 1:
         return
     imgui.invisible_button("track", size)
-    track = _Track(playback.player.edges, imgui.get_item_rect_min(), size)
-    timeline, frame = playback.timeline, playback.player.frame_at(track.time(imgui.get_mouse_pos().x))
+    track = _Track(playback.whole.edges, imgui.get_item_rect_min(), size)
+    timeline, frame = playback.timeline, playback.whole.frame_at(track.time(imgui.get_mouse_pos().x))
     if imgui.is_item_active() or imgui.is_item_deactivated():
-        playback.seek(frame, time.monotonic())
+        storage, grabbed = imgui.get_state_storage(), imgui.get_id("grabbed")
+        if imgui.is_item_activated():
+            storage.set_int(grabbed, track.grabbed(playback.span, imgui.get_mouse_pos()))
+        if end := storage.get_int(grabbed):
+            playback.set_end(end == _LAST, frame)
+        else:
+            playback.seek(frame, time.monotonic())
     if len(timeline) > 1:
         if imgui.is_item_hovered():
             words = [frame_in_words(frame), timeline.label(frame)]
@@ -141,6 +149,7 @@ def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> Non
     for index in playback.timeline.broken:
         track.bar(index, index + 1, palette.broken)
     if len(playback.timeline) > 1:
+        track.ends(playback.span, palette.accent)
         track.head(playback.session.index, palette.text if playback.problem is None else palette.broken)
 
 
@@ -181,6 +190,26 @@ class _Track:
             wide = imgui.calc_text_size(text).x * _TICK_TEXT
             left = min(max(x - wide / 2, self.corner.x), self.corner.x + self.size.x - wide)
             self.draw_list.add_text(font, size, ImVec2(left, middle), color, text)
+
+    def ends(self, span: range, color: int) -> None:
+        """Mark the frames that are played: a handle below either end, a line between where not all are."""
+        top, half = self.corner.y + _BAR[1] * self.size.y, _HANDLE * self.size.y
+        left, right = self.x(self.edges[span.start]), self.x(self.edges[span.stop])
+        if len(span) < len(self.edges) - 1:
+            line = ImVec2(left, top), ImVec2(right, top + 0.25 * half)
+            self.draw_list.add_rect_filled(*line, theme.packed(color))
+        for x in (left, right):
+            corners = ImVec2(x, top), ImVec2(x - half, top + 1.5 * half), ImVec2(x + half, top + 1.5 * half)
+            self.draw_list.add_triangle_filled(*corners, theme.packed(color))
+
+    def grabbed(self, span: range, mouse: ImVec2) -> int:
+        """The end whose handle is under the mouse, _FIRST or _LAST; 0 where none is."""
+        half = _HANDLE * self.size.y
+        if mouse.y > self.corner.y + _BAR[1] * self.size.y:
+            for end, index in ((_LAST, span.stop), (_FIRST, span.start)):
+                if abs(mouse.x - self.x(self.edges[index])) <= 1.5 * half:
+                    return end
+        return 0
 
     def head(self, index: int, color: int) -> None:
         """Mark the middle of the current frame."""
