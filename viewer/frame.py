@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,10 +12,12 @@ from typing import Any
 from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
+from .gpu.context import Gpu
+from .gpu.mean import PictureMean
 from .gpu.pose import drawn_bounds
 from .gpu.shade import shade
 from .gpu.surface import Surface
-from .look import Look, drawable
+from .look import SAMPLES, Look, drawable
 from .renderer import Renderer, Want
 from .scan.layers import NO_LAYERS, Layers
 from .scan.pods import first_camera
@@ -50,13 +53,15 @@ def render_frame(
     wait: bool = True,
     share: float = 1.0,
     moving: bool = False,
+    shift: tuple[float, float] = (0.0, 0.0),
 ) -> bool:
     """Draw what is asked for into `surface`; True if a later call would refine it.
 
     wait: whether to wait for estimated attributes and derived data; while they are made on
     a worker, plain points are drawn instead, and what a backend finds bit by bit is drawn as far as
     it is. share: of the points that need to be drawn; a preview with less than 1 is refined by a call
-    with 1. moving: whether other pictures will follow at once. Raises InputError for what the scan
+    with 1. moving: whether other pictures will follow at once. shift: pixels right and down by which the
+    picture is moved within its edges, up to half of one. Raises InputError for what the scan
     or the parameters do not allow.
     """
     start = time.perf_counter()
@@ -74,6 +79,7 @@ def render_frame(
         plain = fallback(request)
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
+    view = replace(view, shift=shift)
     surface.start(pose, view, look, request.layers, backend.values)
     stats = surface.stats
     stats.backend = backend.name
@@ -102,6 +108,74 @@ def render_frame(
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
     return refinable or prepared is None
+
+
+def supersample(renderer: Renderer, request: Request, surface: Surface, *, wait: bool = True) -> bool:
+    """Draw one more sample of each pixel of the picture that `render_frame` has completed for this request;
+    True until it shows the mean of as many as the look's quality says.
+
+    The samples are pictures of their own, shifted by less than a pixel, so every backend does, and edges
+    become smooth by how much of a pixel is covered. Only `surface.picture` changes, after each four; what
+    is measured, picked or exported as numbers stays that of the middles of pixels. wait: see `render_frame`;
+    without, it may take several calls to draw one.
+    """
+    samples = SAMPLES[request.look.quality]
+    if samples == 1:
+        return False
+    state = surface.keep(_Samples)
+    if state.of is not surface.drawn:
+        state.begin(surface)
+    if state.mean.count < samples:
+        look = request.look
+        if surface.color_range is not None:
+            look = replace(look, low=surface.color_range[0], high=surface.color_range[1])
+        shift = sample_shifts(samples)[state.mean.count]
+        if render_frame(renderer, replace(request, look=look), state.sample, wait=wait, shift=shift):
+            return True
+        state.mean.add(state.sample.picture)
+        if state.mean.count % 4 == 1:
+            state.mean.write(surface.picture)
+            surface.stats.samples = state.mean.count
+    return state.mean.count < samples
+
+
+@cache
+def sample_shifts(samples: int) -> tuple[tuple[float, float], ...]:
+    """The shifts of 1, 5 or 17 samples of each pixel, pixels, the middle first: a square lattice, turned so
+    that each has a column and a row of its own. The first one and each four that follow are centred."""
+    step = math.isqrt(samples - 1)  # whose square is -1, modulo their number: a quarter turn
+    firsts = {1: (), 5: (1,), 17: (2, 3, 6, 1)}[samples]
+    turned = [0, *(first * step**turns % samples for first in firsts for turns in range(4))]
+
+    def centered(number: int) -> float:
+        return ((number + samples // 2) % samples - samples // 2) / samples
+
+    return tuple((centered(number), centered(number * step)) for number in turned)
+
+
+class _Samples:
+    """Samples of a surface's pixels, kept with it. of: the `drawn` of the picture that they are of."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self.sample = Surface(gpu, size)
+        self.mean = PictureMean(gpu, size)
+        self.of: dict[str, object] | None = None
+
+    def begin(self, surface: Surface) -> None:
+        """Begin with the picture that the surface has."""
+        self.of = surface.drawn
+        self.mean.clear()
+        self.mean.add(surface.picture)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.sample.nbytes + self.mean.nbytes
+
+    def release(self) -> None:
+        """Delete what it holds on the GPU."""
+        self.sample.release()
+        self.mean.release()
 
 
 def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms: float) -> bool:
@@ -222,6 +296,8 @@ def render(
     )
     surface = Surface(renderer.gpu, size)
     while render_frame(renderer, request, surface):
+        pass
+    while supersample(renderer, request, surface):
         pass
     return surface
 

@@ -42,6 +42,9 @@ LIGHT_WORDS = {
     "fixed": "From a fixed side",
 }
 RANGE_WORDS = {"sequence": "All frames", "frame": "Each frame"}
+# Samples of each pixel that a picture at rest is the mean of, the middle one among them.
+SAMPLES = {"fast": 1, "balanced": 5, "fine": 17}
+QUALITY_WORDS = {"fast": "Fast", "balanced": "Balanced", "fine": "Fine"}
 _FIXED, _FLAT = {"light": ("fixed",)}, {"light": ("flat",)}
 _EYE_DOME = {"eye_dome": (None, True)}
 
@@ -53,9 +56,14 @@ class Look:
     `color_by` and `light` are "auto" by default: own colours where the scan has them, a
     head light where it has normals, else eye-dome lighting, which needs depth alone; the photographs
     of range images are shown as they are. "level" shows measured pixels in grey, filled ones in a
-    colour for each level that fills.
+    colour for each level that fills. `quality`: see `frame.supersample`.
     """
 
+    quality: str = param(
+        "balanced",
+        "Smooth edges at rest: fast: one sample of each pixel; balanced: the mean of 5; fine: of 17",
+        choices=tuple(SAMPLES), words=QUALITY_WORDS, basic=True,
+    )  # fmt: skip
     color_by: str = param(
         "auto",
         f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, #N for scalar N, or a number "

@@ -14,6 +14,7 @@ LINEAR_KNEE, ENCODED_KNEE = 0.0031308, 0.04045
 # Colours that are added up are whole steps of linear light, so that sums are exact: as few steps as keep
 # neighbouring levels apart where they are dark. Roots are light's square roots, which need fewer bits.
 LIGHT_STEPS, LIGHT_ROOTS = 4095, 1023
+LIGHT_PARTS = 16  # of a step, to which means of pictures are rounded before they become bytes
 
 
 def linear_from_bytes(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ class View:
     near, far: what is outside is not drawn. reach: the depth that an orthographic depth
     buffer ends at. All depths count from a plane that lies so far before the eye: base, scan units. It is 0
     unless the view is `straightened`, so that float32 resolves depths by the scan's size rather than by how
-    far it is away.
+    far it is away. shift: pixels right and down by which the picture is moved within its edges.
     """
 
     size: tuple[int, int]
@@ -40,6 +40,7 @@ class View:
     reach: float
     perspective: bool
     base: float = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def of(
@@ -92,10 +93,16 @@ class View:
         )
 
     @property
+    def center(self) -> NDArray[np.float64]:
+        """Pixel coordinates, (2,), of the line of sight."""
+        return np.array(self.size) / 2 + self.shift
+
+    @property
     def key(self) -> tuple[object, ...]:
         """Equal for views that show the same."""
-        lens = (self.size, self.scale, self.near, self.far, self.reach, self.perspective, self.base)
-        return (self.origin.tobytes(), self.rotation.tobytes(), self.translation.tobytes(), *lens)
+        shape = (self.size, self.shift, self.base, self.perspective)
+        lens = (self.scale, self.near, self.far, self.reach)
+        return (self.origin.tobytes(), self.rotation.tobytes(), self.translation.tobytes(), *shape, *lens)
 
     def project(self, positions: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Pixel coordinates (N, 2), row 0 at the top, and depths (N,), in float64.
@@ -105,8 +112,7 @@ class View:
         view = positions @ self.rotation.T + self.translation
         depth = -view[:, 2]
         scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
-        center = np.array(self.size) / 2
-        return center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
+        return self.center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
 
     def unproject(self, pixels: NDArray[np.floating], depth: NDArray[np.floating]) -> NDArray[np.float64]:
         """Positions (N, 3), relative to the origin, of pixel coordinates (N, 2) at depths (N,).
@@ -114,7 +120,7 @@ class View:
         The inverse of `project`, in float64.
         """
         scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
-        offsets = (pixels - np.array(self.size) / 2) * np.array([1, -1]) / scale[:, None]
+        offsets = (pixels - self.center) * np.array([1, -1]) / scale[:, None]
         return (np.column_stack([offsets, -depth]) - self.translation) @ self.rotation
 
     def along(self, pixel: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -16,13 +16,12 @@ vec2 tangents(float along, float radius, float middle) {
 
 // First and last.
 ivec4 cells_of(float radius) {
-    vec2 middle = 0.5 * vec2(view_size);
-    vec2 x = tangents(center.x, radius, middle.x), y = tangents(-center.y, radius, middle.y);
+    vec2 x = tangents(center.x, radius, view_center.x), y = tangents(-center.y, radius, view_center.y);
     vec4 box = vec4(x.x, y.x, x.y, y.y) + ROUNDING * vec4(-2.0, -2.0, 2.0, 2.0);
     return clamp(ivec4(floor(box)) + margin >> fine_shift, ivec4(0), fine_size.xyxy - 1);
 }
 
-// From the center to the plane through the eye and a line of pixels, which are counted from the picture's middle.
+// From the center to the plane through the eye and a line of pixels, which are counted from the line of sight.
 float plane_distance(float along, float pixel) {
     float slope = pixel / view_scale;
     return view_perspective ? abs(along + slope * center.z) * inversesqrt(1.0 + slope * slope) : abs(along - slope);
@@ -31,7 +30,7 @@ float plane_distance(float along, float pixel) {
 // The distance within which cells hold all participants; UNKNOWN: all that there are.
 float known_within(ivec4 cells) {
     vec4 edge = vec4((cells + ivec4(0, 0, 1, 1) << fine_shift) - margin) + ROUNDING * vec4(1.0, 1.0, -1.0, -1.0);
-    edge -= 0.5 * vec2(view_size).xyxy;
+    edge -= view_center.xyxy;
     vec4 known = vec4(UNKNOWN);
     if (cells.x > 0) known.x = plane_distance(center.x, edge.x);
     if (cells.y > 0) known.y = plane_distance(-center.y, edge.y);

@@ -19,13 +19,13 @@ float scale_at(float depth) {
 vec2 to_pixel(vec3 view) {
     precise float scale = view_perspective ? view_scale / -view.z : view_scale;
     precise vec2 pixel = vec2(view.x, -view.y) * scale;
-    pixel = pixel + 0.5 * vec2(view_size);
+    pixel = pixel + view_center;
     return pixel;
 }
 
 // View-space position of a pixel coordinate at a depth.
 vec3 from_pixel(vec2 pixel, float depth) {
-    precise vec2 offset = (pixel - 0.5 * vec2(view_size)) / scale_at(depth);
+    precise vec2 offset = (pixel - view_center) / scale_at(depth);
     return vec3(offset.x, -offset.y, -depth);
 }
 
@@ -35,10 +35,11 @@ bool in_depth_range(float depth) {
 
 // Clip coordinates with reversed depth: near 1, far 0.
 vec4 to_clip(vec3 view) {
-    vec2 half_size = 0.5 * vec2(view_size);
+    vec2 half_size = 0.5 * vec2(view_size), shift = view_center / half_size - 1.0;
     float depth = -view.z;
-    if (view_perspective) return vec4(view.xy * view_scale / half_size, view_near, depth);
-    return vec4(view.xy * view_scale / half_size, (view_reach - depth) / (view_reach - view_near), 1.0);
+    vec2 at = view.xy * view_scale / half_size + vec2(shift.x, -shift.y) * (view_perspective ? depth : 1.0);
+    if (view_perspective) return vec4(at, view_near, depth);
+    return vec4(at, (view_reach - depth) / (view_reach - view_near), 1.0);
 }
 
 // The depth (scan units) that a reversed depth-buffer value stands for.

@@ -52,7 +52,7 @@ vec3 tile_corner(RangeView v, RangeTile tile, int number) {
 
 // Whether no pixel can show it: all corners are beyond one of the picture's planes by more than so many pixels.
 bool is_outside(RangeView v, RangeTile tile, float margin) {
-    vec2 reach = 0.5 * vec2(view_size) + margin;
+    vec2 reach = max(view_center, vec2(view_size) - view_center) + margin;
     vec3 least = vec3(uintBitsToFloat(NO_DEPTH)), most = -least;  // beyond left and top, right and bottom, near and far
     for (int i = 0; i < 8; ++i) {
         vec3 pod = tile_corner(v, tile, i), place = to_screen_view(v, pod);
@@ -92,6 +92,6 @@ vec2 footprint(RangeView v, RangeTile tile) {
         farthest = max(farthest, depth);
     }
     if (!view_perspective) return tile.spacing * view_scale;
-    float aside = length(0.5 * vec2(view_size)) / view_scale;  // in the picture's corners, along the line of sight
+    float aside = length(max(view_center, vec2(view_size) - view_center)) / view_scale;  // in the picture's corners, along the line of sight
     return tile.spacing * vec2(scale_at(farthest), scale_at(max(nearest, view_near)) * sqrt(1.0 + aside * aside));
 }

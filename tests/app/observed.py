@@ -91,7 +91,7 @@ def is_idle(app: App) -> bool:
     goes_on = (
         app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on,
         app.tasks.all, app.scans.waits, app.browser.waits,
-        playback.pose is not None and not app.viewport.is_complete,
+        playback.pose is not None and not app.viewport.is_refined,
     )  # fmt: skip
     return not any(goes_on)
 

@@ -252,3 +252,42 @@ def test_a_surface_that_nothing_was_drawn_into_is_not_shown(
 
 def failing(*args: object, **options: object) -> bool:
     raise ValueError("of a library")
+
+
+def test_a_picture_at_rest_is_refined_and_any_other_one_begins_anew(viewport: Viewport) -> None:
+    viewport.draw(REQUEST)
+    assert viewport.surface is not None
+    plain = viewport.surface.image()
+    assert viewport.is_complete
+    assert not viewport.is_refined
+    assert math.isinf(viewport.refines_at(playing=True))
+    for samples in (1, 1, 1, 5):
+        assert viewport.refines_at(playing=False) < time.monotonic()
+        assert viewport.refine() == (samples == 5)
+        assert viewport.surface.stats.samples == samples
+    assert viewport.is_refined
+    assert not viewport.refine()
+    refined = viewport.surface.image()
+    assert (refined != plain).any()
+
+    viewport.draw(turned(REQUEST), held=True)
+    assert viewport.surface.stats.samples == 1
+    assert time.monotonic() < viewport.refines_at(playing=False) < time.monotonic() + 1, "not while it moves"
+    viewport.refine()
+    viewport.draw(REQUEST)
+    np.testing.assert_array_equal(viewport.surface.image(), plain)
+    viewport.finish()
+    assert not viewport.is_refined, "which picks do not wait for"
+    viewport.finish(refined=True)
+    np.testing.assert_array_equal(viewport.surface.image(), refined)
+    viewport.draw(replace(REQUEST, look=Look(quality="fast")))
+    assert viewport.is_refined
+
+
+def test_a_preview_is_not_refined(viewport: Viewport) -> None:
+    viewport.draw(REQUEST)
+    viewport.took(1000.0, goal_ms=10.0)
+    viewport.draw(turned(REQUEST), held=True)
+    assert viewport.is_preview
+    assert math.isinf(viewport.refines_at(playing=False))
+    assert not viewport.refine()

@@ -19,7 +19,7 @@ from viewer import frame
 from viewer.camera import Camera
 from viewer.document.recording import Recording
 from viewer.gpu.surface import NOTHING
-from viewer.look import Look
+from viewer.look import SAMPLES, Look
 from viewer.renderer import Renderer
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -349,3 +349,22 @@ def test_one_colour_is_one_value_in_all_frames(run: Run, tmp_path: Path) -> None
     assert run(*arguments, "range=frame", "--all", "-o", tmp_path / "own%d.png").code == 0
     assert np.array_equal(picture(tmp_path / "own1.png"), picture(tmp_path / "one.png"))
     assert not np.array_equal(picture(tmp_path / "own1.png"), picture(tmp_path / "all1.png"))
+
+
+def test_quality_smooths_pictures_and_leaves_what_is_measured(run: Run, scans: Path, tmp_path: Path) -> None:
+    ball = ("render", scans / "ball.npz", *SMALL)
+    for name in SAMPLES:
+        for suffix in ("png", "npz"):
+            assert run(*ball, "--quality", name, "-o", tmp_path / f"{name}.{suffix}").code == 0
+    assert run(*ball, "-o", tmp_path / "usual.png").code == 0
+    fast, balanced, fine, usual = (picture(tmp_path / f"{name}.png") for name in (*SAMPLES, "usual"))
+    assert (fast != balanced).any()
+    assert (balanced != fine).any()
+    assert np.array_equal(balanced, usual)
+    one, many = (stored(tmp_path / f"{name}.npz") for name in ("fast", "fine"))
+    assert all(np.array_equal(bits(one[name]), bits(many[name])) for name in one)
+    again = ("render", "--replay", tmp_path / "fast.png", "-o")
+    assert run(*again, tmp_path / "again.png").code == 0
+    assert np.array_equal(picture(tmp_path / "again.png"), fast)
+    assert run(*again, tmp_path / "finer.png", "--quality", "fine").code == 0
+    assert np.array_equal(picture(tmp_path / "finer.png"), fine)

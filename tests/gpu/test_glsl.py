@@ -30,7 +30,7 @@ from viewer.backends.auto_splats.splatting import WAYS, draw_splats
 from viewer.bench import baselines
 from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.frame import Request, render_frame, supersample
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
@@ -99,6 +99,10 @@ def settings() -> Iterator[tuple[str, dict[str, object]]]:
 def draw_all(renderer: Renderer) -> None:
     """A picture of each kind, so that each program is built."""
     surface = Surface(renderer.gpu, SIZE)
+    flat = Pose(0, 0.0, "test", sphere(100))
+    request = Request(flat, Camera.orbit(flat.bounds, **CAMERA), "points")
+    render_frame(renderer, request, surface)
+    supersample(renderer, request, surface)
 
     def draw(
         scanned: PointCloud | Pose,

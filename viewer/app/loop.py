@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +58,8 @@ class Loop:
             changed = self._advance(time.monotonic())
         if changed or self._app.window.due:
             self._draw()
+        else:
+            self._refine()
         self._turns.end()
 
     def _ends(self) -> bool:
@@ -81,7 +84,21 @@ class Loop:
             app.playback.player.until_next(now), app.notices.next_change(now),
             app.steering.turntable.next_change(now), app.replayer.until_next(now),
         )  # fmt: skip
-        return min(look, *changes, app.viewport.better_at(app.playback.player.playing) - now)
+        playing, viewport = app.playback.player.playing, app.viewport
+        return min(look, *changes, viewport.better_at(playing) - now, self._refines_at - now)
+
+    @property
+    def _refines_at(self) -> float:
+        """When the picture may be refined, by the clock: while nothing is acted on."""
+        app = self._app
+        return math.inf if app.steering.moves else app.viewport.refines_at(app.playback.player.playing)
+
+    def _refine(self) -> None:
+        """Draw one more sample of a picture at rest, in a turn in which nothing else is to be drawn."""
+        if time.monotonic() >= self._refines_at:
+            with self._turns.part("refine"), self._app.failures.told("Refining"):
+                if self._app.viewport.refine():
+                    self._app.window.touch(frames=1)
 
     def _advance(self, now: float) -> bool:
         """Take in what time and workers have brought; True where there is something to show."""

@@ -129,6 +129,7 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
 def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     """The picture of an entry, anonymous where it or the arguments are. Raises InputError."""
     pose, start = timeline.pose(entry.pose), float(timeline.times[0])
+    entry = replace(entry, look=replace(entry.look, quality=args.quality or entry.look.quality))
     if entry.anonymous:
         return entry.request(anonymous_pose(pose, start))
     request = entry.request(pose)
@@ -145,7 +146,8 @@ def _completed(
     """
     marks = entry.marks if args.marks is None else marks_of(args.marks)
     unit = args.unit or entry.unit or timeline.unit
-    shown = replace(entry, scan=scan, hash=hash, marks=marks, unit=unit)
+    look = replace(entry.look, quality=request.look.quality)
+    shown = replace(entry, scan=scan, hash=hash, look=look, marks=marks, unit=unit)
     if not (entry.anonymous or args.anonymous):
         return shown
     time = float(request.pose.time)

@@ -77,6 +77,9 @@ class Texture(IntEnum):
     RANGE_XY = auto()
     RANGE_TILES = auto()
     RANGE_VIEWS = auto()
+    # Means of pictures.
+    LIGHT = auto()  # of bytes
+    ENCODED = auto()  # bytes of light
     SCRATCH = auto()  # where buffers become textures
 
 
@@ -96,6 +99,7 @@ class Storage(IntEnum):
     # Shading, beside a list.
     PICTURE = 0
     PIXEL_BITS = 1
+    LIGHT_SUMS = 1
     # Scatter, beside a list; what says which cells are visited has those from 4 on.
     KEYS = 0
     BEST = 1

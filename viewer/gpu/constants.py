@@ -31,6 +31,7 @@ SRGB_LINEAR_KNEE = srgb.LINEAR_KNEE
 SRGB_ENCODED_KNEE = srgb.ENCODED_KNEE
 LIGHT_STEPS = float(srgb.LIGHT_STEPS)
 LIGHT_ROOTS = float(srgb.LIGHT_ROOTS)
+LIGHT_PARTS = srgb.LIGHT_PARTS
 
 
 def constants_glsl() -> str:

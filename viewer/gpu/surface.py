@@ -46,7 +46,8 @@ class Stats:
     estimates included. passes: (name, gpu_ms), empty while timers are off.
     skipped: what was not computed -> why. counted: what was looked at, as tiles -> a function that reads how
     many of it became what; it waits for the GPU, and tells of the last picture of its surface. chosen:
-    parameter -> what "auto" stood for. faces_away: whether points that face away from the eye were left
+    parameter -> what "auto" stood for. samples: of each pixel, whose mean the picture shows (see
+    `frame.supersample`). faces_away: whether points that face away from the eye were left
     out. share: of the points that needed to be drawn, by the order of gpu/sample.py, less than 1 in a
     preview. left_out: the points that are not in that share. simplified: whether it is drawn more simply than
     a picture at rest would be, as `FrameView.moving` allows; the window draws it anew then.
@@ -65,6 +66,7 @@ class Stats:
     share: float = 1.0
     left_out: int = 0
     simplified: bool = False
+    samples: int = 1
 
 
 W = TypeVar("W", bound=Workspace)

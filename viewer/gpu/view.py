@@ -14,7 +14,8 @@ class ViewBlock:
 
     world_to_view: columns. view_scale: pixels per unit of x / depth, or of x (orthographic). view_near,
     view_far: scan units along the view axis, infinite where nothing was said. view_reach: what an
-    orthographic depth buffer ends at. view_size: pixels. view_base: how far from the eye depths begin.
+    orthographic depth buffer ends at. view_size: pixels. view_center: pixel coordinates of
+    the line of sight. view_base: how far from the eye depths begin.
     """
 
     world_to_view: Mat4
@@ -23,6 +24,7 @@ class ViewBlock:
     view_far: float
     view_reach: float
     view_size: tuple[int, int]
+    view_center: tuple[float, float]
     view_perspective: bool
     view_base: float
 
@@ -42,6 +44,7 @@ class ViewBlock:
             view_far=view.far,
             view_reach=view.reach,
             view_size=view.size,
+            view_center=(float(view.center[0]), float(view.center[1])),
             view_perspective=view.perspective,
             view_base=view.base,
         )

@@ -106,7 +106,7 @@ def first_hits(
     """The surface that is first met at places of a picture, anywhere in its pixels: (N, 3), absolute; NaN
     where nothing is. places: (N, 2), pixels from the left and from the top. size: (width, height), pixels."""
     view = View.of(camera, size, scene.origin, scene.bounds)
-    across = (places - np.array(size) / 2) * np.array([1, -1]) / view.scale
+    across = (places - view.center) * np.array([1, -1]) / view.scale
     starts, steps = _rays(view, across)
     depth = _cast(scene, starts, steps, view.near, view.far).distance
     there = np.isfinite(depth)
@@ -212,7 +212,7 @@ def pixel_rays(view: View, pixels: NDArray[np.integer]) -> tuple[Rays, Rays]:
     Relative to the view's origin; start + t * step has depth t.
     """
     row, column = np.divmod(pixels, view.size[0])
-    across = np.stack([column + 0.5 - view.size[0] / 2, view.size[1] / 2 - row - 0.5], axis=1)
+    across = np.stack([column + 0.5 - view.center[0], view.center[1] - row - 0.5], axis=1)
     return _rays(view, across / view.scale)
 
 

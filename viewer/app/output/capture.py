@@ -72,7 +72,7 @@ class Capture:
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels."""
-        self._viewport.finish()
+        self._viewport.finish(refined=True)
         surface = self._viewport.surface
         if surface is None or not self._viewport.is_there:
             self._note("There is no picture to save.")

@@ -34,6 +34,7 @@ def draw(
     for name, number in counting.words(viewport, counts):
         widgets.fact(name, number)
     widgets.fact("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
+    widgets.fact("Samples of a pixel", str(surface.stats.samples))
     for name, text in rows:
         widgets.fact(name, text)
     for name, choice in surface.stats.chosen.items():

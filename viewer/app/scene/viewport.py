@@ -12,9 +12,10 @@ from typing import Any
 from ...analysis.pick import Picked, before_gap, pick
 from ...bounds import Bounds
 from ...errors import Scan4DError
-from ...frame import Request, bring, colorable, fallback, is_prepared, prepare, render_frame
+from ...frame import Request, bring, colorable, fallback, is_prepared, prepare, render_frame, supersample
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
+from ...look import SAMPLES
 from ...renderer import Renderer
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
@@ -37,8 +38,9 @@ class Viewport:
     place: the rectangle: left, bottom, width, height, pixels from the window's lower left; the next picture
     is as large. request: what was drawn last, None before: pose, camera and how it is shown. problem: why it
     could not be drawn, None where it could; the image before stays then. size: of the picture, pixels. While
-    it moves, a picture may be a preview, of fewer points and pixels, which is drawn in full at rest. surface:
-    what the picture shows, smaller than `size` where it is a preview. number: of pictures drawn so far.
+    it moves, a picture may be a preview, of fewer points and pixels, which is drawn in full at rest, and then
+    refined (see `refine`). surface: what the picture shows, smaller than `size` where it is a preview.
+    number: of pictures drawn so far.
     shown_at: by the clock, when the last one was there.
     """
 
@@ -55,6 +57,7 @@ class Viewport:
         self.request: Request | None = None
         self.problem: Scan4DError | None = None
         self._prepared_at = math.inf  # by the clock, when what is being prepared may be there
+        self._is_rough = False  # whether it can be refined when it is at rest
         self._drawn: Any = None
         self._asked_for: Request | None = None  # the last one that was drawn as it says
         self._motion = Motion()
@@ -98,6 +101,7 @@ class Viewport:
                 self._prepared_at = now + _PREPARED_LATER  # the same again would be the same
                 return False
             self._drawn, self.request, self._picked = wanted, request, None
+            self._is_rough = False
             self.problem, self._prepared_at = None, math.inf
             self.size = size
             moving = playing or now < self._motion.ends
@@ -107,6 +111,7 @@ class Viewport:
             refinable = render_frame(self.renderer, drawn, surface, wait=False, share=share, moving=moving)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
+            self._is_rough = False
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
             return True
         if moving:
@@ -137,6 +142,8 @@ class Viewport:
             self._prepared_at = now + _PREPARED_LATER
         elif refinable and not self.is_preview:
             self._prepared_at = now
+        has_samples = SAMPLES[request.look.quality] > 1
+        self._is_rough = has_samples and as_asked and not (refinable or self.is_preview)
         pixels = surface.size
         log.debug("drew frame %d with %s, %dx%d pixels, %d points", request.pose.index, drew, *pixels, count)
 
@@ -152,11 +159,33 @@ class Viewport:
         before = colorable(before)
         return before if is_prepared(self.renderer, before, self.size) else None
 
-    def finish(self) -> None:
-        """Draw the picture in full, where it is a preview."""
+    def refine(self) -> bool:
+        """Draw one more sample of each pixel (see `frame.supersample`), or go on with one; whether the
+        picture is another one then. Does nothing where `refines_at` says never."""
+        surface, request = self.surface, self.request
+        if not self._is_rough or surface is None or request is None:
+            return False
+        before = surface.stats.samples
+        try:
+            self._is_rough = supersample(self.renderer, request, surface, wait=False)
+        except Scan4DError as error:  # as where memory is short; the picture is whole without
+            self._is_rough = False
+            log.debug("not refined: %s", error)
+        self.renderer.gpu.ctx.finish()  # so that a turn of the window's loop takes no more than this
+        return surface.stats.samples != before
+
+    def refines_at(self, playing: bool) -> float:
+        """The time by the clock from which `refine` may go on; infinite: never."""
+        is_ready = self._is_rough and not playing and math.isinf(self.better_at(playing))
+        return self._motion.ends if is_ready else math.inf
+
+    def finish(self, refined: bool = False) -> None:
+        """Draw the picture in full, where it is a preview. refined: with all of its samples."""
         if self.is_preview and self.request is not None:
             self._motion.end()
             self.draw(self.request)
+        while refined and self._is_rough:
+            self.refine()
 
     def rest(self) -> None:
         """Draw the next picture in full, however soon it comes."""
@@ -174,6 +203,11 @@ class Viewport:
     def is_complete(self) -> bool:
         """Whether drawing the same again would change nothing."""
         return self.request is not None and math.isinf(self.better_at(playing=False))
+
+    @property
+    def is_refined(self) -> bool:
+        """Whether it is complete, and `refine` has nothing left to do."""
+        return self.is_complete and not self._is_rough
 
     def better_at(self, playing: bool) -> float:
         """The time by the clock when drawing the same again may give a better picture; infinite: never."""
@@ -245,7 +279,7 @@ class Viewport:
     def clear(self) -> None:
         """Forget what is shown, whose image stays until the next request is drawn."""
         self._drawn = self.request = self.problem = self._bounded = self._picked = self._asked_for = None
-        self._prepared_at = math.inf
+        self._prepared_at, self._is_rough = math.inf, False
 
     def bounds(self, pose: Pose) -> Bounds:
         """The robust bounds of a pose, unmoved, found once; also of one that is too large to draw."""
