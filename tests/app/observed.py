@@ -91,7 +91,8 @@ def is_idle(app: App) -> bool:
     goes_on = (
         app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on,
         app.tasks.all, app.scans.waits, app.browser.waits,
-        playback.pose is not None and not app.viewport.is_refined,
+        playback.pose is not None and not app.viewport.is_complete,
+        playback.pose is not None and not (app.viewport.is_refined or app.steering.moves),
     )  # fmt: skip
     return not any(goes_on)
 
@@ -142,6 +143,7 @@ def shown(app: App) -> dict[str, Any]:
             "backend": surface.stats.backend,
             "color_range": surface.color_range,
             "pixels": surface.size,
+            "samples": surface.stats.samples,
             "points": len(viewport.request.pose.cloud) - surface.stats.left_out,
         }
     return state

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import RunningApp, State, running_app, virtual_screen
+from virtual_screen import PANEL, RunningApp, State, running_app, virtual_screen
 from written import picture
 
 from viewer import cli
@@ -126,3 +126,19 @@ def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: 
     expect_full(app)
     assert app.state.pictures == before + 1, "a single change is drawn in full at once"
     assert "Traceback" not in app.log()
+
+
+def test_a_picture_at_rest_becomes_smooth_and_any_act_goes_first(app: RunningApp) -> None:
+    screen = app.screen
+    assert app.settle().samples == 5
+    app.choose(PANEL, "quality/##value", "###fine")
+    assert app.settle().samples == 17
+    screen.do("key", "Right")
+    app.see(lambda state: state.frame == 1 and 1 < state.samples < 17)
+    screen.do("key", "Right")
+    app.see(frame=2, samples=1)
+    assert app.settle().samples == 17
+    path, again = saved(app)
+    np.testing.assert_array_equal(picture(path), again)
+    app.choose(PANEL, "quality/##value", "###fast")
+    assert app.settle().samples == 1

@@ -173,12 +173,11 @@ class Entry:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any], where: object = None) -> Entry:
-        """The entry of a complete JSON object; what earlier versions did not tell has its default, but for
-        the quality: they drew one sample of each pixel.
+        """The entry of a complete JSON object; what earlier versions did not tell is as they had it.
 
         where: it stands, for messages. Raises InputError for whatever is wrong in it.
         """
-        if is_object(data.get("look")):  # as it was before there were choices
+        if is_object(data.get("look")):  # before there were choices
             data = {**data, "look": {"range": "frame", "quality": "fast", **data["look"]}}
         entry = structured(cls, data, where)
         params = structured(find_backend(entry.backend).module.Params, entry.params, f"{where}, params")
