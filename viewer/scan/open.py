@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from . import formats
 from .points import UNKNOWN_UNIT
-from .range_folders import find_range_frames, pods
+from .range_folders import find_range_frames, lacking_part, pods
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
@@ -26,6 +26,7 @@ DEMO = "demo"
 _PICTURES = {  # beside which text tables are no points
     ".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".tif", ".tiff", ".bmp",
 }  # fmt: skip
+_NAME_TABLES = "Where tables are points, name them by a pattern such as '*.txt'"
 _PRINTF = re.compile("%(0?[0-9]{0,2})d")
 _NAMES_TO_COMPARE = 5000
 
@@ -87,11 +88,16 @@ def folder_frames(folder: Path) -> list[Path]:
     """The scan files that a folder plays as one scan, at least one, in natural order. No file is read.
 
     They are in the folder, or in its folder `frames`, whatever stands beside that. Raises InputError
-    where there are none.
+    where there are none, and where text tables seem to belong to range images that are missing.
     """
     for place in (folder / "frames", folder):
         if os.path.isdir(place) and (frames := _choose_frames(entries(place), place)):
+            are_notes = all(frame.suffix.lower() in formats.NOTES for frame in frames)
+            if are_notes and (lacking := lacking_part(place)):
+                raise InputError(f"{lacking}: its text tables alone are no points", folder, _NAME_TABLES)
             return frames
+    if lacking := lacking_part(folder):
+        raise InputError(lacking, folder, "Copy the folder as a whole")
     inner = sorted((entry.name for entry in entries(folder) if os.path.isdir(entry)), key=natural_key)
     hint = f"Its folders: {_listed(inner)}" if inner else f"Known files: {_listed(formats.known_suffixes())}"
     raise InputError("holds no scan files", folder, hint)
@@ -142,7 +148,10 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     if by_kind.keys() - formats.NOTES:
         by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in formats.NOTES}
     elif by_kind and any(file.suffix.lower() in _PICTURES for file in files):
-        hint = "Depth is read from 16-bit PNG with a camera.json; name tables of points as '*.txt'"
+        lacking = os.path.isdir(str(where)) and lacking_part(Path(str(where)))
+        if lacking:
+            raise InputError(f"{lacking}: text tables beside pictures are no points", where, _NAME_TABLES)
+        hint = f"Depth is read from 16-bit PNG with a camera.json. {_NAME_TABLES}"
         raise InputError("holds pictures, and text tables that are no scan beside them", where, hint)
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))

@@ -63,12 +63,12 @@ def test_upper_case_suffixes_are_known(tmp_path: Path) -> None:
 
 
 def test_unknown_suffix_lists_the_known(tmp_path: Path) -> None:
-    (tmp_path / "scan.stl").write_text("solid")
+    (tmp_path / "scan.stp").write_text("solid")
     for call in (formats.read, formats.frame_count):
-        with pytest.raises(InputError, match=r"unknown file suffix '\.stl'") as caught:
-            call(tmp_path / "scan.stl")
+        with pytest.raises(InputError, match=r"unknown file suffix '\.stp'") as caught:
+            call(tmp_path / "scan.stp")
         assert all(suffix in str(caught.value) for suffix in formats.known_suffixes())
-    for suffix in (".json", ".ptx"):  # near to one that is another format
+    for suffix in (".json", ".svg"):  # near to one that is another format
         path = tmp_path / f"scan{suffix}"
         path.write_text("{}")
         with pytest.raises(InputError, match=r"unknown file suffix '\..*'\. Known: \.csv, ") as caught:
@@ -171,3 +171,11 @@ def test_simple_files_need_no_other_library(full_cloud: PointCloud, tmp_path: Pa
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == ""
+
+
+def test_what_can_be_converted_is_refused_with_what_converts_it(tmp_path: Path) -> None:
+    for suffix in (".e57", ".ptx"):
+        path = tmp_path / f"scan{suffix}"
+        path.write_text("none")
+        with pytest.raises(InputError, match=f"'pdal translate FILE{suffix} FILE.ply' converts it"):
+            formats.read(path)

@@ -243,7 +243,7 @@ def test_constant_arrays_of_modest_size_are_no_bomb(path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
-        ({"xyz": np.eye(3)}, "no array 'positions', only: xyz"),
+        ({"corners": np.eye(3)}, "no array 'positions', only: corners"),
         ({"positions": np.zeros((4, 2))}, r"array 'positions' has shape \(4, 2\). Positions are \(N, 3\)"),
         ({"positions": np.zeros((2, 2, 4, 3))}, "has shape"),
         ({"positions": np.zeros((0, 5, 3))}, "holds no points"),
@@ -317,3 +317,23 @@ def test_a_viewpoint_is_kept(path: Path) -> None:
         read(path)
     np.savez(path, positions=np.eye(4)[:, :3], viewpoint=np.zeros(4))
     assert read(path).viewpoint is None
+
+
+@pytest.mark.parametrize("name", ["points", "vertices", "xyz"])
+def test_points_by_other_names(name: str, path: Path) -> None:
+    normals = RNG.random((30, 3), np.float32)
+    np.savez(path, **{name: SEQUENCE[1], "normals": normals, "weight": np.arange(30)})
+    cloud = read(path)
+    np.testing.assert_array_equal(cloud.world(), SEQUENCE[1])
+    np.testing.assert_array_equal(cloud.normals, normals)
+    assert list(cloud.scalars) == ["weight"]
+    np.savez(path, **{name: SEQUENCE[1], "positions": SEQUENCE[2]})
+    np.testing.assert_array_equal(read(path).world(), SEQUENCE[2])
+
+
+def test_sequences_by_other_names_have_their_frames(path: Path) -> None:
+    for name in ("points", "vertices"):
+        np.savez(path, **{name: SEQUENCE, "times": np.arange(4) / 10})
+        assert frame_count(path) == 4
+        np.testing.assert_array_equal(read(path, 2).world(), SEQUENCE[2])
+        np.testing.assert_array_equal(read_times(path), np.arange(4) / 10)

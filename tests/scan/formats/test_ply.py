@@ -183,7 +183,7 @@ def test_faces_are_not_taken_for_missing_vertices(path: Path) -> None:
     ("header", "reason"),
     [
         ("element vertex 1\nproperty float x\nproperty float y\n", "no x, y and z among the columns: x, y"),
-        ("element vertex 1\nfloat x\nfloat y\nfloat z\nproperty uchar red\n", "the header line 'float x'"),
+        ("element vertex 1\nflat x\nfloat y\nfloat z\nproperty uchar red\n", "the header line 'flat x'"),
         ("element vertex 1\nproperty triple x\n", "unknown PLY property type 'triple'. Known: char, double"),
         ("element vertex -1\n" + XYZ, "promises '-1' rows of vertex"),
         ("element vertex 0\n" + XYZ, "holds no vertices"),
@@ -194,6 +194,28 @@ def test_faces_are_not_taken_for_missing_vertices(path: Path) -> None:
 def test_headers_that_cannot_be_used(header: str, reason: str, encoding: str, path: Path) -> None:
     with pytest.raises(InputError, match=reason):
         read(save(path, header, "1 2 3 4 5 6 7\n", encoding))
+
+
+def test_properties_without_the_word_are_properties(path: Path) -> None:
+    header = "element vertex 1\n" + XYZ + "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    plain = read(save(path, header, "1 2 3 4 5 6\n"))
+    bare = read(save(path, header.replace("property float ", "float "), "1 2 3 4 5 6\n"))
+    for cloud in (plain, bare):
+        np.testing.assert_array_equal(cloud.world(), [[1, 2, 3]])
+        np.testing.assert_array_equal(cloud.colors, [[4, 5, 6, 255]])
+
+
+def test_normals_that_are_declared_and_not_stored_are_left_aside(path: Path) -> None:
+    rows = np.zeros(2, [("p", "<f4", 3), ("c", "u1", 3)])
+    rows["p"], rows["c"] = np.arange(6).reshape(2, 3), 7
+    header = "element vertex 2\n" + XYZ + "float nx\nfloat ny\nfloat nz\n"
+    header += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    cloud = read(save(path, header, rows.tobytes(), "binary_little_endian"))
+    np.testing.assert_array_equal(cloud.world(), rows["p"])
+    assert cloud.normals is None
+    assert (cloud.colors[:, :3] == 7).all()
+    with pytest.raises(InputError, match="holds 1 of the 2 vertices"):
+        read(save(path, header, rows.tobytes() + b"1", "binary_little_endian"))
 
 
 def test_unknown_encoding(path: Path) -> None:

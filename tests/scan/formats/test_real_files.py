@@ -14,7 +14,6 @@ from viewer.scan.formats import known_suffixes, read, read_points
 REFUSED = {
     "odd/ply/assimp_issue623.ply": "row 0 of vertex ends before its vertex_indices",
     "odd/ply/assimp_pond.0.ply": "holds 70048 of the 70051 vertices",
-    "odd/ply/cat_header_missing_property_keyword_00022.ply": "the header line 'float x' says nothing",
     "odd/ply/pdal_no_vertex.ply": "has no vertex element",
     "odd/ply/pdal_sized_dims.ply": "no x, y and z among the columns: x, y, j, i",
     "odd/ply/pdal_unsized_dims.ply": "no x, y and z among the columns: y, x, i, j",
@@ -34,6 +33,7 @@ REFUSED = {
 COUNTED = {
     "crlf_test.txt": 10, "largescan.txt": 6, "missingheader.txt": 5, "numeric_dim.txt": 5,
     "points_agisoft.xyz": 100, "points_cloudcompare.xyz": 101, "quoted.txt": 9, "site_56_8.pts": 8,
+    "cat_header_missing_property_keyword_00022.ply": 13_533,
     "utm17_1.txt": 10, "utm17_2.txt": 10, "utm17_3.txt": 11,
 }  # fmt: skip
 

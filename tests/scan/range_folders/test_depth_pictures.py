@@ -179,6 +179,33 @@ def test_text_tables_beside_pictures_are_no_scan(tmp_path: Path) -> None:
     assert len(find_source(tmp_path / "*.txt")) == 1
 
 
+def test_a_folder_that_lacks_its_depth_says_what_it_looks_like(tmp_path: Path) -> None:
+    def emptied() -> None:
+        for path in tmp_path.iterdir():
+            path.unlink()
+
+    for number in range(3):
+        write_color(tmp_path / f"frame-{number}.color.png", colors())
+        write_matrix(tmp_path / f"frame-{number}.pose.txt", np.diag([1.0, 2, 3, 1]))
+    assert "looks like 7-Scenes, but its depth pictures, frame-N.depth.png, are missing" in refusal(tmp_path)
+    for number in range(3):
+        (tmp_path / f"frame-{number}.color.png").unlink()
+    assert "looks like 7-Scenes" in refusal(tmp_path)
+    assert len(find_source(tmp_path / "*.txt")) == 3
+    emptied()
+    for name, told in (
+        ("groundtruth.txt", "TUM's RGB-D images, but depth.txt"),
+        ("trajectory.log", "Open3D's RGB-D images, but its folder 'depth' of 16-bit PNG"),
+        ("camera_intrinsics.json", "TrueDepth frames, but its frames, frame-N.npz, are"),
+        ("calibration.json", "a stereo pair of Middlebury's, but its disparity"),
+    ):
+        (tmp_path / name).write_text("0.0 1 2 3 0 0 0 1\n")
+        assert f"looks like {told}" in refusal(tmp_path)
+        np.save(tmp_path / "scan.npy", np.eye(3))
+        assert find_source(tmp_path).label(0) == "scan.npy", "a scan beside it is one"
+        emptied()
+
+
 def test_frames_follow_their_numbers(tmp_path: Path) -> None:
     put(tmp_path, "depth_2", "depth_10", "depth_11")
     with open_scan(tmp_path, fps=10) as scan:

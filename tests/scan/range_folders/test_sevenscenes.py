@@ -17,6 +17,8 @@ from depth_folders import (
     write_matrix,
 )
 
+from viewer.errors import InputError
+from viewer.scan.image_poses import UPRIGHT
 from viewer.scan.open import find_source, open_scan
 from viewer.scan.range_view import RangeView
 
@@ -47,6 +49,18 @@ def test_a_matrix_beside_them_is_the_camera(tmp_path: Path, name: str) -> None:
     (view,) = find_source(tmp_path).load(0)
     assert isinstance(view, RangeView)
     assert (view.fx, view.fy, view.cx, view.cy) == (500, 501, 300.5, 200.5)
+
+
+def test_without_poses_frames_are_in_their_cameras_space(tmp_path: Path) -> None:
+    put(tmp_path, 0)
+    (tmp_path / "camera-intrinsics.txt").write_text("500 0 300\n0 501 200\n0 0 1\n")
+    (tmp_path / "frame-000000.pose.txt").unlink()
+    (view,) = find_source(tmp_path).load(0)
+    assert isinstance(view, RangeView)
+    np.testing.assert_array_equal(view.world_to_camera, UPRIGHT)
+    put(tmp_path, 1)
+    with pytest.raises(InputError, match="has no pose"):
+        find_source(tmp_path).load(0)
 
 
 def test_real_frames_agree_in_the_world(data_dir: Path) -> None:

@@ -42,6 +42,14 @@ from ..units import usable_unit
 from ._admission import admit
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
+_CONVERT = {  # what is not read, and what turns it into what is
+    ".e57": "E57 is not read: 'pdal translate FILE.e57 FILE.ply' converts it, or CloudCompare",
+    ".bpf": "BPF is not read: 'pdal translate FILE.bpf FILE.ply' converts it",
+    ".ptx": "PTX is not read: 'pdal translate FILE.ptx FILE.ply' converts it, or CloudCompare",
+    ".off": "OFF is not read: MeshLab or CloudCompare convert it into PLY",
+    ".vtk": "VTK is not read: ParaView or CloudCompare convert it into PLY",
+    ".stl": "STL is not read: MeshLab or CloudCompare convert it into PLY",
+}
 _LONGEST_MESSAGE = 400  # characters
 
 
@@ -233,7 +241,7 @@ def _readable(path: Path) -> ModuleType:
         raise InputError("is a device or a pipe, not a file", path, "Copy what it gives into a file")
     suffix = path.suffix.lower()
     if suffix not in _formats():
-        hint = f"Known: {', '.join(known_suffixes())}"  # one that is close is another format
+        hint = _CONVERT.get(suffix, f"Known: {', '.join(known_suffixes())}")  # one that is close is another
         raise InputError(f"unknown file suffix '{shortened(suffix)}'", path, hint)
     if status.st_size == 0:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")

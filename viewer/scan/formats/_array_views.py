@@ -8,7 +8,7 @@
 | `elevation` (H, W) | instead: heights of a terrain, in metres or the unit that is told |
 | `color` (H, W), (H, W, 3 or 4) | uint8, or floats in 0..1, sRGB |
 | `mask` (H, W), `confidence` (H, W) | above 0.01: use the depth; any real |
-| `intrinsics` (3, 3), or `fx` `fy` `cx` `cy` | pixels, the centre of the first one at 0, 0 |
+| `intrinsics` or `K` (3, 3), or `fx` `fy` `cx` `cy` | pixels, the centre of the first one at 0, 0 |
 | `distortion` (4,), (5,) or (8,) | as OpenCV has it |
 | `pose`, or `world_to_camera`, (4, 4) | from the camera to the world, or back, in an image's axes |
 | `unit` | of length |
@@ -38,6 +38,7 @@ from ._admission import admit
 from ._stored import StoredArray
 
 _IMAGES = ("depth", "xyz", "elevation")  # of which one makes a view
+_MATRICES = ("intrinsics", "K")
 _PINHOLE = ("fx", "fy", "cx", "cy")
 _EDGES = ("xmin", "xmax", "ymin", "ymax")
 _MOST_RATIO = 40  # of memory to the file: what is masked packs well
@@ -156,8 +157,8 @@ def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
 
 def _calibration(arrays: _Arrays, height: int, width: int, kind: str) -> dict[str, Any]:
     """The pinhole; one that is assumed where nothing tells it."""
-    if "intrinsics" in arrays:
-        matrix = _vector(arrays, "intrinsics", 9).reshape(3, 3)
+    if told := next((name for name in _MATRICES if name in arrays), None):
+        matrix = _vector(arrays, told, 9).reshape(3, 3)
         fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     elif missing := [name for name in _PINHOLE if name not in arrays]:
         if len(missing) < len(_PINHOLE) or kind == "height":

@@ -17,6 +17,8 @@ def camera_matrices(table: NDArray[np.float64]) -> str | None:
     intrinsics have focal lengths and the last row 0, 0, 1. Three or four points may happen to be
     along the axes: that alone makes no pose of them, unless there is a last row 0, 0, 0, 1.
     """
+    if table.shape == (1, 7) and abs(np.linalg.norm(table[0, 3:]) - 1) < _ORTHONORMAL:
+        return "a camera pose (a translation and a quaternion)"
     for height, width in _LAYOUTS:
         size = height * width
         if not table.size or table.size % size or table.shape[1] not in (width, size):

@@ -130,6 +130,8 @@ def parse_header(head: bytes) -> PlyHeader:
                 elements[-1].properties.append(Property(name, type_, length_type))
             case ["property", type_, name] if elements:
                 elements[-1].properties.append(Property(name, type_))
+            case [type_, name] if elements and type_ in TYPES:  # some exporters forget the word
+                elements[-1].properties.append(Property(name, type_))
             case ["comment" | "obj_info", *_] | []:
                 pass
             case _:

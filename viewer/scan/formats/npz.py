@@ -1,6 +1,7 @@
 """NPZ: NumPy arrays by name.
 
-`positions` (N, 3), or (T, N, 3) for a sequence; optional `normals` (…, N, 3), `colors` (…, N, 3 or 4)
+`positions` (N, 3), or (T, N, 3) for a sequence, else `points`, `vertices`, or `xyz` (N, 3); optional
+`normals` (…, N, 3), `colors` (…, N, 3 or 4)
 uint8 or float in 0..1, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N)
 by their names, `origin` (3,) that is to be added to the positions, `viewpoint` (3,), where the scanner stood,
 `times` (T,) in seconds, `faces` (F, 3) whole numbers, which tell the topology of all frames. Attributes of a
@@ -46,6 +47,7 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
     "radii": [()],
     "axes": [(4,)],
 }
+_ALSO_POSITIONS = ("points", "vertices", "xyz")  # what other programs call them; the first that is there
 _OF_ALL = {"origin", "times", "viewpoint"}
 _FORM = "Name points 'positions', (N, 3) or (T, N, 3), and range images 'depth', (H, W)"
 _SAVE_ANEW = "Save it with numpy.savez"
@@ -168,11 +170,21 @@ def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
     with ZipFile(stream) as archive, ExitStack() as members:
         infos = [info for info in archive.infolist() if info.filename.endswith(".npy")]
         _check_members(infos, size_of(stream))
-        yield {
+        arrays = {
             name: StoredArray.open(name, members.enter_context(archive.open(info)), info.file_size)
             for info in infos
             for name in [info.filename.removesuffix(".npy")]
         }
+        called = next((name for name in _ALSO_POSITIONS if _are_points(name, arrays)), None)
+        if called and "positions" not in arrays and not makes_views(arrays):
+            arrays["positions"] = arrays.pop(called)
+        yield arrays
+
+
+def _are_points(name: str, arrays: dict[str, StoredArray]) -> bool:
+    """Whether there is an array of this name that has points; `xyz` of three dimensions is an image."""
+    shape = arrays[name].shape if name in arrays else ()
+    return shape[-1:] == (3,) and len(shape) in ((2,) if name == "xyz" else (2, 3))
 
 
 def _check_directory(stream: BinaryIO) -> None:

@@ -12,6 +12,7 @@ import re
 import sys
 from array import array
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -53,6 +54,7 @@ TITLE = "PLY"
 SUFFIXES = (".ply",)
 
 _ROWS_AT_ONCE = 1 << 12  # of text
+_NORMALS = {"nx", "ny", "nz"}
 _GRID, _PLACE_BYTES = "range_grid", 64  # bytes of memory for a place of it
 
 
@@ -72,12 +74,23 @@ def read(path: Path, frame: int = 0) -> PointCloud:
                 f": the header line '{odd[0]}' says nothing in PLY" if odd else f" among the columns: {found}"
             )
             raise InputError(f"no x, y and z{reason}")
+        if len(names) == 1 and header.encoding != "ascii":
+            vertex = _as_stored(vertex, size_of(stream) - header.size)
         stream.seek(header.size)
         for element in before:
             _skip(stream, element, header.encoding)
         read_rows = _read_ascii if header.encoding == "ascii" else _read_binary
         cloud = cloud_from_columns(read_rows(stream, vertex, header.encoding))
         return with_topology(cloud, _faces(stream, header, len(before) + 1))
+
+
+def _as_stored(vertex: Element, held: int) -> Element:
+    """The vertices without normals, where a file of vertices alone holds exactly that many bytes: exporters
+    that forget the word `property` also declare normals that they do not store."""
+    stored = replace(vertex, properties=[p for p in vertex.properties if p.name not in _NORMALS])
+    if vertex.has_lists or held >= vertex.count * vertex.layout.width:
+        return vertex
+    return stored if held == vertex.count * stored.layout.width else vertex
 
 
 def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:

@@ -6,6 +6,8 @@ A module declares
 - `find(folder, names) -> RangeFrames | None`: its frames, where the folder is of this kind. names: those of
   all that is in the folder, in no order. No frame is read, small text files may be. It raises where the
   folder is of this kind and something is wrong with all of it;
+- where parts that are missing can be told: `lacks(names) -> str`, what is missing in a folder that has other
+  parts of this kind, and "" where it has none of them;
 - `GENERAL = True` where it takes what more special kinds do not.
 
 Modules whose name starts with an underscore are helpers.
@@ -24,7 +26,7 @@ from ...errors import InputError, explained
 from ..formats import one_message
 from ._source import RangeFrames
 
-__all__ = ["RangeFrames", "find_range_frames"]
+__all__ = ["RangeFrames", "find_range_frames", "lacking_part"]
 
 
 def find_range_frames(folder: Path) -> RangeFrames | None:
@@ -41,6 +43,16 @@ def find_range_frames(folder: Path) -> RangeFrames | None:
             if (frames := kind.find(folder, names)) is not None:
                 return frames
     return None
+
+
+def lacking_part(folder: Path) -> str:
+    """Words on which kind of range images a folder seems to hold and what of it is missing; "" where it looks
+    like none of them."""
+    names = [name for name in os.listdir(folder) if not name.startswith(".")]
+    for kind in _kinds():
+        if hasattr(kind, "lacks") and (missing := kind.lacks(names)):
+            return f"looks like {kind.TITLE}, but {missing}"
+    return ""
 
 
 @cache

@@ -46,6 +46,11 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     return RangeFrames(folder.resolve().name, (disparity.name,), read, files, "mm")
 
 
+def lacks(names: Sequence[str]) -> str:
+    """The disparity, where the calibration stands without."""
+    return f"its disparity, NAME{_DISPARITY}, is missing" if _CALIBRATION in names else ""
+
+
 def _view(file: Path, left: Path | None, numbers: Sequence[float]) -> RangeView:
     (disparity,) = read_arrays(file, "disparity")
     color = None if left is None else read_color(left)

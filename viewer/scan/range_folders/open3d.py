@@ -49,6 +49,12 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     return frames_of_pictures(folder, pictures, calibration, pose, known)
 
 
+def lacks(names: Sequence[str]) -> str:
+    """The folder of depth pictures, where logs or pairs stand without."""
+    known = [name for name in (_PAIRS, *_LOGS) if name in names]
+    return f"its folder '{DEPTH_FOLDER}' of 16-bit PNG is missing" if known else ""
+
+
 def read_log(path: Path) -> NDArray[np.float64]:
     """The matrices of a log, (N, 4, 4), from the camera to the world. Raises InputError."""
     words = text_of(path).split()

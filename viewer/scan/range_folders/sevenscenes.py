@@ -1,7 +1,8 @@
 """Microsoft's 7-Scenes: frame-NNNNNN.depth.png, .color.jpg (or .png) and .pose.txt.
 
 Depth is in millimetres, a pose is from the camera to the world in metres. Without a `camera-intrinsics.txt`
-the camera is the one that the data set's page gives, f 585, c 320, 240.
+the camera is the one that the data set's page gives, f 585, c 320, 240. Without poses, where that file alone
+tells the kind, each frame is in its camera's own space.
 """
 
 from __future__ import annotations
@@ -9,6 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..image_poses import UPRIGHT
 from ._calibration import calibration_beside, of_pinhole, read_calibration
 from ._partners import frames_of_pictures, named_pictures, pose_of_file
 from ._source import RangeFrames
@@ -21,14 +26,23 @@ _KINECT = of_pinhole(585.0, 320.0, 240.0)
 
 
 def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
-    """A frame for each depth picture, where some name ends as 7-Scenes has it."""
-    if not all(any(name.endswith(end) for name in names) for end in (_DEPTH, _POSE)):
+    """A frame for each depth picture, where some names end as 7-Scenes has it."""
+    has_depth, has_poses = (any(name.endswith(end) for name in names) for end in (_DEPTH, _POSE))
+    if not has_depth or not (has_poses or _INTRINSICS in names):
         return None
     pictures = named_pictures(folder, names)
     if _INTRINSICS in names:
         calibration = read_calibration(folder / _INTRINSICS, _KINECT)
     else:
         calibration = calibration_beside(folder, names, _KINECT)
-    return frames_of_pictures(
-        folder, pictures, calibration, lambda i: pose_of_file(pictures[i]), [_INTRINSICS]
-    )
+
+    def pose(index: int) -> NDArray[np.float64]:
+        return pose_of_file(pictures[index]) if has_poses else UPRIGHT
+
+    return frames_of_pictures(folder, pictures, calibration, pose, [_INTRINSICS])
+
+
+def lacks(names: Sequence[str]) -> str:
+    """The pictures of depth, where there are poses without."""
+    has_poses = any(name.endswith(_POSE) for name in names)
+    return f"its depth pictures, frame-N{_DEPTH}, are missing" if has_poses else ""

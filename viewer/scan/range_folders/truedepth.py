@@ -51,6 +51,11 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     )
 
 
+def lacks(names: Sequence[str]) -> str:
+    """The frames, where their calibration stands without."""
+    return f"its frames, {_FRAME}N.npz, are missing" if _CAMERA in names else ""
+
+
 def _view(file: Path, camera: NDArray[np.float64], turns: int) -> RangeView:
     """The view of a frame, turned clockwise by so many quarters."""
     depth, color = read_arrays(file, "depth", "color")

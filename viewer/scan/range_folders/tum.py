@@ -56,6 +56,11 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     return frames_of_pictures(folder, pictures, calibration, pose, lists, times - times[0])
 
 
+def lacks(names: Sequence[str]) -> str:
+    """The list of depth pictures, where poses stand without."""
+    return f"{_DEPTH}, the list of its depth pictures, is missing" if _POSES in names else ""
+
+
 def nearest_once(times: NDArray[np.float64], others: NDArray[np.float64], most: float) -> NDArray[np.int64]:
     """The number of the nearest other of each time, no other twice; -1 where none is within `most`.
 

@@ -1,0 +1,78 @@
+"""LAS and LAZ: what is written by laspy, real files, and damaged ones."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+
+from viewer.errors import InputError
+from viewer.scan.formats import read
+
+RNG = np.random.default_rng(5)
+COUNT = 100_000  # more than are unpacked at once
+POINTS = np.round(RNG.random((COUNT, 3)) * 100 + (4e5, 5e6, 200), 3)
+
+
+def save(path: Path, colors: np.ndarray | None = None, **scalars: np.ndarray) -> Path:
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    header.scales, header.offsets = np.full(3, 1e-3), np.array([4e5, 5e6, 0])
+    written = laspy.LasData(header)
+    written.x, written.y, written.z = POINTS.T
+    if colors is not None:
+        scalars |= dict(zip(("red", "green", "blue"), colors.T, strict=True))
+    for name, values in scalars.items():
+        written[name] = values
+    written.write(path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+@pytest.mark.parametrize("scale", [1, 257])
+def test_points_colours_and_scalars_are_those_that_were_written(
+    suffix: str, scale: int, tmp_path: Path
+) -> None:
+    colors = RNG.integers(0, 256, (COUNT, 3), np.uint16)
+    intensity = RNG.integers(0, 1000, COUNT, np.uint16)
+    path = save(tmp_path / f"a{suffix}", colors * np.uint16(scale), intensity=intensity)
+    cloud = read(path)
+    np.testing.assert_allclose(cloud.world(), POINTS, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(cloud.colors[:, :3], colors)
+    np.testing.assert_array_equal(cloud.scalars["intensity"], intensity)
+    assert list(cloud.scalars) == ["intensity"], "what is the same for all tells nothing"
+
+
+def test_room_for_colours_alone_is_no_colour(tmp_path: Path) -> None:
+    assert read(save(tmp_path / "a.las")).colors is None
+
+
+def test_real_files_hold_as_many_points_as_stated(data_dir: Path) -> None:
+    readme = (data_dir / "README.md").read_text(encoding="utf-8")
+    stated = {name: int(count) for name, count in re.findall(r"\| (odd/las/\S+) \|.*? n=(\d+)", readme)}
+    assert len(stated) > 40
+    for name, count in stated.items():
+        if count and "garbage" not in name:
+            assert len(read(data_dir / name)) == count, name
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_damaged_files_are_refused_in_one_message(suffix: str, tmp_path: Path) -> None:
+    path = save(tmp_path / f"a{suffix}")
+    whole = path.read_bytes()
+    for size in (1, 100, 230, 400, len(whole) // 2):
+        path.write_bytes(whole[:size])
+        with pytest.raises(InputError) as caught:
+            read(path)
+        assert str(caught.value).startswith(str(path))
+    path.write_bytes(whole[:100] + b"\xff\xff\xff\x7f" + whole[104:])
+    with pytest.raises(InputError, match="promises 2,147,483,647 records"):
+        read(path)
+    for at in RNG.integers(0, len(whole), 20):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        try:
+            assert len(read(path))
+        except InputError:
+            continue

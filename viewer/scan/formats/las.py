@@ -1,0 +1,93 @@
+"""LAS and LAZ: points of airborne and terrestrial laser scanners, read by laspy, unpacked by lazrs.
+
+Coordinates are whole numbers times a scale and an offset, as float64. Colours count as 16 bit, as 8 bit where
+none is above 255, as many programs write them. Intensity, classification, returns, times and extra dimensions
+are scalars; those that are the same for all points are left out.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...task import checkpoint
+from ..points import PointCloud
+from ._admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
+from ._columns import cloud_from_columns, named
+
+if TYPE_CHECKING:
+    from laspy import LasReader
+
+TITLE = "LAS"
+SUFFIXES = (".las", ".laz")
+
+_AT_ONCE = 1 << 16  # points unpacked together
+_MOST_RATIO = 100  # of memory to the file: LAZ packs points of regular scanners to a twentieth
+_COLORS = ("red", "green", "blue")
+_WHOLE = {"X", "Y", "Z"}  # coordinates before scale and offset
+_COPIES, _OTHERS = 2, 36  # of a point's bytes; bytes of its coordinates and of what becomes of them
+_HEADER = 247  # bytes, of the first versions fewer
+_OF_RECORDS, _OF_LATER_RECORDS = struct.Struct("<100xI"), struct.Struct("<243xI")  # numbers of them
+_SMALLEST_RECORD = 54  # bytes
+
+
+def read(path: Path, frame: int = 0) -> PointCloud:
+    """All finite points of a LAS or LAZ file. Raises InputError."""
+    import laspy
+
+    with opened(path) as stream:
+        _check_records(stream.read(_HEADER), size_of(stream))
+        stream.seek(0)
+        try:
+            with laspy.open(stream, closefd=False) as reader:
+                return cloud_from_columns(_columns(reader, size_of(stream)))
+        except BaseException as error:  # the unpacker panics on damage, which is no Exception
+            if type(error).__name__ == "PanicException":
+                raise InputError(f"its points are damaged ({error})") from error
+            raise
+
+
+def _check_records(head: bytes, held: int) -> None:
+    """Raise InputError where a file of `held` bytes promises more records beside its points than fit into it:
+    laspy would go through all of them."""
+    if not head.startswith(b"LASF") or len(head) < _OF_RECORDS.size:
+        raise InputError("is no LAS file")
+    (records,) = _OF_RECORDS.unpack_from(head)
+    later = _OF_LATER_RECORDS.unpack_from(head)[0] if len(head) == _HEADER and head[25] >= 4 else 0
+    if _SMALLEST_RECORD * (records + later) > held:
+        raise InputError(f"promises {records + later:,} records beside its points, more than fit into it")
+
+
+def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:
+    header = reader.header
+    count, form = header.point_count, header.point_format
+    check_count(len(list(form.dimension_names)), MOST_COLUMNS, "dimensions of a point")
+    admit(held, count * (_COPIES * form.size + _OTHERS), _MOST_RATIO)
+    parts: dict[str, list[NDArray]] = {}
+    done = 0
+    for points in reader.chunk_iterator(_AT_ONCE):
+        checkpoint(done / count if count else None)
+        for axis in "xyz":
+            parts.setdefault(axis, []).append(np.array(points[axis], np.float64))
+        for name in form.dimension_names:
+            values = np.array(points[name])
+            if name not in _WHOLE and values.ndim == 1:
+                parts.setdefault(name, []).append(values)
+        done += len(points)
+    if not done:
+        raise InputError("holds no points" if not count else "holds none of the points that it promises")
+    if done < count:
+        raise too_few(done, count, "points")
+    columns = {name: np.concatenate(parts.pop(name)) for name in list(parts)}
+    if not any(columns[name].any() for name in _COLORS if name in columns):  # room for them alone
+        for name in _COLORS:
+            columns.pop(name, None)
+    for name in columns.keys() - {"x", "y", "z", *_COLORS}:
+        if (columns[name] == columns[name][0]).all():
+            del columns[name]
+    return named(columns.items())
