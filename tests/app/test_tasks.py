@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -9,18 +10,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import sphere
 from test_window import Screenshot, on_screen, shown
-from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
+from virtual_screen import PANEL, ROOT, RunningApp, running_app, virtual_screen
 
 from viewer.analysis.pick import pick
 from viewer.gpu.surface import EMPTY, Surface
 from viewer.scan import formats
 from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
 
 pytestmark = pytest.mark.slow
 
 SIZE = (1280, 720)
 FACES = ("face_a.npz", "face_b.npz")
+MOUTH = (-24.0, -62.0, 92.0), (24.0, -62.0, 92.0)  # its corners
 NOSE, LEFT_EYE, RIGHT_EAR = (0.0, -28.5, 109.5), (31.0, 10.0, 74.0), (-84.0, 0.0, -18.0)  # of the demo, mm
 
 
@@ -48,6 +52,19 @@ class Person:
             "mousemove", x, y, "sleep", 0.1, "mousedown", button, "sleep", 0.1, "mousemove", *middle,
             "sleep", 0.1, "mousemove", *end, "sleep", 0.3, "mouseup", button,
         )  # fmt: skip
+
+    def click(self, place: tuple[int, int]) -> None:
+        self._act("mousemove", *place, "sleep", 0.2, "click", 1)
+
+    def choose(self, name: str, word: str) -> None:
+        """An item of a list in the panel; opening the list is part of it."""
+        self.app.choose(PANEL, f"{name}/##value", f"###{word}")
+        self.app.settle()
+        self.actions[self.task] += 1
+
+    def push(self, window: str, button: str) -> None:
+        self.app.act(window, ("item_click", button))
+        self.actions[self.task] += 1
 
     def turn_wheel(self, clicks: int) -> None:
         """Forward, or back for fewer than none."""
@@ -181,3 +198,62 @@ def test_set_b_turn_pan_and_find_nose_eye_and_ear(person: Person) -> None:
         person.task = "B7"
         person.go_to_the_list()
     assert {task: person.actions[task] / len(FACES) for task in told("B")} == told("B")
+
+
+def test_set_c_is_seen_well_and_upright_without_doing_anything(tmp_path: Path) -> None:
+    ball = sphere(60_000)
+    formats.write(tmp_path / "bare.npz", PointCloud.from_arrays(ball.positions))
+    rng = np.random.default_rng(3)
+    ground = np.column_stack([rng.uniform(-40, 40, (60_000, 2)), 0.1 * rng.standard_normal(60_000)])
+    tree = np.column_stack([rng.normal((3, 5), 1.0, (8000, 2)), rng.uniform(0, 12, 8000)])
+    formats.write(tmp_path / "ground.npz", PointCloud.from_arrays(np.concatenate([ground, tree])))
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+    with virtual_screen(tmp_path, SIZE) as screen:
+        with running_app(screen, tmp_path / "one", tmp_path / "bare.npz") as app:
+            surface = Person(app).look().surface()
+            assert holes(surface) < 0.003
+            lit = surface.image()[surface.level != EMPTY][:, 1].astype(int)
+            assert np.ptp(np.quantile(lit, [0.05, 0.95])) > 40, "shaded by its shape"
+        with running_app(screen, tmp_path / "two", tmp_path / "ground.npz") as app:
+            camera = Person(app).look().camera
+            assert camera.rotation()[1][2] > 0.5, "up in the picture is up"
+            assert camera.rotation()[2][2] > 0.3, "from above"
+    assert told("C")["C1"] == told("C")["C2"] == 0
+
+
+def test_set_c_distances_to_a_table_a_film_colours_and_back(tmp_path: Path) -> None:
+    with virtual_screen(tmp_path, SIZE) as screen, running_app(screen, tmp_path, "demo") as app:
+        person = Person(app)
+        corners = [on_screen(app, *person.pixel(corner)) for corner in MOUTH]
+        person.task = "C3"
+        person.press("m")
+        for corner in corners:
+            person.click(corner)
+        person.push(PANEL, "Save CSV...")
+        person.press("Return")
+        file = app.told(r"Saved (.*\.csv), in all 64 frames")[1]
+        with open(file, newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+        assert sorted(int(row["frame_1"]) for row in rows) == list(range(1, 65))
+        assert np.ptp([float(row["distance"]) for row in rows]) > 1, "the mouth moves"
+        app.screen.do("key", "Escape")
+        person.task = "C4"
+        person.press("r")
+        app.screen.do("key", "Right", "key", "Right")  # what is to be seen in it
+        app.settle()
+        person.press("r")
+        app.told("Recorded")
+        person.push("problems", "$$0/Save as film")
+        assert Path(app.told(r"Saved (.+\.mp4)")[1]).stat().st_size > 1000
+        person.task = "C5"
+        person.choose("color_by", "displacement")
+        person.choose("range", "fixed")
+        look = app.settle().document["look"]
+        assert look["high"] > look["low"]
+        person.task = "C6"
+        person.press("ctrl", "r")
+        assert app.settle().document["look"]["color_by"] == "auto"
+    counted = {task: count for task, count in told("C").items() if task in person.actions}
+    assert person.actions == counted
+    assert len(counted) == 4
