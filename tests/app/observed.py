@@ -134,6 +134,7 @@ def shown(app: App) -> dict[str, Any]:
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),
         "range_note": app.ranging.words(),
+        "scan_rate": app.pacing.rate,
         "undoes": app.session.history.undoes,
         "redoes": app.session.history.redoes,
     }
@@ -142,6 +143,7 @@ def shown(app: App) -> dict[str, Any]:
             "frame": viewport.request.pose.index,
             "backend": surface.stats.backend,
             "color_range": surface.color_range,
+            "shown_time": viewport.request.pose.time,
             "pixels": surface.size,
             "samples": surface.stats.samples,
             "points": len(viewport.request.pose.cloud) - surface.stats.left_out,

@@ -37,7 +37,7 @@ ENDS = End(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), End(2, 0.08, (1, 2, 3)
 FULL = Document(
     camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
-    unit="mm", shown_unit="cm", front=-30.0, span=(2, 7),
+    unit="mm", shown_unit="cm", front=-30.0, span=(2, 7), fps=30.0, times_by_names=True,
     bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
     parts={"measurements": Measurements((Measurement(*ENDS), Measurement(*ENDS[::-1])))},
     unread={"clips": [{"plane": [1, 0, 0]}]},

@@ -10,7 +10,8 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.open import open_scan
+from viewer.scan.open import has_times_in_names, open_scan, retime
+from viewer.scan.points import PointCloud
 
 
 def put(folder: Path, *names: str) -> Path:
@@ -284,3 +285,27 @@ def test_a_folder_called_demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_a_mesh_beside_its_frames_opens_alone(data_dir: Path) -> None:
     with open_scan(data_dir / "sequences" / "crane_175" / "mesh_topology.ply") as scan:
         assert [len(pose.cloud) for pose in scan] == [10_002]
+
+
+def test_a_rate_or_names_tell_the_times_of_a_scan_that_is_open(tmp_path: Path) -> None:
+    for stamp in ("12.000", "12.540", "13.120"):
+        formats.write(tmp_path / f"face_{stamp}.npz", PointCloud.from_arrays(np.eye(3)))
+    with open_scan(tmp_path) as scan:
+        before = scan.times
+        assert has_times_in_names(scan)
+        retime(scan, None, by_names=True)
+        np.testing.assert_allclose(scan.times, [0, 0.54, 1.12])
+        retime(scan, 10.0)
+        np.testing.assert_allclose(scan.times, [0, 0.1, 0.2])
+        retime(scan, None)
+        np.testing.assert_array_equal(scan.times, before)
+
+
+def test_no_rate_counts_beside_a_times_csv(tmp_path: Path) -> None:
+    for number in (40, 80):
+        formats.write(tmp_path / f"{number}.npz", PointCloud.from_arrays(np.eye(3)))
+    (tmp_path / "times.csv").write_text("40.npz,0\n80.npz,3\n")
+    with open_scan(tmp_path) as scan:
+        assert not has_times_in_names(scan)
+        retime(scan, 10.0, by_names=True)
+        np.testing.assert_array_equal(scan.times, [0, 3])

@@ -571,3 +571,16 @@ def test_shortened_splats_are_reported(tmp_path: Path) -> None:
     with open_scan(tmp_path / "scan.npz") as scan:
         assert scan.pose(0).cloud.shortened == 9
         assert scan.messages[0].text == "scan.npz: 9 splats far larger than the scan are shortened"
+
+
+def test_frames_get_other_times_and_their_points_stay() -> None:
+    source = Frames(4)
+    with timeline(source) as scan:
+        poses = [scan.pose(index) for index in range(2)]
+        scan.retime([0, 0.5, 1, 1.5])
+        assert [scan.pose(index).time for index in range(4)] == [0, 0.5, 1, 1.5]
+        assert scan.pose(1).points is poses[1].points
+        assert source.loads == [0, 1, 2, 3], "none is read again"
+        with pytest.raises(InputError):
+            scan.retime([0, 1, 1, 2])
+        assert scan.pose(3).time == 1.5

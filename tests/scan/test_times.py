@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import InputError
-from viewer.scan.times import frame_numbers, natural_key, paced_times, read_times_csv
+from viewer.scan.times import frame_numbers, natural_key, paced_times, read_times_csv, times_in_names
 
 LABELS = ["a.ply", "b.ply", "c.ply"]
 
@@ -97,3 +97,20 @@ def test_times_csv_that_make_no_sense(tmp_path: Path, text: str | bytes, message
         read_times_csv(table(tmp_path, text), LABELS)
     assert message in str(caught.value)
     assert str(tmp_path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("labels", "times"),
+    [
+        (["a_0.5.ply", "a_0.75.ply"], [0, 0.25]), (["10.ply", "50.ply", "90.ply"], [0, 0.04, 0.08]),
+        (["1305031102175304.ply", "1305031102211214.ply"], [0, 0.03591]),
+        (["1305031102175304000.ply", "1305031102211214000.ply"], [0, 0.03591]),
+        (["a_1.ply", "a_2.ply"], None), (["2_0.5.ply", "3_0.75.ply"], None), (["a.ply", "b.ply"], None),
+        (["a_9.5.ply", "a_0.75.ply"], None), (["a_1.ply"], None), ([], None),
+    ],
+)  # fmt: skip
+def test_times_in_names(labels: list[str], times: list[float] | None) -> None:
+    found = times_in_names(labels)
+    assert (found is None) == (times is None)
+    if found is not None:
+        np.testing.assert_allclose(found, times, atol=1e-9)

@@ -45,6 +45,7 @@ from .output.exporting import Exporting
 from .output.replaying import Replayer
 from .panel import Panel
 from .playing.ahead import Ahead
+from .playing.pacing import Pacing
 from .playing.playback import Playback
 from .playing.ranging import Ranging
 from .scene.bookmarks import Bookmarks
@@ -67,9 +68,9 @@ log = logging.getLogger(__name__)
 class App:
     """All that the window shows and can do. Panels read it and call its commands.
 
-    session: what the user has chosen. playback: the scan. ahead: has its poses prepared. ranging: of colours,
-    over its frames. renderer: what is on the GPU. viewport: the 3D view. marks: what lies over it. rendering:
-    which backend draws it.
+    session: what the user has chosen. playback: the scan. ahead: has its poses prepared. pacing: of its
+    frames. ranging: of colours, over its frames. renderer: what is on the GPU. viewport: the 3D view. marks:
+    what lies over it. rendering: which backend draws it.
     steering: what moves its camera. pointer: what the mouse points at in it. bookmarks: cameras to go
     back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
@@ -112,6 +113,7 @@ class App:
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
         self.ahead: Ahead = Ahead(self.session, self.playback, self.renderer)
+        self.pacing: Pacing = Pacing(self.session, self.playback, fps is not None)
         self.ranging: Ranging = Ranging(self.session)
         self.commands = Commands()
         self.tools: Toolbox = Toolbox(

@@ -115,6 +115,7 @@ class Loop:
             ("Saving", app.capture.advance),
             ("Replaying", lambda: app.replayer.advance(now)),
             ("Preparing", app.ahead.advance),
+            ("Pacing", lambda: app.pacing.advance(now)),
             ("Playing", lambda: app.playback.advance(now)),
             ("Ranging", lambda: app.ranging.advance(now, not (app.moving or app.playback.waiting))),
             ("Reading", app.pass_on_messages),

@@ -19,6 +19,7 @@ from ..scan.pose import Pose
 from .part import Part
 from .schema import (
     DAMAGED,
+    FrameRate,
     Kind,
     PoseNumber,
     ReadBy,
@@ -87,9 +88,10 @@ class Document:
     another backend is chosen. unit: what the user calls the scan's unit of length, None where the scan tells
     or nobody does. shown_unit: that lengths are told in, None for the scan's own. front: degrees that the
     front of the scan is turned about what is up. span: the first and the last frame that playing keeps to,
-    None for all. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a tool
-    that is not there, what its file said. unread: fields that are not known here or could not be read -> what
-    the file said, which is written again; so is what was made anew of
+    None for all. fps: frames a second as the user says, None as the scan does. times_by_names: whether the
+    names of the frames tell when they are. bookmarks: cameras to go back to. parts: name -> what a tool
+    keeps (see `Part`); of a tool that is not there, what its file said. unread: fields that are not known
+    here or could not be read -> what the file said, which is written again; so is what was made anew of
     params and parts, under names such as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
@@ -105,6 +107,8 @@ class Document:
     shown_unit: Unit | None = None
     front: float = 0.0
     span: Span | None = None
+    fps: FrameRate | None = None
+    times_by_names: bool = False
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
     unread: Values = field(default_factory=dict)

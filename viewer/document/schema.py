@@ -34,6 +34,7 @@ from ..errors import InputError, explained, shortened, unknown_name
 from ..files import parsed_json, read_text
 from ..output.export import read_description
 from ..params import describe, parse, renamed
+from ..scan.times import FPS_LIMITS
 from ..scan.units import checked_unit
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ ScanName = Annotated[str, Kind("the name of a scan", _is_name)]
 Count = Annotated[int, Kind("a whole number", lambda value: 0 <= value < 2**31)]
 PoseNumber = Annotated[int, Kind("the number of a pose", lambda value: 0 <= value < 2**31)]
 Time = Annotated[float, Kind("a time in seconds", lambda value: abs(value) <= _LATEST)]
+FrameRate = Annotated[float, Kind("frames a second", lambda value: FPS_LIMITS[0] <= value <= FPS_LIMITS[1])]
 Stamp = Annotated[float, Kind("a time within a day, in seconds", _is_stamp)]
 Values = Annotated[Any, Kind("values by name", is_object)]
 

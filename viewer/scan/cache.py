@@ -87,6 +87,11 @@ class PoseCache:
         self._count(pose.index)
         return True
 
+    def exchange(self, change: Callable[[Pose], Pose]) -> None:
+        """Hold what a function makes of each pose in its place, which has the same points."""
+        for index, pose in self._poses.items():
+            self._poses[index] = change(pose)
+
     def trim(self) -> None:
         """Evict the least recently used while the poses have grown beyond the budget."""
         while self.nbytes > self.budget:

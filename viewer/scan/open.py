@@ -19,7 +19,7 @@ from .points import UNKNOWN_UNIT
 from .range_folders import find_range_frames, lacking_part, pods
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
-from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times
+from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times, times_in_names
 from .units import checked_unit
 
 DEMO = "demo"
@@ -49,6 +49,7 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     if recorded is None or (fps is not None and not measured):
         recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
     timeline = Timeline(source, recorded, unit or source.unit or UNKNOWN_UNIT)
+    timeline.is_measured = measured
     if measured and fps is not None:
         timeline.messages.append(
             ScanMessage("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used")
@@ -56,10 +57,30 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     return timeline
 
 
+def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> None:
+    """Have the frames of a scan follow each other at this rate, or as their names tell; else as they did when
+    it was opened. A times.csv tells the times whatever is asked for."""
+    source = timeline.source
+    told = times_in_names(_labels(source)) if by_names and not timeline.is_measured else None
+    if told is None and fps is not None and not timeline.is_measured:
+        told = _paced(source, fps)
+    timeline.retime(timeline.opened_with if told is None else told)
+
+
+def has_times_in_names(timeline: Timeline) -> bool:
+    """Whether the names of the frames tell when they are, and nothing better does."""
+    return not timeline.is_measured and times_in_names(_labels(timeline.source)) is not None
+
+
+def _labels(source: FrameSource) -> list[str]:
+    """The names of the frames, where these are files of their own."""
+    return [] if isinstance(source, MultiFrameFile) else [source.label(i) for i in range(len(source))]
+
+
 def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
     if isinstance(source, MultiFrameFile):  # of perhaps a million, whose labels tell nothing more
         return np.arange(len(source)) / fps
-    return paced_times([source.label(index) for index in range(len(source))], fps)
+    return paced_times(_labels(source), fps)
 
 
 def find_source(path: str | os.PathLike[str]) -> FrameSource:

@@ -9,7 +9,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -51,6 +51,9 @@ class Timeline:
     unit:     the name of the scan's unit of length
     name:     the scan's name
     messages: what there is to report; it only grows, by one of a kind per frame
+    is_measured: whether a file beside the frames tells the times
+    source:   where the frames come from
+    opened_with: the times that it began with
     finish:   called with each pose on the thread that has read it, before anybody gets it; for what
               would take too long where it is shown
 
@@ -66,12 +69,13 @@ class Timeline:
 
         Raises InputError where there is no frame, or the times do not fit or increase.
         """
-        self.times = _checked_times(times, source)
+        self.times = self.opened_with = _checked_times(times, source)
+        self.is_measured = False
         self.unit = unit
         self.name = source.name
         self.messages: list[ScanMessage] = []
         self.finish: Callable[[Pose], object] = lambda pose: None
-        self._source = source
+        self.source = source
         self._state = threading.Condition()  # guards all that follows
         self._cache = PoseCache(default_budget() if cache_bytes is None else cache_bytes)
         self._loading: dict[int, Future[Pose]] = {}
@@ -100,18 +104,35 @@ class Timeline:
                 continue
             yield pose
 
+    def retime(self, times: ArrayLike) -> None:
+        """Have the frames be at other times from now on, (T,) seconds; poses in memory make way for the same
+        ones at these. Raises InputError where the times do not fit or increase."""
+        checked = _checked_times(times, self.source)
+        if np.array_equal(checked, self.times):
+            return
+        with self._state:
+            self.times = checked
+            self._cache.exchange(self._timed)
+            if self._in_use is not None:
+                self._in_use = self._cache.get(self._in_use.index) or self._timed(self._in_use)
+
+    def _timed(self, pose: Pose) -> Pose:
+        """The pose at the time that its frame has now."""
+        time = float(self.times[pose.index])
+        return pose if pose.time == time else replace(pose, time=time)
+
     @property
     def files(self) -> tuple[Path, ...]:
         """The files that hold its frames; none for the demo."""
-        return self._source.files
+        return self.source.files
 
     def label(self, index: int) -> str:
         """The name of a frame, for example its file's."""
-        return self._source.label(self._checked_index(index))
+        return self.source.label(self._checked_index(index))
 
     def faces(self, index: int) -> Faces:
         """Read the faces between the points of a frame, perhaps none. Raises InputError."""
-        return self._source.faces(self._checked_index(index))
+        return self.source.faces(self._checked_index(index))
 
     def nearest(self, time: float) -> int:
         """The index of the pose nearest to a time in seconds, the earlier one of two."""
@@ -287,7 +308,7 @@ class Timeline:
                     return
                 index, ahead = task
                 future = self._begin(index)
-                reading = self._reading = Task(f"Reading {self._source.label(index)}")
+                reading = self._reading = Task(f"Reading {self.source.label(index)}")
             with reading.current():
                 self._load(index, future, ahead)
             self._reading = None
@@ -343,13 +364,14 @@ class Timeline:
             with self._state:
                 del self._loading[index]
                 if isinstance(error, Cancelled) and self._is_given_up:
-                    error = InputError("reading was cancelled", self._source.label(index), "Open it again")
+                    error = InputError("reading was cancelled", self.source.label(index), "Open it again")
                 if isinstance(error, InputError):
                     error = self._note_broken(index, error)
             future.set_exception(error)
             return
         with self._state:
             del self._loading[index]
+            pose = self._timed(pose)  # where times have changed meanwhile
             if pose.dropped and index not in self._sizes:
                 what = f"{pose.label}: {pose.dropped} points without finite coordinates are left out"
                 self.messages.append(ScanMessage("dropped", what, index))
@@ -366,10 +388,10 @@ class Timeline:
         future.set_result(pose)
 
     def _read(self, index: int) -> Pose:
-        label = self._source.label(index)
+        label = self.source.label(index)
         try:
             with np.errstate(all="ignore"):  # odd numbers in a file are data
-                scanned = self._source.load(index)
+                scanned = self.source.load(index)
                 if not isinstance(scanned, PointCloud):
                     scanned = self._in_unit(index, scanned)
                     for assumed in {view.assumed for view in scanned if view.assumed}:
@@ -384,14 +406,12 @@ class Timeline:
 
     def _in_unit(self, index: int, views: tuple[RangeView, ...]) -> tuple[RangeView, ...]:
         """The views in the unit that the scan tells, where they have another one; told once."""
-        unit = self._source.unit or UNKNOWN_UNIT
+        unit = self.source.unit or UNKNOWN_UNIT
         converted = in_one_unit(views, unit)
         others = [before.unit for before in views if before.unit != unit]
         if others:
             done = "converted" if all(view.unit == unit for view in converted) else "taken as they are"
-            what = (
-                f"{self._source.label(index)} is in {others[0]}, the scan in {unit}: other units are {done}"
-            )
+            what = f"{self.source.label(index)} is in {others[0]}, the scan in {unit}: other units are {done}"
             self._tell_once("unit", what, index)
         return converted
 

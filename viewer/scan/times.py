@@ -6,6 +6,7 @@ import csv
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 from io import TextIOWrapper
 from pathlib import Path, PurePath
 
@@ -17,6 +18,8 @@ from ..files import open_plain
 
 TIMES_FILE = "times.csv"
 DEFAULT_FPS = 25.0
+FPS_LIMITS = 1e-6, 1e6  # of frame rates
+_STEPS = 1 / 300, 10.0  # seconds between frames, at least and at most, where names tell times
 _LARGEST_STEP = 1000  # numbers further apart are dates or clock readings, not frame numbers
 
 
@@ -54,6 +57,29 @@ def paced_times(labels: Sequence[str], fps: float = DEFAULT_FPS) -> NDArray[np.f
     """
     numbers = frame_numbers(labels) or range(len(labels))
     return np.array([number - numbers[0] for number in numbers], np.float64) / fps
+
+
+def times_in_names(labels: Sequence[str]) -> NDArray[np.float64] | None:
+    """(T,) seconds from the first frame on, as the names tell: these differ in one number, which is seconds
+    with decimals, or whole milliseconds, microseconds or nanoseconds, whichever makes steps of a film.
+
+    None where there is no such number, or it does not increase.
+    """
+    rows = [re.split(r"([0-9]+(?:\.[0-9]+)?)", label) for label in labels]
+    if len(rows) < 2 or len({len(row) for row in rows}) != 1:
+        return None
+    columns = [column for column in zip(*rows, strict=True) if len(set(column)) > 1]
+    if len(columns) != 1 or not columns[0][0][:1].isdecimal():
+        return None
+    told = [Decimal(text) for text in columns[0]]
+    since = np.array([float(time - told[0]) for time in told])
+    steps = np.diff(since)
+    units = (1.0,) if any("." in text for text in columns[0]) else (1e-3, 1e-6, 1e-9)
+    shortest, longest = _STEPS
+    if not (steps > 0).all():
+        return None
+    fits = (unit for unit in units if shortest <= float(np.median(steps)) * unit <= longest)
+    return next((since * unit for unit in fits), None)
 
 
 def typical_rate(times: NDArray[np.float64]) -> float:

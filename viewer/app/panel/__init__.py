@@ -57,7 +57,7 @@ class Panel:
         """Declare the panel in the current ImGui window."""
         imgui.begin_child("settings")
         pose, ui = app.playback.pose, Ui(app.keys)
-        about = ScanSection(app.scans, app.session, app.playback, app.steering, app.keys)
+        about = ScanSection(app.scans, app.session, app.playback, app.pacing, app.steering, app.keys)
         self._section("Scan", about.draw)
         if pose is not None:
             for title, is_revealed, declare in app.tools.sections():

@@ -12,6 +12,7 @@ from ...files import printable
 from ...geometry import AXES
 from ...scan.guessed_unit import guess_unit
 from ...scan.points import UNKNOWN_UNIT
+from ...scan.times import FPS_LIMITS, TIMES_FILE
 from ...scan.units import UNIT_WORDS, is_length
 from .. import widgets
 from ..files.scans import title
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from ...scan.pose import Pose
     from ..files.scans import Scans
     from ..keys import Keys
+    from ..playing.pacing import Pacing
     from ..playing.playback import Playback
     from ..scene.steering import Steering
     from ..session import Session
@@ -35,6 +37,7 @@ class ScanSection:
     scans: Scans
     session: Session
     playback: Playback
+    pacing: Pacing
     steering: Steering
     keys: Keys
 
@@ -49,6 +52,7 @@ class ScanSection:
         if self.playback.pose is not None:
             self._draw_facts(self.playback.pose)
             self._draw_unit(self.playback.pose)
+            self._draw_rate()
             self._draw_up()
 
     def _draw_scans(self) -> None:
@@ -105,6 +109,28 @@ class ScanSection:
         wanted = widgets.combo("shown_unit", now, list(shown), shown)
         if wanted != now:
             self.session.change("Show lengths in another unit", shown_unit=None if wanted == _OWN else wanted)
+
+    def _draw_rate(self) -> None:
+        """Declare how fast frames follow each other, and what changes that where nothing measured does."""
+        pacing = self.pacing
+        if len(self.playback.timeline) == 1:
+            return
+        if not pacing.can_change:
+            by = "as the command line says" if pacing.is_told else f"by {TIMES_FILE}"
+            widgets.fact("Rate", f"{pacing.rate:.4g} Hz, {by}")
+            return
+        widgets.label("Frame rate", "Frames a second of the scan, by Enter. It stays with the scan.")
+        entered, rate = imgui.input_float(
+            "##rate", pacing.rate, format="%.4g Hz", flags=imgui.InputTextFlags_.enter_returns_true.value
+        )
+        if entered and FPS_LIMITS[0] <= rate <= FPS_LIMITS[1]:
+            pacing.choose(float(f"{rate:.6g}"))
+        if pacing.has_names:
+            by_names = self.session.document.times_by_names
+            changed, wanted = imgui.checkbox("Times from file names", by_names)
+            widgets.tooltip("The names of the files tell when each frame was taken")
+            if changed:
+                pacing.use_names(wanted)
 
     def _draw_up(self) -> None:
         pose, now = self.playback.pose, self.session.document.look.up

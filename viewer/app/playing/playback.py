@@ -48,6 +48,15 @@ class Playback:
         self.jumps += 1
         timeline.request(first)
 
+    def retime(self, now: float) -> None:
+        """Take in that the frames have other times; playing goes on from the frame shown."""
+        was_playing = self.player.playing
+        self.whole = Player(self.timeline.times, self.session.pace)
+        self.player = Player(self.timeline.times[self.span.start : self.span.stop], self.session.pace)
+        self._shown.clear()
+        if was_playing:
+            self._play(now)
+
     @property
     def unit(self) -> str:
         """The scan's unit of length: as the user calls it, else as the scan tells, else "units"."""

@@ -205,11 +205,11 @@ class Tool:
             save_table(file, self._table())
             self.desk.note(f"Saved {file}")
             return
-        made, unit = self.made.all, self.desk.unit
+        made, scale = self.made.all, self.desk.scale
 
         def save_all_frames() -> None:
             rows = readings_in_frames(made, len(timeline), timeline.visit, one_topology=True)
-            save_table(file, table(rows, timeline.name, unit))
+            save_table(file, table(rows, timeline.name, scale.unit, scale.factor))
 
         told = f"Saved {file}, in all {len(timeline)} frames"
         self.desk.run(f"Saving {file.name}", save_all_frames, lambda _: self.desk.note(told))
