@@ -45,6 +45,7 @@ FULL = Settings(
     export_marks=Marks(scale_bar=True),
     recent=("/scans/b", "demo"),
     panel=PanelChoices(30.0, {"Statistics": True}),
+    glide=False,
     slow_devices=("llvmpipe",),
     tools={"notes": {"texts": False}},
 )

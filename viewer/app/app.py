@@ -51,6 +51,7 @@ from .playing.ranging import Ranging
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
 from .scene.full_view import FullView
+from .scene.glide import Glide
 from .scene.legend import ViewMarks
 from .scene.pointed import Pointer
 from .scene.rendering import Rendering
@@ -71,8 +72,8 @@ class App:
     session: what the user has chosen. playback: the scan. ahead: has its poses prepared. pacing: of its
     frames. ranging: of colours, over its frames. renderer: what is on the GPU. viewport: the 3D view. marks:
     what lies over it. rendering: which backend draws it.
-    steering: what moves its camera. pointer: what the mouse points at in it. bookmarks: cameras to go
-    back to. full_view: whether it is alone.
+    steering: what moves its camera. glide: how the picture follows that. pointer: what the mouse points at in
+    it. bookmarks: cameras to go back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
     changes: of the open one's files.
     keeping: keeps what is to come back at the next start.
@@ -139,6 +140,7 @@ class App:
             self.session, self.playback, self.viewport, self.pointer, remembered.cube,
             remembered.turn_seconds, up is not None, self.note,
         )  # fmt: skip
+        self.glide: Glide = Glide(remembered.glide)
         self.marks: ViewMarks = ViewMarks(
             self.session, self.playback, self.viewport, self.steering, self.ranging, remembered.marks,
             remembered.marks_in_files,
@@ -293,7 +295,7 @@ class App:
             marks=self.marks.shown, marks_in_files=self.marks.in_files, cube=self.steering.cube.is_shown,
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
-            panel=self.panel.chosen, slow_devices=self._slow_devices,
+            panel=self.panel.chosen, glide=self.glide.is_wanted, slow_devices=self._slow_devices,
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------
@@ -341,6 +343,7 @@ class App:
             self.session.take_up(session)
         self._check(session or left)
         self.viewport.clear()
+        self.glide.end()
         self._messages_read = 0
         self.window.title = f"{timeline.name} - Scan4D"
         self.scans.opened(self.session.scan)

@@ -285,6 +285,10 @@ _VIEW: Menu[App] = Menu("View", (
             "cube", "Orientation cube", lambda app: app.steering.cube.toggle(),
             is_on=lambda app: app.steering.cube.is_shown,
         ),
+        Command(
+            "glide", "Views glide", lambda app: app.glide.toggle(),
+            is_on=lambda app: app.glide.is_wanted,
+        ),
     ),
     (
         _mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from . import layout
@@ -82,7 +83,7 @@ class Loop:
         look = _AWAIT if waits else _WATCH
         changes = (
             app.playback.player.until_next(now), app.notices.next_change(now),
-            app.steering.turntable.next_change(now), app.replayer.until_next(now),
+            app.steering.turntable.next_change(now), app.glide.next_change(now), app.replayer.until_next(now),
         )  # fmt: skip
         playing, viewport = app.playback.player.playing, app.viewport
         return min(look, *changes, viewport.better_at(playing) - now, self._refines_at - now)
@@ -120,6 +121,7 @@ class Loop:
             ("Ranging", lambda: app.ranging.advance(now, not (app.moving or app.playback.waiting))),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
+            ("Gliding", lambda: app.glide.is_on),
             ("Keeping the history", lambda: app.settle(now)),
             ("Advancing tools", app.tools.advance),
             ("Counting", lambda: app.counting.advance(app.viewport, not app.moving, now)),
@@ -171,10 +173,12 @@ class Loop:
         if pose is None:
             return False
         app.steering.settle(pose)
-        playing, held = app.playback.player.playing, app.steering.moves
+        now, playing = time.monotonic(), app.playback.player.playing
         app.rendering.tell_missing(pose)
         request = app.ranging.ranged(app.document.request(pose, app.session.laid.layers(pose)))
-        drew = app.viewport.draw(request, playing=playing, held=held)
+        may_glide = app.steering.rests(now) and not app.steering.follows and app.replayer.replaying is None
+        request = replace(request, camera=app.glide.follow(request.camera, may_glide, now))
+        drew = app.viewport.draw(request, playing=playing, held=app.steering.moves or app.glide.is_on)
         if drew and app.viewport.problem is not None:
             app.failures.tell("Drawing", app.viewport.problem)
         elif drew:

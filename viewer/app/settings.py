@@ -83,8 +83,8 @@ class Settings:
     orientation cube is shown. turn_seconds: of the turntable. export, export_marks: of the export dialog.
     recent: the scans opened last, newest first. places: what earlier versions kept here of each scan, whose
     documents have files of their own now.
-    panel: its width, and which of its sections are open. slow_devices: those of which the user was told that
-    they draw in software.
+    panel: its width, and which of its sections are open. glide: whether views glide. slow_devices: those of
+    which the user was told that they draw in software.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
     """
 
@@ -104,6 +104,7 @@ class Settings:
     recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
     places: Mapping[str, SavedSession] = field(default_factory=dict)
     panel: PanelChoices = field(default_factory=PanelChoices)
+    glide: bool = True
     slow_devices: tuple[str, ...] = ()
     tools: Annotated[Mapping[str, Mapping[str, Any]], ReadBy(_read_tools)] = field(default_factory=dict)
 

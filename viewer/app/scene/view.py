@@ -109,7 +109,7 @@ def _serve_tools(app: App, size: ImVec2) -> None:
         if is_released and is_first and _is_click() and not imgui.get_io().key_shift:
             app.tools.click(_pixel(app))
     if camera := app.document.camera:
-        app.tools.draw_over(ViewPlace(camera, imgui.get_item_rect_min(), size, is_hovered))
+        app.tools.draw_over(ViewPlace(app.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered))
 
 
 def _is_click() -> bool:
