@@ -49,6 +49,17 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     app.see(lambda state: state.pointed and state.pointed[0].endswith(" mm"))
     assert place(app) == pytest.approx([1000 * number for number in metres], abs=0.01)
 
+    app.choose(PANEL, "color_by/##value", "###height")
+    app.choose(PANEL, "range/##value", "###fixed")
+    look = app.settle().document["look"]
+    assert -0.13 < look["low"] < -0.1 < 0.1 < look["high"] < 0.13
+    app.act(PANEL, ("item_input_value", "high/##value", 50.0))
+    assert app.settle().document["look"]["high"] == pytest.approx(0.05), "50 mm"
+    assert app.state.document["look"]["low"] == look["low"]
+    for _ in range(3):
+        ctrl(app.screen, "z")
+    app.see(lambda state: state.document["look"]["color_by"] == "auto")
+
     app.screen.do("key", "m")
     app.see(clicking="measuring")
     for x in (-width // 12, width // 12):

@@ -62,8 +62,10 @@ class Panel:
         if pose is not None:
             for title, is_revealed, declare in app.tools.sections():
                 self._section(title, lambda declare=declare: declare(ui), is_revealed=is_revealed)  # type: ignore[misc]
+            viewport, scale = app.viewport, app.playback.scale
             self._section(
-                "Appearance", lambda: appearance.draw(app.session, app.rendering, app.viewport, pose, ui)
+                "Appearance",
+                lambda: appearance.draw(app.session, app.rendering, viewport, scale, pose, ui),
             )
             self._section("Views", lambda: views.draw(app.steering, app.document.camera, app.bookmarks, ui))
             self._section("Renderer", lambda: renderer.draw(app.session, app.rendering, pose))

@@ -18,6 +18,7 @@ from ..ui import Ui
 
 if TYPE_CHECKING:
     from ...scan.pose import Pose
+    from ...scan.units import Scale
     from ..scene.rendering import Rendering
     from ..scene.viewport import Viewport
     from ..session import Session
@@ -25,24 +26,38 @@ if TYPE_CHECKING:
 _FIXED = "fixed"  # both ends are given
 
 
-def draw(session: Session, rendering: Rendering, viewport: Viewport, pose: Pose, ui: Ui) -> None:
-    """Declare the section."""
+def draw(
+    session: Session, rendering: Rendering, viewport: Viewport, scale: Scale, pose: Pose, ui: Ui
+) -> None:
+    """Declare the section. scale: how lengths are told, as which heights and depths are edited."""
     look = session.document.look
     names = session.laid.layers(pose).names(pose.overview.scalars)
     found = backend(session.document.chosen(pose)[0]).values
     colors = _colors(look, names, found)
     is_found = look.color_by in found and look.color_by not in names
     shown = viewport.surface.color_range if viewport.surface is not None and viewport.is_there else None
+    factor = scale.factor if look.color_by in ("depth", "height") else 1.0
+    told = _in_unit(look, factor)
+    shown = shown and (factor * shown[0], factor * shown[1])
     edited = widgets.edit(
-        look, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
+        told, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
         dict(zip(("low", "high"), shown or (), strict=False)), {"range": partial(_edit_range, shown)},
     )  # fmt: skip
-    rendering.edit_look(edited)
+    ends = _in_unit(edited, 1 / factor)
+    low = look.low if edited.low == told.low else ends.low  # what is not edited stays to the last bit
+    high = look.high if edited.high == told.high else ends.high
+    rendering.edit_look(replace(edited, low=low, high=high))
     imgui.begin_disabled(rendering.is_default)
     if imgui.button("Back to the usual", ui.button_size(1)):
         rendering.reset()
     imgui.end_disabled()
     ui.tooltip("Appearance and renderer as of a scan that was never open", "reset")
+
+
+def _in_unit(look: Look, factor: float) -> Look:
+    """The look with its ends of the colour map in another unit."""
+    low, high = (None if end is None else factor * end for end in (look.low, look.high))
+    return replace(look, low=low, high=high)
 
 
 def _edit_range(shown: tuple[float, float] | None, look: Look) -> Look:
