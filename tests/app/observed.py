@@ -125,6 +125,7 @@ def shown(app: App) -> dict[str, Any]:
         "words": words_over(app),
         "theme": app.theme,
         "is_replaying": app.replayer.replaying is not None,
+        "is_welcomed": app.welcome.is_over,
         "is_browser_open": app.browser.is_open,
         "refusal": app.browser.refusal,
         "is_export_open": app.exporting.is_open,

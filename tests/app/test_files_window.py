@@ -269,3 +269,19 @@ def test_the_command_line_opens_the_window_on_what_cannot_be_read(screen: Screen
     assert "bad.npz: cannot be read as NPZ" in told
     ended = subprocess.run(command, env={**env, "DISPLAY": ""}, cwd=tmp_path, capture_output=True, text=True)
     assert (ended.returncode, ended.stdout) == (2, "")
+
+
+def test_a_card_over_the_demo_goes_with_the_first_act_for_good(screen: Screen, tmp_path: Path) -> None:
+    with running_app(screen, tmp_path, DEMO) as app:
+        state = app.settle()
+        assert not state.is_welcomed
+        left, top, width, _ = app.view()
+        card = np.s_[top + 20 : top + 100, left + width // 2 - 80 : left + width // 2 + 80]
+        there = screen.picture()[card]
+        screen.do("key", "Tab", "sleep", 0.2, "key", "Tab")
+        assert app.settle().is_welcomed
+        assert (screen.picture()[card] != there).any()
+        close(app)
+    with running_app(screen, tmp_path, DEMO) as app:
+        assert app.settle().is_welcomed
+        close(app)

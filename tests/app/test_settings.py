@@ -47,6 +47,7 @@ FULL = Settings(
     panel=PanelChoices(30.0, {"Statistics": True}),
     glide=False,
     slow_devices=("llvmpipe",),
+    welcomed=True,
     tools={"notes": {"texts": False}},
 )
 

@@ -61,6 +61,7 @@ from .session import Session, known_as
 from .settings import Settings
 from .tasks import Tasks
 from .toolbox import Toolbox
+from .welcome import Welcome
 from .window import Window
 
 log = logging.getLogger(__name__)
@@ -79,7 +80,8 @@ class App:
     keeping: keeps what is to come back at the next start.
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
     and films at other sizes.
-    panel: at the right. commands: all that can be done. keys: which do what.
+    panel: at the right. welcome: the card of the first start. commands: all that can be done. keys: which do
+    what.
     tools: what is in their folder. help: its open pages.
     theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
     tasks: work that goes on beside it. counting: of the points that are shown.
@@ -149,6 +151,7 @@ class App:
         self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
         self.panel = Panel(remembered.panel)
+        self.welcome: Welcome = Welcome(self.session, remembered.welcomed)
         self.capture: Capture = Capture(
             self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
             lambda *film: self.exporting.film(*film),
@@ -295,7 +298,8 @@ class App:
             marks=self.marks.shown, marks_in_files=self.marks.in_files, cube=self.steering.cube.is_shown,
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
-            panel=self.panel.chosen, glide=self.glide.is_wanted, slow_devices=self._slow_devices,
+            panel=self.panel.chosen, glide=self.glide.is_wanted, welcomed=self.welcome.is_over,
+            slow_devices=self._slow_devices,
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------

@@ -40,6 +40,7 @@ def draw(app: App) -> Place:
         ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken)),
         ("The list of work", lambda: app.tasks.draw(place, head)),
         ("Help", app.help.draw),
+        ("The first card", lambda: app.welcome.draw(*place[:3])),
         ("The dialog that opens scans", lambda: app.browser.draw(app.palette.broken)),
         ("The dialog that saves sessions", app.sessions.saving.draw),
         ("The export dialog", lambda: export_dialog.draw(app.exporting, app.quit)),

@@ -105,6 +105,7 @@ class Settings:
     places: Mapping[str, SavedSession] = field(default_factory=dict)
     panel: PanelChoices = field(default_factory=PanelChoices)
     glide: bool = True
+    welcomed: bool = False
     slow_devices: tuple[str, ...] = ()
     tools: Annotated[Mapping[str, Mapping[str, Any]], ReadBy(_read_tools)] = field(default_factory=dict)
 

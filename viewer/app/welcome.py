@@ -1,0 +1,56 @@
+"""What somebody who starts Scan4D for the first time needs to know, on a card over the demo."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
+
+from ..scan.open import DEMO
+from .session import Session
+
+_LINES = (
+    (icons.ICON_FA_FOLDER_OPEN, "Drag a scan here, or press Ctrl+O"),
+    (icons.ICON_FA_ROTATE, "Drag with the left button to turn the view"),
+    (icons.ICON_FA_RULER, "M measures between two points"),
+    (icons.ICON_FA_KEYBOARD, "F1 shows all keys"),
+)
+_FLAGS = (
+    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.always_auto_resize
+)  # fmt: skip
+_TEXT_AT = 2.2  # in heights of the font
+
+
+class Welcome:
+    """The card. is_over: whether it was seen, in this window or one before; then it never comes back."""
+
+    def __init__(self, session: Session, is_over: bool) -> None:
+        self._session = session
+        self.is_over = is_over
+
+    def draw(self, left: float, top: float, width: float) -> None:
+        """Declare it at the top of the 3D view, where the demo is shown, until the first act, which is done
+        as without it. left, top, width: of the view."""
+        if self.is_over or self._session.scan != DEMO:
+            return
+        if _is_act():
+            self.is_over = True
+            return
+        em = imgui.get_font_size()
+        imgui.set_next_window_pos(ImVec2(left + width / 2, top + em), imgui.Cond_.always, ImVec2(0.5, 0.0))
+        imgui.begin("welcome", None, _FLAGS)
+        for icon, text in _LINES:
+            imgui.text_disabled(icon)
+            imgui.same_line(_TEXT_AT * em)
+            imgui.text(text)
+        imgui.end()
+
+
+def _is_act() -> bool:
+    """Whether a button, the wheel or a key was used just now."""
+    buttons = range(imgui.MouseButton_.count.value)
+    if imgui.get_io().mouse_wheel or any(imgui.is_mouse_clicked(button) for button in buttons):
+        return True
+    keys = range(imgui.Key.named_key_begin.value, imgui.Key.gamepad_start.value)
+    return any(imgui.is_key_pressed(imgui.Key(key)) for key in keys)
