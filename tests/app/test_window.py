@@ -429,7 +429,7 @@ def run_without_display(scan: object) -> str:
     ).stdout
 
 
-def test_a_wrong_name_is_told_before_a_window_opens(tmp_path: Path) -> None:
+def test_a_wrong_name_is_told_where_no_window_opens(tmp_path: Path) -> None:
     assert run_without_display(tmp_path / "none").startswith("InputError")
 
 

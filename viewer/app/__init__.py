@@ -34,8 +34,10 @@ def run(
     opened: the first of the scans, where that is open already; the window closes it. device: has no effect
     on a window, which says so. replay: a recording to show first. session: to open the first scan with.
     watch: called at the end of each turn of the window's loop, with the app as it is then. refused: what was
-    wrong with what the user named, to be told. Raises NoOpenGLError without a window.
+    wrong with what the user named, to be told. Raises NoOpenGLError without a window, and
+    InputError where no scan can be opened either.
     """
+    from ..errors import NoOpenGLError
     from ..geometry import up_vector
     from ..scan.listing import named_scans
     from ..scan.open import DEMO, open_scan
@@ -43,7 +45,7 @@ def run(
     if up is not None:
         up_vector(up)
     found, problems = named_scans(scans)
-    found = found or [DEMO]
+    is_lost, found = not found, found or [DEMO]
     timeline = opened or open_scan(found[0], unit, fps)
     from .closing import Signals
 
@@ -59,7 +61,12 @@ def run(
 
         remembered, notes = settings.load(user_folder() / settings.FILE)
         take_over(remembered.places.values())
-        window = Window("Scan4D", remembered.window)
+        try:
+            window = Window("Scan4D", remembered.window)
+        except NoOpenGLError as error:
+            if is_lost:  # which is nearer to the user than the window
+                raise problems[0] from error
+            raise
         try:
             app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up, session=session)
             try:
