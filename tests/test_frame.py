@@ -398,6 +398,7 @@ def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> N
     assert bring(own, bare, SIZE, budget_ms=1000)
     assert not is_prepared(own, bare, SIZE)
     assert is_prepared(own, fallback(bare), SIZE)
+    assert fallback(bare).params.point_size == 0, "which touch: no dust in between"
     own.release()
 
 
@@ -421,3 +422,13 @@ def test_a_frame_that_fails_still_tells_what_drew(renderer: Renderer) -> None:
     with pytest.raises(InputError, match="missing"):
         render_frame(renderer, request, surface)
     assert surface.stats.backend == "points"
+
+
+def test_normals_that_are_estimated_for_the_renderer_light_the_picture(renderer: Renderer) -> None:
+    for passes in ("one", "two"):
+        auto = viewer.render(BARE, size=SIZE, backend="surfels", passes=passes)
+        lit = viewer.render(BARE, size=SIZE, backend="surfels", passes=passes, look=Look(light="head"))
+        np.testing.assert_array_equal(auto.image(), lit.image())
+    unlit = viewer.render(BARE, size=SIZE, backend="points").image()
+    flat = viewer.render(BARE, size=SIZE, backend="points", look=Look(light="flat", eye_dome=True)).image()
+    np.testing.assert_array_equal(unlit, flat)

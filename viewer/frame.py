@@ -80,7 +80,7 @@ def render_frame(
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
     view = replace(view, shift=shift)
-    surface.start(pose, view, look, request.layers, backend.values)
+    surface.start(pose, view, look, request.layers, backend.values, backend.needs(pose.pose, params))
     stats = surface.stats
     stats.backend = backend.name
     if colorable(request) is not request:
@@ -214,8 +214,11 @@ def prepare_ahead(renderer: Renderer, requests: Iterable[Request], afresh: bool 
 
 
 def fallback(request: Request) -> Request:
-    """Request for plain points, of which nothing is prepared: drawn while the other picture is."""
-    plain = colorable(replace(request, backend=FALLBACK, params=find_backend(FALLBACK).params()))
+    """Request for plain points that touch, of which nothing is prepared: drawn while the other picture is."""
+    points = find_backend(FALLBACK)
+    suited = points.suits(request.pose)
+    params = points.params(suited.params if suited else None)
+    plain = colorable(replace(request, backend=FALLBACK, params=params))
     return replace(plain, look=_unlit(plain.look))
 
 

@@ -58,7 +58,8 @@ def shade(surface: Surface, look: Look) -> None:
         color = "plain"
     # Photographs have the light that they were taken in, and what depth cameras measure is rougher than that.
     photographed = surface.samples is not None and color == "own" and not by_level
-    lit = not photographed and (cloud.normals is not None or surface.is_own("normal"))
+    has_normals = cloud.normals is not None or "normals" in surface.needs or surface.is_own("normal")
+    lit = has_normals and not photographed
     light = look.light if look.light != "auto" else "head" if lit else "flat"
     unlit = look.light == "auto" and light == "flat" and not photographed
     eye_dome = unlit if look.eye_dome is None else look.eye_dome

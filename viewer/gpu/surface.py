@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple, TypeVar, cast
@@ -89,8 +89,8 @@ class Surface:
     filled, and what the backend did not write of it is unknown. Reading a property copies it to the CPU.
     drawn: what the picture was made of, by name; empty before, and where drawing failed.
     look: what it is drawn for, and shaded in last; shaded_by: what did it, None before. layers: over the
-    pose. finds: the numbers that the backend finds for rows, by name, unless the scan or a layer has one of
-    that name.
+    pose. needs: names of what the backend has of the pose, stored or estimated. finds: the numbers that the
+    backend finds for rows, by name, unless the scan or a layer has one of that name.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
     samples: the points of range views whose samples the rows are; None where these are points.
     """
@@ -122,6 +122,7 @@ class Surface:
         self.samples: RangePoints | None = None
         self.look = Look()
         self.layers = NO_LAYERS
+        self.needs: Collection[str] = ()
         self.finds: Mapping[str, ValueKind] = {}
         self._given: tuple[str, gl.BufferTexture] | None = None  # which of these the backend gave
         self.shaded_by: Callable[[Surface, Look], None] | None = None
@@ -143,8 +144,10 @@ class Surface:
         look: Look | None = None,
         layers: Layers = NO_LAYERS,
         finds: Mapping[str, ValueKind] | None = None,
+        needs: Collection[str] = (),
     ) -> None:
         """Begin a frame: what backends and shading read from now on."""
+        self.needs = needs
         self._shown, self._stood_for, self.samples = (pose, view), None, None
         self._octants = None
         self.look, self.layers = look or Look(), layers
