@@ -197,3 +197,23 @@ def test_a_scan_begins_with_the_next_frame_that_can_be_read(tmp_path: Path) -> N
             assert read_from(timeline, begin) == 2
             assert set(timeline.broken) == order
             assert timeline.ready(2) is not None
+
+
+@pytest.mark.slow
+def test_every_odd_or_hostile_file_opens_or_is_refused_in_one_message(data_dir: Path) -> None:
+    opening, refused = Opening(), dict[str, str]()
+    found = [path for folder in ("odd", "hostile") for path in (data_dir / folder).rglob("*")]
+    files = [path for path in found if path.is_file()]
+    for path in files:
+        start(opening, path)
+        try:
+            _, timeline = taken(opening)
+        except InputError as error:
+            refused[path.name] = str(error)
+        else:
+            assert timeline.cached(), "a frame of it was read"
+            timeline.close()
+    assert 0 < len(refused) < len(files) / 2
+    for name, told in refused.items():
+        assert name in told
+        assert len(told) < 1000

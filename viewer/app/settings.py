@@ -84,7 +84,8 @@ class Settings:
     recent: the scans opened last, newest first. places: what earlier versions kept here of each scan, whose
     documents have files of their own now.
     panel: its width, and which of its sections are open. glide: whether views glide. slow_devices: those of
-    which the user was told that they draw in software. welcomed: whether the card of the first start was seen.
+    which the user was told that they draw in software. welcomed: whether the card of the first start was
+    seen.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
     """
 

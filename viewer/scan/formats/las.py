@@ -7,6 +7,7 @@ are scalars; those that are the same for all points are left out.
 
 from __future__ import annotations
 
+import logging
 import struct
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,6 +41,7 @@ def read(path: Path, frame: int = 0) -> PointCloud:
     """All finite points of a LAS or LAZ file. Raises InputError."""
     import laspy
 
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # what is wrong is told by what is raised
     with opened(path) as stream:
         _check_records(stream.read(_HEADER), size_of(stream))
         stream.seek(0)
