@@ -103,7 +103,9 @@ def ranged(look: Look, timeline: Timeline, indices: Sequence[int]) -> Look:
     """The look with the range over these poses together for the ends that it leaves open; of one pose, its
     own. All are read for it where there are several."""
     poses = list(dict.fromkeys(indices))
-    if len(poses) == 1 or not is_open_range(look):
+    if len(timeline) == 1 or not is_open_range(look):
+        return look
+    if len(poses) == 1:
         return with_range(look, None)
     ranges = ValueRanges(len(poses))
     ranges.gather(timeline, look, poses)

@@ -60,10 +60,8 @@ class Ranging:
         chosen, layers = self._session.document.look, request.layers
         is_laid = chosen.color_by in laid.names or not layers.place.is_identity
         self._wanted = None if is_laid or not is_open_range(chosen) else chosen
-        if not is_open_range(look):
+        if not is_open_range(look) or self._ranges.count == 1:
             return request
-        if self._ranges.count == 1:
-            return replace(request, look=with_range(look, None))
         self._ranges.take(pose, look, layers)
         return replace(request, look=with_range(look, self._ranges.range(look)))
 
