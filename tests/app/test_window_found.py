@@ -30,7 +30,7 @@ def app(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ru
     formats.write(scan, CLOUD)
     with running_app(screen, tmp_path_factory.mktemp("app"), scan, before=REGISTERED) as app:
         yield app
-    assert "Traceback" not in app.log()
+    assert "Traceback" not in app.log(), app.log()
 
 
 def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -39,6 +39,7 @@ def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.Monke
     app.act(PANEL, ("item_input_value", "point_size/##value", 6))
     app.choose(PANEL, "color_by/##value", "###gap")
     app.choose(PANEL, "light/##value", "###flat")
+    app.choose(PANEL, "quality/##value", "###fast")  # colours of the map, unmixed
     assert app.settle().document["look"]["color_by"] == "gap"
     left, top, width, height = app.view()
     app.screen.do("mousemove", left + width // 2, top + height // 2, "sleep", 0.2)

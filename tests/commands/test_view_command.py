@@ -87,7 +87,7 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     opened = [options.pop("opened") for _, options in calls]
     assert [timeline.name for timeline in opened] == ["ball.npz", "demo"], "opened once, and handed over"
     assert (opened[0].unit, opened[0].times[0]) == ("mm", 0.0)
-    nothing = {"replay": None, "session": None}
+    nothing = {"replay": None, "session": None, "refused": None}
     assert calls == [
         ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, **nothing}),
         (["demo"], {"unit": None, "fps": None, "up": None, "device": None, **nothing}),
@@ -100,7 +100,14 @@ def test_view_opens_a_session_with_its_scan(
     from viewer import app
 
     calls: list[tuple[object, object]] = []
-    monkeypatch.setattr(app, "run", lambda scans, **options: calls.append((scans, options["session"])) or 0)
+    refusals: list[object] = []
+
+    def opened(scans: object, **options: object) -> int:
+        calls.append((scans, options["session"]))
+        refusals.append(options["refused"])
+        return 0
+
+    monkeypatch.setattr(app, "run", opened)
     monkeypatch.setenv("DISPLAY", ":7")
     ball, path = tmp_path / "ball.npz", tmp_path / "a.scan4d.json"
     shutil.copy(scans / "ball.npz", ball)
@@ -110,8 +117,10 @@ def test_view_opens_a_session_with_its_scan(
     assert run("view", path).code == 0
     ball.rename(tmp_path / "moved.npz")
     missing = run("view", path)
-    assert missing.code == 2
-    assert f"its scan 'ball.npz' is not there. Say where it is now: scan4d view SCAN {path}" in missing.err
+    words = f"its scan 'ball.npz' is not there. Say where it is now: scan4d view SCAN {path}"
+    assert words in missing.err
+    assert words in str(refusals.pop()), "the window over the demo says so"
+    assert calls.pop() == (["demo"], None)
     assert run("view", tmp_path / "moved.npz", path).code == 0
     assert calls == [([str(ball)], session), ([str(tmp_path / "moved.npz")], session)]
 

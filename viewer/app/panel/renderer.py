@@ -24,7 +24,7 @@ def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
     widgets.tooltip(f"{name}: {backend(name).help}")
     if chosen != name:
         rendering.choose(chosen)
-    _, params = session.document.chosen(pose)
+    name, params = session.document.chosen(pose)
     for attribute in _estimated(backend(name), pose, params):
         widgets.fact(attribute.capitalize(), "estimated")
         widgets.tooltip(f"The scan stores no {attribute}; they are estimated from its points")
