@@ -18,7 +18,8 @@ layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; }
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
 const int LEAST_COUNT = 6;  // points that tell of a surface
-// Radii in the picture's typical ones: from which neighbors are far; from which on splats grow no more, nor beyond `widest`.
+// Radii in the picture's typical ones: from which neighbors are far; from which on splats grow no more: of those in
+// space, not beyond `widest`.
 const float FAR = 3.0;
 const float MOST = 3.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
@@ -166,7 +167,7 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
     float pixel = 1.0 / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z), in_picture = typical * pixel;
     float typical_radius = max(in_picture, typical_in_space);  // near the eye, points are sparse in any picture
-    float splat = splat_radius(extent, values, normal, CROWDED * pixel * unit, min(MOST * typical_radius, widest) * unit) / unit;
+    float splat = splat_radius(extent, values, normal, CROWDED * pixel * unit, min(MOST * typical_radius, max(widest, MOST * in_picture)) * unit) / unit;
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));

@@ -424,6 +424,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         (kept,) = app.state.document["parts"]["measurements"]["all"]
         np.testing.assert_allclose([kept["first"]["position"], kept["second"]["position"]], ends, atol=1e-6)
         press(app, "Escape")
+        press(app, "ctrl+z")  # pictures have measured lines, too
 
         press(app, "alt+d")
         app.told("Laying is switched off until the next start: .*'rising' is .*expected 160,000 numbers")

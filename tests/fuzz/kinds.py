@@ -78,7 +78,7 @@ def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
         found.setdefault(kind_of(path.name), []).append(path.read_bytes())
     for path in sorted((data_dir / "odd").rglob("*")) if data_dir else ():
         if path.suffix in formats.known_suffixes() and path.stat().st_size < MOST_SEED:
-            found[path.suffix].append(path.read_bytes())
+            found.setdefault(path.suffix, []).append(path.read_bytes())
     return found
 
 

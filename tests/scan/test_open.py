@@ -112,10 +112,10 @@ def test_a_folder_called_frames_inside(tmp_path: Path) -> None:
 
 
 def test_nothing_to_open(tmp_path: Path) -> None:
-    assert "holds no scan files. Known files: .csv, .exr, .npy" in message(tmp_path)
+    assert "holds no scan files. Known files: .csv, .exr, .las, .laz, .npy" in message(tmp_path)
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
     assert message(tmp_path).endswith("holds no scan files. Its folders: a9, a10, b")
-    assert "a.jpg: unknown file suffix '.jpg'. Known: .csv, .exr, .npy" in message(
+    assert "a.jpg: unknown file suffix '.jpg'. Known: .csv, .exr, .las, .laz" in message(
         put(tmp_path, "a.jpg") / "a.jpg"
     )
     assert "is empty" in message_of_pose(put_empty(tmp_path / "empty.ply"))

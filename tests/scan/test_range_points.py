@@ -178,7 +178,7 @@ def test_a_timeline_reads_without_merging_and_lets_go_where_others_merge(tmp_pat
     assert not timeline.messages
     size = poses[0].nbytes
     with open_scan(tmp_path) as source:
-        timeline = Timeline(source._source, source.times, cache_bytes=6 * size + 100)
+        timeline = Timeline(source.source, source.times, cache_bytes=6 * size + 100)
     with timeline:
         poses = list(timeline)
         assert timeline.cached() == [range(6)]

@@ -24,7 +24,6 @@ from zlib import Z_RLE
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.pick import is_seen
 from ..errors import InputError, explained
 from ..files import open_plain, whole_file
 from ..look import Look, rgba
@@ -140,6 +139,8 @@ def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
 
 def with_hidden(legend: Legend, surface: Surface) -> Legend:
     """The legend whose lines tell what the surface hides of them."""
+    from ..analysis.pick import is_seen  # here, as commands that draw nothing know this module, and no OpenGL
+
     lines = (
         replace(line, hidden=not all(map(partial(is_seen, surface), line.ends, line.slack)))
         for line in legend.lines
