@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from imgui_bundle import ImVec2, imgui
 
-from ...document.schema import Kind
+from ...document.schema import Kind, ReadBy, is_object
 from ..ui import Ui
 from . import appearance, renderer, statistics, views
 from .scan import ScanSection
@@ -20,13 +20,19 @@ NARROWEST, WIDEST = 14.0, 60.0  # in heights of the font
 PanelWidth = Annotated[float, Kind("a width of the panel", lambda width: NARROWEST <= width <= WIDEST)]
 
 
+def _read_sections(data: Any) -> dict[str, bool]:
+    """Whether sections are open, by name; what is something else is left out."""
+    values = data.items() if is_object(data) else ()
+    return {name: value for name, value in values if isinstance(value, bool)}
+
+
 @dataclass(frozen=True)
 class PanelChoices:
     """The choices about the panel that outlive the window. width: in heights of the font. sections: whether
     each is open, by name, where that was changed."""
 
     width: PanelWidth = 21.0
-    sections: Mapping[str, bool] = field(default_factory=dict)
+    sections: Annotated[Mapping[str, bool], ReadBy(_read_sections)] = field(default_factory=dict)
 
 
 class Panel:

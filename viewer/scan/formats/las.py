@@ -1,5 +1,8 @@
 """LAS and LAZ: points of airborne and terrestrial laser scanners, read by laspy, unpacked by lazrs.
 
+Damaged LAZ can end the process that unpacks it, as the unpacker takes what memory the file asks for: it is
+done in a process of its own.
+
 Coordinates are whole numbers times a scale and an offset, as float64. Colours count as 16 bit, as 8 bit where
 none is above 255, as many programs write them. Intensity, classification, returns, times and extra dimensions
 are scalars; those that are the same for all points are left out.
@@ -8,14 +11,18 @@ are scalars; those that are the same for all points are left out.
 from __future__ import annotations
 
 import logging
+import os
 import struct
+import subprocess
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...helper import start_python
 from ...task import checkpoint
 from ..points import PointCloud
 from ._admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
@@ -35,6 +42,9 @@ _COPIES, _OTHERS = 2, 36  # of a point's bytes; bytes of its coordinates and of 
 _HEADER = 247  # bytes, of the first versions fewer
 _OF_RECORDS, _OF_LATER_RECORDS = struct.Struct("<100xI"), struct.Struct("<243xI")  # numbers of them
 _SMALLEST_RECORD = 54  # bytes
+_FORMAT, _PACKED = 104, 0x80  # where the header has the format of points, and the bit that tells LAZ
+_LOOK = 0.1  # seconds between looks at whether reading is cancelled
+_SAID = 200  # letters of what the unpacker says
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
@@ -43,15 +53,62 @@ def read(path: Path, frame: int = 0) -> PointCloud:
 
     logging.getLogger("laspy").setLevel(logging.CRITICAL)  # what is wrong is told by what is raised
     with opened(path) as stream:
-        _check_records(stream.read(_HEADER), size_of(stream))
-        stream.seek(0)
-        try:
+        head, held = stream.read(_HEADER), size_of(stream)
+        _check_records(head, held)
+        if not head[_FORMAT] & _PACKED:
+            stream.seek(0)
             with laspy.open(stream, closefd=False) as reader:
-                return cloud_from_columns(_columns(reader, size_of(stream)))
-        except BaseException as error:  # the unpacker panics on damage, which is no Exception
-            if type(error).__name__ == "PanicException":
-                raise InputError(f"its points are damaged ({error})") from error
+                return cloud_from_columns(_columns(reader, held))
+    with TemporaryDirectory() as folder:
+        plain = Path(folder) / "plain.las"
+        _unpack_beside(path, plain)
+        with laspy.open(plain) as reader:
+            return cloud_from_columns(_columns(reader, plain.stat().st_size))
+
+
+def unpack_laz(packed: str, plain: str) -> None:
+    """Write the points of a LAZ file as LAS. Raises InputError where there are fewer than it promises."""
+    import laspy
+
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)
+    with laspy.open(packed) as reader:
+        header, done = reader.header, 0
+        admit(
+            os.path.getsize(packed),
+            header.point_count * (_COPIES * header.point_format.size + _OTHERS),
+            _MOST_RATIO,
+        )
+        # Without its records: some cannot be written, and nobody reads them here.
+        bare = laspy.LasHeader(version=header.version, point_format=header.point_format)
+        bare.scales, bare.offsets = header.scales, header.offsets
+        with laspy.open(plain, mode="w", header=bare, do_compress=False) as writer:
+            for points in reader.chunk_iterator(_AT_ONCE):
+                writer.write_points(points)
+                done += len(points)
+        if done < header.point_count:
+            raise too_few(done, header.point_count, "points")
+
+
+def _unpack_beside(packed: Path, plain: Path) -> None:
+    """`unpack_laz` in a process of its own. Raises InputError where that fails, however it ends."""
+    code = f"import sys; from {__name__} import unpack_laz; unpack_laz(*sys.argv[1:])"
+    with start_python(code, str(packed), str(plain), nice=0, stderr=subprocess.PIPE) as process:
+        try:
+            while True:
+                checkpoint()
+                try:
+                    _, said = process.communicate(timeout=_LOOK)
+                    break
+                except subprocess.TimeoutExpired:
+                    continue
+        except BaseException:
+            process.kill()
             raise
+    if process.returncode:
+        words = said.decode(errors="replace").strip().splitlines()
+        raise InputError(
+            f"its points cannot be unpacked ({words[-1][:_SAID] if words else process.returncode})"
+        )
 
 
 def _check_records(head: bytes, held: int) -> None:
