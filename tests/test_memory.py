@@ -74,6 +74,7 @@ def test_a_large_cloud_takes_a_small_multiple_of_its_size(tmp_path: Path) -> Non
     assert int(done.stdout) < 4 * own + 250
 
 
+@pytest.mark.slow
 def test_surfaces_that_nobody_holds_are_given_back() -> None:
     code = """
 import numpy as np, viewer

@@ -178,6 +178,7 @@ def broken(folder: Path, count: int) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_dialog_says_at_the_field_what_cannot_be_opened(
     screen: Screen, tmp_path: Path, study: Path
 ) -> None:

@@ -74,6 +74,7 @@ def test_opening_is_cancelled_replaced_and_done(app: RunningApp, folder: Path) -
     assert names[3] not in {state.scan for state in app.states}
 
 
+@pytest.mark.slow
 def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningApp, folder: Path) -> None:
     go_to(app, folder / "2_bare.npz")
     app.see(frame=0, backend="auto_splats")

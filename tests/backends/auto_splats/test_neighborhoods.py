@@ -134,7 +134,7 @@ def test_splats_reach_as_far_as_cells(name: str) -> None:
     assert np.count_nonzero(as_expected) >= 0.8 * len(expected) or name == "strays"
 
 
-@pytest.mark.parametrize("k", [3, 4, 7, 16, 32])
+@pytest.mark.parametrize("k", [3, 4, 7, 16, pytest.param(32, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["bumpy", "copied", "lattice", "strays", "three-points"])
 def test_any_number_of_neighbors(name: str, k: int) -> None:
     scene = SCENES[name]()
@@ -152,6 +152,7 @@ def test_gaps_end_neighborhoods(growth: float, expansions: int) -> None:
     assert (true.distances[others, 1] ** 2 > 0.7 * (1 - EXACT) * true.radii[others] ** 2).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bumpy", "noisy", "two-scales"])
 def test_planes_go_through_as_few_points_as_are_certain(name: str) -> None:
     scene = SCENES[name]()
