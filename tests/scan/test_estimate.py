@@ -124,9 +124,7 @@ def test_normals_of_real_bodies_point_out(data_dir: Path, model: str) -> None:
             0.002,
             marks=pytest.mark.xfail(strict=True, reason="3.5 %: rings round thin legs"),
         ),
-        pytest.param(
-            "crane_175", 0.002, marks=pytest.mark.xfail(strict=True, reason="0.5 %: folds of clothes")
-        ),
+        pytest.param("crane_175", 0.002, marks=pytest.mark.xfail(strict=True, reason="0.5 % are wrong")),
     ],
 )
 def test_normals_of_moving_bodies_point_out(data_dir: Path, folder: str, wanted: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from imgui_bundle import ImVec2, imgui
@@ -67,7 +68,7 @@ class Panel:
         self._section("Scan", about.draw)
         if pose is not None:
             for title, is_revealed, declare in app.tools.sections():
-                self._section(title, lambda declare=declare: declare(ui), is_revealed=is_revealed)  # type: ignore[misc]
+                self._section(title, partial(declare, ui), is_revealed=is_revealed)
             viewport, scale = app.viewport, app.playback.scale
             self._section(
                 "Appearance",
