@@ -47,7 +47,7 @@ def is_full(app: RunningApp, state: State) -> bool:
 
 def wait_for_preview(app: RunningApp) -> None:
     if any("Drawn in software" in note for note in app.notes):  # a graphics card may need none
-        app.see(lambda state: state.points < POINTS, backend="surfels")
+        app.see(lambda state: not is_full(app, state), backend="surfels")
 
 
 def expect_full(app: RunningApp) -> None:

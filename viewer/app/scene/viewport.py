@@ -20,7 +20,7 @@ from ...renderer import Renderer
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
 from ..failures import failure_in_words
-from .detail import Detail, Quality
+from .detail import Budget, Detail
 from .motion import Motion
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ class Viewport:
         self.shown_at = -math.inf
         self.surface: Surface | None = None
         self._surfaces: dict[str, Surface] = {}  # one in full, one for previews
-        self._quality = Quality()  # that was drawn last
+        self._detail = Detail()  # that was drawn last
         self.request: Request | None = None
         self.problem: Scan4DError | None = None
         self._prepared_at = math.inf  # by the clock, when what is being prepared may be there
@@ -61,7 +61,7 @@ class Viewport:
         self._drawn: Any = None
         self._asked_for: Request | None = None  # the last one that was drawn as it says
         self._motion = Motion()
-        self._details: defaultdict[str, Detail] = defaultdict(Detail)  # by the backend's name
+        self._budgets: defaultdict[str, Budget] = defaultdict(Budget)  # by the backend's name
         self._simplifies: defaultdict[str, bool] = defaultdict(bool)  # whether it does in motion, the same
         self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
@@ -105,9 +105,9 @@ class Viewport:
             self.problem, self._prepared_at = None, math.inf
             self.size = size
             moving = playing or now < self._motion.ends
-            self._quality = self._detail(request).quality if moving else Quality()
-            self.surface = surface = self._surface_of(self._quality)
-            share = self._quality.share
+            self._detail = self._budget(request).detail if moving else Detail()
+            self.surface = surface = self._surface_of(self._detail)
+            share = self._detail.share
             refinable = render_frame(self.renderer, drawn, surface, wait=False, share=share, moving=moving)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
@@ -221,15 +221,16 @@ class Viewport:
             return
         is_typical = surface.stats.simplified or not self._simplifies[str(request.backend)]  # of motion
         if surface.stats.backend == str(request.backend) and is_typical:
-            self._detail(request).note(ms, self._quality, goal_ms, request.pose.count)
+            pixels = math.prod(self.size)
+            self._budget(request).note(ms, self._detail, goal_ms, request.pose.count, pixels)
 
-    def _detail(self, request: Request) -> Detail:
-        return self._details[str(request.backend)]
+    def _budget(self, request: Request) -> Budget:
+        return self._budgets[str(request.backend)]
 
-    def _surface_of(self, quality: Quality) -> Surface:
-        """The surface for a quality; one in full and one for previews are kept."""
-        width, height = (max(1, round(pixels * quality.scale)) for pixels in self.size)
-        kind = "full" if quality.scale == 1 else "preview"
+    def _surface_of(self, detail: Detail) -> Surface:
+        """The surface for a detail; one in full and one for previews are kept."""
+        width, height = (max(1, round(pixels * detail.scale)) for pixels in self.size)
+        kind = "full" if detail.scale == 1 else "preview"
         surface = self._surfaces.get(kind)
         if surface is None or surface.size != (width, height):
             if surface is not None:
