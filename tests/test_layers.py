@@ -127,7 +127,16 @@ def libraries(names: Iterable[str]) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
-TOOLS_KNOW = {"commands", "desk", "save_dialog", "scene.canvas", "tools", "ui", "widgets"}  # of the window
+TOOLS_KNOW = {
+    "commands",
+    "desk",
+    "read_dialog",
+    "save_dialog",
+    "scene.canvas",
+    "tools",
+    "ui",
+    "widgets",
+}  # of the window
 
 # Modules of the window that know the whole app: what runs it, what divides the window and what the table of
 # commands goes through, as commands act on it; and what does all that a user could. It may only shrink.

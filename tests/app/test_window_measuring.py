@@ -89,12 +89,34 @@ def name_unit(app: RunningApp, name: str) -> None:
     app.see(unit=name)
 
 
+def read_back(app: RunningApp, folder: Path) -> None:
+    """Read the folder's table by the command, after what is none and one of another scan."""
+    screen, table = app.screen, (folder / "table.csv").read_text()
+    (folder / "other.csv").write_text(table.replace("scan.npz", "another.npz"))
+    ctrl(screen, "z")
+    expect_reading(app)
+    ctrl(screen, "k")
+    app.settle()
+    screen.do("type", "--delay", 40, "nowhere.csv")
+    screen.do("key", "Return")
+    app.settle()
+    ctrl(screen, "a")  # the field has kept the keyboard
+    screen.do("type", "--delay", 40, "other.csv")
+    screen.do("key", "Return")
+    app.told("is of 'another.npz', not of 'scan.npz'")
+    ctrl(screen, "k")
+    app.settle()
+    screen.do("key", "Tab", "sleep", 0.2, "key", "Down", "sleep", 0.2, "key", "Return")  # the older of two
+    app.told("Read 1 measurements")
+
+
 @pytest.fixture
 def keys_file(tmp_path: Path) -> None:
     """Keys for what has none of its own."""
     folder = tmp_path / "config" / "scan4d"
     folder.mkdir(parents=True)
     keys = '[keys]\nsave_measurements = "Ctrl+S"\ncopy_measurements = "Ctrl+C"\n'
+    keys += 'read_measurements = "Ctrl+K"\n'
     (folder / "keys.toml").write_text(keys)
 
 
@@ -153,6 +175,8 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
             app.drop(tmp_path / "table.csv")
             app.told(re.escape(told))
             expect_reading(app, distances[1])
+        read_back(app, tmp_path)
+        expect_reading(app, distances[1])
 
         ctrl(screen, "o")
         app.settle()

@@ -21,6 +21,7 @@ from .commands import Command, Commands, Entry, Item, Listing, Menu
 from .desk import Click, Desk
 from .failures import Failures
 from .laid import Numbers, NumbersOf, PlaceOf
+from .notices import Problem
 from .playing.playback import Playback
 from .scene.canvas import Canvas, ViewPlace
 from .scene.viewport import Viewport
@@ -136,9 +137,13 @@ class Toolbox:
                 self._switch_off(slot, error)
         return None
 
-    def _do(self, slot: Slot, act: Callable[[], object]) -> None:
-        """Do something of the slot's tool that the user has asked for."""
-        self._ask(slot, lambda _: act(), self.note)
+    def _tell_problem(self, text: str) -> None:
+        """Tell what stays until the user sends it away: the dialog that asked for it is gone by then."""
+        self.note(Problem(text))
+
+    def _do(self, slot: Slot, act: Callable[[], object], tell: Callable[[str], object] | None = None) -> None:
+        """Do something of the slot's tool that the user has asked for. tell: tells of the user's mistake."""
+        self._ask(slot, lambda _: act(), tell or self.note)
 
     def _call(self, slot: Slot, hook: str, *arguments: Any) -> Any:
         """The answer of a hook of the slot's tool; None where the tool is off, lacks it or fails."""
@@ -264,7 +269,7 @@ class Toolbox:
         for slot in self._slots.values():
             for work in slot.desk.take_done():
                 changed = True
-                self._do(slot, work.finish)
+                self._do(slot, work.finish, self._tell_problem)
             if self._call(slot, "advance", _BUDGET_MS):
                 changed = True
                 slot.desk.redraw()

@@ -31,6 +31,7 @@ from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ...commands import Command, Menu
 from ...desk import Click, Desk
+from ...read_dialog import ReadDialog
 from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
@@ -45,7 +46,7 @@ class Tool:
     """The tool that measures. What was measured is in the document.
 
     begun: the first end of the one that is being made, None where none is. filled: whether ends may be set
-    where holes are filled. saving: the dialog that saves.
+    where holes are filled. saving, reading: dialogs that name a file.
     """
 
     def __init__(self, desk: Desk) -> None:
@@ -53,6 +54,8 @@ class Tool:
         self.filled = False
         about = "All measurements, as a table of comma separated values"
         self.saving = SaveDialog("Save measurements", about, ".csv", self._save)
+        about = "A table that Save CSV has written of this scan"
+        self.reading = ReadDialog("Read measurements", about, ".csv", self._read)
         self.begun: End | None = None
         self._seen: tuple[object, dict[End, bool]] = None, {}
         self._told: list[str] = []
@@ -123,8 +126,9 @@ class Tool:
         panel.draw(self, ui)
 
     def dialog(self) -> None:
-        """Declare the dialog that saves, while it is open."""
+        """Declare the dialogs that name a file, while one is open."""
         self.saving.draw()
+        self.reading.draw()
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
         """Draw what was measured, and tell what changes by it."""
@@ -214,6 +218,14 @@ class Tool:
         told = f"Saved {file}, in all {len(timeline)} frames"
         self.desk.run(f"Saving {file.name}", save_all_frames, lambda _: self.desk.note(told))
 
+    def ask_to_read(self) -> None:
+        """Open the dialog that reads measurements back."""
+        self.reading.ask(working_folder())
+
+    def _read(self, file: Path) -> None:
+        if not self.on_file(file):
+            raise InputError("holds no measurements", file, "Choose a table that 'Save CSV...' has written")
+
     def on_file(self, path: Path) -> bool:
         """Add the measurements of a table that was saved of this scan, but those that are there; whether the
         file is such a table."""
@@ -280,6 +292,7 @@ COMMANDS = {
             (
                 _at_all("copy", "Copy as table", Tool.copy),
                 _at_all("save", "Save CSV...", Tool.ask_to_save),
+                Command("read_measurements", "Read CSV...", Tool.ask_to_read),
                 _at_all("clear", "Clear", Tool.clear),
             ),
         )),
