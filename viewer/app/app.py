@@ -39,6 +39,8 @@ from .files.preview import Previewer
 from .files.scans import Scans, title
 from .files.sessions import Sessions
 from .help import Help
+from .keyboard import Keyboard
+from .menu import MenuBar
 from .notices import Notices, Problem
 from .output.capture import Capture
 from .output.exporting import Exporting
@@ -81,7 +83,7 @@ class App:
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
     and films at other sizes.
     panel: at the right. welcome: the card of the first start. commands: all that can be done. keys: which do
-    what.
+    what. keyboard: which part of the window has it.
     tools: what is in their folder. help: its open pages.
     theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
     tasks: work that goes on beside it. counting: of the points that are shown.
@@ -126,6 +128,8 @@ class App:
         self.keys, problems = keys.load_keys(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)
+        self.keyboard: Keyboard = Keyboard()
+        self.menu_bar = MenuBar()
         self.help: Help = Help(self.commands, self.keys, self.notices, self.renderer.gpu)
         self.scans: Scans = Scans(self.session, self.note, self.refuse, self.open, scans, remembered.recent)
         self.sessions: Sessions = Sessions(

@@ -281,6 +281,8 @@ _VIEW: Menu[App] = Menu("View", (
             "panels", "Panels", lambda app: app.full_view.toggle(), "Tab",
             is_on=lambda app: not app.full_view.is_on,
         ),
+        Command("next_part", "Keyboard to the next part", lambda app: app.keyboard.go(1), "F6 Ctrl+F6"),
+        Command("part_before", "Keyboard to the part before", lambda app: app.keyboard.go(-1), "Shift+F6"),
         Command(
             "cube", "Orientation cube", lambda app: app.steering.cube.toggle(),
             is_on=lambda app: app.steering.cube.is_shown,

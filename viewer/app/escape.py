@@ -14,12 +14,15 @@ def handle(enders: Iterable[Callable[[], bool]]) -> None:
 
     enders: each ends one thing, and tells whether there was any.
     """
+    was_held = imgui.get_current_context().active_id_previous_frame != 0
+    if not (was_held or imgui.is_any_item_active()):
+        imgui.internal.set_key_owner(imgui.Key.escape, _OWNER)  # else ImGui ends something by itself
     if not imgui.is_key_pressed(imgui.Key.escape, repeat=False):
         return
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         if not imgui.get_io().want_text_input:
             _close_list()
-    elif not imgui.is_any_item_active():
+    elif not (was_held or imgui.is_any_item_active()):
         any(end() for end in enders)
 
 

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from ..errors import InputError, did_you_mean, shortened, unknown_name
 from ..files import read_text, whole_file
+from .keyboard import VIEW
 
 if TYPE_CHECKING:
     from .app import App
@@ -32,6 +33,14 @@ _KEYS = {
     **{digit: getattr(imgui.Key, f"_{digit}") for digit in "0123456789"},
     **{f"F{n}": getattr(imgui.Key, f"f{n}") for n in range(1, 13)},
 }
+_SHIFT = int(imgui.Key.mod_shift)
+# What leads the keyboard through widgets, and works them.
+_WIDGETS_OWN = {
+    int(_KEYS[name]) for name in (
+        "Tab", "Space", "Enter", "Left", "Right", "Up", "Down", "Home", "End", "PageUp",
+        "PageDown", "Backspace",
+    )
+}  # fmt: skip
 _HEAD = """\
 # The keys of Scan4D. Take the '#' away from a line and change its keys; "" is none. Scan4D reads this
 # when it starts. Keys: letters, digits, F1 to F12, {named};
@@ -72,16 +81,24 @@ class Keys:
             (self._commands[name], keys) for name, text in self.of.items() for keys in chords(text)
         ]
 
+    def has(self, keys: str) -> bool:
+        """Whether a command has these keys."""
+        return any(pressed == chord(keys) for _, pressed in self._chords)
+
     def hint(self, name: str) -> str:
         """A command's title, and its keys where it has some."""
         keys, title = self.of[name], self._commands[name].title
         return f"{title} ({keys})" if keys else title
 
     def handle(self, app: App) -> None:
-        """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there."""
+        """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there,
+        and to widgets those that lead through them."""
         if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
             return
+        is_in_widgets = app.keyboard.part != VIEW or app.help.focused is not None
         for command, pressed in self._chords:
+            if is_in_widgets and pressed & ~_SHIFT in _WIDGETS_OWN:
+                continue
             flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
             with app.failures.told(command.title):
                 if imgui.shortcut(pressed, flags) and command.can(app):

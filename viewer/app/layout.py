@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import ImVec2, imgui
 
 from . import escape, menu
+from .keyboard import NO_KEYS
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
@@ -22,22 +23,23 @@ _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
     | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_bring_to_front_on_focus
     | imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
-    | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_background
+    | imgui.WindowFlags_.no_nav_focus | imgui.WindowFlags_.no_background
 )  # fmt: skip
 
 
 def draw(app: App) -> Place:
     """Declare all widgets; returns where the 3D view is. Where a part fails, the others are there."""
     told = app.failures.told
+    app.keyboard.begin_frame()
     app.keys.handle(app)
     with told("Escape"):
         escape.handle((
-            app.help.on_escape, app.tools.on_escape, app.replayer.on_escape, app.tasks.on_escape,
-            app.full_view.on_escape, app.notices.on_escape,
+            app.help.on_escape, app.keyboard.on_escape, app.tools.on_escape, app.replayer.on_escape,
+            app.tasks.on_escape, app.full_view.on_escape, app.notices.on_escape,
         ))  # fmt: skip
     place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
     for name, draw_part in (
-        ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken)),
+        ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken, app.keyboard)),
         ("The list of work", lambda: app.tasks.draw(place, head)),
         ("Help", app.help.draw),
         ("The first card", lambda: app.welcome.draw(*place[:3])),
@@ -79,7 +81,8 @@ def _draw_parts(app: App) -> tuple[Place, float]:
         app.panel.draw(app)
         imgui.end()
     with app.failures.told("The timeline"):
-        _place("timeline", 0, bottom, whole.x, whole.y - bottom)
+        _place("timeline", 0, bottom, whole.x, whole.y - bottom, app.keyboard.flags("timeline"))
+        app.keyboard.take("timeline")
         timeline_bar.draw(app)
         imgui.end()
     return view_and_head
@@ -99,7 +102,7 @@ def _draw_view(app: App, top: int, width: int, height: int) -> tuple[Place, floa
 
 def _draw_head(app: App, width: float) -> int:
     """Declare menus and toolbar; returns where what is below them begins."""
-    below = menu.draw_bar(app)
+    below = app.menu_bar.draw(app)
     padding = imgui.get_style().window_padding
     padding = ImVec2(padding.x, 0.4 * padding.y)  # not the style's own, which the next line changes
     imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
@@ -111,10 +114,11 @@ def _draw_head(app: App, width: float) -> int:
     return int(below + height)
 
 
-def _place(name: str, left: float, top: float, width: float, height: float) -> None:
+def _place(name: str, left: float, top: float, width: float, height: float, keys: int = NO_KEYS) -> None:
+    """Begin an ImGui window. keys: flags that say whether the keyboard goes through its widgets."""
     imgui.set_next_window_pos(ImVec2(left, top))
     imgui.set_next_window_size(ImVec2(width, height))
     imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-    imgui.begin(name, flags=_STILL)
+    imgui.begin(name, flags=_STILL.value | keys)
     imgui.pop_style_var(2)

@@ -9,21 +9,87 @@ from imgui_bundle import icons_fontawesome_6 as icons
 
 from . import theme, widgets
 from .commands import Command, Entry, Listing, Menu, Toolbar
+from .keyboard import VIEW
+from .keys import chord
 
 if TYPE_CHECKING:
     from .app import App
 
+_ASIDE = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # to the menus beside
 
-def draw_bar(app: App) -> float:
-    """Declare the menu bar of the window; returns its height."""
-    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
-    is_there = imgui.begin_main_menu_bar()
-    imgui.pop_style_var()
-    if is_there:
-        for menu in app.commands.menus:
-            _draw(app, menu)
-        imgui.end_main_menu_bar()
-    return imgui.get_frame_height()
+
+class MenuBar:
+    """The menu bar of the window. By keys: Alt opens the first menu, Alt and its first letter each, Left and
+    Right go to those beside it; ImGui leads the keyboard through what is open."""
+
+    def __init__(self) -> None:
+        self._is_by_keys = False  # what is open was opened by keys, and the mouse has rested since
+        self._goes_on = False  # Left or Right was pressed while a menu was open
+
+    def draw(self, app: App) -> float:
+        """Declare it; returns its height."""
+        imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+        is_there = imgui.begin_main_menu_bar()
+        imgui.pop_style_var()
+        if is_there:
+            asked, has_list = _asked_for(app), imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+            if has_list:
+                self._goes_on = any(imgui.is_key_pressed(key) for key in _ASIDE)
+            for menu in app.commands.menus:
+                if menu.title == asked:
+                    self._open(app, menu)
+                start = imgui.get_cursor_screen_pos()
+                _draw(app, menu)
+                if not has_list and imgui.is_window_focused() and imgui.is_item_focused():
+                    self._leave_or_open(app, menu)
+                if imgui.is_key_down(imgui.Key.mod_alt):
+                    _underline(start, menu.title[0])
+            self._mark_chosen()
+            imgui.end_main_menu_bar()
+        return imgui.get_frame_height()
+
+    def _open(self, app: App, menu: Menu[App]) -> None:
+        imgui.open_popup(menu.title)
+        self._is_by_keys = True
+        app.window.touch()  # ImGui takes frames to lay it out, and to find what the keyboard begins with
+
+    def _leave_or_open(self, app: App, menu: Menu[App]) -> None:
+        """Open a menu that ImGui has led the keyboard to from an open one; else the view has it again."""
+        if imgui.get_current_context().nav_any_request:
+            return
+        if self._goes_on:
+            self._goes_on = False
+            self._open(app, menu)
+        else:
+            imgui.set_window_focus(VIEW)
+
+    def _mark_chosen(self) -> None:
+        """Have ImGui mark the entry that the keyboard is at, until the mouse is moved."""
+        moved = imgui.get_io().mouse_delta
+        self._is_by_keys = self._is_by_keys and not (moved.x or moved.y)
+        if self._is_by_keys and imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
+            imgui.set_nav_cursor_visible(True)
+
+
+def _asked_for(app: App) -> str | None:
+    """The menu that was asked for by keys: the first by Alt alone, each by Alt and its first letter, unless
+    those are a command's."""
+    asked = app.commands.menus[0].title if app.window.take_alt() else None
+    if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
+        return None
+    for menu in app.commands.menus:
+        keys = f"Alt+{menu.title[0]}"
+        if not app.keys.has(keys) and imgui.is_key_chord_pressed(chord(keys)):
+            asked = menu.title
+    return asked
+
+
+def _underline(start: ImVec2, letter: str) -> None:
+    """Mark the letter that opens a menu with Alt. start: where the menu's entry in the bar begins."""
+    padding = imgui.get_style().item_spacing.x / 2  # as ImGui puts the words of a menu
+    left = start + ImVec2(padding, imgui.get_style().frame_padding.y + imgui.get_font_size())
+    right = left + ImVec2(imgui.calc_text_size(letter).x, 0)
+    imgui.get_window_draw_list().add_line(left, right, imgui.get_color_u32(imgui.Col_.text))
 
 
 def draw_toolbar(app: App) -> None:

@@ -15,6 +15,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..files import printable
 from . import theme, widgets
+from .keyboard import Keyboard
 
 log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
@@ -123,9 +124,11 @@ class Notices:
             draw_text(notice.text, corner, extent, wrap, pad)
             bottom = corner.y - 2 * pad.y - 0.4 * em
 
-    def draw_staying(self, left: float, top: float, width: float, height: float, color: int) -> None:
+    def draw_staying(
+        self, left: float, top: float, width: float, height: float, color: int, keyboard: Keyboard
+    ) -> None:
         """Declare a window with problems and offers, over the 3D view. color: 0xRRGGBB, of the mark beside
-        each problem."""
+        each problem. keyboard: which goes there as well."""
         staying = [notice for notice in self.shown(time.monotonic()) if notice.stays]
         self._foot = 0.0
         if not staying:
@@ -134,7 +137,8 @@ class Notices:
         foot = ImVec2(left + width / 2, top + height - 0.5 * _FOOT * em)
         imgui.set_next_window_pos(foot, imgui.Cond_.always, ImVec2(0.5, 1.0))
         imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(width, height))
-        imgui.begin("problems", None, _STILL)
+        imgui.begin("problems", None, _STILL.value | keyboard.flags("problems"))
+        keyboard.take("problems")
         buttons = 2 * imgui.get_frame_height() + 3 * em
         wrap = max(10 * em, min(_WIDTH * em, width - buttons - 5 * em))
         for number, notice in enumerate(staying):

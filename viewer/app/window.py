@@ -37,6 +37,7 @@ _MODIFIERS = {
     glfw.KEY_LEFT_ALT, glfw.KEY_RIGHT_ALT, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER,
 }  # fmt: skip
 _UNUSED_KEY = imgui.Key.f24
+_ENDS_ALT = (imgui.backends.glfw_mouse_button_callback, imgui.backends.glfw_window_focus_callback)
 
 
 class Window(GlfwWindow):
@@ -77,6 +78,7 @@ class Window(GlfwWindow):
         self.text_scale = 1.0
         self._scale = 0.0  # of text and widgets in ImGui's coordinates, as it is set
         self._is_key_pressed = False  # since a modifier changed
+        self._is_alt_alone = self._was_alt = False  # pressed without anything else; and released so
         self._frames_due = _SETTLE_FRAMES
         self._tooltips_at: float | None = None
         self._start_imgui()
@@ -101,6 +103,8 @@ class Window(GlfwWindow):
 
     def _take_event(self, forward: Callable[..., None], window: Any, *event: Any) -> None:
         self._note_event()
+        if forward in _ENDS_ALT:
+            self._is_alt_alone = False
         forward(_address(window), *event)
 
     def _note_event(self, *_: Any) -> None:
@@ -119,7 +123,17 @@ class Window(GlfwWindow):
             self._is_key_pressed = False
             for down in (True, False):  # of one key ImGui takes in one change a frame
                 imgui.get_io().add_key_event(_UNUSED_KEY, down)
+        _, action, _ = event
+        self._was_alt = self._was_alt or (
+            key == glfw.KEY_LEFT_ALT and action == glfw.RELEASE and self._is_alt_alone
+        )
+        self._is_alt_alone = key == glfw.KEY_LEFT_ALT and action != glfw.RELEASE
         self._take_event(imgui.backends.glfw_key_callback, window, key, *event)
+
+    def take_alt(self) -> bool:
+        """Whether Alt was pressed and released since the last call, and nothing else meanwhile."""
+        was_alt, self._was_alt = self._was_alt, False
+        return was_alt
 
     def _note_drop(self, _: Any, paths: list[str]) -> None:
         self.dropped += paths
@@ -158,6 +172,7 @@ class Window(GlfwWindow):
     def _start_imgui(self) -> None:
         imgui.create_context()
         imgui.get_io().set_ini_filename("")
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard.value
         imgui.backends.glfw_init_for_opengl(_address(self._window), False)
         imgui.backends.opengl3_init("#version 430")
         theme.add_fonts()

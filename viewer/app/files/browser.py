@@ -31,6 +31,11 @@ _KNOWN_SHARE, _PREVIEW_SHARE = 0.2, 0.26  # of the width
 _ICON_ROOM, _COUNT_ROOM, _DATE_ROOM = 1.6, 5.5, 5.5  # in heights of the font
 _LINGERS = 0.15  # seconds that a row is chosen before its scan is read
 _PAGE = 10  # rows
+_ROW_KEYS = (
+    imgui.Key.down_arrow, imgui.Key.up_arrow, imgui.Key.left_arrow, imgui.Key.right_arrow,
+    imgui.Key.page_down, imgui.Key.page_up, imgui.Key.enter, imgui.Key.keypad_enter,
+)  # fmt: skip
+_OWNER = 2  # of these: any number of its own
 _HINT = "Files, folders and recordings can also be dropped onto the window."
 _ICONS = {
     "whole": icons.ICON_FA_FILM, "folder": icons.ICON_FA_FOLDER, "sequence": icons.ICON_FA_FILM,
@@ -264,8 +269,10 @@ class Browser:
             imgui.text_disabled(", ".join(filter(None, told)))
 
     def _draw_path(self) -> None:
+        imgui.push_item_flag(imgui.ItemFlags_.no_tab_stop, True)  # the first Tab goes to the field
         if widgets.icon_button(icons.ICON_FA_ARROW_UP, "The folder above (Backspace)"):
             self._go_up()
+        imgui.pop_item_flag()
         imgui.same_line()
         imgui.set_next_item_width(-1)
         returns = imgui.InputTextFlags_.enter_returns_true
@@ -311,9 +318,14 @@ class Browser:
         self._open_again(scan)
 
     def _take_keys(self) -> None:
-        """Arrows choose, Enter opens, Backspace goes up, letters filter; not while a field takes them."""
-        if imgui.is_any_item_active():
+        """Arrows choose, Enter opens, Backspace goes up, letters filter; not while a field takes them, or Tab
+        has led the keyboard elsewhere."""
+        if imgui.is_window_appearing():
+            imgui.set_nav_cursor_visible(False)
+        if imgui.is_any_item_active() or imgui.get_io().nav_visible:
             return
+        for key in _ROW_KEYS:  # else ImGui takes them to go through the widgets
+            imgui.internal.set_key_owner(key, _OWNER)
         last = len(self._rows) - 1
         for key, by in (
             (imgui.Key.down_arrow, 1), (imgui.Key.up_arrow, -1),
@@ -369,7 +381,7 @@ class Browser:
         imgui.pop_id()
         if clicked:
             self._choose(number)
-            if imgui.is_mouse_double_clicked(0):
+            if imgui.is_mouse_double_clicked(0) or imgui.get_io().nav_visible:
                 self._take(row)
 
     def _draw_words(self, row: Listed, width: float, faint: bool) -> None:

@@ -62,7 +62,8 @@ class Panel:
 
     def draw(self, app: App) -> None:
         """Declare the panel in the current ImGui window."""
-        imgui.begin_child("settings")
+        imgui.begin_child("settings", window_flags=app.keyboard.flags("panel"))
+        app.keyboard.take("panel")
         pose, ui = app.playback.pose, Ui(app.keys)
         about = ScanSection(app.scans, app.session, app.playback, app.pacing, app.steering, app.keys)
         self._section("Scan", about.draw)

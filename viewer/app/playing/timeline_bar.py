@@ -70,7 +70,8 @@ def _draw_steps(app: App) -> None:
 
 def _draw_button(app: App, icon: str, name: str, color: int | None = None, about: str = "") -> None:
     """The button of a command. about: what more its tooltip says."""
-    if widgets.icon_button(icon, app.keys.hint(name) + about, color):
+    # By its name: the keyboard stays with it where the icon changes.
+    if widgets.icon_button(f"{icon}###{name}", app.keys.hint(name) + about, color):
         app.commands.of[name].act(app)
     imgui.same_line()
 

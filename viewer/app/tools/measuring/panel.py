@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 def draw(measuring: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
-    if imgui.button("Stop measuring" if measuring.is_active else "Measure", ui.button_size(2)):
+    words = "Stop measuring" if measuring.is_active else "Measure"
+    if imgui.button(f"{words}###measure", ui.button_size(2)):
         measuring.toggle()
     ui.tooltip("Click two places in the view for their distance", "measure")
     imgui.same_line()

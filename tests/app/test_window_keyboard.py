@@ -1,0 +1,147 @@
+"""The window without a mouse, with real keys: menus, the panel, the timeline, dialogs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_screen import RunningApp, Screen, running_app
+
+from viewer.app.theme import PALETTES, rgb
+
+
+@pytest.fixture(scope="module")
+def running(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+    scan = tmp_path_factory.mktemp("scan")
+    for number in range(5):
+        points = np.random.default_rng(number).uniform((-1, -2, -3), (1, 2, 3), (4000, 3))
+        np.save(scan / f"{number}.npy", points)
+    with running_app(screen, tmp_path_factory.mktemp("app"), scan) as app:
+        yield app
+
+
+@pytest.fixture
+def app(running: RunningApp) -> RunningApp:
+    running.reset()
+    return running
+
+
+def press(app: RunningApp, *keys: str) -> None:
+    """As fingers do it: one after the other."""
+    for key in keys:
+        app.screen.do("key", key)
+        app.settle()
+
+
+def framed(app: RunningApp, *box: int) -> int:
+    """How many pixels of a part of the screen have the colour of what frames the widget with the keyboard.
+
+    box: left, top, right, bottom.
+    """
+    left, top, right, bottom = box
+    accent = np.array(rgb(PALETTES[app.settle().theme].accent)) * 255
+    part = app.screen.picture()[top:bottom, left:right].astype(float)
+    return int((np.abs(part - accent).max(axis=-1) < 3).sum())
+
+
+def panel(app: RunningApp) -> tuple[int, int, int, int]:
+    """Where the panel is on the screen: left, top, right, bottom."""
+    left, top, width, height = app.view()
+    return left + width, top, app.state.size[0], top + height
+
+
+def timeline(app: RunningApp) -> tuple[int, int, int, int]:
+    """Where the buttons of the timeline are on the screen."""
+    _, top, _, height = app.view()
+    return 0, top + height, 220, app.state.size[1]
+
+
+def looks_from(app: RunningApp) -> list[int]:
+    """The side that the view is seen from, as a direction."""
+    camera = app.settle().camera
+    away = np.subtract(camera["eye"], camera["target"])
+    return [int(part) for part in np.round(away / np.linalg.norm(away))]
+
+
+def test_alt_opens_the_menus_and_arrows_and_enter_choose(app: RunningApp) -> None:
+    assert looks_from(app) == [0, 0, 1]
+    press(app, "Alt_L", "Right", "Right")  # File, Edit, View
+    press(app, "Down", "Down", "Down", "Right", "Down", "Return")  # From, Back
+    assert looks_from(app) == [0, 0, -1]
+
+
+def test_alt_and_a_letter_open_a_menu_and_escape_gives_the_view_its_keys_back(app: RunningApp) -> None:
+    press(app, "alt+v", "Down", "Down", "Down", "Right", "Return")
+    press(app, "alt+t", "Escape")
+    press(app, "Alt_L", "Right", "Left", "Escape")
+    assert app.settle().frame == 0
+    press(app, "Right")
+    assert app.settle().frame == 1
+
+
+def test_alt_with_something_else_opens_nothing(app: RunningApp) -> None:
+    app.screen.do("keydown", "Alt_L", "key", "i", "keyup", "Alt_L")
+    app.settle()
+    left, top, width, height = app.view()
+    app.screen.do("mousemove", left + width // 2, top + height // 2)
+    app.screen.do("keydown", "Alt_L", "click", 1, "keyup", "Alt_L")
+    app.settle()
+    press(app, "Right")  # in a menu it would go to the next
+    assert app.settle().frame == 1
+
+
+def test_f6_leads_through_panel_and_timeline_and_back(app: RunningApp) -> None:
+    ticks, loop = framed(app, *panel(app)), framed(app, *timeline(app))  # of what is on
+    press(app, "F6")
+    assert framed(app, *panel(app)) > ticks + 100
+    press(app, "Right", "space", "space")  # in the panel these are not the view's
+    assert (app.settle().frame, app.state.is_playing) == (0, False)
+    press(app, "ctrl+F6")
+    assert framed(app, *panel(app)) == ticks
+    assert framed(app, *timeline(app)) > loop + 50
+    press(app, "F6", "Right")
+    assert app.settle().frame == 1
+    assert framed(app, *timeline(app)) == loop
+
+
+def test_a_widget_of_the_panel_is_worked_by_keys(app: RunningApp) -> None:
+    assert app.settle().clicking is None
+    press(app, "F6", "Home", "Return")  # closes the first section
+    press(app, "Tab", "Tab", "Return")  # over the head of the next to its first button, which measures
+    assert app.settle().clicking == "measuring"
+    press(app, "Return")
+    assert app.settle().clicking is None
+    press(app, "Home", "Return")
+
+
+def test_the_timeline_plays_and_pauses_by_its_button(app: RunningApp) -> None:
+    press(app, "shift+F6", "Right", "Right")
+    app.screen.do("key", "Return")
+    app.see(is_playing=True)
+    app.screen.do("key", "Return")
+    app.see(is_playing=False)
+    app.screen.do("key", "Escape", "key", "Home", "key", "space")
+    app.see(is_playing=True)
+    app.screen.do("key", "space")
+    app.see(is_playing=False)
+
+
+def test_the_mouse_takes_the_keyboard_back(app: RunningApp) -> None:
+    ticks = framed(app, *panel(app))
+    press(app, "F6")
+    left, top, width, height = app.view()
+    app.screen.do("mousemove", left + width // 2, top + height // 2, "click", 1)
+    app.settle()
+    assert framed(app, *panel(app)) == ticks
+    press(app, "Right")
+    assert app.settle().frame == 1
+
+
+def test_the_dialog_that_exports_is_filled_in_by_keys(app: RunningApp) -> None:
+    press(app, "ctrl+e")
+    assert app.settle().is_export_open
+    press(app, "shift+Tab", "shift+Tab", "Return")  # from the last button, Cancel, to the one before
+    path = app.told(r"Saved (.+\.png)")[1]
+    assert Path(path).stat().st_size > 1000
