@@ -1,16 +1,22 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
-// SINGLE: squares are of one pixel.
+// FILTERED: those that are not visible are left out. SINGLE: squares are of one pixel.
 #include "common/view.glsl"
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if SAMPLED
 layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
+#if FILTERED
+layout(binding = TEXTURE_VISIBLE) uniform usamplerBuffer visible;
+#endif
 #include <params>
 
 void scatter(uint i) {
 #if SAMPLED
     i = texelFetch(drawn_rows, int(i)).r;
+#endif
+#if FILTERED
+    if (texelFetch(visible, int(i)).r == 0u) return;
 #endif
     vec3 view = to_view(texelFetch(positions, int(i)).xyz);
     float depth = -view.z;

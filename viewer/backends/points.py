@@ -7,8 +7,9 @@ there are far fewer points than pixels, the points list the pixels to be shaded.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from ..gpu import gl
 from ..gpu.bindings import Texture
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
@@ -60,9 +61,23 @@ def suits(pose: Pose) -> Suited:
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter the points; complete where all shall be drawn."""
-    params: Params = frame.params
+    return draw_squares(pose, frame, surface, frame.params.point_size)
+
+
+def draw_squares(
+    pose: GpuPose,
+    frame: FrameView,
+    surface: Surface,
+    point_size: int,
+    shown: gl.BufferTexture | None = None,
+) -> bool:
+    """Write the points to the Surface as squares; True if a later call would draw more of them.
+
+    point_size: edge, pixels; 0: as far as the next point. shown: R32UI, a texel a row, 0 where a point is
+    left out; None: all are drawn.
+    """
     rows, count = surface.take_sample(frame.share)
-    size = params.point_size or _touching(pose, frame.view)
+    size = point_size or _touching(pose, frame.view)
     if rows is not None:
         size = min(round(size * math.sqrt(len(pose.cloud) / count)), _LARGEST)
     sparse = count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
@@ -71,9 +86,11 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         pose.array("positions").bind(Texture.POSITIONS)
         if rows is not None:
             rows.bind(Texture.DRAWN_ROWS)
+        if shown is not None:
+            shown.bind(Texture.VISIBLE)
 
-    defines = {"SINGLE": int(size == 1), "SAMPLED": int(rows is not None)}
-    visits = Visits("points/cells.glsl", count, bind, defines, replace(params, point_size=size))
+    defines = {"SINGLE": int(size == 1), "SAMPLED": int(rows is not None), "FILTERED": int(shown is not None)}
+    visits = Visits("points/cells.glsl", count, bind, defines, Params(point_size=size))
     listed = surface.take_covered() if sparse else None
     scatter(pose.gpu, visits, surface.depths, surface.rows, listed)
     if sparse:

@@ -77,6 +77,10 @@ class Texture(IntEnum):
     RANGE_XY = auto()
     RANGE_TILES = auto()
     RANGE_VIEWS = auto()
+    # Hidden points, with keys and best: of sectors.
+    HOMES = auto()  # sector and key of each row
+    OCCUPIED = auto()  # cells of sectors that points fall into
+    VISIBLE = auto()  # rows that are
     # Means of pictures.
     LIGHT = auto()  # of bytes
     ENCODED = auto()  # bytes of light
@@ -150,6 +154,15 @@ class Storage(IntEnum):
     # Splats that become smaller, beside the forms of tiles.
     RADII = 4
     DISCS = 5
+    # Hidden points, beside scatter and a list.
+    POINT_SPOTS = 4
+    HOMES = 5
+    OCCUPIED = 6
+    NEXT_LIST = 4
+    NEXT_DISPATCH = 5
+    STAMPS = 6
+    NEXT_ROWS = 7
+    VISIBLE = 0
     # Samples of range views: a level that is made.
     RANGE_DEPTHS = 0
     RANGE_LOOKS = 1

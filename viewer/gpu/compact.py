@@ -47,10 +47,10 @@ class IndexList:
         self.texels.buffer.write(indices)
         self._dispatch.write(struct.pack("4I", -(-count // (GROUP * self._rows)), self._rows, 1, count))
 
-    def bind(self) -> None:
-        """Bind where shaders that include common/list.glsl find it."""
-        self.texels.buffer.bind_to_storage_buffer(Storage.LIST)
-        self._dispatch.bind_to_storage_buffer(Storage.DISPATCH)
+    def bind(self, indices: Storage = Storage.LIST, dispatch: Storage = Storage.DISPATCH) -> None:
+        """Bind where shaders that include common/list.glsl find it, or elsewhere."""
+        self.texels.buffer.bind_to_storage_buffer(indices)
+        self._dispatch.bind_to_storage_buffer(dispatch)
 
     def run(self, program: moderngl.ComputeShader) -> None:
         """Run the invocations of all indices, without the CPU knowing how many there are."""

@@ -1,0 +1,60 @@
+// A point's cell is its sector, its key how far its flip lies along the sector's direction. The first pass keeps each
+// point's spot, sector and key, so that positions are read once, and notes which cells of sectors points fall into.
+// FILTERED: points that are not visible are left out. SAMPLED: a list says which points there are.
+#include "hpr/sectors.glsl"
+
+#if SAMPLED
+layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
+#endif
+#if PASS == 0
+uniform vec4 clip;  // points are left out where this plane is below 0
+uniform int cell_shift;
+
+layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+#if FILTERED
+layout(binding = TEXTURE_VISIBLE) uniform usamplerBuffer visible;
+#endif
+layout(std430, binding = STORAGE_POINT_SPOTS) buffer Spots { float spots[]; };
+layout(std430, binding = STORAGE_HOMES) buffer Homes { uvec2 homes[]; };
+layout(std430, binding = STORAGE_OCCUPIED) buffer Occupied { uint occupied[]; };
+
+uvec2 home_of(uint row, vec3 position) {
+    vec3 spot;
+    bool has_spot = find_spot(position, spot);
+    spots[3u * row] = spot.x;
+    spots[3u * row + 1u] = spot.y;
+    spots[3u * row + 2u] = spot.z;
+    if (dot(clip.xyz, position) + clip.w < 0.0) return uvec2(NOTHING, NOTHING);
+    if (!has_spot) return uvec2(NOTHING, 0u);
+    uint sector = sector_of(spot);
+    if (sector == NOTHING) return uvec2(NOTHING, 0u);
+    ivec3 place = place_of(sector);
+    int cells = ((edge - 1) >> cell_shift) + 1;
+    ivec2 cell = place.xy >> cell_shift;
+    occupied[(place.z * cells + cell.y) * cells + cell.x] = 1u;
+    return uvec2(sector, key_of(spot, direction_at(place)));
+}
+#else
+layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
+#endif
+
+void scatter(uint i) {
+#if SAMPLED
+    uint row = texelFetch(drawn_rows, int(i)).r;
+#else
+    uint row = i;
+#endif
+#if PASS == 0
+#if FILTERED
+    if (texelFetch(visible, int(row)).r == 0u) {
+        homes[i] = uvec2(NOTHING, NOTHING);
+        return;
+    }
+#endif
+    uvec2 home = home_of(row, texelFetch(positions, int(row)).xyz);
+    homes[i] = home;
+#else
+    uvec2 home = texelFetch(homes, int(i)).rg;
+#endif
+    if (home.x != NOTHING) visit(home.x, home.y, row);
+}

@@ -1,0 +1,265 @@
+"""Only the points that the eye sees, found without normals or faces: hidden ones are removed.
+
+Machado e Silva 2014: the operator of Katz 2007, for which the points on the hull of the flipped scan are
+visible, by sectors of directions, each of which keeps the point whose flip lies farthest along it (3 to 5).
+Its radius and the number of sectors and steps are found as in 6. Unlike there, angles are divided evenly to
+both sides, so that sectors are alike up to 45 degrees off the middle, and an eye nearer than that has six
+such grids around it, as the faces of a cube.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError, unknown_name
+from ...gpu import gl
+from ...gpu.context import Gpu, headless
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Surface
+from ...params import param
+from ...scan.pose import Pose
+from ...view import View
+from .. import FrameView
+from ..points import draw_squares
+from .calibration import EyeCalibration, body_of, calibrate
+from .candidates import EVERYWHERE, UNLIMITED, Candidates
+from .exact import as_cloud
+from .sectors import Sectors
+
+TITLE = "Visible points"
+MODES = ("hull",)
+_DEPTH = 0.05  # radii of the body
+_QUALITY = 4.0
+_MOVING = 0.5  # of the sectors along an edge while the picture moves
+_MOST_SECTORS = 1 << 24
+_NEAR = 1 / 64  # of the body's radius: a near plane closer to an eye inside it cuts off too little to matter
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of hidden point removal."""
+
+    point_size: int = param(
+        0, "Edge of a point's square; 0: as far as the next point", low=0, high=32, unit="px", basic=True
+    )
+    quality: float = param(
+        _QUALITY,
+        "Sectors, as many times those of which half have a point",
+        low=0.25,
+        high=64,
+        sweep=(1, 4, 16),
+        basic=True,
+        group="Visibility",
+    )
+    depth: float = param(
+        _DEPTH,
+        "How far behind a surface points are hidden by it, in radii of the body; less shows deeper folds, "
+        "and more of what lies behind gaps",
+        low=1e-6,
+        high=1e3,
+        title="Hides from",
+        sweep=(0.01, 0.05, 0.2),
+        basic=True,
+        group="Visibility",
+    )
+    radius: float | None = param(
+        None,
+        "R, where points are flipped, in distances of the farthest point; auto: from the depth and how "
+        "densely points lie",
+        type=float,
+        low=1,
+        high=1e9,
+        group="Visibility",
+    )
+    sectors: int | None = param(
+        None,
+        "Sectors in all, k; auto: from the quality",
+        type=int,
+        low=1,
+        high=_MOST_SECTORS,
+        group="Visibility",
+    )
+    steps: int | None = param(
+        None,
+        "Sectors that a candidate reaches beyond its own; auto: as many as lie between visible points",
+        type=int,
+        low=0,
+        high=UNLIMITED,
+        group="Visibility",
+    )
+
+
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
+    """Nothing but positions."""
+    return ()
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Find what the eye sees, unless that is known, and scatter it."""
+    if not len(pose.cloud):
+        surface.clear()
+        return False
+    seen = surface.keep(_Seen)
+    candidates = seen.look(pose, frame, surface)
+    return draw_squares(pose, frame, surface, frame.params.point_size, candidates.visible)
+
+
+class _Seen:
+    """The candidates that a surface showed last, and what for."""
+
+    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self._candidates: Candidates | None = None
+        self._pose: weakref.ref[GpuPose] | None = None
+        self._sought: tuple[object, ...] = ()
+        self._chosen: dict[str, str] = {}
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self._candidates.nbytes if self._candidates else 0
+
+    def look(self, pose: GpuPose, frame: FrameView, surface: Surface) -> Candidates:
+        """The candidates of a picture."""
+        params: Params = frame.params
+        directions, clip = _directions(pose, frame.view)
+        sample = surface.take_sample(frame.share)
+        sought = (
+            sample[1],
+            directions,
+            clip,
+            params.quality,
+            params.depth,
+            params.radius,
+            params.sectors,
+            params.steps,
+            frame.moving,
+        )
+        stats = surface.stats
+        known = self._candidates is not None and self._pose is not None and self._pose() is pose
+        if known and self._sought == sought:
+            stats.skipped["candidates"] = "pose and eye stand still"
+        else:
+            self._find(pose, directions, clip, frame, sample)
+            self._pose, self._sought = weakref.ref(pose), sought
+        assert self._candidates is not None
+        stats.chosen.update(self._chosen)
+        stats.counted["points"] = self._candidates.count
+        stats.simplified = frame.moving
+        return self._candidates
+
+    def _find(
+        self,
+        pose: GpuPose,
+        directions: Sectors,
+        clip: tuple[float, float, float, float],
+        frame: FrameView,
+        sample: tuple[gl.BufferTexture | None, int],
+    ) -> None:
+        params: Params = frame.params
+        radius = None if params.radius is None else params.radius * directions.farthest
+        rows, count = sample
+        drawn = count / len(pose.cloud)
+        found = calibrate(pose.stored, directions, pose.origin, params.depth, radius, drawn)
+        sectors, steps = chosen_sectors(found, params.sectors, params.steps, params.quality)
+        if frame.moving:
+            sectors, steps = found.with_sectors(max(round(sectors.edge * _MOVING), 1))
+        if self._candidates is None or not self._candidates.fits(sectors, len(pose.cloud)):
+            self._gpu.discard(self._candidates)
+            self._candidates = None
+            self._candidates = Candidates(self._gpu, sectors, len(pose.cloud))
+        self._candidates.find(
+            pose.array("positions"), sectors, steps, sample=None if rows is None else (rows, count), clip=clip
+        )
+        self._chosen = {
+            "radius": "parallel rays" if math.isinf(found.radius) else f"{found.radius:.4g}",
+            "sectors": f"{sectors.count:,} ({sectors.mapping})",
+            "steps": str(steps),
+        }
+
+    def release(self) -> None:
+        """Delete what it holds on the GPU."""
+        if self._candidates is not None:
+            self._candidates.release()
+
+
+def _directions(pose: GpuPose, view: View) -> tuple[Sectors, tuple[float, float, float, float]]:
+    """How directions from a view's eye are divided, and what its near plane leaves out."""
+    body = body_of(pose.stored)
+    if view.perspective:
+        eye = view.origin - view.rotation.T @ view.translation
+        directions = Sectors.around(body.center, body.radius, eye, pose.origin)
+    else:
+        directions = Sectors.along(body.center, body.radius, -view.rotation[2], pose.origin)
+    nearest = float(view.depths(body.center - view.origin)) - body.radius
+    least = _NEAR * body.radius if directions.mapping == "cube" else 0.0
+    if view.near <= max(nearest, least):
+        return directions, EVERYWHERE
+    x, y, z = (-view.rotation[2]).tolist()
+    return directions, (x, y, z, float(-view.translation[2] - view.near))
+
+
+def chosen_sectors(
+    found: EyeCalibration, count: int | None, steps: int | None, quality: float = _QUALITY
+) -> tuple[Sectors, int]:
+    """Sectors, and steps of propagation in them, where they are given or else by the quality."""
+    faces = found.sectors.count / found.sectors.edge**2
+    wanted = quality * found.sectors.count if count is None else count
+    edge = math.sqrt(min(wanted, _MOST_SECTORS) / faces)
+    sectors, suited = found.with_sectors(max(round(edge), 1))
+    return sectors, suited if steps is None else steps
+
+
+def visible_points(
+    points: Pose | ArrayLike,
+    eye: ArrayLike,
+    *,
+    radius: float | None = None,
+    sectors: int | None = None,
+    steps: int | None = None,
+    mode: str = "hull",
+    gpu: Gpu | None = None,
+) -> NDArray[np.uint32]:
+    """The points that an eye sees: ids (M,) uint32, ascending.
+
+    points: a pose, or (N, 3) absolute; ids count the points that it came with, also those that are
+    left out because a coordinate is not finite. eye: (3,), absolute. radius: R of the flip, scan units, not
+    less than the distance to the farthest point; sectors: how many, k; steps: of propagation at most; None:
+    as the calibration says (`calibrate`). mode: "hull" takes the points of the hull of the flipped ones, as
+    the sectors find them (Machado e Silva 2014). Of points in one place one is visible, and so is a point in
+    the eye itself. gpu: None takes a context of its own, which is kept. Raises InputError, NoOpenGLError.
+    """
+    if mode not in MODES:
+        raise unknown_name("mode", mode, MODES)
+    cloud, gpu = as_cloud(points), gpu or _gpu()
+    at = np.asarray(eye, np.float64)
+    if at.shape != (3,) or not np.isfinite(at).all():
+        raise InputError(f"an eye is three finite numbers, not {eye!r}")
+    if not len(cloud):
+        return np.empty(0, np.uint32)
+    gpu.activate()
+    pose = GpuPose(gpu, Pose(0, 0.0, "", cloud))
+    body = body_of(cloud)
+    found = calibrate(
+        cloud, Sectors.around(body.center, body.radius, at, pose.origin), pose.origin, _DEPTH, radius
+    )
+    divided, suited = chosen_sectors(found, sectors, steps)
+    candidates = Candidates(gpu, divided, len(cloud))
+    try:
+        candidates.find(pose.array("positions"), divided, suited)
+        rows = candidates.visible_rows()
+    finally:
+        candidates.release()
+    return rows if cloud.ids is None else cloud.ids[rows]
+
+
+@cache
+def _gpu() -> Gpu:
+    """The context that `visible_points` uses where none is given."""
+    return headless()

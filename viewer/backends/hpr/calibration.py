@@ -1,0 +1,109 @@
+"""EyeCalibration: radius, number of sectors and steps from how densely points lie, as the eye sees them.
+
+Machado e Silva 2014, 6.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scan.points import NOTHING, PointCloud, strided
+from .sectors import Sectors
+
+_OCCUPIED = 0.5  # of the sectors inside the object's outline: a of eq. 5
+_COARSE = 64  # cells along an edge of the coarse map
+_PARTS = 4  # steps in which the edge doubles: small changes of a scan leave it
+_ROOM = 1 + 1e-5  # so that rounding puts no point of the sphere outside the grid
+
+
+@dataclass(frozen=True)
+class Body:
+    """The body of a scan. center: (3,) scan units, the mean of the points; radius: of the sphere around it
+    that has them all, far outliers aside. count: of the points that differ."""
+
+    center: NDArray[np.float64]
+    radius: float
+    count: int
+
+
+def body_of(cloud: PointCloud) -> Body:
+    """The body of a cloud that has points; found once."""
+    return cloud.remember(_body)
+
+
+def _body(cloud: PointCloud) -> Body:
+    bounds = cloud.bounds()
+    low, high = (bounds.low - cloud.origin), (bounds.high - cloud.origin)
+    inside = ((cloud.positions >= low) & (cloud.positions <= high)).all(axis=1)
+    points = cloud.positions if inside.all() or not inside.any() else cloud.positions[inside]
+    center = points.mean(axis=0, dtype=np.float64)
+    away = points - center.astype(np.float32)
+    radius = math.sqrt(float(np.einsum("ij,ij->i", away, away).max()))
+    least = float(np.abs(points).max()) * 1e-6 or 1.0  # of all points in one place
+    return Body(center + cloud.origin, max(radius, least) * _ROOM, _distinct(cloud.positions))
+
+
+def _distinct(positions: NDArray[np.float32]) -> int:
+    words = (positions + np.float32(0)).view(np.uint32).astype(np.uint64)  # + 0: no negative zero
+    mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ mixed >> np.uint64(29)) + words[:, 1] * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ mixed >> np.uint64(32)) + words[:, 2] * np.uint64(0x94D049BB133111EB)
+    mixed.sort()
+    return 1 + int(np.count_nonzero(mixed[1:] != mixed[:-1]))
+
+
+@dataclass(frozen=True)
+class EyeCalibration:
+    """Sectors and flip that suit a cloud as one eye sees it.
+
+    sectors: so many that half of those inside the outline have a point, with the weight of `radius`. radius:
+    R of the flip, scan units, infinite for parallel rays. occupied: share of all directions of the sectors
+    that the object takes. spacing: usual angle between neighbouring visible points, in sectors of these.
+    """
+
+    sectors: Sectors
+    radius: float
+    occupied: float
+    spacing: float
+
+    def with_sectors(self, edge: int) -> tuple[Sectors, int]:
+        """Sectors of these directions, so many along an edge, and the steps of propagation that close the
+        gaps between visible points in them."""
+        return self.sectors.divided(edge), max(math.ceil(self.spacing * edge / self.sectors.edge), 1)
+
+
+def calibrate(
+    cloud: PointCloud,
+    sectors: Sectors,
+    origin: NDArray[np.float64],
+    depth: float,
+    radius: float | None = None,
+    drawn: float = 1.0,
+) -> EyeCalibration:
+    """The calibration for a cloud that has points.
+
+    sectors: how directions are divided, by any number. origin: what they take positions relative to, (3,).
+    depth: a point hides others that lie so much farther away behind it, in units of the sectors: d of the
+    paper. radius: R, scan units; None: from `depth`. drawn: share of the points that are looked at.
+    """
+    coarse = sectors.divided(_COARSE)
+    spots = coarse.spots(strided(cloud.positions) + (cloud.origin - origin))
+    cells = coarse.sector_of(spots)
+    share = max(len(np.unique(cells[cells != NOTHING])), 1) / coarse.count
+    count = max(body_of(cloud).count * drawn, 1.0)
+    inside = -1 / math.expm1(math.log1p(-_OCCUPIED) / count)  # eq. 5
+    wanted = math.sqrt(inside / share * coarse.edge**2 / coarse.count)
+    edge = max(round(2 ** (round(_PARTS * math.log2(wanted)) / _PARTS)), 1)
+    found = sectors.divided(edge)
+    spacing = math.sqrt(2 * inside / count)  # half of the points are seen
+    if math.isinf(found.distance):
+        return EyeCalibration(found.weighted(4 * depth / (2 * found.angle) ** 2), math.inf, share, spacing)
+    if radius is None:
+        surface = float(np.nanmean(found.distances(spots)))
+        radius = surface / 2 + depth * found.unit / (4 * math.sin(2 * found.angle / 4) ** 2)
+        radius = max(radius, found.farthest)
+    return EyeCalibration(found.flipped(radius), radius, share, spacing)

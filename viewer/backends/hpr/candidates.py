@@ -1,0 +1,200 @@
+"""Candidates: the point of each sector whose flip lies farthest along its direction.
+
+Machado e Silva 2014, 4.2 and 4.3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...gpu import gl
+from ...gpu.bindings import Storage, Texture
+from ...gpu.compact import IndexList
+from ...gpu.constants import NOTHING
+from ...gpu.context import Gpu, Program
+from ...gpu.scatter import Visits, scatter
+from .sectors import Sectors
+
+EVERYWHERE = (0.0, 0.0, 0.0, 1.0)  # the clip plane that leaves out no point
+UNLIMITED = 1 << 30  # steps: until nothing changes
+_RUN = 8  # sectors an invocation of hpr/empty.comp looks at
+_STEPS_AT_ONCE = 32  # of propagation, before the CPU asks whether anything still changes
+_EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones is coarser (4.3)
+
+
+class Candidates:
+    """Candidates of the sectors around an eye, and what is visible, on the GPU.
+
+    rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. keys: R32UI, its key.
+    spots: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector that it
+    lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where a sector has it or it
+    lies in none. sectors: what `rows` are of; shaders that include hpr/sectors.glsl take it as `params`, with
+    `defines`.
+
+    Raises InputError for more sectors or points than the driver takes.
+    """
+
+    def __init__(self, gpu: Gpu, sectors: Sectors, points: int) -> None:
+        self._gpu = gpu
+        self.sectors, self.points = sectors, points
+        self._capacity = sectors.count
+        if 4 * sectors.count > gpu.max_storage_bytes or 12 * points > gpu.max_storage_bytes:
+            raise InputError(
+                f"{sectors.count:,} sectors for {points:,} points are more than this driver takes",
+                hint="Use fewer sectors",
+            )
+
+        def texels(count: int, texel_format: int, words: int) -> gl.BufferTexture:
+            return gl.BufferTexture(gpu.ctx.buffer(reserve=4 * words * max(count, 1)), texel_format)
+
+        self.rows, self.keys, self._stamps, self._found, self._occupied = (
+            texels(sectors.count, gl.R32UI, 1) for _ in range(5)
+        )
+        self.spots = texels(points, gl.RGB32F, 3)
+        self.homes = texels(points, gl.RG32UI, 2)
+        self.visible = texels(points, gl.R32UI, 1)
+        self._todo, self._changed = (IndexList(gpu, sectors.count) for _ in range(2))
+        self.steps, self.looked_at = 0, points
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU: 28 a sector and 24 a point."""
+        held = (self.rows, self.keys, self._stamps, self._found, self._occupied)
+        by_row = (self.spots, self.homes, self.visible)
+        return sum(each.buffer.size for each in (*held, *by_row)) + self._todo.nbytes + self._changed.nbytes
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """Macros of hpr/sectors.glsl."""
+        return {"CUBE": int(self.sectors.mapping == "cube")}
+
+    def fits(self, sectors: Sectors, points: int) -> bool:
+        """Whether there is room for these, and not for many more."""
+        return points == self.points and sectors.count <= self._capacity <= 4 * sectors.count
+
+    def find(
+        self,
+        positions: gl.BufferTexture,
+        sectors: Sectors,
+        steps: int,
+        *,
+        sample: tuple[gl.BufferTexture, int] | None = None,
+        among: gl.BufferTexture | None = None,
+        clip: tuple[float, float, float, float] = EVERYWHERE,
+    ) -> None:
+        """Find the candidates of sectors, and which points are visible.
+
+        positions: RGB32F, a texel a point, relative to the origin of the sectors. steps: of propagation at
+        most. sample: rows that are looked at in place of all, R32UI, and how many. among: R32UI, a texel a
+        point, leaves out those where it is 0; `visible` is then left as it is. clip: a plane, points below
+        which are left out.
+        """
+        self.sectors, self.steps = sectors, steps
+        gpu, shift = self._gpu, self._cell_shift()
+        gl.clear_words(self._occupied.buffer, 0)
+
+        def bind(program: Program) -> None:
+            positions.bind(Texture.POSITIONS)
+            self.homes.bind(Texture.HOMES)
+            self.spots.buffer.bind_to_storage_buffer(Storage.POINT_SPOTS)
+            self.homes.buffer.bind_to_storage_buffer(Storage.HOMES)
+            self._occupied.buffer.bind_to_storage_buffer(Storage.OCCUPIED)
+            if among is not None:
+                among.bind(Texture.VISIBLE)
+            if sample is not None:
+                sample[0].bind(Texture.DRAWN_ROWS)
+            if "cell_shift" in program:  # the first pass alone has it
+                gpu.set(program, clip=clip, cell_shift=shift)
+
+        self.looked_at = self.points if sample is None else sample[1]
+        sampled = {"SAMPLED": int(sample is not None)}
+        defines = {"FILTERED": int(among is not None), **sampled, **self.defines}
+        visits = Visits("hpr/candidates.glsl", self.looked_at, bind, defines, sectors)
+        with gpu.timers.measure("candidates"):
+            scatter(gpu, visits, self.keys, self.rows)
+        self._list_inside(shift)
+        with gpu.timers.measure("propagate"):
+            self._propagate(steps)
+        if among is None:
+            self._mark_visible(sampled)
+
+    def _cell_shift(self) -> int:
+        """Halvings of the grid, until its cells are so few for the points that none inside is empty by
+        chance."""
+        most = max(_EMPTY_BELOW * self.points, 1.0)
+        edge = self.sectors.edge
+        return min(max(math.ceil(math.log2(self.sectors.count / most) / 2), 0), edge.bit_length())
+
+    def _list_inside(self, shift: int) -> None:
+        gpu = self._gpu
+        program = gpu.compute("hpr/empty.comp", self.defines, params=self.sectors)
+        with gpu.timers.measure("empty"):
+            self._todo.clear()
+            self._todo.bind()
+            self._occupied.bind(Texture.OCCUPIED)
+            self._stamps.buffer.bind_to_storage_buffer(Storage.STAMPS)
+            gpu.set(program, cell_shift=shift)
+            gpu.dispatch(program, -(-self.sectors.count // _RUN))
+
+    def _propagate(self, steps: int) -> None:
+        gpu = self._gpu
+        look, take = (
+            gpu.compute("hpr/propagate.comp", {"TAKE": take, **self.defines}, params=self.sectors)
+            for take in (0, 1)
+        )
+        self.spots.bind(Texture.SPOTS)
+        self.keys.bind(Texture.KEYS)
+        self.rows.bind(Texture.BEST)
+        self._found.bind(Texture.FOUND)
+        for step in range(1, steps + 1):
+            self._changed.clear()
+            self._changed.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
+            self._found.buffer.bind_to_storage_buffer(Storage.NEXT_ROWS)
+            self._todo.run(look)
+            self._todo.clear()
+            self._todo.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
+            self.keys.buffer.bind_to_storage_buffer(Storage.KEYS)
+            self.rows.buffer.bind_to_storage_buffer(Storage.BEST)
+            self._stamps.buffer.bind_to_storage_buffer(Storage.STAMPS)
+            gpu.set(take, step_number=step)
+            self._changed.run(take)
+            if step % _STEPS_AT_ONCE == 0 and not len(self._todo):
+                break
+
+    def _mark_visible(self, sampled: dict[str, int]) -> None:
+        gpu = self._gpu
+        gl.clear_words(self.visible.buffer, 0)
+        with gpu.timers.measure("visible"):
+            self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
+            self.homes.bind(Texture.HOMES)
+            self.rows.bind(Texture.BEST)
+            for mark, count in ((0, self.looked_at), (1, self.sectors.count)):
+                gpu.dispatch(gpu.compute("hpr/visible.comp", {"MARK": mark, **sampled}), count)
+
+    def visible_rows(self) -> NDArray[np.uint32]:
+        """The rows that are visible, ascending; waits for the GPU."""
+        flags = np.frombuffer(self.visible.buffer.read(), np.uint32, self.points)
+        return np.flatnonzero(flags).astype(np.uint32)
+
+    def count(self) -> dict[str, int]:
+        """How many points and sectors there are, and became visible or occupied; waits for the GPU."""
+        rows = np.frombuffer(self.rows.buffer.read(), np.uint32, self.sectors.count)
+        return {
+            "in": self.looked_at,
+            "visible": len(self.visible_rows()),
+            "sectors": self.sectors.count,
+            "occupied": int(np.count_nonzero(rows != NOTHING)),
+        }
+
+    def release(self) -> None:
+        """Delete all of it."""
+        for each in (self.rows, self.keys, self._stamps, self._found, self._occupied):
+            each.release()
+        for each in (self.spots, self.homes, self.visible):
+            each.release()
+        self._todo.release()
+        self._changed.release()
