@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+_ASTRAY = 8.0  # times as far out as usual: frames that reach farther are mistakes
+
 
 @dataclass(frozen=True)
 class Bounds:
@@ -22,6 +24,17 @@ class Bounds:
         return cls(
             np.min([one.low for one in several], axis=0), np.max([one.high for one in several], axis=0)
         )
+
+    @classmethod
+    def of_frames(cls, shown: Bounds, known: Sequence[Bounds]) -> Bounds:
+        """The smallest box around a frame that is shown and those of its sequence that are known, but such as
+        are astray."""
+        known = [shown, *known]
+        centers = np.array([one.center for one in known])
+        off = np.linalg.norm(centers - np.median(centers, axis=0), axis=1)
+        sizes = np.array([one.radius for one in known])
+        is_near = off + sizes <= _ASTRAY * (np.median(off) + np.median(sizes))
+        return cls.around([shown, *(one for one, near in zip(known, is_near, strict=True) if near)])
 
     @property
     def center(self) -> NDArray[np.float64]:

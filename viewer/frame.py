@@ -291,7 +291,7 @@ def render(
     bounds = layers.place.bounds(resident.bounds)
     request = Request(
         pose=pose,
-        camera=camera or first_camera(views, bounds, size[0] / size[1], pose.upright.up),
+        camera=camera or first_camera(views, bounds, size[0] / size[1], pose.upright),
         backend=name,
         params=chosen,
         look=look or Look(),

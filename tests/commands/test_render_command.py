@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,12 +17,15 @@ from written import bits, film, picture
 
 import viewer
 from viewer import frame
+from viewer.app.scene.extent import Extent
 from viewer.camera import Camera
 from viewer.document.recording import Recording
 from viewer.gpu.surface import NOTHING
 from viewer.look import SAMPLES, Look
 from viewer.renderer import Renderer
 from viewer.scan import formats
+from viewer.scan.open import open_scan
+from viewer.scan.pods import first_camera
 from viewer.scan.points import PointCloud
 
 
@@ -191,6 +195,30 @@ def test_a_turntable_goes_round_and_never_cuts(run: Run, tmp_path: Path) -> None
     z = [plank[end[end != NOTHING], 2].mean() for end in ends]
     assert z[0] > 4
     assert z[1] < -4
+
+
+def test_the_first_camera_is_that_of_the_window(run: Run, data_dir: Path, tmp_path: Path) -> None:
+    with open_scan(data_dir / "sequences" / "crane_175") as timeline:
+        for number, away in enumerate([0, 0, 0, 1e4, 0]):  # one frame is astray
+            positions = timeline.pose(40 * number).cloud.positions
+            np.savez(tmp_path / f"f{number}.npz", positions=positions + np.float32(away))
+    with open_scan(tmp_path) as timeline:
+        extent = Extent()
+        extent.begin(timeline)
+        pose = timeline.pose(0)
+        extent.visit()
+        while not extent.take_visited():
+            time.sleep(0.01)
+        assert pose.upright.front == -90
+        expected = first_camera((), extent.around(pose.bounds), 96 / 64, pose.upright)
+    out = tmp_path / "out"
+    out.mkdir()
+    assert run("render", tmp_path, "--all", *SMALL, "-o", out / "p%d.png").code == 0
+    drawn = Recording.load(out / "p0.png").entries[0].camera
+    assert drawn == expected
+    assert run("render", tmp_path, "--all", "--turntable", 4, *SMALL, "-o", out / "t%d.png").code == 0
+    turned = Recording.load(out / "t0.png").entries[0].camera
+    assert turned.rotation() == pytest.approx(expected.rotation()), "it begins at the front"
 
 
 def test_a_turntable_while_playing(run: Run, scans: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from viewer.camera import Camera
 from viewer.geometry import up_vector
 from viewer.scan.pods import first_camera
 from viewer.scan.range_view import RangeView
+from viewer.scan.upright import Upright
 from viewer.view import View
 
 BALL = Bounds(np.full(3, -1.0), np.full(3, 1.0))
@@ -61,10 +62,14 @@ def test_several_are_looked_between_and_the_scan_is_shown_whole() -> None:
     np.testing.assert_allclose(aside.eye, Camera.orbit(BALL, 30, aspect=1.5).eye, atol=1e-9)
 
 
+def told(up: str) -> Upright:
+    return Upright(up, "told", 1.0)
+
+
 def test_from_all_around_or_nowhere_it_looks_from_the_front() -> None:
     around = [from_aside(24.0 * number) for number in range(15)]
     for views in ([], around, [from_aside(0), from_aside(180)], [from_aside(-60), from_aside(60)]):
-        assert first_camera(views, BALL, 1.5, "+z") == Camera.orbit(BALL, aspect=1.5, up="+z")
+        assert first_camera(views, BALL, 1.5, told("+z")) == Camera.orbit(BALL, aspect=1.5, up="+z")
 
 
 def test_what_is_up_in_the_pods_picture_is_up_unless_another_axis_is_told() -> None:
@@ -72,15 +77,17 @@ def test_what_is_up_in_the_pods_picture_is_up_unless_another_axis_is_told() -> N
     turn = np.eye(4)
     turn[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
     pod = replace(pod, world_to_camera=turn @ pod.world_to_camera)
-    assert first_camera([pod], BALL, 1.0, "+y").up == pytest.approx(pod.world_to_camera[1, :3])
+    assert first_camera([pod], BALL, 1.0, told("+y")).up == pytest.approx(pod.world_to_camera[1, :3])
     for up in ("-y", "+x"):
-        assert first_camera([pod], BALL, 1.0, up).up == up_vector(up)
+        assert first_camera([pod], BALL, 1.0, told(up)).up == up_vector(up)
 
 
 def test_between_several_it_is_level_unless_it_looks_up_or_down() -> None:
     pair = [from_aside(-20.0), from_aside(20.0)]
-    assert first_camera(pair, BALL, 1.0, "+x").up == up_vector("+x")
-    assert first_camera(pair, BALL, 1.0, "+z").up == pytest.approx((0, pair[0].world_to_camera[1, 1], 0))
+    assert first_camera(pair, BALL, 1.0, told("+x")).up == up_vector("+x")
+    assert first_camera(pair, BALL, 1.0, told("+z")).up == pytest.approx(
+        (0, pair[0].world_to_camera[1, 1], 0)
+    )
 
 
 def test_heights_are_looked_at_along_their_direction() -> None:

@@ -88,7 +88,7 @@ def estimate_normals(
     surface = Surface(renderer.gpu, size)
     resident = renderer.resident(pose)
     bounds = resident.bounds
-    camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.upright.up)
+    camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.upright)
     view = View.of(camera, size, resident.origin, bounds)
     surface.start(resident, view)
     found = surface.keep(Neighborhoods)

@@ -24,6 +24,7 @@ from ..renderer import Renderer
 from ..scan.ranges import ValueRanges
 from ..scan.timeline import Timeline
 from ..scan.times import typical_rate
+from ..scan.upright import Upright
 from ._scans import frame_title
 
 
@@ -67,11 +68,14 @@ def outputs(out: Path, numbers: Iterable[int], stats: Path | None = None) -> lis
 
 
 def turntable_camera(
-    bounds: Bounds, azimuths: Sequence[float], aspect: float, up: str
+    bounds: Bounds, azimuths: Sequence[float], aspect: float, upright: Upright
 ) -> Callable[[Shot], Camera]:
-    """A camera for each shot, at the one distance that shows the whole bounds from all azimuths."""
-    distance = max(Camera.orbit(bounds, azimuth, aspect=aspect, up=up).distance for azimuth in azimuths)
-    return lambda shot: Camera.orbit(bounds, shot.azimuth, distance=distance, up=up)
+    """A camera for each shot, from the front on, at the one distance that shows the whole bounds from all
+    azimuths."""
+    up, front = upright.up, upright.front
+    turned = (Camera.orbit(bounds, front + azimuth, aspect=aspect, up=up) for azimuth in azimuths)
+    distance = max(camera.distance for camera in turned)
+    return lambda shot: Camera.orbit(bounds, front + shot.azimuth, distance=distance, up=up)
 
 
 def check_color_source(

@@ -15,13 +15,13 @@ from pathlib import Path
 from ..bounds import Bounds
 from ..errors import InputError
 from ..files import absolute, printable, whole_file
-from ..geometry import UP
 from ..output.export import is_pattern, numbered
 from ..scan import formats
 from ..scan.open import entries, open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import TIMES_FILE, frame_in_words
+from ..scan.upright import UNTOLD, Upright
 from ._console import warn
 
 _FRAMED = 5  # poses that a camera is fitted to
@@ -98,7 +98,8 @@ def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
 
 
 def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
-    """The bounds of some of these poses together, so that a subject that moves stays in the picture.
+    """The bounds of some of these poses together, so that a subject that moves stays in the picture, but for
+    poses that are astray.
 
     Broken ones are passed over. Raises InputError where none can be read.
     """
@@ -109,18 +110,18 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
             boxes.append(timeline.pose(index).bounds)
     if not boxes:  # there may be a readable one between
         return next(read_poses(timeline, indices)).bounds
-    return Bounds.around(boxes)
+    return Bounds.of_frames(boxes[0], boxes)
 
 
-def told_up(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> str:
-    """The axis that is up: as the arguments tell, else as is guessed of the first of these poses that can
-    be read, else +y."""
+def told_upright(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> Upright:
+    """The up and the front: as the arguments tell, else as is guessed of the first of these poses that can
+    be read."""
     if args.up:
-        return args.up
+        return Upright(args.up, "as told", 1.0)
     for index in indices:
         with suppress(InputError):
-            return timeline.pose(index).upright.up
-    return UP
+            return timeline.pose(index).upright
+    return UNTOLD
 
 
 def frame_title(timeline: Timeline, index: int) -> str:

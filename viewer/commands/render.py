@@ -33,6 +33,7 @@ from ..scan.open import DEMO
 from ..scan.pods import first_camera
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
+from ..scan.upright import Upright
 from ..timing import draw
 from . import _arguments as arguments
 from . import _drawing as drawing
@@ -49,7 +50,7 @@ from ._scans import (
     framing,
     open_timeline,
     read_poses,
-    told_up,
+    told_upright,
 )
 
 _SIZE = (1920, 1280)
@@ -144,9 +145,9 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         shots = drawing.shots(indices, args.turntable)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
         outputs = drawing.outputs(args.out, [shot.number for shot in shots], args.stats)
-        up = told_up(args, timeline, indices)
+        upright = told_upright(args, timeline, indices)
         if "up" not in dict(args.look):
-            look = replace(look, up=up)
+            look = replace(look, up=upright.up)
         look = replace(look, quality=args.quality or look.quality)
         claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
         drawing.check_color_source(look, timeline, indices, args.backend)
@@ -157,7 +158,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         marks = marks_of(args.marks)
 
         def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
-            for shot, request in _requests(args, timeline, shots, size, look, values, camera, up):
+            for shot, request in _requests(args, timeline, shots, size, look, values, camera, upright):
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
@@ -206,7 +207,7 @@ def _requests(
     look: Look,
     values: dict[str, object],
     camera: Camera | None,
-    up: str,
+    upright: Upright,
 ) -> Iterator[tuple[Shot, Request]]:
     """Requests for each shot. The first pose settles the backend, several the camera if there is none.
 
@@ -216,7 +217,7 @@ def _requests(
     camera_of = None if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or backend_for(pose, args.backend, values)
-        camera_of = camera_of or _camera(args, timeline, shots, size, up, pose)
+        camera_of = camera_of or _camera(args, timeline, shots, size, upright, pose)
         own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
         if own is not look:
             title = frame_title(timeline, pose.index)
@@ -227,17 +228,22 @@ def _requests(
 
 
 def _camera(
-    args: Namespace, timeline: Timeline, shots: list[Shot], size: tuple[int, int], up: str, first: Pose
+    args: Namespace,
+    timeline: Timeline,
+    shots: list[Shot],
+    size: tuple[int, int],
+    upright: Upright,
+    first: Pose,
 ) -> Callable[[Shot], Camera]:
     """The camera of each shot, fitted. first: the first pose that can be read."""
     aspect = size[0] / size[1]
     bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
     if args.turntable:
-        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, up)
+        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, upright)
     if args.orbit:
-        camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=up)
+        camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=upright.up)
     else:
-        camera = first_camera(first.views, bounds, aspect, up)
+        camera = first_camera(first.views, bounds, aspect, upright)
     return lambda shot: camera
 
 

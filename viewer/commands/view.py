@@ -31,7 +31,7 @@ from ..unfinished import remove_leftovers
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
-from ._scans import SCAN_HELP, framing, open_timeline, read_poses, told_up
+from ._scans import SCAN_HELP, framing, open_timeline, read_poses, told_upright
 from .doctor import display
 
 _SIZE = (1200, 800)
@@ -161,7 +161,7 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     """Draw all poses of a scan into the folder, and say what is there."""
     name = _stem(args.fallback, prefix, timeline)
     indices = list(range(len(timeline)))
-    up = told_up(args, timeline, indices)
+    upright = told_upright(args, timeline, indices)
     on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
     fps = drawing.film_rate(timeline, indices, args.fps)
     thumbnails = []
@@ -173,8 +173,8 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
         bounds = framing(timeline, indices)
         camera = None
         for pose in read_poses(timeline, indices):
-            camera = camera or first_camera(pose.views, bounds, _SIZE[0] / _SIZE[1], up)
-            draw(renderer, Request(pose, camera, look=Look(up=up)), surface)
+            camera = camera or first_camera(pose.views, bounds, _SIZE[0] / _SIZE[1], upright)
+            draw(renderer, Request(pose, camera, look=Look(up=upright.up)), surface)
             image = surface.image()
             write_png(image, f"{name}_{pose.index:04d}.png")
             add(image)

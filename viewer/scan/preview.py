@@ -27,7 +27,7 @@ def preview_picture(pose: Pose, size: tuple[int, int]) -> NDArray[np.uint8]:
     """
     width, height = size
     cloud = pose.overview
-    camera = first_camera(pose.views, pose.bounds, width / height, pose.upright.up)
+    camera = first_camera(pose.views, pose.bounds, width / height, pose.upright)
     step = -(-len(cloud) // _MOST_POINTS)
     rotation = camera.rotation()
     eye = np.subtract(camera.eye, cloud.origin)

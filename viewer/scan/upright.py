@@ -58,7 +58,7 @@ class Upright:
     front: float = 0.0
 
 
-_UNTOLD = Upright(UP, "nothing tells otherwise", 0.4)
+UNTOLD = Upright(UP, "nothing tells otherwise", 0.4)
 
 
 def guess_up(cloud: PointCloud, views: Sequence[RangeView] = ()) -> Upright:
@@ -70,7 +70,7 @@ def guess_up(cloud: PointCloud, views: Sequence[RangeView] = ()) -> Upright:
     for rule in (_of_a_map, _of_a_camera, _of_ground, _of_a_body):
         if len(points) and (found := rule(points, normals)) is not None:
             return found
-    return _UNTOLD
+    return UNTOLD
 
 
 def first_elevation(bounds: Bounds, up: str) -> float:

@@ -107,8 +107,8 @@ class Budget:
 
 
 class _Cost:
-    """Time that a picture takes always, for each of its pixels and for each of its points, as far as pictures have
-    told: a Kalman filter. All three may change together, as where the machine is busy, and each a little."""
+    """Time that a picture takes always, for each of its pixels and for each of its points, as far as pictures
+    have told: a Kalman filter. All three may change together, as on a busy machine, and each a little."""
 
     def __init__(self, ms: float, drawn: NDArray[np.float64]) -> None:
         """Begin with one picture, whose parts are guessed."""

@@ -6,8 +6,6 @@ import threading
 from concurrent.futures import Future
 from contextlib import suppress
 
-import numpy as np
-
 from ...bounds import Bounds
 from ...errors import InputError
 from ...scan.pose import Pose
@@ -15,7 +13,6 @@ from ...scan.timeline import Timeline
 from ...task import Task, checkpoint, in_background
 
 _VISITED = 5  # frames, spread over the scan, that are read for it
-_ASTRAY = 8.0  # times as far out as usual: frames that reach farther are mistakes
 
 
 class Extent:
@@ -52,12 +49,7 @@ class Extent:
     def around(self, bounds: Bounds) -> Bounds:
         """The box around these bounds, of the frame that is shown, and those of all known frames but such as
         are astray."""
-        known = [bounds, *self._known.values()]
-        centers = np.array([one.center for one in known])
-        off = np.linalg.norm(centers - np.median(centers, axis=0), axis=1)
-        sizes = np.array([one.radius for one in known])
-        is_near = off + sizes <= _ASTRAY * (np.median(off) + np.median(sizes))
-        return Bounds.around([bounds, *(one for one, near in zip(known, is_near, strict=True) if near)])
+        return Bounds.of_frames(bounds, [*self._known.values()])
 
     def visit(self) -> None:
         """Read a few frames beside the window, those that were not read yet."""

@@ -209,8 +209,8 @@ class Steering:
         """The camera that a scan is first shown with."""
         is_moved = not self._session.laid.layers(pose).place.is_identity
         views = () if is_moved else pose.views
-        front = self._session.document.front
-        return first_camera(views, self.whole(pose), self._viewport.aspect, self._up, front)
+        upright = replace(pose.upright, up=self._up, front=self._session.document.front)
+        return first_camera(views, self.whole(pose), self._viewport.aspect, upright)
 
     def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
         """Move the camera, and what it turns about, as far as the subject has gone since another pose."""
