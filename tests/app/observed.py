@@ -129,6 +129,7 @@ def shown(app: App) -> dict[str, Any]:
         "is_browser_open": app.browser.is_open,
         "refusal": app.browser.refusal,
         "is_export_open": app.exporting.is_open,
+        "is_saving": app.capture.task is not None,
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,
         "clicking": app.tools.clicking,

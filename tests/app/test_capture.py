@@ -120,7 +120,7 @@ def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) 
     app.session.hash_found.set_result(None)
     image = np.zeros((48, 64, 3), np.uint8)
     app.viewport.surface = SimpleNamespace(image=lambda: image, color_range=None, value_kind=None)
-    app.viewport.finish = lambda refined: None
+    app.viewport.is_refined = True
     capture.screenshot()
     colour_by_a_layer(app)
     capture.screenshot()

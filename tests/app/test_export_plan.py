@@ -38,6 +38,10 @@ def test_the_current_view_at_its_own_size_with_marks() -> None:
     assert choices.out() == Path("a.png")
 
 
+def test_its_quality_is_that_of_the_view_or_its_own() -> None:
+    assert {entry.look for entry in made(quality="fine")[1]} == {replace(SHOWN.look, quality="fine")}
+
+
 def test_a_turntable_goes_all_round_from_the_current_view_on() -> None:
     choices, entries, _ = made(what="turntable", pictures=4)
     eyes = np.array([entry.camera.eye for entry in entries])

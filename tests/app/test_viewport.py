@@ -277,7 +277,8 @@ def test_a_picture_at_rest_is_refined_and_any_other_one_begins_anew(viewport: Vi
     np.testing.assert_array_equal(viewport.surface.image(), plain)
     viewport.finish()
     assert not viewport.is_refined, "which picks do not wait for"
-    viewport.finish(refined=True)
+    while not viewport.is_refined:
+        viewport.refine()
     np.testing.assert_array_equal(viewport.surface.image(), refined)
     viewport.draw(replace(REQUEST, look=Look(quality="fast")))
     assert viewport.is_refined

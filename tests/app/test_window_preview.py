@@ -142,3 +142,31 @@ def test_a_picture_at_rest_becomes_smooth_and_any_act_goes_first(app: RunningApp
     np.testing.assert_array_equal(picture(path), again)
     app.choose(PANEL, "quality/##value", "###fast")
     assert app.settle().samples == 1
+
+
+def test_a_picture_is_saved_as_it_was_while_the_window_goes_on_and_can_be_cancelled(app: RunningApp) -> None:
+    screen = app.screen
+    app.choose(PANEL, "quality/##value", "###fine")
+    app.settle()
+    screen.do("key", "Right")
+    app.see(frame=1)
+    screen.do("key", "p", "key", "Right")
+    app.see(frame=2, is_saving=True)
+    path = Path(app.told(r"Saved (.+\.png)")[1])
+    (entry,) = Recording.load(path).entries
+    assert (entry.pose, entry.look.quality) == (1, "fine")
+    assert app.settle().frame == 2
+    again = path.with_name(f"again_{path.name}")
+    assert cli.main(["render", "--replay", str(path), "-o", str(again)]) == 0
+    np.testing.assert_array_equal(picture(path), picture(again))
+
+    there = set(path.parent.glob("scan4d_*"))
+    screen.do("key", "Right")
+    app.see(frame=3)
+    screen.do("key", "p")
+    app.see(is_saving=True)
+    screen.do("key", "Escape")
+    app.told("Cancelled: Drawing the picture to save")
+    app.settle()
+    assert set(path.parent.glob("scan4d_*")) == there
+    app.choose(PANEL, "quality/##value", "###balanced")

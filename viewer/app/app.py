@@ -166,8 +166,9 @@ class App:
             remembered.export, remembered.export_marks,
         )  # fmt: skip
         self.tasks: Tasks = Tasks(
-            self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting, self.note
-        )
+            self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting,
+            self.capture, self.note,
+        )  # fmt: skip
         self.browser: Browser = Browser(
             self.session, self.scans, self.sessions, self._opening, self.open, self.replayer.replay,
             self.tools.take_file, Previewer(window.ctx),

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, imgui
 from ..task import Task
 from . import widgets
 from .files.opening import Opening
+from .output.capture import Capture
 from .output.exporting import Exporting
 from .playing.playback import Playback
 from .scene.viewport import Viewport
@@ -37,16 +38,18 @@ class Tasks:
         opening: Opening,
         tools: Toolbox,
         exporting: Exporting,
+        capture: Capture,
         note: Callable[[str], None],
     ) -> None:
         self._session, self._playback, self._viewport = session, playback, viewport
         self._opening, self._tools, self._exporting, self._note = opening, tools, exporting, note
+        self._capture = capture
 
     @property
     def all(self) -> list[Task]:
         """All of the work, the latest last."""
         preparing = self._viewport.renderer.preparing
-        tasks = [self._exporting.task, preparing, self._opening.task, *self._tools.tasks]
+        tasks = [self._exporting.task, self._capture.task, preparing, self._opening.task, *self._tools.tasks]
         if self._playback.pose is None:
             tasks.append(self._playback.timeline.reading)
         return [task for task in tasks if task is not None]

@@ -18,14 +18,16 @@ from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
 from ...errors import InputError, explained
 from ...files import free_file, working_folder
+from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
-from ...output.marks import Marks, marked
+from ...output.marks import Legend, Marks, marked
 from ...task import Task, in_background
 from ..failures import failure_in_words
 from ..notices import Offer, Problem
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
+from .unsaved_picture import UnsavedPicture
 
 _PATIENCE = 10.0  # seconds that closing waits for pictures
 
@@ -51,6 +53,7 @@ class Capture:
         self.recorder: Recorder | None = None
         self.last: Path | None = None
         self._journal: Journal | None = None  # of what is recorded
+        self._unsaved: list[tuple[UnsavedPicture, Callable[[Surface], None]]] = []
         self._saving: list[Future[str]] = []  # files; each brings what is to be told
         self._looking: list[Future[str]] = []  # the same of what writes nothing
         self._naming = Lock()  # one free name at a time
@@ -71,22 +74,53 @@ class Capture:
         )  # fmt: skip
 
     def screenshot(self) -> None:
-        """Save the picture as it is shown, in full and without panels."""
-        self._viewport.finish(refined=True)
-        surface = self._viewport.surface
-        if surface is None or not self._viewport.is_there:
+        """Save the picture as it is shown, in full and without panels; what is not drawn of it yet is drawn
+        in slices first."""
+        viewport, request = self._viewport, self._viewport.request
+        if viewport.surface is None or request is None or not viewport.is_there:
             self._note("There is no picture to save.")
+            return
+        if any(unsaved.request is request for unsaved, _ in self._unsaved):
             return
         try:
             entry = self.shown()
         except InputError as error:
             entry = None
             self._note(Problem(f"The picture cannot be replayed: {error}"))
-        legend = None
-        if entry is not None and self._viewport.request is not None:
-            legend = with_hidden(entry.legend(self._playback.timeline, self._viewport.request.pose), surface)
+        legend = None if entry is None else entry.legend(self._playback.timeline, request.pose)
+        save = partial(self._begin_saving, entry, legend, self._session.hash_found)
+        if viewport.is_refined:
+            save(viewport.surface)
+        else:
+            self._unsaved.append((UnsavedPicture(viewport.renderer, request, viewport.size), save))
+
+    @property
+    def task(self) -> Task | None:
+        """The picture that is being drawn to be saved, None without one."""
+        return self._unsaved[0][0].task if self._unsaved else None
+
+    def _draw_unsaved(self) -> None:
+        """Draw a slice of the first picture that is to be saved, and begin to save it once it is complete."""
+        unsaved, save = self._unsaved[0]
+        try:
+            surface = None if unsaved.task.cancelled else unsaved.advance()
+            if surface is not None:
+                save(surface)
+        except Exception as error:  # whatever a scan brings, the window stays
+            self._note(Problem(failure_in_words("Drawing the picture to save", error)))
+            unsaved.task.cancel()
+            surface = None
+        if surface is not None or unsaved.task.cancelled:
+            self._unsaved.pop(0)
+            unsaved.release()
+
+    def _begin_saving(
+        self, entry: Entry | None, legend: Legend | None, hash: Future[str | None], surface: Surface
+    ) -> None:
+        """Save what a surface shows, with the marks of its legend."""
+        legend = None if legend is None else with_hidden(legend, surface)
         finish = partial(marked, surface.image(), legend, surface.color_range, surface.value_kind)
-        work = partial(self._save_picture, finish, entry, self._session.hash_found)
+        work = partial(self._save_picture, finish, entry, hash)
         self._saving.append(in_background(Task("Saving"), work))
 
     # --- recording --------------------------------------------------------------------
@@ -190,7 +224,10 @@ class Capture:
         self._looking.append(in_background(Task("Looking"), look))
 
     def advance(self) -> None:
-        """Tell of the work that is done: of files in the order of their names."""
+        """Draw a slice of what is to be saved, and tell of the work that is done: of files in the order of
+        their names."""
+        if self._unsaved:
+            self._draw_unsaved()
         done = [work for work in self._looking if work.done()]
         self._looking = [work for work in self._looking if work not in done]
         while self._saving and self._saving[0].done():
@@ -202,7 +239,7 @@ class Capture:
     @property
     def waits(self) -> bool:
         """Whether something is being saved or looked for."""
-        return bool(self._saving or self._looking)
+        return bool(self._unsaved or self._saving or self._looking)
 
     def end_recording(self) -> None:
         """Save what is being recorded."""
@@ -210,7 +247,10 @@ class Capture:
             self.toggle_recording()
 
     def close(self) -> None:
-        """Wait for pictures that are being written, but not for a disk that does not answer."""
+        """Wait for pictures that are being drawn and written, but not for a disk that does not answer."""
+        end = time.monotonic() + _PATIENCE
+        while self._unsaved and time.monotonic() < end:
+            self._draw_unsaved()
         wait(self._saving, _PATIENCE)
         self.advance()
 

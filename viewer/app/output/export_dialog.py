@@ -8,11 +8,12 @@ from dataclasses import replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ...look import QUALITY_WORDS
 from ...output.export import numbered
 from ...output.marks import Marks
 from ...params import describe
 from .. import widgets
-from .export_plan import EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices
+from .export_plan import AS_SHOWN, EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices
 from .exporting import Exporting
 
 _TITLE, _LEAVING = "Export", "Close Scan4D?"
@@ -36,6 +37,7 @@ def draw(exporting: Exporting, quit: Callable[[], None]) -> None:
             choices = _edit_what(choices, exporting.count, problems)
             choices = _edit_format(choices, exporting.rate, problems)
             choices = _edit_size(choices, exporting.size, problems)
+            choices = _edit_quality(choices, exporting.quality)
             marks = _edit_marks(exporting.marks, choices)
             choices = _edit_place(choices, problems)
             exporting.change(choices, marks)
@@ -97,6 +99,18 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
     height = _whole("height", choices.height, share)
     _draw_problems(problems, "width", "height")
     return replace(choices, width=width, height=height)
+
+
+def _edit_quality(choices: Choices, shown: str) -> Choices:
+    """Declare the choice of samples. shown: the word for that of the view."""
+    titles = {AS_SHOWN: f"As in Appearance: {QUALITY_WORDS[shown]}", **QUALITY_WORDS}
+    imgui.begin_disabled(choices.format == EXR)
+    widgets.label("Quality", _HELP["quality"])
+    quality = widgets.combo("quality", choices.quality, list(titles), titles)
+    imgui.end_disabled()
+    if choices.format == EXR:
+        widgets.tooltip("EXR holds the surface in the middle of each pixel")
+    return replace(choices, quality=quality)
 
 
 def _edit_marks(marks: Marks, choices: Choices) -> Marks:

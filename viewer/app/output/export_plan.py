@@ -14,6 +14,7 @@ from ...camera import Camera
 from ...document.recording import Entry, Recording, matrix_of
 from ...errors import InputError
 from ...geometry import Vector
+from ...look import SAMPLES
 from ...output.export import FRAME_RATES, numbered
 from ...output.marks import Marks
 from ...params import describe, param
@@ -22,6 +23,7 @@ from ...scan.times import DEFAULT_FPS, typical_rate
 
 VIEW, TURNTABLE, FRAMES = "view", "turntable", "frames"
 PNG, EXR, MP4 = "png", "exr", "mp4"
+AS_SHOWN = "as shown"
 _MOST_PIXELS = 16_384  # a side
 _MOST_PICTURES = 3600  # of a turn
 _LONGEST_NAME = 200  # bytes; file systems take 255, of which numbers and temporary files need some
@@ -44,6 +46,10 @@ class Choices:
     )  # fmt: skip
     width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
     height: int = param(1080, "Pixels", low=1, high=_MOST_PIXELS)
+    quality: str = param(
+        AS_SHOWN, "How smooth edges are: as Appearance says, or the mean of 1, 5 or 17 samples of each pixel",
+        choices=(AS_SHOWN, *SAMPLES),
+    )  # fmt: skip
     anonymous: bool = param(False, "Pictures do not tell which scan they show, where it was and when")
     folder: str = param("", "Where the files go")
     name: str = param("", "Of the file; several are numbered")
@@ -140,7 +146,8 @@ def recording(
 
     pivot: what a turntable turns about; None: the camera's target. place: that frames are moved to, by index.
     """
-    base = replace(shown, size=choices.size, marks=marks)
+    look = shown.look if choices.quality == AS_SHOWN else replace(shown.look, quality=choices.quality)
+    base = replace(shown, size=choices.size, marks=marks, look=look)
     if choices.what == TURNTABLE:
         angles = [360 * number / choices.pictures for number in range(choices.pictures)]
         entries = [replace(base, camera=_turned(base.camera, angle, pivot)) for angle in angles]

@@ -88,6 +88,11 @@ class Exporting:
         """Width and height of the picture in the window, pixels; None where there is none."""
         return self._viewport.size if self._viewport.surface else None
 
+    @property
+    def quality(self) -> str:
+        """The quality of the view's look."""
+        return self._session.document.look.quality
+
     def ask(self) -> None:
         """Open the dialog; a name is suggested unless the user gave one."""
         if self._entry() is None:

@@ -179,13 +179,11 @@ class Viewport:
         is_ready = self._is_rough and not playing and math.isinf(self.better_at(playing))
         return self._motion.ends if is_ready else math.inf
 
-    def finish(self, refined: bool = False) -> None:
-        """Draw the picture in full, where it is a preview. refined: with all of its samples."""
+    def finish(self) -> None:
+        """Draw the picture in full, where it is a preview."""
         if self.is_preview and self.request is not None:
             self._motion.end()
             self.draw(self.request)
-        while refined and self._is_rough:
-            self.refine()
 
     def rest(self) -> None:
         """Draw the next picture in full, however soon it comes."""
