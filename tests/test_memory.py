@@ -33,6 +33,7 @@ print(peak // 1024)
 """
 
 
+@pytest.mark.slow
 def test_playing_a_long_sequence_stays_within_the_budget(tmp_path: Path) -> None:
     frames, points, budget = 80, 400_000, 60
     sequence = np.lib.format.open_memmap(

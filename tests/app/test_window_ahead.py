@@ -139,7 +139,14 @@ def test_jumping_about_drops_what_was_queued(app: RunningApp) -> None:
     assert "Traceback" not in app.log()
 
 
-@pytest.mark.parametrize("how", ["close", signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "how",
+    [
+        "close",
+        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, marks=pytest.mark.slow),
+    ],
+)
 def test_nothing_is_left_of_work_when_the_window_ends(app: RunningApp, how: str | int) -> None:
     choose(app, "surfels")
     app.screen.do("key", "space")

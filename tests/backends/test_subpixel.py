@@ -96,6 +96,7 @@ def test_without_epsilon_the_nearest_is_alone(draw: Draw) -> None:
     assert_agree(nearest, surfels(draw, CLOUD, camera(), epsilon=0, instancing="gs"), others=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [200_000, 4_300_000])
 def test_very_many_in_one_pixel(draw: Draw, count: int) -> None:
     """Of the larger number, light and normals would add up to more than 2^31: the nearest is shown alone."""

@@ -220,6 +220,7 @@ def test_parameters_that_cannot_be_read_as_a_whole_draw_with_those_that_can() ->
     assert document.chosen(pose) == ("points", FULL.params["points"])
 
 
+@pytest.mark.slow
 def test_whatever_stands_in_a_session_it_is_read_or_refused() -> None:
     data = json.loads(json.dumps(SESSION.to_json()))
     data["document"]["bookmarks"] = data["document"]["bookmarks"][:1]

@@ -18,6 +18,7 @@ def test_files_that_once_did_harm(tmp_path: Path) -> None:
     assert not found.wrong, report(found)
 
 
+@pytest.mark.slow
 def test_damaged_files_do_no_harm(tmp_path: Path) -> None:
     found = campaign(tmp_path, 0, INPUTS)
     assert found.inputs == INPUTS
@@ -36,6 +37,7 @@ PLANTS = {
 }
 
 
+@pytest.mark.slow
 def test_what_goes_wrong_is_found(tmp_path: Path) -> None:
     assert_found(PLANTS, tmp_path)
 

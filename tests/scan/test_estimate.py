@@ -211,6 +211,7 @@ def test_estimating_stops_where_it_is_cancelled() -> None:
         cloud_normals(cloud)
 
 
+@pytest.mark.slow
 def test_real_noisy_hands(data_dir: Path) -> None:
     cloud = formats.read(data_dir / "sequences" / "hands_knot_5" / "00001.ply")
     normals, radii = cloud_normals(cloud), cloud_radii(cloud)

@@ -201,6 +201,7 @@ def test_large_views_are_opened_and_drawn_with_and_without_skipping(renderer: Re
     )  # medium; the extreme one is by pixels a sample, here fewer than the full one's
 
 
+@pytest.mark.slow
 def test_sequences_are_played(renderer: Renderer) -> None:
     rows = list(measure_playing(Bench(renderer, BenchSettings()), poses=2))
     assert [row["primitive"] for row in rows] == list(pyramids.PRIMITIVES)

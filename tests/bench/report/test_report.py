@@ -214,16 +214,27 @@ def test_numerics_are_held_failed_or_limited() -> None:
 # --- the page -------------------------------------------------------------------------
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Results, numerics and a picture."""
-    written(tmp_path / "results.jsonl", *some_rows())
-    written(tmp_path / "numerics.jsonl", numerics_line(), numerics_line(backend="surfels", held=False))
-    (tmp_path / "notes.txt").write_text("stopped early\n", encoding="utf-8")
-    path = picture_path(tmp_path, "torus", "points")
+def filled(folder: Path, *rows: Row) -> Path:
+    """Results, numerics and a picture in a folder."""
+    written(folder / "results.jsonl", *rows)
+    written(folder / "numerics.jsonl", numerics_line(), numerics_line(backend="surfels", held=False))
+    (folder / "notes.txt").write_text("stopped early\n", encoding="utf-8")
+    path = picture_path(folder, "torus", "points")
     path.parent.mkdir()
     Image.fromarray(np.full((20, 30, 3), 90, np.uint8)).save(path)
-    return tmp_path
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with some rows, without a report."""
+    return filled(tmp_path, *some_rows())
+
+
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page made of such a folder, beside its plots; tests only read it."""
+    return write_report(filled(tmp_path_factory.mktemp("reported"), *some_rows()))
 
 
 class Page(HTMLParser):
@@ -246,8 +257,8 @@ class Page(HTMLParser):
         return [given[name] or "" for _, given in self.elements for name in attributes if name in given]
 
 
-def test_the_page_needs_nothing_else(folder: Path) -> None:
-    text = write_report(folder).read_text(encoding="utf-8")
+def test_the_page_needs_nothing_else(reported: Path) -> None:
+    text = reported.read_text(encoding="utf-8")
     page = Page(text)
     ids = set(page.values("id"))
     for target in page.values("src", "href", "xlink:href"):
@@ -257,14 +268,14 @@ def test_the_page_needs_nothing_else(folder: Path) -> None:
     assert not re.search(r"https?:|@import|url\((?!#)", without_names)
 
 
-def test_the_page_has_every_part(folder: Path) -> None:
-    page = Page(write_report(folder).read_text(encoding="utf-8"))
+def test_the_page_has_every_part(reported: Path) -> None:
+    page = Page(reported.read_text(encoding="utf-8"))
     assert {"summary", "against", "swept", "passes", "pictures", "numerics", "every", "glossary"} <= set(
         page.values("id")
     )
     assert {"gl-points", "surfels", "(floor)", "(ceiling)", "device", "finish", "early"} <= set(page.words)
     assert "N^1.00" in page.words  # gpu_ms of the sweep, and of the defaults near it
-    plots = {path.stem for path in (folder / "plots").glob("*.png")}
+    plots = {path.stem for path in (reported.parent / "plots").glob("*.png")}
     assert plots == {
         "time-hole_percent", "time-psnr", "time-depth_bias_px", "time-normal_mean", "passes",
         "points-torus", "points-bunny", "noise-torus", "noise-bunny",
@@ -320,7 +331,8 @@ def test_nothing_to_report_is_said(tmp_path: Path) -> None:
         write_report(tmp_path)
 
 
-def test_a_broken_picture_is_said(folder: Path) -> None:
+def test_a_broken_picture_is_said(tmp_path: Path) -> None:
+    folder = filled(tmp_path, a_row())
     picture_path(folder, "torus", "points").write_bytes(b"not a picture")
     with pytest.raises(InputError, match="is no picture"):
         write_report(folder)

@@ -248,6 +248,7 @@ def test_pods_stand_all_round_or_left_and_right_of_the_front(name: str, turns: l
     np.testing.assert_allclose(found, np.array(turns) % 360, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_demo_is_scanned_while_it_speaks() -> None:
     subject = catalog.subject("demo-pair", None, noise=0.0)
     assert subject.moments == 64

@@ -25,7 +25,7 @@ WITH_DATA = [
     "crane",
     "horse-gallop",
     "owlii",
-    pytest.param("truedepth-head", marks=pytest.mark.slow),
+    "truedepth-head",
 ]
 
 
@@ -56,6 +56,7 @@ def test_views_cover_what_they_should(name: str) -> None:
     check(name, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WITH_DATA)
 def test_views_of_real_shapes_cover_what_they_should(name: str, data_dir: Path) -> None:
     check(name, data_dir)

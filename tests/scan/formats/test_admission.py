@@ -155,6 +155,7 @@ def pcd_of_columns(path: Path, dropped: bool) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="peaks are read from /proc")
 @pytest.mark.parametrize("dropped", [False, True])
 @pytest.mark.parametrize(("make", "suffix"), [(npz_of_columns, ".npz"), (pcd_of_columns, ".pcd")])
