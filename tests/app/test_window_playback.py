@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from virtual_screen import RunningApp, Screen, running_app, virtual_screen
 
+from viewer.app.theme import PALETTES, rgb
+
 SIZE = (1280, 720)
+TRACK = 300  # pixels from the left, between the loop's button and the bar
 COUNT = 7  # frames
 
 
@@ -76,6 +79,48 @@ def test_every_frame_backward_faster_and_real_time(app: RunningApp) -> None:
     screen.do("key", "space")
     app.settle()
     assert "Traceback" not in app.log()
+
+
+def handles(app: RunningApp) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The middles of the two handles of the timeline on the screen, as seen."""
+    app.screen.do("mousemove", 5, 300)  # away with the tooltip
+    accent = np.array(rgb(PALETTES[app.settle().theme].accent)) * 255
+    _, top, _, height = app.view()
+    part = app.screen.picture()[top + height :, TRACK:].astype(float)
+    y, x = np.nonzero(np.abs(part - accent).max(axis=-1) < 3)
+    low = y >= y.max() - 2  # below the line between them
+    middle = (x[low].min() + x[low].max()) / 2
+    sides = [x[low][(x[low] > middle) == is_last].mean() for is_last in (False, True)]
+    row = top + height + int(y[low].mean())
+    return (TRACK + round(sides[0]), row), (TRACK + round(sides[1]), row)
+
+
+def drag_to(app: RunningApp, start: tuple[int, int], x: float) -> None:
+    app.screen.do("mousemove", *start, "sleep", 0.1, "mousedown", 1, "sleep", 0.1)
+    app.screen.do("mousemove", round(x), start[1], "sleep", 0.2, "mouseup", 1)
+    app.settle()
+
+
+def test_the_mouse_chooses_the_frames_that_are_played(app: RunningApp) -> None:
+    first, last = handles(app)
+    wide = (last[0] - first[0]) / COUNT  # of a frame
+    drag_to(app, first, first[0] + 2.5 * wide)
+    assert app.state.document["span"] == [2, COUNT - 1]
+    assert app.state.frame == 0, "choosing them goes nowhere"
+    drag_to(app, last, first[0] + 4.5 * wide)
+    assert app.state.document["span"] == [2, 4]
+    near, far = handles(app)
+    assert near[0] == pytest.approx(first[0] + 2 * wide, abs=3)
+    assert far[0] == pytest.approx(first[0] + 5 * wide, abs=3)
+    app.screen.do("key", "space")
+    app.see(is_playing=True)
+    assert set(wait_for_frames(app, 6)[1:]) == {2, 3, 4}
+    app.screen.do("key", "space")
+    app.see(is_playing=False)
+    drag_to(app, (first[0] + round(0.5 * wide), first[1] - 8), first[0] + 5.5 * wide)
+    assert app.settle().frame == 5, "on the bar itself it goes there"
+    app.screen.do("key", "alt+i")
+    assert app.settle().document["span"] is None
 
 
 def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:

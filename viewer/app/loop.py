@@ -37,6 +37,7 @@ class Loop:
         self._watch = watch
         self._turns = Turns()
         self._reported: Any = None
+        self._told = 0, 0  # how many messages, and how many of them are shown
 
     def run(self) -> None:
         """Go on until the window is closed, whatever goes wrong meanwhile."""
@@ -129,8 +130,11 @@ class Loop:
             with app.failures.told(name):
                 changed |= bool(advance())
         told = app.notices.count, len(app.notices.shown(now))
+        if told != self._told:
+            app.window.touch()  # ImGui shows a window that fits its content from the second frame on
+            self._told = told
         cached = app.playback.timeline.cached()
-        report = (app.playback.pose, app.session.index, cached, told, app.tasks.report)
+        report = (app.playback.pose, app.session.index, cached, app.tasks.report)
         changed |= report != self._reported
         self._reported = report
         return changed or now >= app.viewport.better_at(app.playback.player.playing)

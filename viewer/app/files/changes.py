@@ -3,17 +3,40 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
+from ...errors import InputError
+from ...scan.open import find_source
 from ...scan.timeline import Timeline
 from ...task import Task, in_background
 from ..notices import Offer
 from ..session import Session
 
 EVERY = 3.0  # seconds between looks
-Stamps = tuple[tuple[int, int] | None, ...]  # time of the last change and size of each file; None: not there
+_Stamp = tuple[int, int] | None  # time of the last change, nanoseconds, and size; None: not there
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The files of a scan at one moment, by when and how large each was, and the folders that they lie in."""
+
+    files: Mapping[Path, _Stamp]
+    folders: Mapping[Path, _Stamp]
+
+    @classmethod
+    def of(cls, scan: str, files: Iterable[Path], before: Seen | None = None) -> Seen:
+        """How the files are. scan: as the user named it. before: at the last look; where a folder has changed
+        since, the scan's files are looked for anew."""
+        there = list(files if before is None else before.files)
+        folders = {folder: _stamp(folder) for folder in dict.fromkeys(file.parent for file in there)}
+        if before is not None and folders != before.folders:
+            with suppress(InputError):  # as where the only file is being replaced
+                there = list(find_source(scan).files)
+        return cls({file: _stamp(file) for file in there}, folders)
 
 
 class Changes:
@@ -23,9 +46,9 @@ class Changes:
         """open: opens a scan anew."""
         self._session, self._note, self._open = session, note, open
         self._files: Sequence[Path] = ()
-        self._known: Stamps | None = None  # as they were when the scan was opened, or reading was offered
-        self._last: Stamps | None = None  # as they were at the last look
-        self._look: Future[Stamps] | None = None
+        self._known: Seen | None = None  # as they were when the scan was opened, or reading was offered
+        self._last: Seen | None = None  # as they were at the last look
+        self._look: Future[Seen] | None = None
         self._next = 0.0  # by the clock, when to look again
 
     def begin(self, timeline: Timeline) -> None:
@@ -39,30 +62,31 @@ class Changes:
         """
         if self._look is not None and self._look.done():
             found, self._look, self._next = self._look.result(), None, now + EVERY
-            is_still, self._last = found == self._last, found
+            is_still, self._last = self._last is not None and found.files == self._last.files, found
             if self._known is None:
                 self._known = found
-            elif is_still and found != self._known and None not in found:
+            elif is_still and found.files != self._known.files and None not in found.files.values():
+                self._offer(len(found.files) - len(self._known.files))
                 self._known = found
-                self._offer()
         if self._look is None and self._files and now >= self._next:
-            files = self._files
-            self._look = in_background(Task("Looking for changes"), lambda: stamps(files))
+            scan, files, last = self._session.scan, self._files, self._last
+            self._look = in_background(Task("Looking for changes"), lambda: Seen.of(scan, files, last))
 
-    def _offer(self) -> None:
+    def _offer(self, new: int) -> None:
+        """Offer to read the scan anew. new: how many files it has more."""
         scan = self._session.scan
         choices = {"Reload": lambda: self._open(scan)}
-        self._note(Offer("Files of the scan have changed on disk.", choices, "changes"))
+        told = (
+            f"The scan has {new} more files on disk."
+            if new > 0
+            else "Files of the scan have changed on disk."
+        )
+        self._note(Offer(told.replace("1 more files", "1 more file"), choices, "changes"))
 
 
-def stamps(files: Sequence[Path]) -> Stamps:
-    """When each file was changed last, nanoseconds, and its bytes."""
-    return tuple(_stamp(file) for file in files)
-
-
-def _stamp(file: Path) -> tuple[int, int] | None:
+def _stamp(path: Path) -> _Stamp:
     try:
-        found = os.stat(file)
+        found = os.stat(path)
     except OSError:
         return None
     return found.st_mtime_ns, found.st_size

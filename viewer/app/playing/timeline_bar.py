@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ _SHORTEST_TRACK = 8.0
 _BAR = (0.12, 0.4)  # of the track's height, where the frames are
 _TICKS = 0.5  # where their numbers begin
 _HANDLE = 0.2  # half the width of what sets an end
+_GRAB = 1.5  # of that, how near the mouse has to be
 _FIRST, _LAST = 1, 2
 _TICK_TEXT = 0.75  # heights of the font
 _TICK_ROOM = 7.0  # from one to the next at least, in heights of their text
@@ -125,11 +127,12 @@ def _report(playback: Playback) -> str:
 def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> None:
     """Draw the frames over time: cached ones coloured, broken ones red, and seconds. A press or a drag goes
     there; what is under the mouse is told."""
-    size = ImVec2(width, imgui.get_frame_height())
-    if size.x < 1:
+    height = imgui.get_frame_height()
+    inset = ImVec2(_GRAB * _HANDLE * height, 0)  # so that handles at the ends are grabbed by either half
+    if width < 2 * inset.x + 1:
         return
-    imgui.invisible_button("track", size)
-    track = _Track(playback.whole.edges, imgui.get_item_rect_min(), size)
+    imgui.invisible_button("track", ImVec2(width, height))
+    track = _Track(playback.whole.edges, imgui.get_item_rect_min() + inset, ImVec2(width, height) - inset * 2)
     timeline, frame = playback.timeline, playback.whole.frame_at(track.time(imgui.get_mouse_pos().x))
     if imgui.is_item_active() or imgui.is_item_deactivated():
         storage, grabbed = imgui.get_state_storage(), imgui.get_id("grabbed")
@@ -143,7 +146,7 @@ def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> Non
         if imgui.is_item_hovered():
             words = [frame_in_words(frame), timeline.label(frame)]
             imgui.set_tooltip("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words))))
-        track.seconds(float(timeline.times[0]))
+        track.seconds(float(timeline.times[0]), playback.span)
     track.bar(0, len(playback.timeline), palette.frame[0])
     for run in playback.timeline.cached():
         track.bar(run.start, run.stop, palette.cached)
@@ -176,20 +179,23 @@ class _Track:
         corners = ImVec2(left, top), ImVec2(max(right, left + 2), bottom)
         self.draw_list.add_rect_filled(*corners, theme.packed(color))
 
-    def seconds(self, first: float) -> None:
+    def seconds(self, first: float, span: range) -> None:
         """Mark round times below the bar, with as many numbers as there is room for. first: of the first
-        frame, which the scan's times may begin at."""
+        frame, which the scan's times may begin at. span: the frames between handles, which numbers avoid."""
         size, font = _TICK_TEXT * imgui.get_font_size(), imgui.get_font()
         duration = float(self.edges[-1])
         step = tick_step(duration, self.size.x / (_TICK_ROOM * size))
         decimals = max(0, -math.floor(math.log10(step)))
         top, middle = (self.corner.y + share * self.size.y for share in (_BAR[1], _TICKS))
         color = imgui.get_color_u32(imgui.Col_.text_disabled)
+        reach = _HANDLE * self.size.y + 0.2 * size
+        ends = (self.x(self.edges[index]) for index in (span.start, span.stop))
+        handles = [(end - reach, end + reach) for end in ends]
         for number in range(math.ceil(first / step), math.floor((first + duration) / step) + 1):
             x, text = self.x(number * step - first), f"{number * step:.{decimals}f} s"
             self.draw_list.add_line(ImVec2(x, top), ImVec2(x, middle), color)
             wide = imgui.calc_text_size(text).x * _TICK_TEXT
-            left = min(max(x - wide / 2, self.corner.x), self.corner.x + self.size.x - wide)
+            left = beside(x - wide / 2, wide, handles, self.corner.x, self.corner.x + self.size.x)
             self.draw_list.add_text(font, size, ImVec2(left, middle), color, text)
 
     def ends(self, span: range, color: int) -> None:
@@ -208,7 +214,7 @@ class _Track:
         half = _HANDLE * self.size.y
         if mouse.y > self.corner.y + _BAR[1] * self.size.y:
             for end, index in ((_LAST, span.stop), (_FIRST, span.start)):
-                if abs(mouse.x - self.x(self.edges[index])) <= 1.5 * half:
+                if abs(mouse.x - self.x(self.edges[index])) <= _GRAB * half:
                     return end
         return 0
 
@@ -227,6 +233,19 @@ def tick_step(duration: float, most: float) -> float:
     least = duration / max(most, 1.0)
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least)
+
+
+def beside(
+    left: float, wide: float, taken: Sequence[tuple[float, float]], first: float, last: float
+) -> float:
+    """Move a text aside as little as needed; returns where it begins. left, wide: of the text. taken: from
+    where to where it must not be. first, last: of the room for it."""
+    places = [left, *(to for _, to in taken), *(start - wide for start, _ in taken)]
+    free = [
+        place for place in (min(max(place, first), last - wide) for place in places)
+        if all(place + wide <= start or to <= place for start, to in taken)
+    ]  # fmt: skip
+    return min(free, key=lambda place: abs(place - left), default=min(max(left, first), last - wide))
 
 
 def _pointed(words: list[str], room: float) -> str:
