@@ -158,7 +158,7 @@ class App:
         self.welcome: Welcome = Welcome(self.session, remembered.welcomed)
         self.capture: Capture = Capture(
             self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
-            lambda *film: self.exporting.film(*film),
+            lambda *film: self.exporting.film(*film), self.ranging.words,
         )  # fmt: skip
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(

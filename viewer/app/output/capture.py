@@ -46,9 +46,11 @@ class Capture:
         note: Callable[[str], None],
         marks: Callable[[], Marks],
         film: Callable[[Recording, Path], object],
+        range_note: Callable[[], str] = str,
     ) -> None:
-        """marks: brings those that what is saved has. film: makes one of a recording, under this name."""
-        self._marks, self._film = marks, film
+        """marks: brings those that what is saved has. film: makes one of a recording, under this name.
+        range_note: brings what the colour bar of the view says."""
+        self._marks, self._film, self._range_note = marks, film, range_note
         self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
         self.last: Path | None = None
@@ -87,7 +89,10 @@ class Capture:
         except InputError as error:
             entry = None
             self._note(Problem(f"The picture cannot be replayed: {error}"))
-        legend = None if entry is None else entry.legend(self._playback.timeline, request.pose)
+        legend = None
+        if entry is not None:
+            told = entry.legend(self._playback.timeline, request.pose)
+            legend = replace(told, range_note=self._range_note())
         save = partial(self._begin_saving, entry, legend, self._session.hash_found)
         if viewport.is_refined:
             save(viewport.surface)

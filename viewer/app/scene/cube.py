@@ -12,6 +12,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from numpy.typing import NDArray
 
+from ...camera import Camera
 from .. import theme, widgets
 from . import navigation, orientation
 from .orientation import Direction
@@ -57,20 +58,23 @@ def cube_place(width: float, height: float, em: float) -> tuple[float, float, fl
     return width - inset, inset, _HALF * em
 
 
-def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: bool) -> None:
+def take_mouse(
+    steering: Steering, document: Document, seen: Camera | None, size: ImVec2, is_drawn: bool
+) -> None:
     """Let the mouse click and drag the cube; declare this before the view, so that it comes first.
 
+    seen: the camera that the picture shows, which the document's may be ahead of; None before there is one.
     size: of the view. is_drawn: whether the cube is.
     """
     cube, camera = steering.cube, document.camera
     where = cube_place(size.x, size.y, imgui.get_font_size())
     cube.under_mouse = None
-    if camera is None or where is None or not is_drawn:
+    if camera is None or seen is None or where is None or not is_drawn:
         cube.is_held = cube.is_dragged = False
         return
     x, y, half = where
     mouse = imgui.get_mouse_pos() - imgui.get_window_pos() - ImVec2(x, y)
-    turned = orientation.rotation(camera, document.look.up, document.front)
+    turned = orientation.rotation(seen, document.look.up, document.front)
     under = orientation.part_at(turned, mouse.x / half, -mouse.y / half)
     if under is None and not cube.is_held:
         return
@@ -93,13 +97,15 @@ def take_mouse(steering: Steering, document: Document, size: ImVec2, is_drawn: b
         widgets.tooltip(f"Look from {orientation.name(under)}")
 
 
-def draw(cube: OrientationCube, document: Document, palette: theme.Palette, size: ImVec2) -> None:
-    """Draw a cube over the view in the current ImGui window. size: of the view."""
+def draw(
+    cube: OrientationCube, document: Document, seen: Camera | None, palette: theme.Palette, size: ImVec2
+) -> None:
+    """Draw a cube over the view in the current ImGui window. seen, size: as for `take_mouse`."""
     where = cube_place(size.x, size.y, imgui.get_font_size())
-    if document.camera is None or where is None:
+    if seen is None or where is None:
         return
     x, y, half = where
-    turned = orientation.rotation(document.camera, document.look.up, document.front)
+    turned = orientation.rotation(seen, document.look.up, document.front)
     _Drawing(cube, palette, turned, imgui.get_window_pos() + ImVec2(x, y), half).draw()
 
 

@@ -32,7 +32,8 @@ def draw(app: App) -> float:
     """Declare the view in the current ImGui window, which it fills; returns where notes at its top end."""
     size, told = imgui.get_content_region_avail(), app.failures.told
     the_cube, has_cube = app.steering.cube, app.steering.cube.is_shown and not app.full_view.is_on
-    cube.take_mouse(app.steering, app.document, size, has_cube)
+    camera = app.document.camera and app.glide.seen(app.document.camera)  # that the picture shows
+    cube.take_mouse(app.steering, app.document, camera, size, has_cube)
     on_menu = (
         has_cube
         and app.document.camera is not None
@@ -52,7 +53,7 @@ def draw(app: App) -> float:
             _serve_tools(app, size)
     with told("The cube"):
         if has_cube:
-            cube.draw(the_cube, app.document, app.palette, size)
+            cube.draw(the_cube, app.document, camera, app.palette, size)
     with told("Scale bar and colour bar"):
         app.marks.draw(size)
     text = printable(words_over(app) or "")
@@ -74,7 +75,7 @@ def _move(app: App, pose: Pose, size: ImVec2) -> None:
         _take_wheel(app, size, radius)
     camera, pivot = app.document.camera, app.document.pivot
     if camera and pivot and imgui.is_item_hovered():
-        _draw_pivot(camera, pivot, size)
+        _draw_pivot(app.glide.seen(camera), pivot, size)
 
 
 def _take_drag(app: App, size: ImVec2, radius: float) -> None:
