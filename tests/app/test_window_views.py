@@ -170,3 +170,11 @@ def test_larger_text_takes_more_room(app: RunningApp) -> None:
     assert app.view() == usual
     assert shown(app).size
     assert "Traceback" not in app.log()
+
+
+def test_the_window_tells_the_desktop_how_small_it_may_be(app: RunningApp) -> None:
+    display = pytest.importorskip("Xlib.display").Display(app.screen.env["DISPLAY"])
+    number = int(app.screen.do("search", "--name", "Scan4D").split()[-1])
+    hints = display.create_resource_object("window", number).get_wm_normal_hints()
+    display.close()
+    assert (hints.min_width, hints.min_height) == (640, 420)

@@ -32,6 +32,7 @@ _LINES = 45  # of text that are as high as a picture
 _LEAST_TEXT = 11.0  # pixels, where the picture has room for it
 _BAR_SHARE = 1 / 6  # of the picture's width that a scale bar takes at most
 _TEXT_SHARE = 0.4  # the same of a text
+_MAP_SHARE = 0.2  # of the picture's height that a colour map takes at most
 _MOST_DIGITS = 15  # that a float64 holds
 
 # In heights of the text:
@@ -276,7 +277,7 @@ def _draw_color_bar(
     told = ticks(factor * values[0], factor * values[1], kind)
     widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in told)
     widest = max(widest, painter.width(title), painter.width(note))
-    height = min(_MAP_HEIGHT * em, 0.6 * size[1])
+    height = min(_MAP_HEIGHT * em, _MAP_SHARE * size[1])
     right, bottom = round(size[0] - _MARGIN * em), round(size[1] - _MARGIN * em)
     left = round(right - widest - 2 * _PAD * em)
     top = round(bottom - height - (2.5 + (1 + _GAP if note else 0) + 2 * _PAD) * em)

@@ -28,7 +28,9 @@ from .sessions import Sessions
 _TITLE = "Open a scan"
 _SIZE = ImVec2(72.0, 36.0)  # in heights of the font
 _KNOWN_SHARE, _PREVIEW_SHARE = 0.2, 0.26  # of the width
+_KNOWN_LEAST = 9.5  # the same of the known places, in heights of the font
 _ICON_ROOM, _COUNT_ROOM, _DATE_ROOM = 1.6, 5.5, 5.5  # in heights of the font
+_NAME_ROOM = 7.0  # that a name has at least, before the columns beside it
 _LINGERS = 0.15  # seconds that a row is chosen before its scan is read
 _PAGE = 10  # rows
 _ROW_KEYS = (
@@ -237,7 +239,8 @@ class Browser:
             imgui.text_wrapped(printable(self.refusal))
         foot = imgui.get_frame_height_with_spacing() + imgui.get_style().item_spacing.y
         width = imgui.get_content_region_avail().x
-        imgui.begin_child("known", ImVec2(_KNOWN_SHARE * width, -foot), imgui.ChildFlags_.borders)
+        known = max(_KNOWN_SHARE * width, _KNOWN_LEAST * imgui.get_font_size())
+        imgui.begin_child("known", ImVec2(known, -foot), imgui.ChildFlags_.borders)
         self._draw_known()
         imgui.end_child()
         imgui.same_line()
@@ -391,12 +394,17 @@ class Browser:
         imgui.align_text_to_frame_padding()
         beside(_ICONS[row.kind])
         imgui.same_line(left + _ICON_ROOM * em)
-        room = width - (_ICON_ROOM + _COUNT_ROOM + _DATE_ROOM) * em
-        imgui.text(widgets.fitted(printable(row.title), room))
-        imgui.same_line(left + width - (_COUNT_ROOM + _DATE_ROOM) * em)
-        beside(f"{row.frames} frames" if row.frames > 1 else size_in_words(row.size))
-        imgui.same_line(left + width - _DATE_ROOM * em)
-        beside(date_in_words(row.changed))
+        columns = [
+            (_COUNT_ROOM * em, f"{row.frames} frames" if row.frames > 1 else size_in_words(row.size)),
+            (_DATE_ROOM * em, date_in_words(row.changed)),
+        ]
+        room = width - _ICON_ROOM * em
+        while columns and room - sum(wide for wide, _ in columns) < _NAME_ROOM * em:
+            columns.pop()
+        imgui.text(widgets.fitted(printable(row.title), room - sum(wide for wide, _ in columns)))
+        for number, (_, text) in enumerate(columns):
+            imgui.same_line(left + width - sum(wide for wide, _ in columns[number:]))
+            beside(text)
 
     def _draw_foot(self) -> None:
         row = self._row

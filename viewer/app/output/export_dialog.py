@@ -26,6 +26,7 @@ _MARKS = {
     "stamp": "Frame and time",
     "measurements": "Measurements",
 }
+_FIRST_MARKS = 0.55  # of a row of boxes, for the first one
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
 
 
@@ -117,7 +118,10 @@ def _edit_marks(marks: Marks, choices: Choices) -> Marks:
     widgets.label("Over the picture", "Not over EXR, which holds the surface behind the picture")
     imgui.begin_disabled(choices.format == EXR)
     imgui.begin_group()
-    for name, title in _MARKS.items():
+    width = imgui.get_content_region_avail().x
+    for number, (name, title) in enumerate(_MARKS.items()):
+        if number % 2:  # two in a row: the dialog has to fit a small window with large text
+            imgui.same_line(_FIRST_MARKS * width)
         marks = replace(marks, **{name: imgui.checkbox(title, getattr(marks, name))[1]})
         widgets.tooltip(_HELP[name])
     imgui.end_group()
