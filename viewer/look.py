@@ -45,6 +45,8 @@ RANGE_WORDS = {"sequence": "All frames", "frame": "Each frame"}
 # Samples of each pixel that a picture at rest is the mean of, the middle one among them.
 SAMPLES = {"fast": 1, "balanced": 5, "fine": 17}
 QUALITY_WORDS = {"fast": "Fast", "balanced": "Balanced", "fine": "Fine"}
+# Backgrounds by what they are for; white shows through in files that cannot be transparent.
+BACKGROUNDS = {"white": "#ffffff", "black": "#000000", "transparent": "#ffffff00"}
 _FIXED, _FLAT = {"light": ("fixed",)}, {"light": ("flat",)}
 _EYE_DOME = {"eye_dome": (None, True)}
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, RunningApp, Screen, running_app, virtual_screen
+from written import picture
+
+from viewer.app.theme import PALETTES
+from viewer.look import rgba
 
 from viewer.app.theme import PALETTES, rgb
 
@@ -139,7 +144,29 @@ def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:
     assert app.frames()[-1] == 0
 
 
-def test_the_theme_changes_the_panels_and_not_the_picture(app: RunningApp) -> None:
+def test_backgrounds_by_what_they_are_for_are_shown_and_saved(app: RunningApp) -> None:
+    left, top, width, height = app.view()
+    corner = np.s_[top + 60 : top + 120, left + 20 : left + 80]
+    for name, shade in (("white", 255), ("black", 0)):
+        app.choose(PANEL, "background/##background", f"###{name}")
+        app.settle()
+        assert (app.screen.picture()[corner] == shade).all()
+    app.choose(PANEL, "background/##background", "###transparent")
+    app.settle()
+    checks = app.screen.picture()[corner]
+    assert len(np.unique(checks)) == 2
+    app.screen.do("key", "p")
+    saved = picture(Path(app.told(r"Saved (.+\.png)")[1]))
+    assert (saved[60:120, 20:80, 3] == 0).all()
+    assert (saved[..., 3] == 255).any()
+    app.choose(PANEL, "background/##background", "###own")
+    app.settle()
+    assert len(np.unique(app.screen.picture()[corner].reshape(-1, 3), axis=0)) == 1
+    app.choose(PANEL, "background/##background", "###theme")
+    app.settle()
+
+
+def test_the_theme_changes_the_panels_and_what_is_behind_the_scan(app: RunningApp) -> None:
     screen = app.screen
     app.see(counted=True)
     dark = screen.picture()
@@ -148,7 +175,11 @@ def test_the_theme_changes_the_panels_and_not_the_picture(app: RunningApp) -> No
     light = screen.picture()
     left, top, width, height = app.view()
     view = np.s_[top : top + height, left : left + width - 112]  # without the cube, which is a widget
-    assert (dark[view] == light[view]).all()
+    behind = (dark[view] == rgba(PALETTES["dark"].picture)[:3]).all(axis=2)
+    assert 0.2 < behind.mean() < 0.9
+    assert (light[view][behind] == rgba(PALETTES["light"].picture)[:3]).all()
+    same = (dark[view] == light[view]).all(axis=2)
+    assert (same | behind).mean() > 0.95, "all but the edges of the scan"
     assert np.ptp(dark[view]) > 100
     for part in (np.s_[top:, left + width + 5 :], np.s_[top + height :, :]):  # panel, timeline
         assert np.median(dark[part]) < 60

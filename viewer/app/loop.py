@@ -8,7 +8,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from . import layout
+from . import layout, theme
 from .files import dropping
 from .turns import Turns
 
@@ -180,6 +180,7 @@ class Loop:
         now, playing = time.monotonic(), app.playback.player.playing
         app.rendering.tell_missing(pose)
         request = app.ranging.ranged(app.document.request(pose, app.session.laid.layers(pose)))
+        request = replace(request, look=theme.themed(request.look, app.palette))
         may_glide = app.steering.rests(now) and not app.steering.follows and app.replayer.replaying is None
         request = replace(request, camera=app.glide.follow(request.camera, may_glide, now))
         drew = app.viewport.draw(request, playing=playing, held=app.steering.moves or app.glide.is_on)

@@ -7,11 +7,13 @@ choice need nothing else.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui
+
+from ..look import Look
 
 _FONTS = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
 _FONT_SIZE = 16.0  # pixels at scale 1
@@ -21,13 +23,14 @@ _FONT_SIZE = 16.0  # pixels at scale 1
 class Palette:
     """The colours of a theme, 0xRRGGBB.
 
-    panel: behind everything. frame: of fields, button, header: each also under the mouse and
-    pressed. grab: what is dragged. accent: ticks, and what is switched on. cached, broken:
-    frames of the timeline.
+    panel: behind everything. picture: behind the scan where the look leaves it to the theme, '#rrggbb'.
+    frame: of fields, button, header: each also under the mouse and pressed. grab: what is dragged. accent:
+    ticks, and what is switched on. cached, broken: frames of the timeline.
     """
 
     base: Callable[[], None]  # for what is not named here
     panel: int
+    picture: str
     text: int
     faint: int
     popup: int
@@ -49,13 +52,15 @@ class Palette:
 
 PALETTES = {
     "dark": Palette(
-        base=imgui.style_colors_dark, panel=0x24272D, text=0xE3E6EA, faint=0x969CA6, popup=0x2B2F36,
+        base=imgui.style_colors_dark, panel=0x24272D, picture=Look().background,
+        text=0xE3E6EA, faint=0x969CA6, popup=0x2B2F36,
         line=0x3A3F48, frame=(0x33383F, 0x3D434C, 0x464D58), button=(0x363C45, 0x454D59, 0x2C6A99),
         header=(0x2E333A, 0x3B424C, 0x44505F), grab=(0x2A6796, 0x2C6A99), accent=0x6FB4E6,
         scroll=0x565E6A, cached=0x4A6B86, broken=0xD2544B,
     ),
     "light": Palette(
-        base=imgui.style_colors_light, panel=0xF1F3F5, text=0x1E2329, faint=0x5C646F, popup=0xFFFFFF,
+        base=imgui.style_colors_light, panel=0xF1F3F5, picture="#e2e6ea",
+        text=0x1E2329, faint=0x5C646F, popup=0xFFFFFF,
         line=0xC9CED5, frame=(0xDDE1E6, 0xD2D8DF, 0xC5CDD6), button=(0xDADFE5, 0xCBD2DA, 0x8FC1E6),
         header=(0xE2E6EA, 0xD3DAE1, 0xC3D3E2), grab=(0x7DB4DE, 0x8FC1E6), accent=0x1F6FAB,
         scroll=0xA9B1BC, cached=0x8FB3D1, broken=0xC43C33,
@@ -63,6 +68,16 @@ PALETTES = {
 }  # fmt: skip
 DEFAULT = "dark"
 TEXT_SCALES = (0.75, 0.85, 1.0, 1.15, 1.35, 1.6, 2.0)  # to choose from
+
+
+def themed(look: Look, palette: Palette) -> Look:
+    """The look on the background of the palette, where it has that of any."""
+    return replace(look, background=palette.picture) if leaves_background(look) else look
+
+
+def leaves_background(look: Look) -> bool:
+    """Whether a look leaves its background to the theme."""
+    return look.background in (palette.picture for palette in PALETTES.values())
 
 
 def set_sizes(scale: float) -> None:

@@ -33,6 +33,7 @@ def edit(
     choices: Mapping[str, Mapping[str, str]] | None = None,
     hidden: Collection[str] = (),
     now: Mapping[str, Any] | None = None,
+    idle: Mapping[str, str] | None = None,
     rows: Mapping[str, Callable[[T], T]] | None = None,
 ) -> T:
     """A row for each parameter that matters beside the others: label, widget, and what resets it where it is
@@ -41,9 +42,10 @@ def edit(
 
     choices: words to choose from and their titles, for parameters that declare none. hidden: names of
     parameters that stand elsewhere. now: the values that "auto" stands for now, which parameters begin with
-    that are not automatic any more. rows: what declares the rows of parameters that have their own, by name.
+    that are not automatic any more. idle: name -> why a parameter changes nothing now: its row is greyed, and
+    says so. rows: what declares the rows of parameters that have their own, by name.
     """
-    more = _More(choices or {}, now or {}, rows or {})
+    more = _More(choices or {}, now or {}, idle or {}, rows or {})
     shown = [one for one in describe(type(values)) if one.matters(values) and one.name not in hidden]
     basic = [one for one in shown if one.basic]
     values = _edit_rows(basic, values, defaults, more)
@@ -64,22 +66,34 @@ class _More(NamedTuple):
 
     choices: Mapping[str, Mapping[str, str]]
     now: Mapping[str, Any]
+    idle: Mapping[str, str]
     rows: Mapping[str, Callable[[Any], Any]]
 
 
 def _edit_rows(parameters: Iterable[Parameter], values: T, defaults: T, more: _More) -> T:
     for parameter in parameters:
-        if parameter.name in more.rows:
-            imgui.push_id(parameter.name)
-            values = more.rows[parameter.name](values)
-            imgui.pop_id()
-            continue
-        old, default = (getattr(each, parameter.name) for each in (values, defaults))
-        words = more.choices.get(parameter.name, parameter.words)
-        new = _edit_row(parameter, old, default, words, more.now.get(parameter.name))
-        if new != old:
-            values = replace(values, **{parameter.name: new})  # type: ignore[type-var]
+        why_idle = more.idle.get(parameter.name)
+        imgui.begin_disabled(why_idle is not None)
+        imgui.begin_group()
+        values = _edit_parameter(parameter, values, defaults, more)
+        imgui.end_group()
+        imgui.end_disabled()
+        if why_idle is not None:
+            tooltip(why_idle)
     return values
+
+
+def _edit_parameter(parameter: Parameter, values: T, defaults: T, more: _More) -> T:
+    """Declare the row of a parameter; returns the values, edited or not."""
+    if parameter.name in more.rows:
+        imgui.push_id(parameter.name)
+        values = more.rows[parameter.name](values)
+        imgui.pop_id()
+        return values
+    old, default = (getattr(each, parameter.name) for each in (values, defaults))
+    words = more.choices.get(parameter.name, parameter.words)
+    new = _edit_row(parameter, old, default, words, more.now.get(parameter.name))
+    return values if new == old else replace(values, **{parameter.name: new})  # type: ignore[type-var]
 
 
 def _edit_row(
@@ -133,6 +147,13 @@ def fact(name: str, text: str) -> None:
     imgui.pop_text_wrap_pos()
 
 
+def faint(text: str) -> None:
+    """A text that is read once, in as many lines as it takes."""
+    imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
+    imgui.text_wrapped(text)
+    imgui.pop_style_color()
+
+
 def label(text: str, help: str = "", gutter: float = 0.0) -> None:
     """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end."""
     width = imgui.get_content_region_avail().x
@@ -174,7 +195,7 @@ def _edit(parameter: Parameter, value: Any, words: Mapping[str, str] | None = No
     if words or parameter.choices:
         return combo("value", value, list(parameter.choices or words or ()), words)
     if parameter.type is str:
-        return _edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
+        return edit_color(name, value) if value.startswith("#") else _edit_text(name, value)
     return _edit_number(name, parameter, value)
 
 
@@ -205,7 +226,8 @@ def _edit_real(name: str, value: float, low: float, high: float, unit: str) -> t
     return changed, float(f"{new:.6g}")  # ImGui's float32 has no more digits
 
 
-def _edit_color(name: str, value: str) -> str:
+def edit_color(name: str, value: str) -> str:
+    """A field for a colour, '#rrggbb' or '#rrggbbaa', whose alpha stays."""
     red, green, blue, _ = rgba(value)
     flags = imgui.ColorEditFlags_.display_hex.value
     changed, new = imgui.color_edit3(name, [red / 255, green / 255, blue / 255], flags)

@@ -11,9 +11,9 @@ from imgui_bundle import imgui
 
 from ...backends import backend
 from ...files import printable
-from ...look import COLOR_BY, COLOR_WORDS, RANGE_WORDS, Look, drawable
+from ...look import BACKGROUNDS, COLOR_BY, COLOR_WORDS, RANGE_WORDS, Look, drawable
 from ...params import in_words
-from .. import widgets
+from .. import theme, widgets
 from ..ui import Ui
 
 if TYPE_CHECKING:
@@ -24,6 +24,15 @@ if TYPE_CHECKING:
     from ..session import Session
 
 _FIXED = "fixed"  # both ends are given
+_THEME, _OWN = "theme", "own"
+_FIRST_OWN = {_THEME: Look().background, _OWN: "#7f858d"}  # no preset's
+_BACKGROUND_WORDS = {
+    _THEME: "As the theme", "white": "White, for print", "black": "Black", "transparent": "Transparent",
+    _OWN: "Own colour",
+}  # fmt: skip
+_OF_NUMBERS = ("color_map", "range", "low", "high")
+_OF_LIGHT = ("ambient", "diffuse", "specular", "shininess")
+_OF_EDGES = ("eye_dome_strength", "eye_dome_radius")
 
 
 def draw(
@@ -37,11 +46,15 @@ def draw(
     is_found = look.color_by in found and look.color_by not in names
     shown = viewport.surface.color_range if viewport.surface is not None and viewport.is_there else None
     factor = scale.factor if look.color_by in ("depth", "height") else 1.0
+    is_here = drawable(look, names, found) == look
+    drawn_by, params = session.document.chosen(pose)
+    idle = idle_parameters(look, pose, is_here, _why_unlit(look, drawn_by, params, pose))
     told = _in_unit(look, factor)
     shown = shown and (factor * shown[0], factor * shown[1])
     edited = widgets.edit(
         told, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
-        dict(zip(("low", "high"), shown or (), strict=False)), {"range": partial(_edit_range, shown)},
+        dict(zip(("low", "high"), shown or (), strict=False)), idle,
+        {"range": partial(_edit_range, shown), "background": _edit_background},
     )  # fmt: skip
     ends = _in_unit(edited, 1 / factor)
     low = look.low if edited.low == told.low else ends.low  # what is not edited stays to the last bit
@@ -58,6 +71,53 @@ def _in_unit(look: Look, factor: float) -> Look:
     """The look with its ends of the colour map in another unit."""
     low, high = (None if end is None else factor * end for end in (look.low, look.high))
     return replace(look, low=low, high=high)
+
+
+def _edit_background(look: Look) -> Look:
+    """Declare what chooses the background, and a field for one's own."""
+    help = "background: what is behind the scan, here and in what is saved; films have no transparency"
+    widgets.label("Background", help, imgui.get_frame_height())
+    presets = {color: name for name, color in BACKGROUNDS.items()}
+    now = _THEME if theme.leaves_background(look) else presets.get(look.background, _OWN)
+    chosen = widgets.combo("background", now, list(_BACKGROUND_WORDS), _BACKGROUND_WORDS)
+    if chosen != now:
+        return replace(look, background=_FIRST_OWN.get(chosen) or BACKGROUNDS[chosen])
+    if now != _OWN:
+        return look
+    widgets.label("", gutter=imgui.get_frame_height())
+    return replace(look, background=widgets.edit_color("##value", look.background))
+
+
+def _why_unlit(look: Look, name: str, params: object, pose: Pose) -> str:
+    """Why a picture by this backend has no light where nothing else is chosen; empty where it has."""
+    drawn_by, cloud = backend(name), pose.overview
+    is_photograph = drawn_by.draws_samples(pose, params) and cloud.colors is not None
+    if is_photograph and look.color_by in ("auto", "own"):
+        return "Photographs of range images are shown as they are; choose another Light"
+    has_normals = cloud.normals is not None or drawn_by.finds_normals
+    if has_normals or "normals" in drawn_by.needs(pose, params):
+        return ""
+    return "Nothing is lit where there are no normals; with another Light they are estimated"
+
+
+def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> dict[str, str]:
+    """The parameters that change nothing now, and why. is_here: whether there is what the look colours by.
+    why_unlit: why there is no light by itself, empty where there is."""
+    has_own = pose.overview.colors is not None
+    idle = {}
+    if has_own and (look.color_by in ("auto", "own") or not is_here):
+        idle["plain"] = "The scan's own colours are shown; choose One colour above"
+    elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
+        idle["plain"] = (
+            f"Colours are by {COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()} now"
+        )
+    if not is_here:
+        idle |= dict.fromkeys(_OF_NUMBERS, "What the colours are by is not in this frame")
+    if look.light == "auto" and why_unlit:
+        idle |= dict.fromkeys(_OF_LIGHT, why_unlit)
+    elif look.eye_dome is None:
+        idle |= dict.fromkeys(_OF_EDGES, "Edges are dark by themselves only where nothing is lit")
+    return idle
 
 
 def _edit_range(shown: tuple[float, float] | None, look: Look) -> Look:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
@@ -10,7 +10,6 @@ from ...backends import backend, backends
 from .. import widgets
 
 if TYPE_CHECKING:
-    from ...backends import Backend
     from ...scan.pose import Pose
     from ..scene.rendering import Rendering
     from ..session import Session
@@ -25,13 +24,4 @@ def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
     if chosen != name:
         rendering.choose(chosen)
     name, params = session.document.chosen(pose)
-    for attribute in _estimated(backend(name), pose, params):
-        widgets.fact(attribute.capitalize(), "estimated")
-        widgets.tooltip(f"The scan stores no {attribute}; they are estimated from its points")
     rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))
-
-
-def _estimated(drawn_by: Backend, pose: Pose, params: Any) -> list[str]:
-    """Attributes that the backend uses and the pose does not store: estimated, or found as it draws."""
-    used = {*drawn_by.needs(pose, params), *(["normals"] if drawn_by.finds_normals else [])} - {"views"}
-    return sorted(name for name in used if getattr(pose.overview, name) is None)

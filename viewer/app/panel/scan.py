@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
+from ...backends import backend
 from ...files import printable
 from ...geometry import AXES
 from ...scan.guessed_unit import guess_unit
@@ -82,6 +83,9 @@ class ScanSection:
         size = " x ".join(f"{scale.factor * edge:.4g}" for edge in bounds.high - bounds.low)
         widgets.fact("Size", f"{size} {scale.unit}")
         widgets.fact("Stored", _stored(pose))
+        if estimated := _estimated(pose, *self.session.document.chosen(pose)):
+            widgets.fact("Estimated", ", ".join(estimated))
+            widgets.tooltip("What the scan does not store and its renderer uses: estimated from the points")
 
     def _draw_unit(self, pose: Pose) -> None:
         """Declare what chooses the unit of length, a guess where nobody has told it, and what lengths are
@@ -149,3 +153,10 @@ def _stored(pose: Pose) -> str:
     views = len(pose.views)
     kind = f"{views} range image{'s' if views > 1 else ''}" if views else "positions"
     return ", ".join([kind, *names])
+
+
+def _estimated(pose: Pose, name: str, params: Any) -> list[str]:
+    """Attributes that a renderer uses and the pose does not store: estimated, or found as it draws."""
+    drawn_by = backend(name)
+    used = {*drawn_by.needs(pose, params), *(["normals"] if drawn_by.finds_normals else [])} - {"views"}
+    return sorted(_ATTRIBUTES.get(one, one) for one in used if getattr(pose.overview, one) is None)

@@ -89,6 +89,8 @@ class Bookmarks:
 
     def draw(self, ui: Ui) -> None:
         """Declare the list: a click on a name goes there; buttons rename and delete."""
+        if not self.all:
+            widgets.faint("No views yet. Add keeps the one that is shown, to come back to.")
         deleted = None
         for number, bookmark in enumerate(self.all):
             imgui.push_id(number)

@@ -27,6 +27,8 @@ def draw(measuring: Tool, ui: Ui) -> None:
     imgui.same_line()
     measuring.filled = imgui.checkbox("Allow filled", measuring.filled)[1]
     widgets.tooltip("Also take places where the renderer has filled a hole, and no point was measured")
+    if not measuring.made.all:
+        widgets.faint("No measurements yet. Press Measure, then click two places on the surface.")
     for number, reading in enumerate(measuring.readings()):
         imgui.push_id(number)
         if _draw_row(measuring, number, reading):
