@@ -23,6 +23,7 @@ from ...gpu.context import Gpu, headless
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...view import View
 from .. import FrameView
@@ -216,6 +217,21 @@ def chosen_sectors(
     return sectors, suited if steps is None else steps
 
 
+def calibrated(
+    points: Pose | PointCloud | ArrayLike, eye: ArrayLike, radius: float | None = None
+) -> EyeCalibration:
+    """What `visible_points` takes where nobody says: of a pose, a cloud, or (N, 3) absolute, as an eye (3,)
+    sees it. radius: R, scan units; None: found too. Raises InputError, also where there are no points."""
+    cloud, at = as_cloud(points), np.asarray(eye, np.float64)
+    if at.shape != (3,) or not np.isfinite(at).all():
+        raise InputError(f"an eye is three finite numbers, not {eye!r}")
+    if not len(cloud):
+        raise InputError("no points to calibrate by")
+    body = body_of(cloud)
+    sectors = Sectors.around(body.center, body.radius, at, cloud.origin)
+    return calibrate(cloud, sectors, cloud.origin, _DEPTH, radius)
+
+
 def visible_points(
     points: Pose | ArrayLike,
     eye: ArrayLike,
@@ -238,17 +254,11 @@ def visible_points(
     if mode not in MODES:
         raise unknown_name("mode", mode, MODES)
     cloud, gpu = as_cloud(points), gpu or _gpu()
-    at = np.asarray(eye, np.float64)
-    if at.shape != (3,) or not np.isfinite(at).all():
-        raise InputError(f"an eye is three finite numbers, not {eye!r}")
     if not len(cloud):
         return np.empty(0, np.uint32)
+    found = calibrated(cloud, eye, radius)
     gpu.activate()
     pose = GpuPose(gpu, Pose(0, 0.0, "", cloud))
-    body = body_of(cloud)
-    found = calibrate(
-        cloud, Sectors.around(body.center, body.radius, at, pose.origin), pose.origin, _DEPTH, radius
-    )
     divided, suited = chosen_sectors(found, sectors, steps)
     candidates = Candidates(gpu, divided, len(cloud))
     try:
