@@ -124,6 +124,19 @@ def test_few_and_flat_points(points: object, seen: list[int]) -> None:
     np.testing.assert_array_equal(exact_visible_points(np.array(points, float), (0, 0, 0), 8.0), seen)
 
 
+@pytest.mark.parametrize("eye", [(0, 0, 0), (3.0, 0, 0)])
+def test_a_circle_in_a_slanted_plane_through_the_eye(eye: tuple[float, float, float]) -> None:
+    angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    at = np.array(eye)
+    seen = np.zeros(100, bool)
+    seen[exact_visible_points(circle @ turn, at @ turn, 4.0)] = True
+    expected = (circle * at).sum(axis=1) > 1 if at.any() else np.ones(100, bool)
+    assert seen[expected].all()
+    assert seen.sum() <= expected.sum() + 4
+
+
 def test_a_flat_grid_before_the_eye_is_seen() -> None:
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21)))
     grid = np.stack([x, y, np.full(x.size, -2.0)], axis=1)

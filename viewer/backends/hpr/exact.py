@@ -33,10 +33,10 @@ Floats = NDArray[np.float64]
 Kernel = Callable[[Floats, Floats, float], Floats]  # see `hull_rows`
 
 _AHEAD = 0.2  # cosine to the way to the middle above which all points count as ahead of the eye
-_FLAT = 1e-10  # share of the widest extent below which there is none
+_FLAT = 1e-6  # share of the widest extent below which there is none; what float32 leaves of flat points
 _ROUNDED = 1 + 1e-6  # by which a sphere may be too small
-_COARSE = 0.25  # decades between radii of the search
-_DECADES = 5.0  # that it looks through
+_COARSE = 0.25  # decades between radii of a search
+_DECADES = 5.0  # of multiples of the farthest distance that it looks through
 _FINE = 3  # times that it halves its step
 
 
@@ -127,9 +127,42 @@ def hull_rows(seen: SeenPoints, kernel: Kernel) -> NDArray[np.intp]:
     return np.sort(np.append(rows, np.flatnonzero(seen.distance == 0)))
 
 
-def lower_side(seen: SeenPoints, kernel: Kernel) -> tuple[Floats, NDArray[np.intp]] | None:
-    """Places (N, 3) of points as the gnomonic map has them, x and y and height, scaled to about 1, and the
-    triangles (T, 3) of the lower side of their hull; None where they are not all ahead of the eye."""
+@dataclass(frozen=True, eq=False)
+class LowerSide:
+    """Flipped points as the gnomonic map has them, and the lower side of their hull.
+
+    across: (N, 2), x / z and y / z. heights: (N,), 1 / z - 1. triangles: (T, 3), rows; those of N on are
+    none of points.
+    """
+
+    across: Floats
+    heights: Floats
+    triangles: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, seen: SeenPoints, kernel: Kernel) -> LowerSide | None:
+        """The lower side, of points that are all ahead of the eye; None where they are not."""
+        across = gnomonic(seen)
+        if across is None:
+            return None
+        less = kernel(seen.distance, seen.beyond, float(np.linalg.norm(seen.middle)))
+        squared = (across**2).sum(axis=1)
+        heights = (squared / (1 + np.sqrt(1 + squared)) + less) / (1 - less)
+        places = np.concatenate([_scaled(across), _scaled(heights[:, None])], axis=1)
+        # Above all, in the middle, it makes a body of what is flat, and is no part of the lower side.
+        above = np.append(places[:, :2].mean(axis=0), 5.0)
+        beside = np.pad(_missing_axes(places[:, :2]), ((0, 0), (0, 1)), constant_values=2.0)
+        beside[:, :2] += above[:2]
+        body = np.concatenate([places, beside, above[None]])
+        triangles = _triangles(body)
+        first, second, third = (body[column, :2] for column in triangles.T)
+        (x, y), (far_x, far_y) = (second - first).T, (third - first).T
+        return cls(across, heights, triangles[x * far_y < y * far_x])
+
+
+def gnomonic(seen: SeenPoints) -> Floats | None:
+    """Places (N, 2) of points in a picture at distance 1 whose middle is theirs; None where they are not all
+    ahead of the eye."""
     middle = float(np.linalg.norm(seen.middle))
     if middle == 0:
         return None
@@ -137,38 +170,26 @@ def lower_side(seen: SeenPoints, kernel: Kernel) -> tuple[Floats, NDArray[np.int
     along = seen.offsets @ ahead + middle
     if not (along > _AHEAD * seen.distance).all():
         return None
-    less = kernel(seen.distance, seen.beyond, middle)
     right, up = _across(ahead)
-    across = np.stack([seen.offsets @ right, seen.offsets @ up], axis=1) / along[:, None]
-    squared = (across**2).sum(axis=1)
-    height = (squared / (1 + np.sqrt(1 + squared)) + less) / (1 - less)
-    places = np.stack([*_scaled(across).T, *_scaled(height[:, None]).T], axis=1)
-    sides = _missing_axes(places[:, :2])
-    # Above all, in the middle, it makes a body of what is flat, and is no part of the lower side.
-    above = np.append(places[:, :2].mean(axis=0), 5.0)
-    beside = np.pad(sides, ((0, 0), (0, 1)), constant_values=2.0)
-    beside[:, :2] += above[:2]
-    body = np.concatenate([places, beside, above[None]])
-    corners = _triangles(body)
-    first, second, third = (body[column, :2] for column in corners.T)
-    (x, y), (far_x, far_y) = (second - first).T, (third - first).T
-    return places, corners[x * far_y < y * far_x]
+    return np.stack([seen.offsets @ right, seen.offsets @ up], axis=1) / along[:, None]
 
 
 def _hull(seen: SeenPoints, kernel: Kernel) -> NDArray[np.intp]:
     """Rows of the vertices, in any order; of points none of which is in the eye."""
-    found = lower_side(seen, kernel)
-    if found is not None:
-        corners = found[1]
-    else:
-        middle = float(np.linalg.norm(seen.middle))
-        less = kernel(seen.distance, seen.beyond, middle)
-        flipped = ((1 - less) / seen.distance)[:, None] * seen.away
-        flipped /= np.abs(flipped).max()
-        corners = _triangles(np.concatenate([flipped, np.zeros((1, 3)), _missing_axes(flipped)]))
+    lower = LowerSide.of(seen, kernel)
+    triangles = flipped_triangles(seen, kernel)[1] if lower is None else lower.triangles
     used = np.zeros(len(seen.distance), bool)
-    used[corners[corners < len(used)]] = True
+    used[triangles[triangles < len(used)]] = True
     return np.flatnonzero(used)
+
+
+def flipped_triangles(seen: SeenPoints, kernel: Kernel) -> tuple[Floats, NDArray[np.intp]]:
+    """Flipped points (N, 3), with lengths of about 1, and the triangles (T, 3) of their hull with the eye;
+    rows of N on are none of points, the eye's is N. Exact to the rounding of these lengths."""
+    less = kernel(seen.distance, seen.beyond, float(np.linalg.norm(seen.middle)))
+    flipped = ((1 - less) / seen.distance)[:, None] * seen.away
+    flipped /= np.abs(flipped).max()
+    return flipped, _triangles(np.concatenate([flipped, np.zeros((1, 3)), _missing_axes(flipped)]))
 
 
 def _triangles(places: Floats) -> NDArray[np.intp]:
@@ -196,7 +217,7 @@ def _scaled(values: Floats) -> Floats:
 def _missing_axes(values: Floats) -> Floats:
     """Directions, to both sides, in which points (N, D) of size 1 have no extent: (2 M, D)."""
     _, sizes, axes = np.linalg.svd(values.T @ values)
-    missing = axes[np.sqrt(np.maximum(sizes, 0)) <= _FLAT * max(np.sqrt(sizes[0]), 1.0)]
+    missing = axes[np.sqrt(sizes) <= _FLAT * max(np.sqrt(sizes[0]), 1.0)]
     return np.concatenate([missing, -missing])
 
 
@@ -216,21 +237,26 @@ def katz_radius(points: Pose | PointCloud | ArrayLike, eye: ArrayLike) -> float:
     least = max(float(seen.distance.max(initial=0.0)) for seen in both)
     if least == 0:
         raise InputError("no points to find a radius of")
-    told: dict[float, int] = {}
 
     def disjoint(decades: float) -> int:
-        if decades not in told:
-            radius = least * 10**decades
-            counts = np.zeros(len(cloud), np.uint8)
-            for seen in both:
-                counts[hull_rows(seen, flipping(seen, radius))] += 1
-            told[decades] = int(np.count_nonzero(counts == 1))
-        return told[decades]
+        counts = np.zeros(len(cloud), np.uint8)
+        for seen in both:
+            counts[hull_rows(seen, flipping(seen, least * 10**decades))] += 1
+        return int(np.count_nonzero(counts == 1))
 
-    steps = np.arange(0, _DECADES + _COARSE / 2, _COARSE).tolist()
-    best, step = max(steps, key=disjoint), _COARSE
+    return least * 10 ** searched_decades(disjoint, 0.0, _DECADES)
+
+
+def searched_decades(score: Callable[[float], float], low: float, high: float) -> float:
+    """The number from `low` to `high` with the largest score: the best in steps of a quarter, and then in
+    halves of these around it, thrice. What scores alike is told from the first."""
+    found = np.arange(low, high + _COARSE / 2, _COARSE).tolist()
+    known = {at: score(at) for at in found}
+    best, step = max(known, key=lambda at: known[at]), _COARSE
     for _ in range(_FINE):
         step /= 2
-        best = max((best, best - step, best + step), key=lambda at: disjoint(max(at, 0.0)))
-        best = max(best, 0.0)
-    return least * 10**best
+        for at in (best - step, best + step):
+            if low <= at <= high and at not in known:
+                known[at] = score(at)
+        best = max(known, key=lambda at: known[at])
+    return best
