@@ -16,6 +16,7 @@ import pytest
 from viewer.backends import backends
 from viewer.bench import measuring
 from viewer.bench.papers.farooq_2013 import farooq
+from viewer.bench.papers.machado_2014 import hpr
 from viewer.bench.papers.preiner_2012 import preiner
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
 from viewer.bench.report import defaults_page, scene_table
@@ -89,7 +90,7 @@ def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: boo
     assert page.read_text(encoding="utf-8") == made
 
 
-@pytest.mark.parametrize("made", [scene_table, defaults_page, measuring], ids=lambda made: made.NAME)
+@pytest.mark.parametrize("made", [scene_table, defaults_page, measuring, hpr], ids=lambda made: made.NAME)
 def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
     page = ROOT / "docs" / made.PAGE
     files = sorted((ROOT / "docs" / "data").glob(f"{made.NAME}*.json"))
@@ -105,7 +106,7 @@ def test_each_place_of_a_table_has_what_makes_it() -> None:
     """A suite of the benchmark, or a script of docs/tables; and none of them makes one without a place."""
     made = [
         (suite.PAGE, key)
-        for suite in (scene_table, defaults_page, measuring)
+        for suite in (scene_table, defaults_page, measuring, hpr)
         for key in suite.tables(
             [suite.read_measurement(next((ROOT / "docs" / "data").glob(f"{suite.NAME}*")))]
         )

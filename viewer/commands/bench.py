@@ -30,6 +30,13 @@ from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
 from ..bench.papers.farooq_2013.farooq import write_farooq
 from ..bench.papers.farooq_2013.large_views import measure_large_views
 from ..bench.papers.farooq_2013.playing import measure_playing
+from ..bench.papers.machado_2014.accuracy import SCENES as VISIBILITY_SCENES
+from ..bench.papers.machado_2014.accuracy import measure_visibility
+from ..bench.papers.machado_2014.growth import measure_growth
+from ..bench.papers.machado_2014.hpr import NAME as HPR
+from ..bench.papers.machado_2014.hpr import write_hpr
+from ..bench.papers.machado_2014.pictures import ERROR_PICTURE, SECTOR_PICTURE
+from ..bench.papers.machado_2014.speed import measure_speeds
 from ..bench.papers.preiner_2012 import auto_splats
 from ..bench.papers.preiner_2012.fits import measure_fits
 from ..bench.papers.preiner_2012.preiner import NAME as PREINER
@@ -49,6 +56,7 @@ from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
     DISTANCES,
     FITS,
+    GROWTH,
     LARGE_VIEWS,
     NOTES,
     NUMERICS,
@@ -57,6 +65,8 @@ from ..bench.report.results import (
     PLAYING,
     RESULTS,
     SEARCHES,
+    SPEEDS,
+    VISIBILITY,
     Row,
     compare,
     read_rows,
@@ -81,7 +91,8 @@ class _PageSuite:
 
     groups: what is drawn, of some scenes. write_page: makes the page of a folder. page: its name. scenes:
     which, unless others are named; None: it has its own. others: what else is measured, by the files of its
-    rows, given the bench, and the scenes where it has any. usual: settings unless told otherwise.
+    rows, given the bench, and the scenes where it has any. pictures: what these write beside, by name. usual:
+    settings unless told otherwise. quick: scenes and views of the quick form, where it has one of its own.
     """
 
     groups: Callable[[BenchSettings, Sequence[str]], list[Group]]
@@ -89,7 +100,9 @@ class _PageSuite:
     page: str
     scenes: Sequence[str] | None = None
     others: Mapping[str, Callable[..., Iterator[Row]]] = field(default_factory=dict)
+    pictures: Sequence[str] = ()
     usual: BenchSettings = field(default_factory=BenchSettings)
+    quick: tuple[Sequence[str], int] | None = None
 
 
 def _octree_scans(bench: Bench) -> Iterator[Row]:
@@ -126,6 +139,16 @@ _WITH_PAGES = {
         others={DISTANCES: measure_distances},
         usual=BenchSettings(size=(400, 300), views=8, frames=0),
     ),
+    "hpr": _PageSuite(
+        lambda *_: [],
+        write_hpr,
+        HPR,
+        VISIBILITY_SCENES,
+        others={VISIBILITY: measure_visibility, GROWTH: measure_growth, SPEEDS: measure_speeds},
+        pictures=(ERROR_PICTURE, SECTOR_PICTURE),
+        usual=BenchSettings(size=(400, 300), views=2, frames=0),
+        quick=(VISIBILITY_SCENES[:1], 1),
+    ),
     "slomp": _PageSuite(lambda *_: slomp.groups(), write_table_two, TABLE_TWO),
     "octrees": _PageSuite(
         lambda *_: octrees.groups(),
@@ -150,6 +173,7 @@ _WITH_PAGES = {
     ),
 }
 _SUITES = ("scenes", "numerics", *_WITH_PAGES)
+_WITHOUT_RESULTS = (MEASURING, HPR)  # suites that draw no pictures of scenes
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -266,7 +290,7 @@ def run(args: Namespace) -> int:
 
 def _report(args: Namespace) -> None:
     """Make the pages of the rows in the folder, and say what is there."""
-    if args.suite != MEASURING:  # which draws no results of scenes
+    if args.suite not in _WITHOUT_RESULTS:
         tell(write_report(args.out))
     if args.suite in _WITH_PAGES:
         tell(_WITH_PAGES[args.suite].write_page(args.out))
@@ -279,7 +303,7 @@ def _others(args: Namespace) -> Mapping[str, Callable[[Bench], Iterator[Row]]]:
     suite = _WITH_PAGES[args.suite]
     if suite.scenes is None:
         return suite.others
-    scenes = args.scene or suite.scenes
+    scenes = args.scene or (suite.quick[0] if args.quick and suite.quick else suite.scenes)
     return {name: partial(measure, scenes=scenes) for name, measure in suite.others.items()}
 
 
@@ -300,6 +324,8 @@ def _claim(args: Namespace, settings: BenchSettings, groups: Sequence[Group], nu
     drawn = dict.fromkeys(contender.backend for group in judged for contender in group.contenders)
     outputs = [*(args.out / name for name in names), *_report_files(args)]
     outputs += [picture_path(args.out, scene, name) for scene, name in product(scenes, drawn)]
+    if args.suite in _WITH_PAGES:
+        outputs += [args.out / name for name in _WITH_PAGES[args.suite].pictures]
     compared = [args.compare, args.compare / RESULTS] if args.compare else []
     claim(outputs, [*compared, *map(Path, args.scene or ())], args.force)
 
@@ -376,7 +402,10 @@ def _settings(args: Namespace) -> BenchSettings:
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
     usual = _WITH_PAGES[args.suite].usual if args.suite in _WITH_PAGES else BenchSettings()
     if args.quick:
-        usual = replace(_QUICK, frames=min(_QUICK.frames, usual.frames))
+        quick = _WITH_PAGES[args.suite].quick if args.suite in _WITH_PAGES else None
+        usual = replace(
+            _QUICK, frames=min(_QUICK.frames, usual.frames), views=quick[1] if quick else _QUICK.views
+        )
     return replace(usual, **{name: value for name, value in told.items() if value is not None})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,6 +78,11 @@ def side_by_side(reference: dict[str, Any], drawn: dict[str, Any], footprint: ND
         ],
         axis=1,
     )[:, :-_GAP]
+
+
+def titled_row(pictures: Mapping[str, Image]) -> Image:
+    """Pictures (H, W, 3) in a row, each below its title."""
+    return np.concatenate([_panel(pixels, title) for title, pixels in pictures.items()], axis=1)[:, :-_GAP]
 
 
 def _seen(covered: NDArray[np.bool_]) -> tuple[slice, slice]:

@@ -21,6 +21,7 @@ OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
 SEARCHES, FITS = "searches.jsonl", "fits.jsonl"
 DISTANCES = "distances.jsonl"
+VISIBILITY, GROWTH, SPEEDS = "visibility.jsonl", "growth.jsonl", "speeds.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -37,6 +38,9 @@ _NEEDED: dict[str, dict[str, Any]] = {
     PLAYING: {"scene": str, "poses": int, "primitive": str, "reading": dict, "playing": dict},
     SEARCHES: {"scene": str, "n": int, "visible": int, "params": dict, "first": dict, "later": dict},
     DISTANCES: {"scene": str, "backend": str, "zoom": int | float, "pairs": int, "covered": int | float},
+    VISIBILITY: {"scene": str, "n": int, "noise": int | float, "method": str, "radius": str, "by_view": list},
+    GROWTH: {"scene": str, "n": int, "method": str, "visible": int, "error": int | float},
+    SPEEDS: {"scene": str, "n": int, "sectors": int, "busy_ms": dict, "wall_ms": dict},
     FITS: {"scene": str, "noise": int | float, "params": dict, "found_inside": dict, "found_band": dict},
 }  # fmt: skip
 

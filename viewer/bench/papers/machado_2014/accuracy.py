@@ -1,0 +1,135 @@
+"""Points called visible against those that truly are: the accuracy experiment (7.1), noise, and peers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....backends.hpr import MODES, calibrated, visible_points
+from ....backends.hpr.exact import Kernel, flipping, katz_radius, searched_decades
+from ....gpu.context import Gpu
+from ....scan.pose import Pose
+from ...report.results import Row
+from ...run import Bench
+from . import peers
+from .pictures import ERROR_PICTURE, error_row, save_picture
+from .verdicts import (
+    AUTOMATIC,
+    BEST,
+    EXACT,
+    HULL,
+    HULL_AT_4M,
+    KATZ,
+    SCENES,
+    Verdicts,
+    View,
+    moments,
+    row_of,
+    views,
+)
+
+NOISES = (0.0, 0.001, 0.005, 0.01)  # standard deviations, in diameters of the model
+PAPER_SECTORS = 4_000_000  # of the paper's experiment
+_LOW, _HIGH = (
+    2.0,
+    5.0,
+)  # decades of radii, in distances to the farthest point, among which the best is looked for
+_SHARPEST = 0.6  # share of a hull's corners that thresholds are tried up to
+_THRESHOLDS = 25
+
+EXPONENTIAL, SHARP = "Katz and Tal 2015: exponential", "Katz and Tal 2015: confidence"
+IMAGE_SPACE, RELAXED = "Biasutti 2019", "after Mehra 2010"
+
+
+def measure_visibility(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row]:
+    """Yield a row for each scene, noise, radius and method. scenes: names, or files of meshes; what cannot be
+    had is noted and left out."""
+    settings = bench.settings
+    for scene in scenes:
+        for moment in moments(bench, scene):
+            for noise in NOISES:
+                told: dict[tuple[str, str], list[Row]] = {}
+                for view in views(moment, settings.views, noise, settings.seed):
+                    if bench.folder and scene == scenes[0] and not (noise or told):
+                        save_picture(error_row(bench.renderer, view), bench.folder / ERROR_PICTURE)
+                    for method, radius, found in judged(bench.renderer.gpu, view):
+                        told.setdefault((method, radius), []).append(found)
+                for (method, radius), by_view in told.items():
+                    yield {
+                        **row_of(bench, scene, moment),
+                        "noise": noise,
+                        "method": method,
+                        "radius": radius,
+                        "by_view": by_view,
+                    }
+
+
+def judged(gpu: Gpu, view: View) -> Iterator[tuple[str, str, Row]]:
+    """What all methods make of a view: their name, that of the radius, and counts with what they took."""
+    automatic = calibrated(view.cloud, view.eye).radius
+    best = best_radius(view, partial(flipping, view.seen))
+    radii = {BEST: best, AUTOMATIC: automatic}
+    if not view.noise:
+        radii[KATZ] = katz_radius(view.cloud, view.eye)
+    for name, radius in radii.items():
+        yield EXACT, name, _row(view.hull(flipping(view.seen, radius)), view, radius)
+        for method, rows in _on_gpu(gpu, view, radius):
+            yield method, name, _row(view.verdicts(rows), view, radius)
+    yield from _peers(view, best)
+
+
+def _on_gpu(gpu: Gpu, view: View, radius: float) -> Iterator[tuple[str, NDArray[np.uint32]]]:
+    """What the operator by sectors makes of it: name and rows, in each mode, and with the paper's sectors."""
+    pose = Pose(0, 0.0, "", view.cloud)
+    for mode in MODES:
+        yield mode, visible_points(pose, view.eye, radius=radius, mode=mode, gpu=gpu)
+    many = visible_points(pose, view.eye, radius=radius, sectors=PAPER_SECTORS, mode=HULL, gpu=gpu)
+    yield HULL_AT_4M, many
+
+
+def best_radius(view: View, kernel: Callable[[float], Kernel]) -> float:
+    """The radius with which the hull errs least. kernel: of a radius."""
+    farthest = view.farthest
+
+    def right(decades: float) -> float:
+        return -view.hull(kernel(farthest * 10**decades)).error
+
+    return farthest * 10 ** searched_decades(right, _LOW, _HIGH)
+
+
+def _peers(view: View, radius: float) -> Iterator[tuple[str, str, Row]]:
+    """What others make of it, each at its own best; radius: the best of the exact operator."""
+    middle = float(np.linalg.norm(view.seen.middle))
+
+    def exponential(radius: float) -> Kernel:
+        return peers.exponential(peers.like_sphere(radius, middle))
+
+    own = best_radius(view, exponential)
+    yield EXPONENTIAL, BEST, _row(view.hull(exponential(own)), view, own)
+    yield SHARP, BEST, _sharpest(view, radius)
+    image_space = np.flatnonzero(peers.image_space_visible(view.seen))
+    yield IMAGE_SPACE, "", _row(view.verdicts(image_space), view)
+    if view.noise:
+        kernel = flipping(view.seen, radius)
+        relaxed = peers.relaxed_visible(view.seen, radius, kernel, 2 * view.noise)
+        yield RELAXED, BEST, _row(Verdicts.of(relaxed, view.truth), view, radius)
+
+
+def _sharpest(view: View, radius: float) -> Row:
+    """The least error of corners above a threshold, of the best radius and twice and thrice as large ones."""
+    found = []
+    for times in (1.0, 2.0, 3.0):
+        sharpness = peers.sharpness(view.seen, flipping(view.seen, times * radius))
+        limits = np.quantile(sharpness[sharpness > 0], np.linspace(0, _SHARPEST, _THRESHOLDS))
+        found += [(Verdicts.of(sharpness >= limit, view.truth), times * radius) for limit in limits]
+    verdicts, at = min(found, key=lambda one: one[0].error)
+    return _row(verdicts, view, at)
+
+
+def _row(verdicts: Verdicts, view: View, radius: float | None = None) -> Row:
+    """Counts of one view, and the radius, where there is one, in distances to the farthest point."""
+    counts = {"missed": verdicts.missed, "extra": verdicts.extra, "correct": verdicts.correct}
+    return counts if radius is None else {**counts, "radius": round(radius / view.farthest, 1)}

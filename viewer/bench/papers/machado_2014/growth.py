@@ -1,0 +1,58 @@
+"""What more sectors bring and take (Fig. 14; 8): visible points, errors, memory, how many hold a point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ....backends.hpr import calibrated, chosen_sectors, visible_points
+from ....backends.hpr.candidates import Candidates
+from ....backends.hpr.exact import flipping
+from ....scan.pose import Pose
+from ...report.results import Row
+from ...run import Bench
+from .pictures import SECTOR_PICTURE, save_picture, sector_row
+from .verdicts import EXACT, HULL, SCENES, Verdicts, View, moments, row_of, views
+
+# 40 K, 100 K and 10 M are those of Fig. 13, 4 M that of the paper's experiment.
+COUNTS = (40_000, 100_000, 250_000, 630_000, 1_600_000, 4_000_000, 10_000_000)
+
+
+def measure_growth(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row]:
+    """Yield a row for each scene and number of sectors, from the first side, at the automatic radius."""
+    for scene in scenes:
+        for moment in moments(bench, scene):
+            (view,) = views(moment, 1)
+            if bench.folder and scene == scenes[-1]:
+                save_picture(sector_row(bench.renderer, view), bench.folder / SECTOR_PICTURE)
+            for found in growth(bench, view):
+                yield {**row_of(bench, scene, moment), "views": 1, **found}
+
+
+def growth(bench: Bench, view: View) -> Iterator[Row]:
+    """Rows of a view: the exact operator, and each number of sectors."""
+    gpu, pose = bench.renderer.gpu, Pose(0, 0.0, "", view.cloud)
+    found = calibrated(pose, view.eye)
+    yield {"method": EXACT, **_told(view.hull(flipping(view.seen, found.radius)))}
+    for count in (*COUNTS, None):
+        rows = visible_points(pose, view.eye, radius=found.radius, sectors=count, mode=HULL, gpu=gpu)
+        sectors, steps = chosen_sectors(found, count, None)
+        candidates = Candidates(gpu, sectors, len(view.cloud))
+        nbytes = candidates.nbytes
+        candidates.release()
+        cells = sectors.sector_of(sectors.spots(view.cloud.positions.astype(np.float64)))
+        yield {
+            "method": HULL,
+            "sectors": sectors.count,
+            "automatic": count is None,
+            "steps": steps,
+            "nbytes": nbytes,
+            "held": round(len(np.unique(cells)) / sectors.count, 5),
+            "inside": round(found.occupied, 5),
+            **_told(view.verdicts(rows)),
+        }
+
+
+def _told(verdicts: Verdicts) -> Row:
+    return {"visible": verdicts.correct + verdicts.extra, "error": round(verdicts.error, 3)}
