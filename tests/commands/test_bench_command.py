@@ -157,6 +157,16 @@ def test_two_files_of_one_name_are_refused(refused: Refused, tmp_path: Path) -> 
     assert "ball.ply" in refused("bench", "--scene", *files, "-o", tmp_path / "out")
 
 
+def test_visible_points_of_a_mesh_of_ones_own_are_judged(run: Run, mesh: Path, tmp_path: Path) -> None:
+    quick = ("--quick", "--suite", "hpr", "--scene", mesh, "--size", "96x64", "-o", tmp_path / "out")
+    assert run("bench", *quick).code == 0
+    page = (tmp_path / "out" / "hpr.md").read_text(encoding="utf-8")
+    assert page.count("| exact |") > 2
+    for name in ("hpr.json", "pictures/hpr-errors.png", "pictures/hpr-sectors.png"):
+        assert (tmp_path / "out" / name).is_file()
+    assert run("bench", *quick).code == 2  # what is there is not replaced
+
+
 def test_measuring_takes_the_scenes_that_are_named(run: Run, tmp_path: Path) -> None:
     file = tmp_path / "ball.obj"
     done = run("bench", "--suite", "measuring", "--scene", file, "-o", tmp_path / "out")

@@ -19,8 +19,8 @@ from viewer.bench.papers.machado_2014.verdicts import (
     EXACT,
     HULL,
     KATZ,
+    JudgedView,
     Verdicts,
-    View,
     pooled,
 )
 from viewer.bench.report.results import GROWTH, SPEEDS, VISIBILITY, Row, write_row
@@ -166,29 +166,31 @@ def test_an_eye_among_the_points_is_refused_by_those_that_need_a_picture() -> No
 
 
 @pytest.fixture
-def view() -> View:
+def view() -> JudgedView:
     """The sphere from its first side."""
     (view,) = verdicts.views(moment(), 1)
     return view
 
 
-def test_all_methods_judge_a_sphere(renderer: Renderer, view: View, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_methods_judge_a_sphere(
+    renderer: Renderer, view: JudgedView, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(accuracy, "PAPER_SECTORS", 40_000)  # what suits so few points
     found = {(method, radius): row for method, radius, row in accuracy.judged(renderer.gpu, view)}
     assert {radius for method, radius in found if method == EXACT} == {BEST, AUTOMATIC, KATZ}
     for method in (EXACT, *MODES):
         assert pooled([found[method, BEST]]).error < 25
     assert pooled([found[EXACT, BEST]]).error <= pooled([found[EXACT, AUTOMATIC]]).error
-    noisy = View(view.cloud, view.camera, view.truth, noise=0.01)
+    noisy = JudgedView(view.cloud, view.camera, view.truth, noise=0.01)
     names = {method for method, _, _ in accuracy.judged(renderer.gpu, noisy)}
     assert accuracy.RELAXED in names
     assert accuracy.RELAXED not in {method for method, _ in found}
 
 
 def test_more_sectors_see_more_and_take_more(
-    renderer: Renderer, view: View, monkeypatch: pytest.MonkeyPatch
+    renderer: Renderer, view: JudgedView, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(growth, "COUNTS", (400, 40_000))
+    monkeypatch.setattr(growth, "COUNTS", (400, 40_000, 10_000_000))
     bench = Bench(renderer, BenchSettings(size=(160, 120)))
     exact, few, many, automatic = growth.growth(bench, view)
     assert "sectors" not in exact
@@ -198,7 +200,7 @@ def test_more_sectors_see_more_and_take_more(
     assert [row["automatic"] for row in (few, many, automatic)] == [False, False, True]
 
 
-def test_speeds_are_of_one_run(renderer: Renderer, view: View) -> None:
+def test_speeds_are_of_one_run(renderer: Renderer, view: JudgedView) -> None:
     bench = Bench(renderer, BenchSettings(size=(160, 120), repeat=1))
     row = speed.speeds(bench, view)
     for kind in ("busy_ms", "wall_ms"):
@@ -207,7 +209,7 @@ def test_speeds_are_of_one_run(renderer: Renderer, view: View) -> None:
     assert 0 < row["visible"] < len(view.cloud)
 
 
-def test_pictures_show_what_is_wrong(renderer: Renderer, view: View, tmp_path: Path) -> None:
+def test_pictures_show_what_is_wrong(renderer: Renderer, view: JudgedView, tmp_path: Path) -> None:
     rows = np.flatnonzero(view.truth)[5:]
     behind = np.flatnonzero(~view.truth)[:3]
     cloud = pictures.marked(view, np.append(rows, behind))

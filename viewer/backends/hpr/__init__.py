@@ -220,8 +220,11 @@ def chosen_sectors(
 def calibrated(
     points: Pose | PointCloud | ArrayLike, eye: ArrayLike, radius: float | None = None
 ) -> EyeCalibration:
-    """What `visible_points` takes where nobody says: of a pose, a cloud, or (N, 3) absolute, as an eye (3,)
-    sees it. radius: R, scan units; None: found too. Raises InputError, also where there are no points."""
+    """Calibrate `visible_points` for points as an eye sees them, where nobody says more.
+
+    points: a pose, a cloud, or (N, 3) absolute. eye: (3,), absolute. radius: R, scan units; None: found too.
+    Raises InputError, also where there are no points.
+    """
     cloud, at = as_cloud(points), np.asarray(eye, np.float64)
     if at.shape != (3,) or not np.isfinite(at).all():
         raise InputError(f"an eye is three finite numbers, not {eye!r}")

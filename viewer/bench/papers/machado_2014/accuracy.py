@@ -23,9 +23,10 @@ from .verdicts import (
     HULL,
     HULL_AT_4M,
     KATZ,
+    MOST_PER_POINT,
     SCENES,
+    JudgedView,
     Verdicts,
-    View,
     moments,
     row_of,
     views,
@@ -67,8 +68,8 @@ def measure_visibility(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator
                     }
 
 
-def judged(gpu: Gpu, view: View) -> Iterator[tuple[str, str, Row]]:
-    """What all methods make of a view: their name, that of the radius, and counts with what they took."""
+def judged(gpu: Gpu, view: JudgedView) -> Iterator[tuple[str, str, Row]]:
+    """Yield the verdicts of all methods on a view: their name, that of the radius, counts and the radius."""
     automatic = calibrated(view.cloud, view.eye).radius
     best = best_radius(view, partial(flipping, view.seen))
     radii = {BEST: best, AUTOMATIC: automatic}
@@ -81,16 +82,17 @@ def judged(gpu: Gpu, view: View) -> Iterator[tuple[str, str, Row]]:
     yield from _peers(view, best)
 
 
-def _on_gpu(gpu: Gpu, view: View, radius: float) -> Iterator[tuple[str, NDArray[np.uint32]]]:
-    """What the operator by sectors makes of it: name and rows, in each mode, and with the paper's sectors."""
+def _on_gpu(gpu: Gpu, view: JudgedView, radius: float) -> Iterator[tuple[str, NDArray[np.uint32]]]:
+    """Yield what the operator by sectors calls visible, in each mode, and with the paper's sectors."""
     pose = Pose(0, 0.0, "", view.cloud)
     for mode in MODES:
         yield mode, visible_points(pose, view.eye, radius=radius, mode=mode, gpu=gpu)
-    many = visible_points(pose, view.eye, radius=radius, sectors=PAPER_SECTORS, mode=HULL, gpu=gpu)
-    yield HULL_AT_4M, many
+    if MOST_PER_POINT * len(view.cloud) >= PAPER_SECTORS:
+        many = visible_points(pose, view.eye, radius=radius, sectors=PAPER_SECTORS, mode=HULL, gpu=gpu)
+        yield HULL_AT_4M, many
 
 
-def best_radius(view: View, kernel: Callable[[float], Kernel]) -> float:
+def best_radius(view: JudgedView, kernel: Callable[[float], Kernel]) -> float:
     """The radius with which the hull errs least. kernel: of a radius."""
     farthest = view.farthest
 
@@ -100,8 +102,8 @@ def best_radius(view: View, kernel: Callable[[float], Kernel]) -> float:
     return farthest * 10 ** searched_decades(right, _LOW, _HIGH)
 
 
-def _peers(view: View, radius: float) -> Iterator[tuple[str, str, Row]]:
-    """What others make of it, each at its own best; radius: the best of the exact operator."""
+def _peers(view: JudgedView, radius: float) -> Iterator[tuple[str, str, Row]]:
+    """Yield what others make of it, each at its own best; radius: the best of the exact operator."""
     middle = float(np.linalg.norm(view.seen.middle))
 
     def exponential(radius: float) -> Kernel:
@@ -118,7 +120,7 @@ def _peers(view: View, radius: float) -> Iterator[tuple[str, str, Row]]:
         yield RELAXED, BEST, _row(Verdicts.of(relaxed, view.truth), view, radius)
 
 
-def _sharpest(view: View, radius: float) -> Row:
+def _sharpest(view: JudgedView, radius: float) -> Row:
     """The least error of corners above a threshold, of the best radius and twice and thrice as large ones."""
     found = []
     for times in (1.0, 2.0, 3.0):
@@ -129,7 +131,7 @@ def _sharpest(view: View, radius: float) -> Row:
     return _row(verdicts, view, at)
 
 
-def _row(verdicts: Verdicts, view: View, radius: float | None = None) -> Row:
+def _row(verdicts: Verdicts, view: JudgedView, radius: float | None = None) -> Row:
     """Counts of one view, and the radius, where there is one, in distances to the farthest point."""
     counts = {"missed": verdicts.missed, "extra": verdicts.extra, "correct": verdicts.correct}
     return counts if radius is None else {**counts, "radius": round(radius / view.farthest, 1)}

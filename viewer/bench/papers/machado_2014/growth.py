@@ -13,7 +13,7 @@ from ....scan.pose import Pose
 from ...report.results import Row
 from ...run import Bench
 from .pictures import SECTOR_PICTURE, save_picture, sector_row
-from .verdicts import EXACT, HULL, SCENES, Verdicts, View, moments, row_of, views
+from .verdicts import EXACT, HULL, MOST_PER_POINT, SCENES, JudgedView, Verdicts, moments, row_of, views
 
 # 40 K, 100 K and 10 M are those of Fig. 13, 4 M that of the paper's experiment.
 COUNTS = (40_000, 100_000, 250_000, 630_000, 1_600_000, 4_000_000, 10_000_000)
@@ -30,12 +30,12 @@ def measure_growth(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row
                 yield {**row_of(bench, scene, moment), "views": 1, **found}
 
 
-def growth(bench: Bench, view: View) -> Iterator[Row]:
+def growth(bench: Bench, view: JudgedView) -> Iterator[Row]:
     """Rows of a view: the exact operator, and each number of sectors."""
     gpu, pose = bench.renderer.gpu, Pose(0, 0.0, "", view.cloud)
     found = calibrated(pose, view.eye)
     yield {"method": EXACT, **_told(view.hull(flipping(view.seen, found.radius)))}
-    for count in (*COUNTS, None):
+    for count in (*(k for k in COUNTS if k <= MOST_PER_POINT * len(view.cloud)), None):
         rows = visible_points(pose, view.eye, radius=found.radius, sectors=count, mode=HULL, gpu=gpu)
         sectors, steps = chosen_sectors(found, count, None)
         candidates = Candidates(gpu, sectors, len(view.cloud))

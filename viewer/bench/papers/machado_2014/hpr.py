@@ -133,7 +133,7 @@ def _error(
 
 
 def _growth(rows: Sequence[dict[str, Any]]) -> str:
-    """What more sectors bring and take."""
+    """Visible points, errors and memory by the number of sectors."""
     head = ["scene", "k", "visible", "error, %", "steps", "MB", "hold a point, %", "in the outline, %"]
     lines = []
     for row in sorted(rows, key=lambda row: (_place(rows, row), row.get("sectors", np.inf))):

@@ -22,7 +22,7 @@ from ....scan.pose import Pose
 from ....timing import draw
 from ...report.pictures import Image, titled_row
 from ...scenes.subjects import with_rows
-from .verdicts import EXACT, HULL, View
+from .verdicts import EXACT, HULL, JudgedView
 
 ERROR_PICTURE, SECTOR_PICTURE = "pictures/hpr-errors.png", "pictures/hpr-sectors.png"
 SHOWN_COUNTS = (40_000, 100_000, 10_000_000)  # Fig. 13
@@ -31,7 +31,7 @@ _CLOSER = 0.8  # of the field of view that shows the sphere around a model
 _MISSED, _EXTRA, _CORRECT = (220, 20, 20, 255), (30, 60, 235, 255), (175, 178, 182, 255)
 
 
-def error_row(renderer: Renderer, view: View) -> Image:
+def error_row(renderer: Renderer, view: JudgedView) -> Image:
     """Points called visible at the automatic radius: missed ones red, extra ones blue, others grey."""
     pose = Pose(0, 0.0, "", view.cloud)
     radius = calibrated(pose, view.eye).radius
@@ -49,7 +49,7 @@ def error_row(renderer: Renderer, view: View) -> Image:
     return titled_row(drawn)
 
 
-def marked(view: View, rows: NDArray[np.integer]) -> PointCloud:
+def marked(view: JudgedView, rows: NDArray[np.integer]) -> PointCloud:
     """The points that are visible or called so, coloured by the verdict on them."""
     called = np.zeros(len(view.truth), bool)
     called[rows] = True
@@ -60,7 +60,7 @@ def marked(view: View, rows: NDArray[np.integer]) -> PointCloud:
     return with_rows(replace(view.cloud, colors=colors), np.flatnonzero(called | view.truth))
 
 
-def sector_row(renderer: Renderer, view: View) -> Image:
+def sector_row(renderer: Renderer, view: JudgedView) -> Image:
     """Visible points by numbers of sectors, and those of the exact operator, lit."""
     pose = Pose(0, 0.0, "", view.cloud)
     radius = calibrated(pose, view.eye).radius

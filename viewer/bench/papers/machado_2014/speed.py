@@ -25,7 +25,7 @@ from ....scan.pose import Pose
 from ....timing import draw
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed
-from .verdicts import EXACT, HULL, SCENES, View, moments, row_of, views
+from .verdicts import EXACT, HULL, SCENES, JudgedView, moments, row_of, views
 
 BACKEND = "hpr"
 CALL = "call"  # of the library function, with all that it uploads and reads back
@@ -46,7 +46,7 @@ def measure_speeds(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row
             yield {**row_of(bench, scene, moment), "views": 1, **speeds(bench, view)}
 
 
-def speeds(bench: Bench, view: View) -> Row:
+def speeds(bench: Bench, view: JudgedView) -> Row:
     """Medians of a view: what each way takes, processor and wall time, ms, the first of each left out."""
     gpu, pose = bench.renderer.gpu, Pose(0, 0.0, "", view.cloud)
     found = calibrated(pose, view.eye)

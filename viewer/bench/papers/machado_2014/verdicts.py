@@ -27,6 +27,7 @@ SCENES = ("armadillo", "igea", "dragon")
 BEST, AUTOMATIC, KATZ = "best", "automatic", "Katz's search"  # radii
 EXACT, HULL, HULL_AT_4M, COMBINED = "exact", "hull", "hull, k = 4e6", "combined"
 
+MOST_PER_POINT = 1000  # sectors: with more, propagation takes too many steps
 _AZIMUTH, _ELEVATION = 30.0, 10.0  # of the first view, degrees
 
 Mask = NDArray[np.bool_]
@@ -51,12 +52,12 @@ class Verdicts:
 
     @property
     def error(self) -> float:
-        """What is wrong, in percent of what is rightly called visible, as the paper has it."""
+        """Share that is wrong, in percent of what is rightly called visible, as the paper has it."""
         return 100 * (self.missed + self.extra) / self.correct if self.correct else np.inf
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class JudgedView:
     """A cloud as one eye sees it. truth: (N,), which of its points are visible. noise: standard deviation by
     which they were moved, scan units."""
 
@@ -67,12 +68,12 @@ class View:
 
     @property
     def eye(self) -> NDArray[np.float64]:
-        """Where the eye is, (3,)."""
+        """Place of the eye, (3,)."""
         return np.array(self.camera.eye)
 
     @cached_property
     def seen(self) -> SeenPoints:
-        """Its points from the eye."""
+        """The points from the eye."""
         return SeenPoints.of(self.cloud, self.eye)
 
     @property
@@ -99,7 +100,7 @@ def moments(bench: Bench, scene: str) -> Iterator[Moment]:
         bench.note(f"{scene} is left out: {error}")
 
 
-def views(moment: Moment, count: int, noise: float = 0.0, seed: int = 0) -> Iterator[View]:
+def views(moment: Moment, count: int, noise: float = 0.0, seed: int = 0) -> Iterator[JudgedView]:
     """A moment's points from evenly spread sides, the first from the front. noise: standard deviation along
     the normals, in diameters of the model."""
     mesh, cloud = moment.mesh, moment.pose.cloud
@@ -112,7 +113,7 @@ def views(moment: Moment, count: int, noise: float = 0.0, seed: int = 0) -> Iter
     for number in range(count):
         camera = Camera.orbit(mesh.bounds, _AZIMUTH + 360 * number / count, _ELEVATION)
         truth = visible(mesh, cloud.positions + (cloud.origin - mesh.origin), camera)
-        yield View(moved, camera, truth, by)
+        yield JudgedView(moved, camera, truth, by)
 
 
 def pooled(by_view: Sequence[Row]) -> Verdicts:
