@@ -138,6 +138,7 @@ def shown(app: App) -> dict[str, Any]:
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),
         "range_note": app.ranging.words(),
+        "thumbnails": len(app.thumbnails),
         "scan_rate": app.pacing.rate,
         "undoes": app.session.history.undoes,
         "redoes": app.session.history.redoes,

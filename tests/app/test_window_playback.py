@@ -187,3 +187,23 @@ def test_the_theme_changes_the_panels_and_what_is_behind_the_scan(app: RunningAp
     screen.do("key", "t")
     app.settle()
     assert (screen.picture() == dark).all()
+
+
+def test_the_timeline_shows_the_frame_under_the_mouse_small(app: RunningApp) -> None:
+    """Also one that was not read yet; as the view has it, and once."""
+    first, last = handles(app)
+    wide, row = (last[0] - first[0]) / COUNT, first[1] - 6
+    before = app.settle().thumbnails
+    for number in (COUNT - 2, 3):
+        app.screen.do("mousemove", round(first[0] + (number + 0.5) * wide), row)
+        before = app.see(lambda state: state.thumbnails == before + 1).thumbnails  # noqa: B023
+    app.settle()
+    bottom = first[1] - 30
+    place = np.s_[bottom - 170 : bottom, first[0] : last[0]]
+    with_it = app.screen.picture()[place].astype(int)
+    app.screen.do("mousemove", 5, 300)
+    app.settle()
+    without = app.screen.picture()[place].astype(int)
+    changed = np.abs(with_it - without).max(axis=-1) > 40
+    assert changed.sum() > 3000
+    assert app.state.frame == 0, "nothing but the mouse went there"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scenes import sphere
 
+from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
@@ -61,3 +62,14 @@ def test_it_ends_where_it_is_cancelled() -> None:
         preview_picture(pose_of(sphere(1000)), SIZE)
     with pytest.raises(InputError):
         preview_picture(pose_of(PointCloud.from_arrays(np.empty((0, 3)))), SIZE)
+
+
+def test_a_camera_of_ones_own_sees_its_side() -> None:
+    points = sphere(20_000).positions
+    halves = np.where(points[:, :1] > 0, [[200, 30, 30]], [[30, 30, 200]]).astype(np.uint8)
+    pose = pose_of(PointCloud.from_arrays(points, colors=halves))
+    for x, channel in ((4, 0), (-4, 2)):
+        camera = Camera(eye=(x, 0, 0), target=(0, 0, 0))
+        picture = preview_picture(pose, SIZE, camera.projected("orthographic"))
+        seen = picture[picture[..., 3] == 255]
+        assert (seen[:, :3].argmax(axis=1) == channel).mean() > 0.99

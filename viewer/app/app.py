@@ -50,6 +50,7 @@ from .playing.ahead import Ahead
 from .playing.pacing import Pacing
 from .playing.playback import Playback
 from .playing.ranging import Ranging
+from .playing.thumbnails import Thumbnails
 from .scene.bookmarks import Bookmarks
 from .scene.counting import Counting
 from .scene.full_view import FullView
@@ -73,8 +74,9 @@ class App:
     """All that the window shows and can do. Panels read it and call its commands.
 
     session: what the user has chosen. playback: the scan. ahead: has its poses prepared. pacing: of its
-    frames. ranging: of colours, over its frames. renderer: what is on the GPU. viewport: the 3D view. marks:
-    what lies over it. rendering: which backend draws it.
+    frames. ranging: of colours, over its frames. thumbnails: of its frames, over the timeline.
+    renderer: what is on the GPU. viewport: the 3D view. marks: what lies over it. rendering: which backend
+    draws it.
     steering: what moves its camera. glide: how the picture follows that. pointer: what the mouse points at in
     it. bookmarks: cameras to go back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
@@ -120,6 +122,7 @@ class App:
         self.ahead: Ahead = Ahead(self.session, self.playback, self.renderer)
         self.pacing: Pacing = Pacing(self.session, self.playback, fps is not None)
         self.ranging: Ranging = Ranging(self.session)
+        self.thumbnails: Thumbnails = Thumbnails(window.ctx)
         self.commands = Commands()
         self.tools: Toolbox = Toolbox(
             self.session, self.playback, self.viewport, self.failures, self.note, window.touch,
@@ -423,6 +426,7 @@ class App:
             ("Hiding the window", self.window.hide),  # what is being read may take a moment to stop
             ("Opening", self._opening.cancel),
             ("Ranging", self.ranging.close),
+            ("Picturing frames", self.thumbnails.clear),
             ("Looking around", self.steering.extent.close),
             ("Reading", self.playback.close),
             ("Drawing", self.viewport.release),

@@ -79,7 +79,12 @@ class Loop:
         """Seconds to wait for events before looking at what else has changed."""
         app = self._app
         waits = (
-            app.playback.waiting or app.tasks.all or app.scans.waits or app.browser.waits or app.capture.waits
+            app.playback.waiting
+            or app.tasks.all
+            or app.scans.waits
+            or app.browser.waits
+            or app.capture.waits
+            or app.thumbnails.waits
         )
         look = _AWAIT if waits else _WATCH
         changes = (
@@ -120,6 +125,7 @@ class Loop:
             ("Pacing", lambda: app.pacing.advance(now)),
             ("Playing", lambda: app.playback.advance(now)),
             ("Ranging", lambda: app.ranging.advance(now, not (app.moving or app.playback.waiting))),
+            ("Picturing frames", lambda: app.thumbnails.advance(not (app.moving or app.playback.waiting))),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
             ("Gliding", lambda: app.glide.is_on),

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..camera import Camera
 from ..task import checkpoint
 from .pods import first_camera
 from .points import PointCloud
@@ -19,15 +20,18 @@ _DARKEST = 0.25  # of the light that falls on what faces the eye
 _SMOOTH = 2  # pixels around one that its depth is averaged over, for light
 
 
-def preview_picture(pose: Pose, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """A picture of a pose as it is first shown, lit from the eye, (H, W, 4) RGBA; alpha 0 where nothing is.
+def preview_picture(pose: Pose, size: tuple[int, int], camera: Camera | None = None) -> NDArray[np.uint8]:
+    """A picture of a pose, lit from the eye, (H, W, 4) RGBA; alpha 0 where nothing is.
 
-    size: width and height in pixels. Takes some tens of milliseconds for whatever number of points, and ends
+    size: width and height in pixels. camera: None has it as it is first shown; of an orthographic one the
+    picture is in perspective. Takes some tens of milliseconds for whatever number of points, and ends
     where its task is cancelled. Raises InputError where there is no point.
     """
     width, height = size
     cloud = pose.overview
-    camera = first_camera(pose.views, pose.bounds, width / height, pose.upright)
+    if camera is None:
+        camera = first_camera(pose.views, pose.bounds, width / height, pose.upright)
+    camera = camera.projected("perspective")
     step = -(-len(cloud) // _MOST_POINTS)
     rotation = camera.rotation()
     eye = np.subtract(camera.eye, cloud.origin)

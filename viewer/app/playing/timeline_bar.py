@@ -47,7 +47,7 @@ def draw(app: App) -> None:
     room = imgui.calc_text_size("100 of 100 fps, 10000 dropped").x + imgui.get_style().item_spacing.x
     width = imgui.get_content_region_avail().x
     is_wide = several and width - room > _SHORTEST_TRACK * imgui.get_font_size()
-    _draw_track(app.playback, app.palette, width - room if is_wide else width)
+    _draw_track(app, width - room if is_wide else width)
     if is_wide:
         imgui.same_line()
         imgui.text_disabled(report)
@@ -124,10 +124,10 @@ def _report(playback: Playback) -> str:
     return f"{shown} of {due} fps, " + ("every frame" if pace.every_frame else f"{playback.dropped} dropped")
 
 
-def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> None:
+def _draw_track(app: App, width: float) -> None:
     """Draw the frames over time: cached ones coloured, broken ones red, and seconds. A press or a drag goes
     there; what is under the mouse is told."""
-    height = imgui.get_frame_height()
+    playback, palette, height = app.playback, app.palette, imgui.get_frame_height()
     inset = ImVec2(_GRAB * _HANDLE * height, 0)  # so that handles at the ends are grabbed by either half
     if width < 2 * inset.x + 1:
         return
@@ -144,8 +144,7 @@ def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> Non
             playback.seek(frame, time.monotonic())
     if len(timeline) > 1:
         if imgui.is_item_hovered():
-            words = [frame_in_words(frame), timeline.label(frame)]
-            imgui.set_tooltip("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words))))
+            _draw_frame(app, frame)
         track.seconds(float(timeline.times[0]), playback.span)
     track.bar(0, len(playback.timeline), palette.frame[0])
     for run in playback.timeline.cached():
@@ -155,6 +154,17 @@ def _draw_track(playback: Playback, palette: theme.Palette, width: float) -> Non
     if len(playback.timeline) > 1:
         track.ends(playback.span, palette.accent)
         track.head(playback.session.index, palette.text if playback.problem is None else palette.broken)
+
+
+def _draw_frame(app: App, frame: int) -> None:
+    """Tell of a frame beside the mouse: a small picture, its time and its name."""
+    timeline, camera = app.playback.timeline, app.document.camera
+    if imgui.begin_tooltip():
+        if camera is not None:
+            app.thumbnails.draw(timeline, frame, camera, app.viewport.aspect)
+        words = [frame_in_words(frame), timeline.label(frame)]
+        imgui.text("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words))))
+        imgui.end_tooltip()
 
 
 class _Track:
