@@ -1,5 +1,9 @@
-// A ball round `center`, and the fine cells that its image may reach.
+// A ball round `center`, the fine cells that its image may reach, and the participants in these. LANES: invocations
+// that take these together.
 #include "auto_splats/place.glsl"
+
+layout(binding = TEXTURE_SLOTS) uniform usamplerBuffer slots;  // place, row and whether it is hidden
+layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 
 const float ROUNDING = 0.02;  // pixels that a point's cell may be off by, and more
 
@@ -37,4 +41,18 @@ float known_within(ivec4 cells) {
     if (cells.z < fine_size.x - 1) known.z = plane_distance(center.x, edge.z);
     if (cells.w < fine_size.y - 1) known.w = plane_distance(-center.y, edge.w);
     return min(min(known.x, known.y), min(known.z, known.w));
+}
+
+// offset: from the point, in the scan's size; row: twice the row, 1 more where it is hidden.
+void take(vec3 offset, uint row);
+
+// Takes each of LANES participants in the cells, from a lane on.
+void take_from(ivec4 cells, vec3 place, int lane) {
+    for (int y = cells.y; y <= cells.w; ++y) {
+        int line = y * fine_size.x, last = int(texelFetch(starts, line + cells.z + 1).r);
+        for (int i = int(texelFetch(starts, line + cells.x).r) + lane; i < last; i += LANES) {
+            uvec4 other = texelFetch(slots, i);
+            take(uintBitsToFloat(other.xyz) - place, other.w);
+        }
+    }
 }

@@ -1,20 +1,13 @@
 // The plane through a neighborhood by linear regression (Preiner 2012, 6), and its splat.
 #include "common/cell_reach.glsl"
 #include "common/color.glsl"
-#include "common/octahedron.glsl"
-#include "common/tangent.glsl"
 #include "auto_splats/eigen.glsl"
+#include "auto_splats/splat.glsl"
 
-layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if HAS_COLORS
 layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #endif
-#if BY_SCANNER
-layout(binding = TEXTURE_RANGE_VIEWS) uniform samplerBuffer range_views;  // its eye, and its first row
-#endif
 layout(std430, binding = STORAGE_EXTENTS) buffer Extents { float extents[]; };  // radii of neighborhoods, by row
-layout(std430, binding = STORAGE_SPLATS) writeonly buffer Splats { uint splats[]; };  // as amplify/packed.glsl reads
-layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; };  // as surfels/passes/look.glsl reads
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
 const int LEAST_COUNT = 6;  // points that tell of a surface
@@ -23,11 +16,11 @@ const int LEAST_COUNT = 6;  // points that tell of a surface
 const float FAR = 3.0;
 const float MOST = 3.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
-const float LEANING = 1.19;  // factor on how far a cell reaches, for splats that lean
 const float OPEN = 1.75;    // radii by share: a cell that reaches farther has no end there
 const float LEAST_SHARE = 0.9, MOST_SHARE = 1.39;  // of the radius by share, bounds of that by the cell
 const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good as in one pixel
-const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
+// Of the largest eigenvalue, below which the second is that of points on a line; radii that lines beside are within.
+const float LINE = 0.1, BESIDE = 6.0;
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
 
 #if ADAPTIVE
@@ -86,28 +79,6 @@ vec3 fit_plane(vec3 place, Extent extent, int count, out mat3 vectors) {
     return eigen(squares, products, vectors);
 }
 
-// What a normal of this place points to, along the pose's axes.
-vec3 seen_from(uint row) {
-    vec3 place = texelFetch(positions, int(row)).xyz;
-#if BY_SCANNER
-    vec3 scanner = vec3(0.0);
-    for (int i = 0; i < SCANNERS; ++i) {
-        vec4 view = texelFetch(range_views, i);
-        if (row >= floatBitsToUint(view.w)) scanner = view.xyz;
-    }
-    return scanner - place;
-#else
-    return transpose(mat3(world_to_view)) * (view_perspective ? -to_view(place) : vec3(0.0, 0.0, 1.0));
-#endif
-}
-
-// Which way a splat's longer half-axis lies, and how round it is, as amplify/packed.glsl has it.
-uint pack_axes(vec3 normal, vec3 longer, float roundness) {
-    vec3 u = tangent_of(normal), v = cross(normal, u);
-    float angle = atan(dot(longer, v), dot(longer, u)) / 3.14159265;
-    return packUnorm2x16(vec2(angle < 0.0 ? angle + 1.0 : angle, max(roundness, LEAST_ROUND)));
-}
-
 // Whether the point is an outlier: without another one within `alone` times the usual radius; or where neighbors are
 // far, with all of them about as far as the farthest, which those of a point of a surface are not.
 bool is_outlier(Extent extent, float usual_radius, bool sparse) {
@@ -150,7 +121,8 @@ float splat_radius(Extent extent, vec3 values, vec3 normal, float crowded, float
     return radius * reach;
 }
 
-void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
+// Returns how far lines beside it are looked for where all neighbors are on a line, scan units; else 0.
+float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     int count = extent.count;
 #if ADAPTIVE
     count = count_of_plane(place, extent);
@@ -167,12 +139,14 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     float radius = sqrt(extent.squared) / unit, sum = values.x + values.y + values.z;
     float pixel = 1.0 / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z), in_picture = typical * pixel;
     float typical_radius = max(in_picture, typical_in_space);  // near the eye, points are sparse in any picture
-    float splat = splat_radius(extent, values, normal, CROWDED * pixel * unit, min(MOST * typical_radius, max(widest, MOST * in_picture)) * unit) / unit;
+    float most = min(MOST * typical_radius, max(widest, MOST * in_picture));
+    float splat = splat_radius(extent, values, normal, CROWDED * pixel * unit, most * unit) / unit;
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
+    bool on_line = extent.count >= LEAST_COUNT && values.y < LINE * values.z;
     extents[row] = radius;
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(max(splat, LEAST));
-    splats[3u * row + 2u] = pack_axes(normal, vectors[2], values.z > 0.0 ? values.y / values.z : 1.0);
+    splats[3u * row + 2u] = pack_axes(normal, vectors[2], ELLIPTICAL && values.z > 0.0 ? values.y / values.z : 1.0);
 #if HAS_COLORS
     uvec3 roots = uvec3(to_roots(texelFetch(colors, int(row)).rgb));
     looks[2u * row] = roots.x | roots.y << 10 | roots.z << 20;
@@ -180,4 +154,5 @@ void fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     looks[2u * row + 1u] = pack_normal(normal);
     found[n] = vec4(radius, outlier ? -extent.count : extent.count,
                     sum > 0.0 ? values.x / sum : 0.0, usual_radius);
+    return on_line && !(outlier && drops) ? BESIDE * min(radius, most) : 0.0;
 }

@@ -16,23 +16,10 @@ layout(local_size_x = LANES) in;
 #include "auto_splats/k_nearest.glsl"
 #include "auto_splats/fit.glsl"
 
-layout(binding = TEXTURE_SLOTS) uniform usamplerBuffer slots;  // place, row and whether it is hidden
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of those that are searched
-layout(std430, binding = STORAGE_NEXT) buffer Next { float next[]; };  // radius of the next ball; 0: done
-layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
+// Radius of the next ball; 0: done; below 0: done, and that of a ball in which lines beside are looked for.
+layout(std430, binding = STORAGE_NEXT) buffer Next { float next[]; };
 layout(binding = TEXTURE_USUAL) uniform samplerBuffer usual;  // radius in each coarse cell, pixels
-
-// Takes each of LANES participants in the cells, from a lane on.
-void take_from(ivec4 cells, vec3 place, int lane) {
-    clear_nearest();
-    for (int y = cells.y; y <= cells.w; ++y) {
-        int line = y * fine_size.x, last = int(texelFetch(starts, line + cells.z + 1).r);
-        for (int i = int(texelFetch(starts, line + cells.x).r) + lane; i < last; i += LANES) {
-            uvec4 other = texelFetch(slots, i);
-            take(uintBitsToFloat(other.xyz) - place, other.w);
-        }
-    }
-}
 
 #if ROUND == 2
 shared float lanes_squared[LANES * K];
@@ -54,6 +41,7 @@ void merge_lanes(int lane) {
 // The extent of the neighborhood as far as one search tells. radius: of the ball, scan units.
 Extent search(vec3 place, float radius, float usual_radius, int lane) {
     ivec4 cells = cells_of(radius);
+    clear_nearest();
     take_from(cells, place, lane);
 #if ROUND == 2
     merge_lanes(lane);
@@ -97,15 +85,14 @@ void main() {
     float usual_radius = texelFetch(usual, coarse_cell(to_pixel(center))).r / scale_at(-center.z);
 #if ROUND == 0
     Extent extent = search(place, first_ball(row, usual_radius), usual_radius, 0);
-    next[n] = wider(extent);
 #elif ROUND == 1
     Extent extent = search(place, next[n], usual_radius, 0);
-    next[n] = wider(extent);
 #else
     int lane = int(gl_LocalInvocationIndex);
     Extent extent = search(place, next[n], usual_radius, lane);
     while (extent.search > 0.0) extent = search(place, wider(extent), usual_radius, lane);
     if (lane > 0) return;
 #endif
-    fit(n, row, place, usual_radius, extent);
+    float across = fit(n, row, place, usual_radius, extent);
+    next[n] = extent.search > 0.0 ? wider(extent) : -across;
 }

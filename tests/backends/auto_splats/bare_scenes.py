@@ -156,6 +156,28 @@ def _strays() -> BareScene:
     return BareScene(cloud, Camera.orbit(bounds, 10, 10, aspect=SIZE[0] / SIZE[1]))
 
 
+def ring_scan(noise: float = 0.0) -> Points:
+    """The ground and a wall as a scanner that turns sees them: 720 points a ring, and rings up to eight times
+    as far apart as ten of their points reach. noise: of distances, scan units."""
+    rng = np.random.default_rng(14)
+    turned, below = np.meshgrid(np.radians(np.arange(0, 360, 0.5)), np.radians(np.arange(-34, 20, 1.5)))
+    turned = turned + np.radians(rng.uniform(0, 0.5, (len(turned), 1)))  # rings begin anywhere
+    rays = np.stack([np.cos(turned) * np.cos(below), np.sin(turned) * np.cos(below), np.sin(below)], axis=-1)
+    rays = rays.reshape(-1, 3)
+    with np.errstate(divide="ignore"):
+        ground, wall = -1.5 / rays[:, 2], 9.0 / rays[:, 0]
+    distance = np.minimum(np.where(ground > 0, ground, np.inf), np.where(wall > 0, wall, np.inf))
+    kept = distance < 12.0
+    distance = distance[kept] + rng.normal(0, noise, np.count_nonzero(kept)) if noise else distance[kept]
+    return rays[kept] * distance[:, None]
+
+
+def ring_scene(noise: float = 0.0, size: tuple[int, int] = (320, 240)) -> BareScene:
+    """Ground and wall seen from above the scanner, with the place below it at the border of the picture."""
+    camera = Camera((-9.0, -6.0, 7.0), (2.5, 0.0, -0.8), up=(0.0, 0.0, 1.0), fov_y=50.0)
+    return BareScene(PointCloud.from_arrays(ring_scan(noise)), camera, size)
+
+
 SCENES: dict[str, Callable[[], BareScene]] = {
     "sphere": _sphere,
     "bumpy": _bumpy,
@@ -177,6 +199,7 @@ SCENES: dict[str, Callable[[], BareScene]] = {
     "cut": _cut,
     "sheets": _sheets,
     "strays": _strays,
+    "rings": ring_scene,
 }
 
 every_scene = pytest.mark.parametrize("name", SCENES)

@@ -117,6 +117,10 @@ class PlainPlanes:
         total = self.values.sum(axis=1)
         return np.divide(self.values[:, 0], total, out=np.zeros(len(total)), where=total > 0)
 
+    def on_lines(self, most: float) -> NDArray[np.bool_]:
+        """Tell where the second eigenvalue is less than this share of the largest, (M,): points on a line."""
+        return self.values[:, 1] < most * self.values[:, 2]
+
     def distinct(self, least: float) -> NDArray[np.bool_]:
         """Tell where the two lowest eigenvalues differ by this share of the largest, (M,)."""
         return self.values[:, 1] - self.values[:, 0] > least * self.values[:, 2]
@@ -195,3 +199,33 @@ def cell_reaches(
     with np.errstate(divide="ignore", invalid="ignore"):
         edges = np.where(beyond[..., None] & (along > 1e-9), squared[..., None] / (2 * along), np.inf)
     return edges.min(axis=1), 2 / np.sqrt(np.maximum(1, shares[:, 1:].sum(axis=1) + 1))
+
+
+def beside_lines(
+    cloud: PointCloud,
+    rows: NDArray[np.integer],
+    along: Floats,
+    participants: NDArray[np.integer],
+    least: Floats,
+    most: Floats,
+) -> tuple[Floats, Floats]:
+    """From the line through each of M points to the nearest participant that is beside it, (M, 3), and to the
+    nearest that is opposite; 0 where there is none.
+
+    along: (M, 3), unit, of the line. Beside is what is farther from the point across the line than along it;
+    opposite what is at least 120 degrees round the line from the first. least, most: (M,), how far both are
+    from the point.
+    """
+    points = cloud.positions[np.sort(participants)].astype(np.float64)
+    found = np.zeros((2, len(rows), 3))
+    for number, (row, line) in enumerate(zip(rows, along, strict=True)):
+        offsets = points - cloud.positions[row]
+        ahead = offsets @ line
+        across = offsets - ahead[:, None] * line
+        distances, widths = np.linalg.norm(offsets, axis=1), np.linalg.norm(across, axis=1)
+        is_beside = (widths > np.abs(ahead)) & (distances > least[number]) & (distances <= most[number])
+        for side in found[:, number]:
+            if is_beside.any():
+                side[:] = across[np.where(is_beside, distances, np.inf).argmin()]
+                is_beside &= across @ side <= -0.5 * widths * np.linalg.norm(side)
+    return found[0], found[1]

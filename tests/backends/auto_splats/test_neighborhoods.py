@@ -9,9 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from bare_scenes import SCENES, BareScene, every_scene, on_unit_sphere, seen
+from bare_scenes import SCENES, BareScene, every_scene, on_unit_sphere, ring_scene, seen
 from numpy.typing import NDArray
-from plain_neighborhoods import PlainNeighborhoods, cell_reaches, certain_counts, neighborhoods, planes
+from plain_neighborhoods import (
+    PlainNeighborhoods,
+    beside_lines,
+    cell_reaches,
+    certain_counts,
+    neighborhoods,
+    planes,
+)
 
 import viewer
 from viewer.analysis.visible_normals import VisibleNormals
@@ -35,6 +42,7 @@ EXACT = 4e-6  # of a radius: some roundings of float32
 # Bounds of splats in radii of a point's share, and the factor on what cells reach.
 LEAST_SHARE, MOST_SHARE, OPEN, LEANING = 0.9, 1.39, 1.75, 1.19
 CROWDED = 4.0  # pixels within which hidden neighbours have no cell
+LINE, APART, BESIDE = 0.1, 0.4, 6.0  # when neighbours are on a line; radii that others beside it are away
 DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
 
 
@@ -62,7 +70,7 @@ def check(
     np.testing.assert_allclose(found.radii, true.radii, rtol=EXACT, atol=0)
     fitted = planes(cloud, found.rows, true)
     clear = true.clear(EXACT) if rounded else np.ones(len(found.rows), bool)
-    known = clear & fitted.distinct(DISTINCT)
+    known = clear & fitted.distinct(DISTINCT) & ~fitted.on_lines(1.01 * LINE)
     angle = angles_between(found.normals[known], fitted.normals[known])
     assert np.minimum(angle, 180 - angle).max(initial=0) < 0.1
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1, atol=1e-4)
@@ -125,13 +133,55 @@ def test_splats_reach_as_far_as_cells(name: str) -> None:
     reach = np.maximum(closing.max(axis=1), LEAST_SHARE * shares)
     near_limit = (np.abs(edges / share - OPEN) < 0.01).any(axis=1)
     values = planes(scene.cloud, found.rows, true).values
-    on_line = values[:, 1] <= 2e-5 * values[:, 2]
+    on_line = values[:, 1] <= 1.01 * LINE * values[:, 2]
     near_limit |= (hidden & np.isclose(true.distances, crowded, rtol=1e-4)).any(axis=1)
     clear = true.clear(EXACT) & ~found.outliers & ~on_line & ~near_limit  # elsewhere rounding decides
     expected = (true.radii * reach)[clear]
     as_expected = np.isclose(found.splat_radii[clear], expected, rtol=0.01)
     assert (as_expected | (found.splat_radii[clear] < expected)).all()  # smaller where points are sparse
     assert np.count_nonzero(as_expected) >= 0.8 * len(expected) or name == "strays"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_planes_of_lines_go_through_the_nearest_beside_them(noise: float) -> None:
+    """And splats reach no less far along the line than a quarter of how far they reach beside it."""
+    scene = ring_scene(noise)
+    found = estimated(scene)
+    true = check(scene, found)
+    fitted = planes(scene.cloud, found.rows, true)
+    on_line = fitted.on_lines(0.99 * LINE) & ~found.outliers & (true.counts >= LEAST_COUNT)
+    rows, along, radii = found.rows[on_line], fitted.vectors[on_line, :, 2], true.radii[on_line]
+    one, other = beside_lines(
+        scene.cloud, rows, along, found.neighbors, APART * radii, BESIDE * (1 - EXACT) * radii
+    )
+    gaps = np.linalg.norm(one, axis=1)
+    assert np.count_nonzero(gaps) > 2000
+    normals = np.cross(along, one - other)[gaps > 0]
+    angles = angles_between(found.normals[on_line][gaps > 0], normals)
+    # Which one is nearest, or opposite enough, is decided by rounding here and there.
+    assert (np.minimum(angles, 180 - angles) < 0.1).mean() > 0.99
+    longer = 0.5 * LEANING * np.maximum(gaps, np.linalg.norm(other, axis=1))
+    assert (found.splat_radii[on_line] >= 0.249 * longer).mean() > 0.99
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_rings_close(noise: float, draw: Callable[..., Surface]) -> None:
+    """The ground is closed from ring to ring, and lies flat."""
+    scene = ring_scene(noise, (640, 480))
+    surface = draw(scene.cloud, scene.camera, scene.size, "auto_splats")
+    x, y = (axis.ravel() + 0.5 for axis in np.meshgrid(*map(np.arange, scene.size)))
+    pixels, view = np.column_stack([x, y]), surface.view
+    rays = view.unproject(pixels, np.full(len(pixels), 2.0)) - view.unproject(pixels, np.ones(len(pixels)))
+    eye = np.array(scene.camera.eye)
+    ground = eye + rays * ((-1.5 - eye[2]) / rays[:, 2:])
+    away = np.hypot(*ground[:, :2].T)
+    within = (away > 2.6) & (away < 7.5) & (rays[:, 2] < 0)
+    inside = (np.minimum(x, scene.size[0] - x) > 24) & (np.minimum(y, scene.size[1] - y) > 24)
+    seen = (within & inside).reshape(scene.size[::-1])
+    assert np.count_nonzero(seen) > 50_000
+    assert np.isinf(surface.depth[seen]).mean() <= (0.003 if noise else 0)
+    tilts = np.degrees(np.arccos(np.clip(surface.normal[seen & np.isfinite(surface.depth), 2], -1, 1)))
+    assert np.median(tilts) < (8 if noise else 0.5)
 
 
 @pytest.mark.parametrize("k", [3, 4, 7, 16, pytest.param(32, marks=pytest.mark.slow)])

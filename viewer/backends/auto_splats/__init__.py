@@ -15,7 +15,7 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import NO_SPACING, FrameView, Limit, Suited
+from .. import FrameView, Limit, Suited
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
@@ -38,8 +38,6 @@ LIMITS = {
     "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
     "1x1 pixels": Limit(0.0, _BY_PICTURE),
     "8192x1 pixels": Limit(0.0, _BY_PICTURE),
-    "collinear points end on, perspective": Limit(0.03, NO_SPACING),
-    "collinear points end on, orthographic": Limit(0.03, NO_SPACING),
 }
 
 _FEW = 1000  # points
@@ -171,7 +169,6 @@ def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:
         count=found.count,
         rows=found["drawn"],
         buffers=buffers,
-        elliptical=params.elliptical,
     )
 
 
@@ -185,5 +182,6 @@ def search_of(params: Params, pose: GpuPose) -> Search:
         alone=2.0**params.expansions,
         drops=not params.outliers,
         adaptive=params.adaptive,
+        elliptical=params.elliptical,
         by_scanner=params.orient == "scanner" and bool(pose.views),
     )

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,7 +58,8 @@ class Search:
     growth: of the area of a ball within which another point must follow; alone: the radius within which the
     second point must lie, in usual ones; others are outliers. drops: whether these have no splat. by_scanner:
     whether normals point to the side that a range view saw, not to the eye. adaptive: whether planes go
-    through as few of the nearest as noise allows.
+    through as few of the nearest as noise allows. elliptical: whether splats are longer where neighbors are
+    farther apart; else only those of lines of points are no discs.
     """
 
     k: int = 10
@@ -68,6 +70,7 @@ class Search:
     drops: bool = True
     by_scanner: bool = False
     adaptive: bool = False
+    elliptical: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,7 @@ class Neighborhoods:
         self._pixels = IndexList(gpu, size[0] * size[1])  # that show a point; then what one search left
         self._rest = IndexList(gpu, size[0] * size[1], GROUP)  # what two left
         self._searched = IndexList(gpu, size[0] * size[1])  # slots
+        self._lines = IndexList(gpu, size[0] * size[1])  # whose neighborhoods are of points on a line
         self._texels: dict[str, gl.BufferTexture] = {}
         self._totals = gpu.ctx.buffer(reserve=8)
         self._bins = Bins(gpu, 1)
@@ -105,14 +109,14 @@ class Neighborhoods:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        lists = self._pixels.nbytes + self._rest.nbytes + self._searched.nbytes + self._bins.nbytes
-        return lists + sum(texels.buffer.size for texels in self._texels.values())
+        lists = (self._pixels, self._rest, self._searched, self._lines, self._bins)
+        texels = sum(texels.buffer.size for texels in self._texels.values())
+        return sum(each.nbytes for each in lists) + texels
 
     def release(self) -> None:
         """Delete everything."""
-        self._gpu.discard(
-            self._pixels, self._rest, self._searched, self._bins, self._totals, *self._texels.values()
-        )
+        lists = (self._pixels, self._rest, self._searched, self._lines)
+        self._gpu.discard(*lists, self._bins, self._totals, *self._texels.values())
 
     def __getitem__(self, name: str) -> gl.BufferTexture:
         return self._texels[name]
@@ -319,6 +323,7 @@ class Neighborhoods:
                 with self._gpu.timers.measure("unknown"):
                     list_flagged(self._gpu, "auto_splats/unknown.glsl", self.count, listed, self._bind_next)
             self._run_search(pose, search, number, first, listed)
+        self._join_lines(pose, search)
 
     def read_rounds(self) -> dict[str, int]:
         """How many neighborhoods were known after one search, two, and more, in the last picture."""
@@ -336,31 +341,43 @@ class Neighborhoods:
             "FIRST_BALL": _FIRST_BALL,
             "LANES": _LANES if number == 2 else 1,
             "HAS_COLORS": int(pose.cloud.colors is not None),
-            "BY_SCANNER": int(search.by_scanner),
             "ADAPTIVE": int(search.adaptive),
+            "ELLIPTICAL": str(search.elliptical).lower(),
             "DIRECTIONS": _DIRECTIONS,
-            "SCANNERS": len(pose.views) if search.by_scanner else 0,
         }
         with self._gpu.timers.measure("search"):
-            program = self._gpu.compute("auto_splats/search.comp", defines, params=self._grids)
-            pose.array("positions").bind(Texture.POSITIONS)
+            program = self._searching("auto_splats/search.comp", pose, search, defines)
             if pose.cloud.colors is not None:
                 pose.array("colors").bind(Texture.COLORS)
-            if search.by_scanner:
-                pose.packed(_scanners, pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
-            self["slots"].bind(Texture.SLOTS)
-            self["drawn"].bind(Texture.DRAWN_ROWS)
-            self._searched.texels.bind(Texture.LISTED)
-            self._bins.starts.bind(Texture.STARTS)
             self["usual"].bind(Texture.USUAL)
-            self._bind_storage(splats=Storage.SPLATS, looks=Storage.LOOKS, found=Storage.FOUND)
-            self._bind_storage(extents=Storage.EXTENTS)
-            self._bind_next(program)
+            self._bind_storage(found=Storage.FOUND)
             if listed is None:
                 self._gpu.set(program, first=first)
                 self._gpu.dispatch(program, self.count - first)
             else:
                 listed.run(program)
+
+    def _join_lines(self, pose: GpuPose, search: Search) -> None:
+        """Have splats of points on a line reach halfway to the lines beside."""
+        with self._gpu.timers.measure("lines"):
+            list_flagged(self._gpu, "auto_splats/lines.glsl", self.count, self._lines, self._bind_next)
+            self._lines.run(self._searching("auto_splats/lines.comp", pose, search, {"LANES": 1}))
+
+    def _searching(
+        self, name: str, pose: GpuPose, search: Search, defines: Mapping[str, object]
+    ) -> moderngl.ComputeShader:
+        """A program that takes participants from cells and makes splats, with what it reads."""
+        views = {"BY_SCANNER": int(search.by_scanner), "SCANNERS": len(pose.views) * search.by_scanner}
+        program = self._gpu.compute(name, {**views, **defines}, params=self._grids)
+        pose.array("positions").bind(Texture.POSITIONS)
+        if search.by_scanner:
+            pose.packed(_scanners, pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
+        self["slots"].bind(Texture.SLOTS)
+        self._searched.texels.bind(Texture.LISTED)
+        self._bins.starts.bind(Texture.STARTS)
+        self._bind_storage(splats=Storage.SPLATS, looks=Storage.LOOKS, extents=Storage.EXTENTS)
+        self._bind_next(program)
+        return program
 
     def _bind_next(self, _: Program) -> None:
         self._bind_storage(next=Storage.NEXT)
