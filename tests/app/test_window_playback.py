@@ -10,10 +10,8 @@ import pytest
 from virtual_screen import PANEL, RunningApp, Screen, running_app, virtual_screen
 from written import picture
 
-from viewer.app.theme import PALETTES
-from viewer.look import rgba
-
 from viewer.app.theme import PALETTES, rgb
+from viewer.look import rgba
 
 SIZE = (1280, 720)
 TRACK = 300  # pixels from the left, between the loop's button and the bar
@@ -145,7 +143,7 @@ def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:
 
 
 def test_backgrounds_by_what_they_are_for_are_shown_and_saved(app: RunningApp) -> None:
-    left, top, width, height = app.view()
+    left, top, *_ = app.view()
     corner = np.s_[top + 60 : top + 120, left + 20 : left + 80]
     for name, shade in (("white", 255), ("black", 0)):
         app.choose(PANEL, "background/##background", f"###{name}")
