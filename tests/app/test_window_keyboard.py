@@ -10,6 +10,7 @@ import pytest
 from virtual_screen import RunningApp, Screen, running_app
 
 from viewer.app.theme import PALETTES, rgb
+from viewer.camera import Camera
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +138,27 @@ def test_the_mouse_takes_the_keyboard_back(app: RunningApp) -> None:
     assert framed(app, *panel(app)) == ticks
     press(app, "Right")
     assert app.settle().frame == 1
+
+
+def test_the_view_is_turned_panned_and_zoomed_by_keys(app: RunningApp) -> None:
+    """By so many steps: on a slow machine a key that is pressed briefly repeats."""
+    start = Camera.from_json(app.settle().camera)
+    app.screen.do("key", "ctrl+Left", "key", "ctrl+Left")
+    turned = Camera.from_json(app.settle().camera)
+    steps = np.degrees(np.arccos(start.rotation()[2] @ turned.rotation()[2])) / 15
+    assert steps == pytest.approx(max(round(steps), 2))
+    assert turned.rotation()[2][0] > 0, "as a drag to the left"
+    press(app, "ctrl+z")
+    assert Camera.from_json(app.settle().camera) == start, "they are one step"
+    press(app, "shift+Up")
+    moved = Camera.from_json(app.settle().camera)
+    steps = 12 * np.subtract(start.target, moved.target)[1] / start.view_height
+    assert steps == pytest.approx(max(round(steps), 1), abs=1e-3)
+    press(app, "equal")
+    near = Camera.from_json(app.settle().camera).distance
+    assert near < moved.distance
+    press(app, "minus")
+    assert Camera.from_json(app.settle().camera).distance > near
 
 
 def test_the_dialog_that_exports_is_filled_in_by_keys(app: RunningApp) -> None:

@@ -122,6 +122,17 @@ def _view(number: int, side: str) -> Command[App]:
     )  # fmt: skip
 
 
+_WAYS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
+
+
+def _nudge(gesture: str, title: str, side: str, key: str) -> Command[App]:
+    """Moves the view as a short drag to a side does."""
+    return Command(
+        f"{gesture}_{side}", title, lambda app: app.steering.nudge(gesture, *_WAYS[side]), key, repeats=True,
+        can=_has_camera,
+    )  # fmt: skip
+
+
 def switch_commands(several: Iterable[Backend]) -> tuple[Command[App], ...]:
     """Commands that switch the parameters with a key that backends declare; one name has one key in all."""
     found: dict[str, Command[App]] = {}
@@ -249,6 +260,11 @@ _BOOKMARKS: Menu[App] = Menu("Bookmarks", (
 _FROM: Menu[App] = Menu(
     "From", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)
 )
+_MOVE: Menu[App] = Menu("Move", (
+    tuple(_nudge("orbit", f"Turn {side}", side, f"Ctrl+{side.capitalize()}") for side in _WAYS),
+    tuple(_nudge("pan", f"Shift {side}", side, f"Shift+{side.capitalize()}") for side in _WAYS),
+    (_nudge("zoom", "Nearer", "up", "="), _nudge("zoom", "Farther", "down", "-")),
+))  # fmt: skip
 _VIEW: Menu[App] = Menu("View", (
     (
         Command(
@@ -261,6 +277,7 @@ _VIEW: Menu[App] = Menu("View", (
             is_on=lambda app: app.steering.follows, can=_has_frames,
         ),
         _FROM,
+        _MOVE,
         Listing("Up", lambda app: app.steering.ups()),
         Command(
             "set_front", "This side is the front", lambda app: app.steering.set_front(), can=_has_camera

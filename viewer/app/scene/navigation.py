@@ -1,4 +1,4 @@
-"""How the mouse moves the camera. Plain functions; distances in heights of the view."""
+"""How the mouse, and keys, move the camera. Plain functions; distances in heights of the view."""
 
 from __future__ import annotations
 
@@ -49,6 +49,15 @@ def shows(camera: Camera, bounds: Bounds, aspect: float) -> bool:
     if camera.projection == "perspective":
         half *= (max(-back, 0.0) + radius) / camera.distance
     return bool(back < radius and abs(up) < half + radius and abs(right) < half * aspect + radius)
+
+
+def drag(
+    gesture: str, camera: Camera, right: float, up: float, radius: float, pivot: Vector | None = None
+) -> Camera:
+    """Move as a drag does. gesture: "orbit", "pan" or "zoom". pivot, radius: as for `orbit` and `zoom`."""
+    if gesture == "zoom":
+        return zoom(camera, up, radius)
+    return pan(camera, right, up) if gesture == "pan" else orbit(camera, right, up, pivot)
 
 
 def orbit(camera: Camera, right: float, up: float, pivot: Vector | None = None) -> Camera:

@@ -27,7 +27,8 @@ from .pointed import Pointer
 from .turntable import Turntable
 from .viewport import Viewport
 
-_PAUSE = 0.5  # seconds without the wheel, after which turning it is another step
+_STEP = 1 / 12  # heights of the view that a key moves by: 15 degrees
+_PAUSE = 0.5  # seconds without the wheel or a key that moves, after which these are another step
 
 
 class Steering:
@@ -59,7 +60,7 @@ class Steering:
         self._followed: Pose | None = None  # where the camera is with the subject
         self._first: Camera | None = None  # that a scan was first shown with
         self._is_checked, self._up_is_told, self._note = False, up_is_told, note
-        self._wheeled = -math.inf  # by the clock, when the wheel was turned last
+        self._stepped = -math.inf  # by the clock, when the wheel or a key moved it last
 
     @property
     def moves(self) -> bool:
@@ -169,14 +170,27 @@ class Steering:
         """Follow the mouse; what it does without a pause is one step of the history. name: of that."""
         self._session.change(name, merge=name, camera=camera)
 
+    def drag(self, gesture: str, right: float, up: float, radius: float) -> None:
+        """Follow a drag, see `navigation.drag`. right, up: in heights of the view. radius: of the scan."""
+        if camera := self._session.document.camera:
+            pivot = self._session.document.pivot
+            self.move(gesture.capitalize(), navigation.drag(gesture, camera, right, up, radius, pivot))
+
+    def nudge(self, gesture: str, right: float, up: float) -> None:
+        """Move as a short drag does, without a mouse. right, up: in steps."""
+        if pose := self._playback.pose:
+            self.turntable.stop()
+            self._stepped = time.monotonic()
+            self.drag(gesture, _STEP * right, _STEP * up, self._viewport.bounds(pose).radius)
+
     def zoom(self, camera: Camera) -> None:
         """Follow the wheel, in one step as well, though nothing tells when it comes to rest."""
-        self._wheeled = time.monotonic()
+        self._stepped = time.monotonic()
         self.move("Zoom", camera)
 
     def rests(self, now: float) -> bool:
         """Whether what moves the camera has come to an end. now: by the clock, seconds."""
-        return not self.moves and now - self._wheeled > _PAUSE
+        return not self.moves and now - self._stepped > _PAUSE
 
     def settle(self, pose: Pose) -> None:
         """Fit the camera to a pose that is to be drawn where there is none, or one that shows nothing of it:

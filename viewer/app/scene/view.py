@@ -89,13 +89,7 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
     elif gesture:
         # The move that ends with the release counts as well, that of the press does not.
         right, up = io.mouse_delta.x / size.y, -io.mouse_delta.y / size.y
-        if gesture == "zoom":
-            camera = navigation.zoom(camera, up, radius)
-        elif gesture == "pan":
-            camera = navigation.pan(camera, right, up)
-        else:
-            camera = navigation.orbit(camera, right, up, app.document.pivot)
-        app.steering.move(gesture.capitalize(), camera)
+        app.steering.drag(gesture, right, up, radius)
     if not imgui.is_item_active():
         app.steering.gesture = None
 
