@@ -1,6 +1,7 @@
 // Propagation, step by step. TAKE 0: each listed sector looks whether a neighbour's candidate is better for it, and
 // goes into the next list if so. TAKE 1: those sectors take what they found, and their neighbours go into the next
-// list, each once. Nobody reads what others write in the same pass, so that the result is the same in any order.
+// list, each once; but for the LAST step. Nobody reads what others write in the same pass, so that the result is the
+// same in any order.
 #include "common/item.glsl"
 #include "common/list.glsl"
 #include "hpr/next_list.glsl"
@@ -29,12 +30,14 @@ void main() {
     uint row = texelFetch(found_rows, int(i)).r;
     rows[sector] = row;
     keys[sector] = key_of(texelFetch(spots, int(row)).xyz, direction);
+#if !LAST
     for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x) {
             uint neighbor = neighbor_at(place, ivec2(x, y));
             if (neighbor == NOTHING || neighbor == sector || stamps[neighbor] == NOTHING) continue;
             if (atomicExchange(stamps[neighbor], step_number) != step_number) next_list[reserve_next(1u)] = neighbor;
         }
+#endif
 #else
     uint key = texelFetch(keys, int(sector)).r, row = texelFetch(rows, int(sector)).r, own = row;
     for (int y = -1; y <= 1; ++y)

@@ -140,6 +140,22 @@ uint neighbor_at(ivec3 place, ivec2 step) {
 
 uint neighbor_of(uint sector, ivec2 step) { return neighbor_at(place_of(sector), step); }
 
+// How far a spot is from the eye, in units: beyond the center of a grid.
+float farther_of(vec3 spot) { return CUBE == 1 ? length(spot) : spot.z; }
+
+// The way from one spot's direction to another's, near it, along axes at right angles: its square is q of keys.
+vec3 across(vec3 from, vec3 to) {
+#if CUBE
+    return normalize(to) - normalize(from);
+#else
+    vec2 apart = to.xy - from.xy;
+    float t2 = tangent * tangent, out_from = dot(from.xy, from.xy);
+    float stretch = inversesqrt(1.0 + t2 * out_from);
+    float along = out_from > 0.0 ? (stretch - 1.0) * dot(apart, from.xy) / out_from : 0.0;
+    return vec3(stretch * (apart + along * from.xy), 0.0);
+#endif
+}
+
 // What is least for the point whose flip is farthest along a direction.
 float distance_key(vec3 spot, vec3 direction) {
 #if CUBE
@@ -167,3 +183,10 @@ uint key_of(vec3 spot, vec3 direction) {
     uint bits = floatBitsToUint(clamp(distance_key(spot, direction), -1e38, 1e38));
     return (bits & 0x80000000u) != 0u ? ~bits >> 1u : (bits | 0x80000000u) >> 1u;
 }
+
+float key_from(uint key) {
+    return uintBitsToFloat((key & 0x40000000u) != 0u ? key << 1u & 0x7fffffffu : ~(key << 1u));
+}
+
+// The width of a sector in the middle of a face, in the terms of `across`.
+float sector_size() { return 2.0 * half_angle / float(edge); }

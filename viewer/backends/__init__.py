@@ -84,10 +84,11 @@ class Limit:
         return all(getattr(params, name) in values for name, values in self.when.items())
 
 
-# A reason of limits that several backends have.
+# Reasons of limits that several backends have.
 NO_SPACING = (
     "points are drawn as large as they lie apart, which a line of them end on, or one alone, does not tell"
 )
+NO_DETAIL = "what is divided is the whole scan: a detail, tiny beside it, is within few of the parts"
 
 
 class Derived(Protocol):

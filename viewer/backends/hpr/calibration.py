@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from .sectors import Sectors
 _OCCUPIED = 0.5  # of the sectors inside the object's outline: a of eq. 5
 _COARSE = 64  # cells along an edge of the coarse map
 _PARTS = 4  # steps in which the edge doubles: small changes of a scan leave it
+_NEAREST = 0.02  # share of the points
+_LEAST = 1 / 16  # of the usual distance: gaps between nearer points stay open
 _ROOM = 1 + 1e-5  # so that rounding puts no point of the sphere outside the grid
 
 
@@ -56,6 +59,16 @@ def _distinct(positions: NDArray[np.float32]) -> int:
     return 1 + int(np.count_nonzero(mixed[1:] != mixed[:-1]))
 
 
+class Search(NamedTuple):
+    """A search for visible points. sectors: how directions are divided. steps: of propagation, which close
+    the gaps between visible points. stride: sectors between those whose candidates are compared with a
+    point."""
+
+    sectors: Sectors
+    steps: int
+    stride: int
+
+
 @dataclass(frozen=True)
 class EyeCalibration:
     """Sectors and flip that suit a cloud as one eye sees it.
@@ -70,10 +83,11 @@ class EyeCalibration:
     occupied: float
     spacing: float
 
-    def with_sectors(self, edge: int) -> tuple[Sectors, int]:
-        """Sectors of these directions, so many along an edge, and the steps of propagation that close the
-        gaps between visible points in them."""
-        return self.sectors.divided(edge), max(math.ceil(self.spacing * edge / self.sectors.edge), 1)
+    def with_sectors(self, edge: int) -> Search:
+        """The search in sectors of these directions, so many along an edge."""
+        finer = edge / self.sectors.edge
+        sectors = self.sectors.divided(edge)
+        return Search(sectors, max(int(self.spacing * finer), 1), max(round(finer), 1))
 
 
 def calibrate(
@@ -100,10 +114,14 @@ def calibrate(
     edge = max(round(2 ** (round(_PARTS * math.log2(wanted)) / _PARTS)), 1)
     found = sectors.divided(edge)
     spacing = math.sqrt(2 * inside / count)  # half of the points are seen
+    apart = 2 * found.angle  # alpha
     if math.isinf(found.distance):
-        return EyeCalibration(found.weighted(4 * depth / (2 * found.angle) ** 2), math.inf, share, spacing)
+        return EyeCalibration(found.weighted(4 * depth / apart), math.inf, share, spacing)
+    distances = found.distances(spots[np.isfinite(spots[:, 2])])
+    surface = float(distances.mean()) if len(distances) else found.unit
+    if len(distances):  # near points lie farther apart
+        spacing *= surface / max(float(np.quantile(distances, _NEAREST)), _LEAST * surface)
     if radius is None:
-        surface = float(np.nanmean(found.distances(spots)))
-        radius = surface / 2 + depth * found.unit / (4 * math.sin(2 * found.angle / 4) ** 2)
+        radius = surface * (0.5 + depth * apart / (4 * math.sin(apart / 4) ** 2))
         radius = max(radius, found.farthest)
     return EyeCalibration(found.flipped(radius), radius, share, spacing)

@@ -21,7 +21,7 @@ from .sectors import Sectors
 
 EVERYWHERE = (0.0, 0.0, 0.0, 1.0)  # the clip plane that leaves out no point
 UNLIMITED = 1 << 30  # steps: until nothing changes
-_RUN = 8  # sectors an invocation of hpr/empty.comp looks at
+_RUN = 8  # sectors an invocation of hpr/empty.comp looks at, points one of hpr/near.comp
 _STEPS_AT_ONCE = 32  # of propagation, before the CPU asks whether anything still changes
 _EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones is coarser (4.3)
 
@@ -58,14 +58,17 @@ class Candidates:
         self.homes = texels(points, gl.RG32UI, 2)
         self.visible = texels(points, gl.R32UI, 1)
         self._todo, self._changed = (IndexList(gpu, sectors.count) for _ in range(2))
+        self._near = IndexList(gpu, max(points, 1))
         self.steps, self.looked_at = 0, points
 
     @property
     def nbytes(self) -> int:
-        """Bytes held on the GPU: 28 a sector and 24 a point."""
+        """Bytes held on the GPU: 24 a sector and up to 4 of cells, 28 a point."""
         held = (self.rows, self.keys, self._stamps, self._found, self._occupied)
         by_row = (self.spots, self.homes, self.visible)
-        return sum(each.buffer.size for each in (*held, *by_row)) + self._todo.nbytes + self._changed.nbytes
+        return sum(each.buffer.size for each in (*held, *by_row)) + sum(
+            each.nbytes for each in (self._todo, self._changed, self._near)
+        )
 
     @property
     def defines(self) -> dict[str, object]:
@@ -81,6 +84,7 @@ class Candidates:
         positions: gl.BufferTexture,
         sectors: Sectors,
         steps: int,
+        stride: int = 1,
         *,
         sample: tuple[gl.BufferTexture, int] | None = None,
         among: gl.BufferTexture | None = None,
@@ -89,9 +93,9 @@ class Candidates:
         """Find the candidates of sectors, and which points are visible.
 
         positions: RGB32F, a texel a point, relative to the origin of the sectors. steps: of propagation at
-        most. sample: rows that are looked at in place of all, R32UI, and how many. among: R32UI, a texel a
-        point, leaves out those where it is 0; `visible` is then left as it is. clip: a plane, points below
-        which are left out.
+        most. stride: sectors between those whose candidates a point is compared with. sample: rows that are
+        looked at in place of all, R32UI, and how many. among: R32UI, a texel a point, leaves out those where
+        it is 0; `visible` is then left as it is. clip: a plane, points below which are left out.
         """
         self.sectors, self.steps = sectors, steps
         gpu, shift = self._gpu, self._cell_shift()
@@ -120,7 +124,7 @@ class Candidates:
         with gpu.timers.measure("propagate"):
             self._propagate(steps)
         if among is None:
-            self._mark_visible(sampled)
+            self._mark_visible(sampled, stride)
 
     def _cell_shift(self) -> int:
         """Halvings of the grid, until its cells are so few for the points that none inside is empty by
@@ -142,9 +146,9 @@ class Candidates:
 
     def _propagate(self, steps: int) -> None:
         gpu = self._gpu
-        look, take = (
-            gpu.compute("hpr/propagate.comp", {"TAKE": take, **self.defines}, params=self.sectors)
-            for take in (0, 1)
+        look, take, take_last = (
+            gpu.compute("hpr/propagate.comp", {**step, **self.defines}, params=self.sectors)
+            for step in ({"TAKE": 0}, {"TAKE": 1, "LAST": 0}, {"TAKE": 1, "LAST": 1})
         )
         self.spots.bind(Texture.SPOTS)
         self.keys.bind(Texture.KEYS)
@@ -161,19 +165,29 @@ class Candidates:
             self.rows.buffer.bind_to_storage_buffer(Storage.BEST)
             self._stamps.buffer.bind_to_storage_buffer(Storage.STAMPS)
             gpu.set(take, step_number=step)
-            self._changed.run(take)
+            self._changed.run(take if step < steps else take_last)
             if step % _STEPS_AT_ONCE == 0 and not len(self._todo):
                 break
 
-    def _mark_visible(self, sampled: dict[str, int]) -> None:
+    def _mark_visible(self, sampled: dict[str, int], stride: int) -> None:
         gpu = self._gpu
+        near, on_hull = (
+            gpu.compute(f"hpr/{name}.comp", {**sampled, **self.defines}, params=self.sectors)
+            for name in ("near", "visible")
+        )
         gl.clear_words(self.visible.buffer, 0)
         with gpu.timers.measure("visible"):
             self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
             self.homes.bind(Texture.HOMES)
             self.rows.bind(Texture.BEST)
-            for mark, count in ((0, self.looked_at), (1, self.sectors.count)):
-                gpu.dispatch(gpu.compute("hpr/visible.comp", {"MARK": mark, **sampled}), count)
+            self.keys.bind(Texture.KEYS)
+            self.spots.bind(Texture.SPOTS)
+            self._near.clear()
+            self._near.bind()
+            gpu.set(near, point_count=self.looked_at, stride=stride)
+            gpu.set(on_hull, stride=stride)
+            gpu.dispatch(near, -(-self.looked_at // _RUN))
+            self._near.run(on_hull)
 
     def visible_rows(self) -> NDArray[np.uint32]:
         """The rows that are visible, ascending; waits for the GPU."""
@@ -196,5 +210,5 @@ class Candidates:
             each.release()
         for each in (self.spots, self.homes, self.visible):
             each.release()
-        self._todo.release()
-        self._changed.release()
+        for listed in (self._todo, self._changed, self._near):
+            listed.release()

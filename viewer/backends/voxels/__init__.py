@@ -25,7 +25,7 @@ from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...view import View
-from .. import NO_SPACING, FrameView, Limit
+from .. import NO_DETAIL, NO_SPACING, FrameView, Limit
 from ..surfels.passes import blends
 from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
@@ -38,7 +38,6 @@ DERIVES_ON_THREAD = True
 _AROUND_ALL = (
     "octants divide the cube around the points, upright: others, or turned ones, lie in other octants"
 )
-_FEW_LEVELS = "an octree has 21 levels: a millionth of its cube is one octant"
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
 # Rows of the stability suite that octants cannot hold in principle.
@@ -47,7 +46,7 @@ LIMITS = {
     "near plane inside the cloud": (Limit(0.01, _AROUND_ALL, _IN_CUBES), Limit(0.001, _AROUND_ALL)),
     "eye inside the cloud": (Limit(0.04, _AROUND_ALL, _IN_CUBES), Limit(0.01, _AROUND_ALL)),
     "zoomed in on 10^-3 of the scan": (Limit(0.007, _AROUND_ALL, _IN_CUBES), Limit(0.001, _AROUND_ALL)),
-    "zoomed in on 10^-6 of the scan": (Limit(0.99, _FEW_LEVELS, _IN_CUBES), Limit(0.65, _FEW_LEVELS)),
+    "zoomed in on 10^-6 of the scan": (Limit(0.99, NO_DETAIL, _IN_CUBES), Limit(0.65, NO_DETAIL)),
     "collinear points": Limit(0.015, _AROUND_ALL),
     "collinear points end on, perspective": Limit(0.01, NO_SPACING),
     "collinear points end on, orthographic": Limit(0.01, NO_SPACING),

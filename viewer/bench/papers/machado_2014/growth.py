@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ....backends.hpr import calibrated, chosen_sectors, visible_points
+from ....backends.hpr import calibrated, chosen_search, visible_points
 from ....backends.hpr.candidates import Candidates
 from ....backends.hpr.exact import flipping
 from ....scan.pose import Pose
@@ -37,7 +37,7 @@ def growth(bench: Bench, view: JudgedView) -> Iterator[Row]:
     yield {"method": EXACT, **_told(view.hull(flipping(view.seen, found.radius)))}
     for count in (*(k for k in COUNTS if k <= MOST_PER_POINT * len(view.cloud)), None):
         rows = visible_points(pose, view.eye, radius=found.radius, sectors=count, mode=HULL, gpu=gpu)
-        sectors, steps = chosen_sectors(found, count, None)
+        sectors, steps, _ = chosen_search(found, count, None)
         candidates = Candidates(gpu, sectors, len(view.cloud))
         nbytes = candidates.nbytes
         candidates.release()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ....backends import backend
-from ....backends.hpr import MODES, calibrated, chosen_sectors, visible_points
+from ....backends.hpr import MODES, calibrated, chosen_search, visible_points
 from ....backends.hpr.exact import exact_visible_points
 from ....frame import Request
 from ....gpu.surface import Surface
@@ -74,7 +74,7 @@ def speeds(bench: Bench, view: JudgedView) -> Row:
         surface.release()
     medians = {name: 1e3 * np.median(times[1:], axis=0) for name, times in taken.items()}
     return {
-        "sectors": chosen_sectors(found, None, None)[0].count,
+        "sectors": chosen_search(found, None, None)[0].count,
         "visible": len(visible_points(pose, view.eye, mode=HULL, gpu=gpu)),
         "busy_ms": {name: round(float(busy), 2) for name, (busy, _) in medians.items()},
         "wall_ms": {name: round(float(wall), 2) for name, (_, wall) in medians.items()},

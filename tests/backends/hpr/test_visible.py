@@ -1,0 +1,203 @@
+"""Visible points: known scenes, the exact operator, extreme numbers, and what is not computed again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+from scenes import sphere
+
+from viewer.backends.hpr import calibrated, visible_points
+from viewer.backends.hpr.exact import exact_visible_points
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.frame import Request, render_frame
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+EYE = np.array([0.0, 0.0, 4.0])
+SIZE = (64, 48)
+
+
+@pytest.fixture(scope="module")
+def seen(renderer: Renderer):  # type: ignore[no-untyped-def]
+    """seen(points, eye, ...): what `visible_points` gives, on the renderer's context."""
+
+    def seen(points: ArrayLike | Pose, eye: ArrayLike = EYE, **how: object) -> NDArray[np.uint32]:
+        return visible_points(points, eye, gpu=renderer.gpu, **how)  # type: ignore[arg-type]
+
+    return seen
+
+
+def bumpy(count: int = 6000) -> NDArray[np.float64]:
+    """A sphere with waves, closed and with hollows."""
+    normals = np.asarray(sphere(count).normals, np.float64)
+    return normals * (1 + 0.1 * np.sin(7 * normals).sum(axis=1))[:, None]
+
+
+@pytest.mark.parametrize("distance", [1.6, 4.0, 1e3])
+def test_of_a_sphere_the_front_is_seen_and_the_back_is_not(seen, distance: float) -> None:  # type: ignore[no-untyped-def]
+    """Near and far: all that faces the eye, but for the rim."""
+    normals = np.asarray(sphere(8000).positions, np.float64)
+    rows = seen(normals, [0, 0, distance])
+    facing = normals @ [0, 0, 1] - 1 / distance  # 0 at the horizon
+    found = np.isin(np.arange(len(normals)), rows)
+    assert found[facing > 0.1].mean() > 0.998
+    assert found[facing < -0.2].mean() < 0.002
+
+
+def test_what_lies_behind_something_is_hidden(seen) -> None:  # type: ignore[no-untyped-def]
+    """The smaller of two spheres, wholly behind the other."""
+    front, behind = np.asarray(sphere(8000).positions), 0.5 * np.asarray(sphere(2000).positions)
+    rows = seen(np.concatenate([front, behind - [0, 0, 3]]))
+    assert len(rows) > 2000
+    assert (rows < 8000).all()
+
+
+def test_an_eye_inside_sees_all_around(seen) -> None:  # type: ignore[no-untyped-def]
+    points = np.asarray(sphere(8000).positions)
+    assert len(seen(points, [0.3, 0.2, 0.1])) > 0.998 * len(points)
+
+
+@pytest.mark.parametrize("eye", [(0, 0, 4), (1.1, 0.6, -0.4)])
+def test_it_comes_to_what_the_exact_operator_says(seen, eye: tuple[float, ...]) -> None:  # type: ignore[no-untyped-def]
+    points = bumpy()
+    radius = calibrated(points, eye).radius
+    exact = np.isin(np.arange(len(points)), exact_visible_points(points, eye, radius))
+    shares: list[float] = []
+    for factor in (0.25, 1, 4):
+        sectors = round(factor * calibrated(points, eye).sectors.count)
+        found = np.isin(np.arange(len(points)), seen(points, eye, radius=radius, sectors=sectors))
+        shares.append((found != exact).sum() / exact.sum())
+    # Near the eye, points lie so far apart that others are seen between them.
+    most = (0.06, 0.04, 0.05) if eye[2] == 4 else (0.2, 0.12, 0.12)
+    assert all(share < limit for share, limit in zip(shares, most, strict=True)), shares
+
+
+@pytest.mark.parametrize("decades", [2, 5, 8])
+@pytest.mark.parametrize("scale", [1e-12, 1e12])
+def test_radius_and_scale_may_be_extreme(seen, decades: int, scale: float) -> None:  # type: ignore[no-untyped-def]
+    """The same points are seen at any scale, more with a larger radius, nearly all with the largest."""
+    points = bumpy(3000)
+    radius = 10.0**decades * 5
+    rows = seen(points, radius=radius)
+    scaled = seen(points * scale, EYE * scale, radius=radius * scale)
+    assert len(np.setxor1d(rows, scaled)) <= 3
+    assert len(rows) > {2: 100, 5: 1400, 8: 2500}[decades]
+
+
+@pytest.mark.parametrize("distance", [1e4, 1e6])
+def test_an_eye_far_away_sees_what_it_sees_from_less_far(seen, distance: float) -> None:  # type: ignore[no-untyped-def]
+    points = bumpy(3000)
+    near, far = seen(points, [0, 0, 1e3]), seen(points, [0, 0, distance])
+    assert len(np.setxor1d(near, far)) < 0.01 * len(near)
+
+
+def test_ids_are_those_of_the_file(seen) -> None:  # type: ignore[no-untyped-def]
+    points = bumpy(2000)
+    holes = np.insert(points, [0, 7, 1500], np.nan, axis=0)
+    expected = np.flatnonzero(np.isfinite(holes[:, 0]))[seen(points)]
+    pose = Pose(0, 0.0, "", PointCloud.from_arrays(holes))
+    np.testing.assert_array_equal(seen(holes), expected)
+    np.testing.assert_array_equal(seen(pose), expected)
+
+
+def test_few_points_are_seen(seen) -> None:  # type: ignore[no-untyped-def]
+    assert seen(np.zeros((0, 3))).tolist() == []
+    assert seen([[1.0, 2, 3]]).tolist() == [0]
+    assert seen([[1.0, 2, 3]] * 4).tolist() == [0], "of points in one place the first"
+    assert seen([EYE, [0, 0, 0]]).tolist() == [0, 1], "one in the eye"
+    assert seen([[0.0, 0, 0], [0, 0, -2]]).tolist() == [0], "one behind the other"
+
+
+def test_what_makes_no_sense_is_refused(seen) -> None:  # type: ignore[no-untyped-def]
+    points = bumpy(100)
+    with pytest.raises(InputError, match="not a viewpoint"):
+        seen(points, [0, 0, np.nan])
+    with pytest.raises(InputError, match="does not hold all points"):
+        seen(points, radius=3.0)
+    with pytest.raises(InputError, match="mode"):
+        seen(points, mode="x-ray")
+
+
+class Drawn:
+    """Pictures of one surface, and of new ones."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self.renderer = renderer
+        self.pose = Pose(0, 0.0, "", PointCloud.from_arrays(bumpy(), normals=bumpy()))
+        self.surface = Surface(renderer.gpu, SIZE)
+
+    def draw(
+        self, camera: Camera, surface: Surface | None = None, look: Look | None = None, **how: object
+    ) -> Surface:
+        surface = surface or self.surface
+        request = Request(self.pose, camera, "hpr", look=look or Look(light="flat"))
+        while render_frame(self.renderer, request, surface, **how):  # type: ignore[arg-type]
+            pass
+        return surface
+
+    def check(self, camera: Camera, skipped: bool, **how: object) -> None:
+        """What is drawn on the surface, skipping or not, is what a new one shows."""
+        found = self.draw(camera, **how)
+        assert ("candidates" in found.stats.skipped) is skipped
+        new = self.draw(camera, Surface(self.renderer.gpu, SIZE), **how)
+        assert "candidates" not in new.stats.skipped
+        np.testing.assert_array_equal(found.row, new.row)
+        np.testing.assert_array_equal(found.depth, new.depth)
+
+
+@pytest.mark.parametrize("eye", [(0.0, 0, 4), (0.2, 0.1, 0.3)])
+def test_nothing_is_found_again_while_pose_and_eye_stand_still(
+    renderer: Renderer, eye: tuple[float, float, float]
+) -> None:
+    """Other looks, and other directions from the same eye."""
+    drawn, camera = Drawn(renderer), Camera(eye, (0.1, 0.2, -1.0))
+    drawn.check(camera, skipped=False)
+    drawn.check(camera, skipped=True)
+    drawn.check(camera, skipped=True, look=Look(light="head"))
+    drawn.check(replace(camera, target=(0.3, 0.1, -1.0)), skipped=True)
+    drawn.check(replace(camera, fov_y=20.0), skipped=True)
+    drawn.check(camera, skipped=True, shift=(0.25, -0.25))
+    drawn.check(replace(camera, eye=(eye[0], eye[1], eye[2] + 0.05)), skipped=False)
+    drawn.pose = Pose(1, 0.0, "", PointCloud.from_arrays(1.1 * bumpy()))
+    drawn.check(camera, skipped=False)
+
+
+def test_fewer_sectors_while_it_moves_and_all_at_rest(renderer: Renderer) -> None:
+    drawn, camera = Drawn(renderer), Camera((0.0, 0, 4))
+
+    def sectors(**how: object) -> int:
+        return drawn.draw(camera, **how).stats.counted["points"]()["sectors"]
+
+    fine, coarse = sectors(), sectors(moving=True)
+    assert drawn.surface.stats.simplified
+    assert coarse < 0.6 * fine
+    drawn.check(camera, skipped=False)
+    assert not drawn.surface.stats.simplified
+
+
+def test_statistics_tell_what_was_looked_at(renderer: Renderer) -> None:
+    drawn = Drawn(renderer)
+    stats = drawn.draw(Camera((0.0, 0, 4))).stats
+    found = stats.counted["points"]()
+    assert found["in"] == 6000
+    assert 2000 < found["visible"] < 3000
+    assert found["occupied"] < found["sectors"]
+    assert set(stats.chosen) == {"radius", "sectors", "steps"}
+
+
+def test_points_before_the_near_plane_hide_nothing(renderer: Renderer) -> None:
+    """As if they were not there."""
+    drawn = Drawn(renderer)
+    camera = Camera((0.0, 0, 4), near=4.0)
+    cut = drawn.draw(camera)
+    points = bumpy()
+    shown = np.unique(cut.row[cut.row != 0xFFFFFFFF])
+    assert len(shown) > 200
+    assert (points[shown, 2] <= 0).all()
