@@ -28,7 +28,7 @@ from ...scan.pose import Pose
 from ...view import View
 from .. import NO_DETAIL, FrameView, Limit
 from ..points import draw_squares
-from .calibration import Body, EyeCalibration, Search, body_of, calibrate
+from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
 from .candidates import EVERYWHERE, UNLIMITED, Candidates
 from .exact import SeenPoints, as_cloud, flipping
 from .sectors import Sectors
@@ -221,7 +221,7 @@ def _snapped(eye: NDArray[np.float64], body: Body) -> NDArray[np.float64]:
 
 def chosen_search(
     found: EyeCalibration, count: int | None, steps: int | None, quality: float = _QUALITY
-) -> Search:
+) -> SectorSearch:
     """The search in so many sectors with so many steps of propagation, None: by the quality."""
     faces = found.sectors.count / found.sectors.edge**2
     wanted = quality * found.sectors.count if count is None else count

@@ -59,7 +59,7 @@ def _distinct(positions: NDArray[np.float32]) -> int:
     return 1 + int(np.count_nonzero(mixed[1:] != mixed[:-1]))
 
 
-class Search(NamedTuple):
+class SectorSearch(NamedTuple):
     """A search for visible points. sectors: how directions are divided. steps: of propagation, which close
     the gaps between visible points. stride: sectors between those whose candidates are compared with a
     point."""
@@ -83,11 +83,11 @@ class EyeCalibration:
     occupied: float
     spacing: float
 
-    def with_sectors(self, edge: int) -> Search:
+    def with_sectors(self, edge: int) -> SectorSearch:
         """The search in sectors of these directions, so many along an edge."""
         finer = edge / self.sectors.edge
         sectors = self.sectors.divided(edge)
-        return Search(sectors, max(int(self.spacing * finer), 1), max(round(finer), 1))
+        return SectorSearch(sectors, max(int(self.spacing * finer), 1), max(round(finer), 1))
 
 
 def calibrate(
