@@ -135,6 +135,19 @@ def deriving() -> Backend:
     return Backend("deriving", module)
 
 
+def test_a_pose_at_another_time_keeps_what_was_made_of_it(renderer: Renderer, deriving: Backend) -> None:
+    own, poses = Renderer(renderer.gpu), [Pose(0, 0.0, "x", sphere(1000))]
+    first = own.prepare(own.resident(poses[0]), deriving, _Params(), Look(), wait=True, view=VIEW)
+    poses[0] = poses[0].at(2.0)
+    own.resident(Pose(1, 0.0, "y", sphere(10)))
+    again = own.prepare(own.resident(poses[0]), deriving, _Params(), Look(), wait=True, view=VIEW)
+    assert again is first
+    del poses[0]
+    own.resident(Pose(1, 0.0, "y", sphere(10)))
+    assert own.nbytes < first.derived.nbytes, "it goes with the pose"
+    own.release()
+
+
 def test_derived_data_is_made_once_counted_and_evicted(renderer: Renderer, deriving: Backend) -> None:
     own = Renderer(renderer.gpu, budget_bytes=1)
     pose = Pose(0, 0.0, "x", sphere(1000))

@@ -20,7 +20,7 @@ from .look import Look, wants_normals
 from .scan.cache import default_budget
 from .scan.estimate import estimate
 from .scan.points import PointCloud
-from .scan.pose import Pose
+from .scan.pose import Life, Pose
 from .scan.spacing import spacings
 from .task import Task
 from .view import View
@@ -84,9 +84,9 @@ class _Begun(NamedTuple):
 
 @dataclass
 class _Resident:
-    """pose: as it was given; that of the GpuPose is the same without keeping it alive."""
+    """life: of the pose as it was given; that of the GpuPose is the same without keeping it alive."""
 
-    pose: weakref.ref[Pose]
+    life: weakref.ref[Life]
     gpu_pose: GpuPose
     derived: OrderedDict[DerivedKey, Prepared] = field(default_factory=OrderedDict)  # last used last
     jobs: dict[Any, _Begun] = field(default_factory=dict)
@@ -179,29 +179,30 @@ class Renderer:
 
     def bytes_of(self, pose: Pose) -> int:
         """Bytes that one pose holds on the GPU, with what was derived from it; 0 where it is not there."""
-        return self._resident[id(pose)].nbytes if id(pose) in self._resident else 0
+        entry = self._resident.get(id(pose.life))
+        return 0 if entry is None else entry.nbytes
 
     def resident(self, pose: Pose) -> GpuPose:
         """The pose on the GPU; its arrays are uploaded when something first reads them."""
         self.gpu.collect()
         entry = self._find(pose)
         self._hold(pose, entry)
-        self._drawn = id(pose)
+        self._drawn = id(pose.life)
         self._resident.move_to_end(self._drawn)
         self._make_room()
         return entry.gpu_pose
 
     def _hold(self, pose: Pose, entry: _Resident) -> None:
         """Keep what there is of a pose from now on, and let go of those that nobody else holds."""
-        for gone in [k for k, r in self._resident.items() if r.pose() is None]:
+        for gone in [k for k, r in self._resident.items() if r.life() is None]:
             self._resident.pop(gone).release()
-        self._resident[id(pose)] = entry
+        self._resident[id(pose.life)] = entry
 
     def _find(self, pose: Pose) -> _Resident:
         """The entry of a pose, else one without anything."""
-        entry = self._resident.get(id(pose))
-        if entry is None or entry.pose() is not pose:
-            entry = _Resident(weakref.ref(pose), GpuPose(self.gpu, replace(pose)))
+        entry = self._resident.get(id(pose.life))
+        if entry is None or entry.life() is not pose.life:
+            entry = _Resident(weakref.ref(pose.life), GpuPose(self.gpu, replace(pose)))
         return entry
 
     def _make_room(self) -> None:
@@ -212,8 +213,7 @@ class Renderer:
             self._resident.pop(farthest).release()
 
     def _steps_to(self, entry: _Resident) -> float:
-        pose = entry.pose()
-        return math.inf if pose is None else self.steps_to(pose)
+        return math.inf if entry.life() is None else self.steps_to(entry.gpu_pose.pose)
 
     def merge(self, gpu_pose: GpuPose) -> bool:
         """Have a worker merge the points of range views; whether they are there."""
@@ -315,7 +315,7 @@ class Renderer:
     def _has_room(self, pose: Pose) -> bool:
         """Whether the budget holds another pose beside those that are drawn sooner than this one."""
         entries, steps = self._resident.values(), self.steps_to(pose)
-        sooner = [r.held_bytes for r in entries if r.pose() is not pose and self._steps_to(r) <= steps]
+        sooner = [r.held_bytes for r in entries if r.life() is not pose.life and self._steps_to(r) <= steps]
         largest = max((r.held_bytes for r in entries), default=0)
         return sum(sooner) + largest <= self.budget_bytes
 

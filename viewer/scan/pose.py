@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,18 @@ from .upright import Upright, guess_up
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 
 
+class Life:
+    """A token that a pose shares with itself at other times; what is on the GPU of it stays for as long."""
+
+    __slots__ = ("__weakref__",)
+
+
 @dataclass(frozen=True, eq=False)
 class Pose:
     """One moment of a scan, on the CPU.
 
     index: its place on the timeline. time: seconds. label: the file or frame it came from. points: its
-    points, or those of the range views where it was scanned as such.
+    points, or those of the range views where it was scanned as such. life: see `Life`.
 
     To merge the points of range views takes time and memory, and is done where something reads `cloud`. What
     is told of them by the `overview` needs no merging.
@@ -32,6 +38,7 @@ class Pose:
     time: float
     label: str
     points: PointCloud | RangePoints
+    life: Life = field(default_factory=Life, init=False, repr=False)
 
     @classmethod
     def of(cls, index: int, time: float, label: str, scanned: Scanned) -> Pose:
@@ -110,3 +117,9 @@ class Pose:
         """Put a cloud that has more attributes of the same points in place of `cloud`."""
         points = cloud if isinstance(self.points, PointCloud) else self.points.with_cloud(cloud)
         return replace(self, points=points)
+
+    def at(self, time: float) -> Pose:
+        """Move it to another time, seconds; what is on the GPU of it stays."""
+        moved = replace(self, time=time)
+        object.__setattr__(moved, "life", self.life)
+        return moved

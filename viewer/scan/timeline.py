@@ -9,7 +9,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -119,7 +119,7 @@ class Timeline:
     def _timed(self, pose: Pose) -> Pose:
         """The pose at the time that its frame has now."""
         time = float(self.times[pose.index])
-        return pose if pose.time == time else replace(pose, time=time)
+        return pose if pose.time == time else pose.at(time)
 
     @property
     def files(self) -> tuple[Path, ...]:
