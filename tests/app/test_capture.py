@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import sphere
+from written import picture
 
 from viewer.app.output.capture import Capture
 from viewer.app.output.export_plan import Choices
@@ -198,3 +199,24 @@ def test_a_pipe_in_place_of_a_scan_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "scan.npz")
     assert fingerprint([tmp_path / "scan.npz"]) is None
     assert fingerprint([tmp_path / "scan.npz"], "00" * 8) is None
+
+
+def test_a_saved_picture_says_what_the_colour_bar_of_the_view_does(app: Any) -> None:
+    notes = iter(("", "range of 3 of 64 frames"))
+    marks = Marks(color_bar=True)
+    capture = Capture(
+        app.session, app.playback, app.viewport, app.note, lambda: marks, no_film, lambda: next(notes)
+    )
+    app.session.hash_found.set_result(None)
+    app.viewport.request = replace(app.viewport.request, look=Look(color_by="height", range="frame"))
+    image = np.zeros((480, 640, 4), np.uint8)
+    app.viewport.surface = SimpleNamespace(
+        image=lambda: image, color_range=(0.0, 1.0), value_kind=None, request=app.viewport.request
+    )
+    app.viewport.is_refined = True
+    for _ in range(2):
+        capture.screenshot()
+    capture.close()
+    without, with_it = (picture(Path(words.removeprefix("Saved "))) for words in app.told)
+    assert without.any()
+    assert (without[..., :3].any(axis=-1) != with_it[..., :3].any(axis=-1)).sum() > 50
