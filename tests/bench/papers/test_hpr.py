@@ -179,7 +179,7 @@ def test_all_methods_judge_a_sphere(
     found = {(method, radius): row for method, radius, row in accuracy.judged(renderer.gpu, view)}
     assert {radius for method, radius in found if method == EXACT} == {BEST, AUTOMATIC, KATZ}
     for method in (EXACT, *MODES):
-        assert pooled([found[method, BEST]]).error < 25
+        assert pooled([found[method, AUTOMATIC]]).error < 25
     assert pooled([found[EXACT, BEST]]).error <= pooled([found[EXACT, AUTOMATIC]]).error
     noisy = JudgedView(view.cloud, view.camera, view.truth, noise=0.01)
     names = {method for method, _, _ in accuracy.judged(renderer.gpu, noisy)}
@@ -187,14 +187,14 @@ def test_all_methods_judge_a_sphere(
     assert accuracy.RELAXED not in {method for method, _ in found}
 
 
-def test_more_sectors_see_more_and_take_more(
+def test_more_sectors_take_more(
     renderer: Renderer, view: JudgedView, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(growth, "COUNTS", (400, 40_000, 10_000_000))
     bench = Bench(renderer, BenchSettings(size=(160, 120)))
     exact, few, many, automatic = growth.growth(bench, view)
     assert "sectors" not in exact
-    assert few["visible"] < many["visible"] <= 1.2 * exact["visible"]
+    assert 0.9 * exact["visible"] < many["visible"] <= 1.1 * exact["visible"]
     assert few["nbytes"] < many["nbytes"]
     assert many["held"] < few["held"] <= 1
     assert [row["automatic"] for row in (few, many, automatic)] == [False, False, True]
