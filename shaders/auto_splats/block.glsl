@@ -1,4 +1,5 @@
 // Blocks of pixels, from the upper left.
 #include "common/view.glsl"
 
-ivec2 blocks = (view_size + BLOCK - 1) / BLOCK;  // those that cover the picture
+// How many cover a picture.
+ivec2 blocks_of(ivec2 size) { return (size + BLOCK - 1) / BLOCK; }

@@ -9,7 +9,7 @@ layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { uint fart
 void main() {
     uint i = item();
     if (i >= item_count) return;
-    ivec2 first = split(int(i), blocks.x) * BLOCK, end = min(first + BLOCK, view_size);
+    ivec2 first = split(int(i), blocks_of(view_size).x) * BLOCK, end = min(first + BLOCK, view_size);
     uint most = 0u;
     for (int y = first.y; y < end.y; ++y)
         for (int x = first.x; x < end.x; ++x) most = max(most, texelFetch(depths, y * view_size.x + x).r);

@@ -17,11 +17,13 @@ void main() {
     float depth;
     if (!is_seen(row, pixel, depth) || is_near(pixel, depth)) return;
     float reach = REACH * texelFetch(usual, coarse_cell(pixel)).r, nearest = depth - reach / scale_at(depth);
+    ivec2 shown = view_size - 2 * border;  // the picture without its border
+    pixel -= float(border);
     ivec2 first = max(ivec2(pixel - reach), ivec2(0)) / BLOCK;
-    ivec2 last = min(ivec2(pixel + reach), view_size - 1) / BLOCK;
+    ivec2 last = min(ivec2(pixel + reach), shown - 1) / BLOCK;
     bool is_late = false;
     for (int y = first.y; y <= last.y; ++y)
         for (int x = first.x; x <= last.x; ++x)
-            is_late = is_late || uintBitsToFloat(texelFetch(farthest, y * blocks.x + x).r) >= nearest;
+            is_late = is_late || uintBitsToFloat(texelFetch(farthest, y * blocks_of(shown).x + x).r) >= nearest;
     if (is_late) add(i, row);
 }

@@ -16,6 +16,7 @@ from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
 from .. import FrameView, Limit, Suited
+from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
@@ -26,7 +27,6 @@ BLENDS = True
 FINDS_NORMALS = True
 
 _HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
-_BY_PICTURE = "how large splats are goes by the points that the picture shows, and by those around them"
 KEPT = {
     "adaptive": "normals of other scans: 1.3° in place of 1.4° on the bunny, 2.6° of 3.1° on the armadillo",
     "hidden_neighbors": "outlines of other scans: spill of 1.2 % in place of 1.8 % on the bunny, 2.2 % of "
@@ -36,8 +36,6 @@ KEPT = {
 }
 LIMITS = {
     "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
-    "1x1 pixels": Limit(0.0, _BY_PICTURE),
-    "8192x1 pixels": Limit(0.0, _BY_PICTURE),
 }
 
 _FEW = 1000  # points
@@ -137,7 +135,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     found = surface.keep(Neighborhoods)
     search = search_of(params, pose)
     anew = bool(frame.changed - {"parameters", "values"})
-    found.find(pose, surface, frame.view, search, frame.share, anew)
+    border = border_of(pose.cloud, frame.view, params.k)
+    found.find(pose, surface, frame.view, search, frame.share, anew, border)
     surface.stats.counted["neighborhoods by searches"] = found.read_rounds
     if not found.count:
         surface.clear()

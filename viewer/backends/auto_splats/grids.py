@@ -6,12 +6,20 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ...scan.points import PointCloud
+from ...scan.spacing import sparse_spacing
+from ...view import View
+
 if TYPE_CHECKING:
     from .neighborhoods import Search
 
 FINEST_COARSE, COARSEST = 4, 7  # shifts of coarse cells: 16 to 128 pixels
 _COARSEST_FINE = 4
 _FINE = 0.7  # edge of fine cells, in typical radii
+_SAMPLE = 4096  # points that tell how large splats are beside the picture
+_WIDEST_BORDER, _BORDER_STEP = 512, 16  # pixels
 
 
 @dataclass(frozen=True)
@@ -20,6 +28,7 @@ class Grids:
 
     Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
     pixels round the picture whose points take part. unit: factor on places, a power of two.
+    border: pixels round the picture shown that the picture of these grids has more, at each edge.
     typical: radius of neighborhoods as points are dense in the picture, pixels; typical_in_space: as they are
     over a body of the scan's size, a rough one, scan units; widest: from which on splats grow no more, scan
     units. culls, growth, alone, drops:
@@ -31,6 +40,7 @@ class Grids:
     fine_shift: int
     coarse_shift: int
     margin: int
+    border: int
     culls: bool
     growth: float
     alone: float
@@ -47,11 +57,12 @@ class Grids:
         coarse_shift: int,
         search: Search,
         unit: float,
+        border: int = 0,
         typical: float = 1.0,
         typical_in_space: float = 0.0,
         widest: float = 0.0,
     ) -> Grids:
-        """The grids over a picture of a size, pixels. unit and what is typical: as above."""
+        """The grids over a picture of a size, pixels, with its border. unit and what is typical: as above."""
         fine_shift = min(max(round(math.log2(_FINE * typical)), 0), _COARSEST_FINE)
         margin = 1 << coarse_shift
         return cls(
@@ -60,6 +71,7 @@ class Grids:
             fine_shift,
             coarse_shift,
             margin,
+            border,
             search.culls,
             search.growth,
             search.alone,
@@ -84,3 +96,23 @@ class Grids:
 def _cells(size: tuple[int, int], margin: int, shift: int) -> tuple[int, int]:
     x, y = (-(-(pixels + 2 * margin) >> shift) for pixels in size)
     return x, y
+
+
+def border_of(cloud: PointCloud, view: View, k: int) -> int:
+    """How far beside a picture points lie whose splats may reach into it, pixels: the radius of neighborhoods
+    of k where points are sparse, as large as it is seen of those in the picture and beside; of those nearest
+    to it where a sample has none there. At most 512."""
+    rows = np.linspace(0, len(cloud) - 1, min(len(cloud), _SAMPLE)).astype(int)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # in the eye's plane
+        pixels, depth = view.project(cloud.positions[rows] + (cloud.origin - view.origin))
+        radius = sparse_spacing(cloud) * math.sqrt(k / math.pi) * view.scale
+        radii = radius / depth if view.perspective else np.full(len(depth), radius)
+        beside = np.maximum(np.maximum(-pixels, pixels - view.size), 0).max(axis=1)
+    shown = (depth >= view.near) & (depth <= view.far) & np.isfinite(beside)
+    if not shown.any():
+        return 0
+    near = shown & (beside <= radii)
+    if not near.any():
+        near = shown & (beside == beside[shown].min())
+    wanted = min(float(np.quantile(radii[near], 0.9)), _WIDEST_BORDER)
+    return _BORDER_STEP * math.ceil(wanted / _BORDER_STEP)

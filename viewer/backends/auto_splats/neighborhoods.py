@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 import struct
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -20,14 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
+from ...gpu.bindings import Storage, Texture, UniformBlock
 from ...gpu.bins import Bins
+from ...gpu.blocks import BlockBuffer
 from ...gpu.compact import IndexList, list_covered, list_flagged
 from ...gpu.constants import GROUP, NO_DEPTH, UNKNOWN
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
+from ...gpu.view import ViewBlock
 from ...scan.points import PointCloud
 from ...scan.range_points import RangePoints
 from ...scan.spacing import spacings
@@ -91,11 +94,9 @@ class Neighborhoods:
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
-        self._gpu, self._size = gpu, size
-        self._pixels = IndexList(gpu, size[0] * size[1])  # that show a point; then what one search left
-        self._rest = IndexList(gpu, size[0] * size[1], GROUP)  # what two left
-        self._searched = IndexList(gpu, size[0] * size[1])  # slots
-        self._lines = IndexList(gpu, size[0] * size[1])  # whose neighborhoods are of points on a line
+        self._gpu = gpu
+        self._resize(size)
+        self._view = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._texels: dict[str, gl.BufferTexture] = {}
         self._totals = gpu.ctx.buffer(reserve=8)
         self._bins = Bins(gpu, 1)
@@ -106,17 +107,27 @@ class Neighborhoods:
         self._made_of: tuple[object, ...] | None = None
         self._pose: weakref.ref[GpuPose] | None = None
 
+    def _resize(self, size: tuple[int, int]) -> None:
+        """Make lists for a picture of a size, its border included."""
+        gpu, self._size, pixels = self._gpu, size, math.prod(size)
+        self._pixels = IndexList(gpu, pixels)  # that show a point; then what one search left
+        self._rest = IndexList(gpu, pixels, GROUP)  # what two left
+        self._searched = IndexList(gpu, pixels)  # slots
+        self._lines = IndexList(gpu, pixels)  # whose neighborhoods are of points on a line
+
+    @property
+    def _lists(self) -> tuple[IndexList, ...]:
+        return self._pixels, self._rest, self._searched, self._lines
+
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        lists = (self._pixels, self._rest, self._searched, self._lines, self._bins)
         texels = sum(texels.buffer.size for texels in self._texels.values())
-        return sum(each.nbytes for each in lists) + texels
+        return sum(each.nbytes for each in self._lists) + self._bins.nbytes + texels
 
     def release(self) -> None:
         """Delete everything."""
-        lists = (self._pixels, self._rest, self._searched, self._lines)
-        self._gpu.discard(*lists, self._bins, self._totals, *self._texels.values())
+        self._gpu.discard(*self._lists, self._bins, self._totals, self._view, *self._texels.values())
 
     def __getitem__(self, name: str) -> gl.BufferTexture:
         return self._texels[name]
@@ -136,18 +147,46 @@ class Neighborhoods:
         search: Search,
         share: float = 1.0,
         anew: bool = True,
+        border: int = 0,
     ) -> None:
         """Find the neighborhoods of the points that are seen, or of the near ones, unless they are known from
-        the last call. anew: even so."""
-        made_of = (view.key, search, share)
+        the last call. anew: even so. border: pixels round the picture whose points are seen, too, as their
+        splats may reach into it."""
+        made_of = (view.key, search, share, border)
         if not anew and self._pose is not None and self._pose() is pose and self._made_of == made_of:
             surface.stats.skipped["neighborhoods"] = "points, camera and search are those of the last picture"
             return
         self._made_of, self._pose = None, weakref.ref(pose)
         self.count, self.is_whole = 0, not search.culls
+        size = (view.size[0] + 2 * border, view.size[1] + 2 * border)
+        if size != self._size:
+            self._gpu.discard(*self._lists)
+            self._resize(size)
+        self._view.write(ViewBlock.of(replace(view, size=size)))
+        with self._bordered(surface):
+            self._find_seen(pose, surface, search, share, border)
+        self._made_of = made_of
+
+    def find_late(self, pose: GpuPose, surface: Surface, search: Search) -> None:
+        """Find the neighborhoods of the points too that are not near, but whose splats may be seen
+        beside what the surface shows by now (Preiner 2012, 7)."""
+        self.is_whole = True
+        if not self.count:
+            return
+        with self._gpu.timers.measure("late"):
+            self._find_blocks(surface)
+            with self._bordered(surface):
+                self["slots"].bind(Texture.SLOTS)
+                self["usual"].bind(Texture.USUAL)
+                self["blocks"].bind(Texture.FARTHEST)
+                self._list_seen("auto_splats/late.comp", pose)
+        with self._bordered(surface):
+            self._search(pose, search)
+
+    def _find_seen(self, pose: GpuPose, surface: Surface, search: Search, share: float, border: int) -> None:
         visible = self._project(pose, surface, share)
         if visible:
-            self._divide(search, visible, pose)
+            self._divide(search, visible, pose, border)
             self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
             if self._reserve("extents", 4 * len(pose.cloud), gl.R32F):
                 gl.clear_words(self["extents"].buffer, 0)
@@ -160,21 +199,15 @@ class Neighborhoods:
                 self._reserve(name, nbytes * visible, texel)
             self._gather(pose, surface, search, share)
             self._search(pose, search)
-        self._made_of = made_of
 
-    def find_late(self, pose: GpuPose, surface: Surface, search: Search) -> None:
-        """Find the neighborhoods of the points too that are not near, but whose splats may be seen
-        beside what the surface shows by now (Preiner 2012, 7)."""
-        self.is_whole = True
-        if not self.count:
-            return
-        with self._gpu.timers.measure("late"):
-            self._find_blocks(surface)
-            self["slots"].bind(Texture.SLOTS)
-            self["usual"].bind(Texture.USUAL)
-            self["blocks"].bind(Texture.FARTHEST)
-            self._list_seen("auto_splats/late.comp", pose)
-        self._search(pose, search)
+    @contextmanager
+    def _bordered(self, surface: Surface) -> Iterator[None]:
+        """Have shaders see the picture with its border."""
+        self._view.bind()
+        try:
+            yield
+        finally:
+            surface.bind_view()
 
     def _project(self, pose: GpuPose, surface: Surface, share: float) -> int:
         """Find the nearest point of each pixel; how many pixels have one."""
@@ -208,12 +241,12 @@ class Neighborhoods:
 
         return Visits(cells, count, bind, {"SAMPLED": int(rows is not None), **defines}, params)
 
-    def _divide(self, search: Search, visible: int, pose: GpuPose) -> None:
+    def _divide(self, search: Search, visible: int, pose: GpuPose, border: int) -> None:
         """Divide the picture into cells as large as neighborhoods usually are, and tell how near each
         sees."""
         shift = FINEST_COARSE
         while True:
-            grids = Grids.of(self._size, shift, search, _unit(pose))
+            grids = Grids.of(self._size, shift, search, _unit(pose), border)
             occupied = self._measure_depths(grids)
             radius = math.sqrt(occupied * 4**shift / visible * search.k / math.pi)
             wanted = min(max(math.ceil(math.log2(radius)), shift), COARSEST)
@@ -222,7 +255,7 @@ class Neighborhoods:
             shift = wanted
         in_space = _typical_radius(pose, search.k)
         self._grids = grids = Grids.of(
-            self._size, shift, search, _unit(pose), radius, in_space, _widest_radius(pose, search.k)
+            self._size, shift, search, _unit(pose), border, radius, in_space, _widest_radius(pose, search.k)
         )
         for name in ("near to", "farthest"):
             self._reserve(name, 4 * grids.coarse_cells, gl.R32F)
@@ -296,7 +329,7 @@ class Neighborhoods:
 
     def _find_blocks(self, surface: Surface) -> None:
         """Find the farthest depth that the surface shows in each block of pixels."""
-        blocks = math.prod(-(-pixels // _BLOCK) for pixels in self._size)
+        blocks = math.prod(-(-pixels // _BLOCK) for pixels in surface.size)
         self._reserve("blocks", 4 * blocks, gl.R32UI)
         surface.depths.bind(Texture.DEPTHS)
         self._bind_storage(blocks=Storage.FARTHEST)
