@@ -8,6 +8,7 @@ layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
 #if PASS == 0
 uniform vec4 clip;  // points are left out where this plane is below 0
+uniform mat4 sides;  // or one of these four, its columns
 uniform int cell_shift;
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
@@ -24,7 +25,8 @@ uvec2 home_of(uint row, vec3 position) {
     spots[3u * row] = spot.x;
     spots[3u * row + 1u] = spot.y;
     spots[3u * row + 2u] = spot.z;
-    if (dot(clip.xyz, position) + clip.w < 0.0) return uvec2(NOTHING, NOTHING);
+    vec4 at = vec4(position, 1.0);
+    if (dot(clip, at) < 0.0 || any(lessThan(at * sides, vec4(0.0)))) return uvec2(NOTHING, NOTHING);
     if (!has_spot) return uvec2(NOTHING, 0u);
     uint sector = sector_of(spot);
     if (sector == NOTHING) return uvec2(NOTHING, 0u);

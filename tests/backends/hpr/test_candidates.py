@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from viewer.backends.hpr.candidates import UNLIMITED, Candidates
+from viewer.backends.hpr.clipping import EVERYWHERE
 from viewer.backends.hpr.sectors import Sectors
 from viewer.errors import InputError
 from viewer.gpu import gl
@@ -144,7 +145,7 @@ def test_some_rows_alone_may_take_part(find: Find, renderer: Renderer) -> None:
 def test_points_before_a_plane_are_left_out(find: Find) -> None:
     points = points_in_ball(300)
     sectors = Sectors.around(ZERO, 1.0, np.array([0.0, 0.0, 3.0]), ZERO, 16).weighted(3.0)
-    rows = find(points, sectors, 2, clip=(0.0, 0.0, -1.0, 0.5)).visible_rows()
+    rows = find(points, sectors, 2, clip=((0.0, 0.0, -1.0, 0.5), *EVERYWHERE[1:])).visible_rows()
     assert len(rows)
     assert (points[rows, 2] <= 0.5).all()
 

@@ -175,11 +175,26 @@ def test_fewer_sectors_while_it_moves_and_all_at_rest(renderer: Renderer) -> Non
     def sectors(**how: object) -> int:
         return drawn.draw(camera, **how).stats.counted["points"]()["sectors"]
 
-    fine, coarse = sectors(), sectors(moving=True)
+    coarse = sectors(moving=True)
     assert drawn.surface.stats.simplified
-    assert coarse < 0.6 * fine
-    drawn.check(camera, skipped=False)
+    fine = sectors()
     assert not drawn.surface.stats.simplified
+    assert coarse < 0.6 * fine
+    assert sectors(moving=True) == fine, "what is known is not found again"
+    assert not drawn.surface.stats.simplified
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_while_it_moves_only_the_field_of_view_is_looked_at(renderer: Renderer, projection: str) -> None:
+    """Of points all around, and in the picture as many are seen."""
+    camera = Camera((0.2, 0.1, 0.3), (0.1, 0.2, -1.0), fov_y=40, projection=projection, height=0.5)
+    moving, still = Drawn(renderer), Drawn(renderer)
+    moving.draw(camera, moving=True)
+    still.draw(camera)
+    counts = [each.surface.stats.counted["points"]()["visible"] for each in (moving, still)]
+    assert 50 < counts[0] < 0.5 * counts[1]
+    shown, expected = (np.unique(each.surface.row) for each in (moving, still))
+    assert len(np.setxor1d(shown, expected)) < 0.1 * len(expected)
 
 
 def test_statistics_tell_what_was_looked_at(renderer: Renderer) -> None:

@@ -29,7 +29,8 @@ from ...view import View
 from .. import NO_DETAIL, FrameView, Limit
 from ..points import draw_squares
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
-from .candidates import EVERYWHERE, UNLIMITED, Candidates
+from .candidates import UNLIMITED, Candidates
+from .clipping import EVERYWHERE, Planes, near_plane, side_planes
 from .exact import SeenPoints, as_cloud, flipping
 from .sectors import Sectors
 
@@ -45,7 +46,6 @@ _QUALITY = 0.5
 _MOVING = 0.5  # of the quality while the picture moves
 _MOST_SECTORS = 1 << 24
 _EYE_BITS = 36  # of its place
-_NEAR = 1 / 64  # of the body's radius: a near plane closer to an eye inside it cuts off too little to matter
 
 
 @dataclass(frozen=True)
@@ -135,37 +135,38 @@ class _Seen:
     def look(self, pose: GpuPose, frame: FrameView, surface: Surface) -> Candidates:
         """The candidates of a picture."""
         params: Params = frame.params
-        directions, clip = _directions(pose, frame.view)
-        sample = surface.take_sample(frame.share)
+        directions, body = _directions(pose, frame.view)
+        near, sample = near_plane(frame.view, body), surface.take_sample(frame.share)
         sought = (
             sample[1],
             directions,
-            clip,
+            near,
             params.quality,
             params.depth,
             params.radius,
             params.sectors,
             params.steps,
-            frame.moving,
         )
+        # What is found at rest is in all directions, and stays while the camera turns.
+        sides = side_planes(frame.view, body) if frame.moving else None
         stats = surface.stats
         known = self._candidates is not None and self._pose is not None and self._pose() is pose
-        if known and self._sought == sought:
+        if known and self._sought in ((sought, None), (sought, sides)):
             stats.skipped["candidates"] = "pose and eye stand still"
         else:
-            self._find(pose, directions, clip, frame, sample)
-            self._pose, self._sought = weakref.ref(pose), sought
+            self._find(pose, directions, (near, *(sides or EVERYWHERE[1:])), frame, sample)
+            self._pose, self._sought = weakref.ref(pose), (sought, sides)
         assert self._candidates is not None
         stats.chosen.update(self._chosen)
         stats.counted["points"] = self._candidates.count
-        stats.simplified = frame.moving and params.sectors is None
+        stats.simplified = self._sought[1] is not None
         return self._candidates
 
     def _find(
         self,
         pose: GpuPose,
         directions: Sectors,
-        clip: tuple[float, float, float, float],
+        clip: Planes,
         frame: FrameView,
         sample: tuple[gl.BufferTexture | None, int],
     ) -> None:
@@ -196,20 +197,13 @@ class _Seen:
             self._candidates.release()
 
 
-def _directions(pose: GpuPose, view: View) -> tuple[Sectors, tuple[float, float, float, float]]:
-    """How directions from a view's eye are divided, and what its near plane leaves out."""
+def _directions(pose: GpuPose, view: View) -> tuple[Sectors, Body]:
+    """How directions from a view's eye are divided, and the body that it sees."""
     body = body_of(pose.stored)
     if view.perspective:
         eye = _snapped(view.origin - view.rotation.T @ view.translation, body)
-        directions = Sectors.around(body.center, body.radius, eye, pose.origin)
-    else:
-        directions = Sectors.along(body.center, body.radius, -view.rotation[2], pose.origin)
-    nearest = float(view.depths(body.center - view.origin)) - body.radius
-    least = _NEAR * body.radius if directions.mapping == "cube" else 0.0
-    if view.near <= max(nearest, least):
-        return directions, EVERYWHERE
-    x, y, z = (-view.rotation[2]).tolist()
-    return directions, (x, y, z, float(-view.translation[2] - view.near))
+        return Sectors.around(body.center, body.radius, eye, pose.origin), body
+    return Sectors.along(body.center, body.radius, -view.rotation[2], pose.origin), body
 
 
 def _snapped(eye: NDArray[np.float64], body: Body) -> NDArray[np.float64]:

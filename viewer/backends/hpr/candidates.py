@@ -6,6 +6,7 @@ Machado e Silva 2014, 4.2 and 4.3.
 from __future__ import annotations
 
 import math
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,9 @@ from ...gpu.compact import IndexList
 from ...gpu.constants import NOTHING
 from ...gpu.context import Gpu, Program
 from ...gpu.scatter import Visits, scatter
+from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 
-EVERYWHERE = (0.0, 0.0, 0.0, 1.0)  # the clip plane that leaves out no point
 UNLIMITED = 1 << 30  # steps: until nothing changes
 _RUN = 8  # sectors an invocation of hpr/empty.comp looks at, points one of hpr/near.comp
 _STEPS_AT_ONCE = 32  # of propagation, before the CPU asks whether anything still changes
@@ -88,14 +89,15 @@ class Candidates:
         *,
         sample: tuple[gl.BufferTexture, int] | None = None,
         among: gl.BufferTexture | None = None,
-        clip: tuple[float, float, float, float] = EVERYWHERE,
+        clip: Planes = EVERYWHERE,
     ) -> None:
         """Find the candidates of sectors, and which points are visible.
 
         positions: RGB32F, a texel a point, relative to the origin of the sectors. steps: of propagation at
         most. stride: sectors between those whose candidates a point is compared with. sample: rows that are
         looked at in place of all, R32UI, and how many. among: R32UI, a texel a point, leaves out those where
-        it is 0; `visible` is then left as it is. clip: a plane, points below which are left out.
+        it is 0; `visible` is then left as it is. clip: planes, points below one of which are left out, and
+        not visible.
         """
         self.sectors, self.steps = sectors, steps
         gpu, shift = self._gpu, self._cell_shift()
@@ -112,7 +114,7 @@ class Candidates:
             if sample is not None:
                 sample[0].bind(Texture.DRAWN_ROWS)
             if "cell_shift" in program:  # the first pass alone has it
-                gpu.set(program, clip=clip, cell_shift=shift)
+                gpu.set(program, clip=clip[0], sides=tuple(chain.from_iterable(clip[1:])), cell_shift=shift)
 
         self.looked_at = self.points if sample is None else sample[1]
         sampled = {"SAMPLED": int(sample is not None)}
