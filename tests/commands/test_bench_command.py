@@ -162,7 +162,12 @@ def test_visible_points_of_a_mesh_of_ones_own_are_judged(run: Run, mesh: Path, t
     assert run("bench", *quick).code == 0
     page = (tmp_path / "out" / "hpr.md").read_text(encoding="utf-8")
     assert page.count("| exact |") > 2
-    for name in ("hpr.json", "pictures/hpr-errors.png", "pictures/hpr-sectors.png"):
+    for name in (
+        "hpr.json",
+        "pictures/hpr-errors.png",
+        "pictures/hpr-sectors.png",
+        "pictures/hpr-growth.png",
+    ):
         assert (tmp_path / "out" / name).is_file()
     assert run("bench", *quick).code == 2  # what is there is not replaced
 

@@ -35,7 +35,7 @@ from ..bench.papers.machado_2014.accuracy import measure_visibility
 from ..bench.papers.machado_2014.growth import measure_growth
 from ..bench.papers.machado_2014.hpr import NAME as HPR
 from ..bench.papers.machado_2014.hpr import write_hpr
-from ..bench.papers.machado_2014.pictures import ERROR_PICTURE, SECTOR_PICTURE
+from ..bench.papers.machado_2014.pictures import ERROR_PICTURE, GROWTH_PICTURE, SECTOR_PICTURE
 from ..bench.papers.machado_2014.speed import measure_speeds
 from ..bench.papers.preiner_2012 import auto_splats
 from ..bench.papers.preiner_2012.fits import measure_fits
@@ -145,7 +145,7 @@ _WITH_PAGES = {
         HPR,
         VISIBILITY_SCENES,
         others={VISIBILITY: measure_visibility, GROWTH: measure_growth, SPEEDS: measure_speeds},
-        pictures=(ERROR_PICTURE, SECTOR_PICTURE),
+        pictures=(ERROR_PICTURE, SECTOR_PICTURE, GROWTH_PICTURE),
         usual=BenchSettings(size=(400, 300), views=2, frames=0),
         quick=(VISIBILITY_SCENES[:1], 1),
     ),

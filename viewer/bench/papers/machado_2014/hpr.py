@@ -11,8 +11,10 @@ import numpy as np
 from ...report import measurement
 from ...report.measurement import Measurement, markdown_table, rows_if_any, spaced, write_measurement
 from ...report.page import three_digits
+from ...report.plots import curves, png
 from ...report.results import GROWTH, SPEEDS, VISIBILITY, Row
 from . import accuracy
+from .pictures import GROWTH_PICTURE
 from .speed import CALL, paper
 from .verdicts import AUTOMATIC, BEST, COMBINED, EXACT, HULL, HULL_AT_4M, KATZ, pooled
 
@@ -32,6 +34,7 @@ def write_hpr(folder: Path) -> Path:
     Raises InputError where they are of another suite.
     """
     made = digest(*(rows_if_any(folder / name) for name in (VISIBILITY, GROWTH, SPEEDS)))
+    _plot_growth(made["growth"], folder / GROWTH_PICTURE)
     return write_measurement(folder, NAME, made, "\n\n".join(tables([made]).values()) + "\n")
 
 
@@ -147,6 +150,22 @@ def _growth(rows: Sequence[dict[str, Any]]) -> str:
             [f"`{row['scene']}`", count, *told, str(row["steps"]), spaced(row["nbytes"] / _MEGA), *shares]
         )
     return markdown_table(head, lines, left=("scene",))
+
+
+def _plot_growth(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Fig. 14 as a picture: visible points by the number of sectors, beside the exact operator's."""
+    exact = {row["scene"]: row["visible"] for row in rows if row["method"] == EXACT}
+    found = {
+        scene: sorted(
+            (row["sectors"], row["visible"])
+            for row in rows
+            if row["scene"] == scene and row["method"] != EXACT
+        )
+        for scene in exact
+    }
+    if found:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        png(curves(found, exact, "sectors, k", "visible points", "exact"), path)
 
 
 def _place(rows: Sequence[dict[str, Any]], row: dict[str, Any]) -> int:

@@ -25,6 +25,7 @@ from ...scenes.subjects import with_rows
 from .verdicts import EXACT, HULL, JudgedView
 
 ERROR_PICTURE, SECTOR_PICTURE = "pictures/hpr-errors.png", "pictures/hpr-sectors.png"
+GROWTH_PICTURE = "pictures/hpr-growth.png"
 SHOWN_COUNTS = (40_000, 100_000, 10_000_000)  # Fig. 13
 _SIZE = (420, 400)
 _CLOSER = 0.8  # of the field of view that shows the sphere around a model
