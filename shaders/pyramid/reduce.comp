@@ -8,6 +8,10 @@ void main() {
     ivec2 at = ivec2(int(i) % out_size.x, int(i) / out_size.x);
     ivec2 first = 2 * at + FIRST, low = max(first, 0), high = min(first + COUNT, size);
     begin_sample();
+#if FRONT
+    for (int y = low.y; y < high.y; ++y)
+        for (int x = low.x; x < high.x; ++x) tell_sample(ivec2(x, y));
+#endif
 #if NEAREST
     vec4 nearest = vec4(uintBitsToFloat(NO_DEPTH));
     bool found = false;

@@ -4,6 +4,9 @@
 
 layout(binding = TEXTURE_SAMPLES) uniform samplerBuffer samples;  // of the level that is read
 layout(binding = TEXTURE_WEIGHTS) uniform samplerBuffer weights;
+#if FRONT
+layout(binding = TEXTURE_GUIDE) uniform samplerBuffer guide;  // a depth, and up to which others are of one surface with it
+#endif
 layout(std430, binding = STORAGE_SAMPLES) writeonly buffer Samples { float out_samples[]; };
 layout(std430, binding = STORAGE_WEIGHTS) writeonly buffer Weights { float out_weights[]; };
 
@@ -16,19 +19,35 @@ const float taps[] = TAPS;
 precise vec4 sum;
 precise float weight;
 precise float inside;
+precise float present;  // weight of all surfaces
+vec2 front;  // depth of the nearest, and up to which others count
 
 bool is_there(float its_weight) { return its_weight > 0.0 && floatBitsToUint(its_weight) < NO_DEPTH; }
 
 void begin_sample() {
     sum = vec4(0.0);
-    weight = inside = 0.0;
+    weight = inside = present = 0.0;
+    front = vec2(uintBitsToFloat(NO_DEPTH));
 }
+
+#if FRONT
+// Told of all samples before any is added.
+void tell_sample(ivec2 at) {
+    int i = at.y * size.x + at.x;
+    vec2 here = texelFetch(guide, i).xy;
+    if (is_there(texelFetch(weights, i).r) && here.x < front.x) front = here;
+}
+#endif
 
 void add_sample(ivec2 at, float tap) {
     int i = at.y * size.x + at.x;
     float w = texelFetch(weights, i).r;
     inside += tap;
     if (!is_there(w)) return;
+    present += tap * w;
+#if FRONT
+    if (texelFetch(guide, i).x > front.y) return;
+#endif
     weight += tap * w;
     sum += tap * w * texelFetch(samples, i);
 }

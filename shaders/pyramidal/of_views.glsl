@@ -85,9 +85,7 @@ Mixture mixed_of(RangeView v, ivec4 at, uint part, vec2 pixel) {
     Corner z = corner_at(v, found, at.y, at.zw + z_at);
     vec3 shares = shares_at(x, y, z, pixel);
     float apart = sqrt(abs(shares.x + shares.y + shares.z));  // a triangle is half a square
-    if (view_perspective) shares /= -vec3(x.place.z, y.place.z, z.place.z);
-    float sum = shares.x + shares.y + shares.z;
-    shares = sum == 0.0 ? vec3(1.0, 0.0, 0.0) : shares / sum;
+    shares = shares_in_space(depths_of(x, y, z), shares);
     bool first = shares.x >= max(shares.y, shares.z);
     ivec2 most = first ? x_at : shares.y >= shares.z ? y_at : z_at;
     return Mixture(

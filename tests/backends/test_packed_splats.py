@@ -13,8 +13,8 @@ from scenes import NOTHING
 from test_elliptical import ELLIPSES
 from test_instancing import CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
 
-from viewer.backends.auto_splats.splatting import WAYS
-from viewer.backends.auto_splats.splatting import draw_splats as draw_all
+from viewer.backends.surfels.packed import WAYS
+from viewer.backends.surfels.packed import draw_splats as draw_all
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
 from viewer.look import Look

@@ -13,7 +13,7 @@ from packed import Packed
 from scenes import NOTHING, looking_down_z, sphere
 from test_instancing import CAMERAS, CLOUD, assert_agree, assert_equal
 
-from viewer.backends.auto_splats.splatting import WAYS, _ByRow, draw_splats
+from viewer.backends.surfels.packed import WAYS, _ByRow, draw_splats
 from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera

@@ -26,7 +26,7 @@ from test_pyramid import FILTERS, chain, picture
 from test_range_samples import held, probe, seen_by, stepped_view
 
 from viewer.backends import Backend, backend, backends
-from viewer.backends.auto_splats.splatting import WAYS, draw_splats
+from viewer.backends.surfels.packed import WAYS, draw_splats
 from viewer.bench import baselines
 from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera

@@ -13,7 +13,19 @@ from numpy.typing import NDArray
 from viewer.errors import InputError
 from viewer.gpu import pyramid
 from viewer.gpu.context import Gpu
-from viewer.gpu.pyramid import BINOMIAL, BOX, GAUSSIAN, NEAREST, TENT, Filter, Image, Pyramid, sizes
+from viewer.gpu.pyramid import (
+    BINOMIAL,
+    BOX,
+    FRONT_BOX,
+    FRONT_TENT,
+    GAUSSIAN,
+    NEAREST,
+    TENT,
+    Filter,
+    Image,
+    Pyramid,
+    sizes,
+)
 from viewer.renderer import Renderer
 
 FILTERS = {"box": BOX, "nearest": NEAREST, "tent": TENT, "binomial": BINOMIAL, "gaussian": GAUSSIAN}
@@ -249,3 +261,85 @@ def test_levels_that_do_not_belong_together_are_refused(renderer: Renderer) -> N
     with pytest.raises(InputError, match="too large"):
         Image(gpu, (1 << 20, 1 << 20), 1)
     gpu.discard(fine, coarse, other)
+
+
+def in_front(depths: Array, weights: Array, reach: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Those of some samples that are there and of the surface of the nearest. depths: (H, W, 2), a depth and
+    up to which others are of one surface with it."""
+    there = [at for at in reach if weights[at] > 0]
+    limit = min((depths[at][0], depths[at][1]) for at in there)[1] if there else 0
+    return [at for at in there if depths[at][0] <= limit]
+
+
+def front_mean(
+    values: Array, guide: Array, weights: Array, taps: dict[tuple[int, int], float]
+) -> tuple[Array, float]:
+    """The plain version of a step with `Filter.front`, for one sample. taps: of the samples in its reach."""
+    used = in_front(guide, weights, list(taps))
+    weight = sum(taps[at] * weights[at] for at in used)
+    total = sum((taps[at] * weights[at] * values[at] for at in used), np.zeros(values.shape[2]))
+    return (total / weight if used else total), weight / sum(taps.values())
+
+
+def taps_of(n: int, how: Filter) -> tuple[dict[int, dict[int, float]], dict[int, dict[int, float]]]:
+    """For each coarse sample along an axis of n fine ones the fine ones it is made of, and the other way."""
+    down: dict[int, dict[int, float]] = {i: {} for i in range(-(-n // 2))}
+    up: dict[int, dict[int, float]] = {i: {} for i in range(n)}
+    for coarse, fine, tap in pairs(n, how):
+        down[coarse][fine] = up[fine][coarse] = tap
+    return down, up
+
+
+def across(rows: dict[int, float], columns: dict[int, float]) -> dict[tuple[int, int], float]:
+    return {(y, x): a * b for y, a in rows.items() for x, b in columns.items()}
+
+
+def surfaces(size: tuple[int, int], seed: int) -> tuple[Array, Array]:
+    """Depths of two surfaces, how far each reaches, and weights, a third of which are not there."""
+    rng = np.random.default_rng(seed)
+    _, weights = picture(size, 1, seed)
+    depth = np.where(rng.random(size[::-1]) < 0.4, 1.0, 3.0) + 0.4 * rng.random(size[::-1])
+    return np.stack([depth, depth + 0.3 + rng.random(size[::-1])], axis=2).astype(np.float32).astype(
+        float
+    ), weights
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("how", [FRONT_BOX, FRONT_TENT], ids=["box", "tent"])
+def test_the_surface_in_front_is_pulled_and_pushed(
+    renderer: Renderer, how: Filter, size: tuple[int, int]
+) -> None:
+    """Of depths, and of colours that go by them."""
+    gpu, coarse_size = renderer.gpu, sizes(size, 2)[1]
+    (rows_down, rows_up), (columns_down, columns_up) = (taps_of(n, how) for n in size[::-1])
+    depths, weights = surfaces(size, 1)
+    colors, _ = picture(size, 3, 2)
+    colors = np.nan_to_num(colors, posinf=0, neginf=0)
+    guide, color = image(gpu, depths, weights), image(gpu, colors)
+    for values, fine in ((depths, guide), (colors, color)):
+        made = Image(gpu, coarse_size, values.shape[2])
+        pyramid.reduce(gpu, fine, made, how, guide)
+        expected = np.zeros((*coarse_size[::-1], values.shape[2])), np.zeros(coarse_size[::-1])
+        for y, x in np.ndindex(expected[1].shape):
+            taps = across(rows_down[y], columns_down[x])
+            expected[0][y, x], expected[1][y, x] = front_mean(values, depths, weights, taps)
+        assert_close(made, *expected)
+        gpu.discard(made)
+    coarse_depths, coarse_weights = surfaces(coarse_size, 3)
+    coarse_colors = np.random.default_rng(4).random((*coarse_size[::-1], 3)).astype(np.float32).astype(float)
+    coarse_guide, coarse_color = image(gpu, coarse_depths, coarse_weights), image(gpu, coarse_colors)
+    for values, coarse, fine, own in (
+        (coarse_colors, coarse_color, color, colors),
+        (coarse_depths, coarse_guide, guide, depths),  # last, since it says what is there
+    ):
+        pyramid.fill(gpu, coarse, fine, how, (coarse_guide, guide))
+        read, read_weights = fine.read()
+        for y, x in np.ndindex(read.shape[:2]):
+            if weights[y, x] > 0:
+                np.testing.assert_array_equal(read[y, x], own[y, x])
+                continue
+            taps = across(rows_up[y], columns_up[x])
+            mean, weight = front_mean(values, coarse_depths, coarse_weights, taps)
+            np.testing.assert_allclose(read[y, x], mean, rtol=1e-4, atol=1e-5)
+            np.testing.assert_allclose(read_weights[y, x], weight, rtol=1e-4, atol=1e-6)
+    gpu.discard(guide, color, coarse_guide, coarse_color)

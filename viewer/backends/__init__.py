@@ -85,6 +85,10 @@ class Limit:
 
 
 # Reasons of limits that several backends have.
+AROUND_ALL = (
+    "octants and sectors divide the cube or the directions around all points, upright: with others, or "
+    "turned ones, points lie in other ones"
+)
 NO_SPACING = (
     "points are drawn as large as they lie apart, which a line of them end on, or one alone, does not tell"
 )

@@ -55,6 +55,7 @@ class Texture(IntEnum):
     WEIGHTS = auto()
     DETAIL = auto()
     DETAIL_WEIGHTS = auto()
+    GUIDE = auto()  # that tells which samples are in front
     # Tiles of splats.
     PLACES = auto()
     FORMS = auto()
@@ -81,6 +82,10 @@ class Texture(IntEnum):
     HOMES = auto()  # sector and key of each row
     OCCUPIED = auto()  # cells of sectors that points fall into
     VISIBLE = auto()  # rows that are
+    # What is shown of visible points.
+    CANDIDATES = auto()  # a row for each sector
+    SPACINGS = auto()
+    JOINED = auto()  # rows that are a face's corners
     # Means of pictures.
     LIGHT = auto()  # of bytes
     ENCODED = auto()  # bytes of light
@@ -163,6 +168,11 @@ class Storage(IntEnum):
     STAMPS = 6
     NEXT_ROWS = 7
     VISIBLE = 0
+    # What is shown of visible points, beside two lists, splats and looks; and levels of pyramids.
+    SPACINGS = 1
+    JOINED = 6
+    LOOK_SAMPLES = 2
+    COLOR_SAMPLES = 3
     # Samples of range views: a level that is made.
     RANGE_DEPTHS = 0
     RANGE_LOOKS = 1

@@ -12,6 +12,7 @@ and 4 for the weight; a whole chain has 4/3 of the samples of its first image.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -37,17 +38,23 @@ class Filter:
 
     nearest: a coarse sample is not the mean, but that one of the fine samples in reach whose first channel is
     least, whatever the taps, so that depths on either side of an outline are not mixed.
+
+    front: the mean is of the nearest surface alone. The first channel is a depth, the second the depth up to
+    which others are of one surface with that sample: those behind that of the nearest in reach do not count.
     """
 
     first: int
     taps: tuple[float, ...]
     nearest: bool = False
+    front: bool = False
 
 
 BOX = Filter(0, (1.0, 1.0))  # means of 2 x 2, as mipmaps have them; expanded: each sample four times
 NEAREST = Filter(0, (1.0, 1.0), nearest=True)  # the nearest of 2 x 2
 TENT = Filter(-1, (1.0, 3.0, 3.0, 1.0))  # expanded: bilinear
 BINOMIAL = Filter(-2, (1.0, 4.0, 6.0, 4.0, 1.0))  # Burt and Adelson's, a = 0.375
+FRONT_BOX = Filter(0, (1.0, 1.0), front=True)  # the two steps of pull and push (Marroquim 2008)
+FRONT_TENT = Filter(-1, (1.0, 3.0, 3.0, 1.0), front=True)
 GAUSSIAN = Filter(-1, (math.exp(-2), 1.0, math.exp(-2)))  # 3 x 3, of spread 0.5 (Farooq 2013, 3.3.2)
 
 
@@ -127,14 +134,31 @@ def sizes(size: tuple[int, int], levels: int | None = None) -> list[tuple[int, i
     return [(-(-size[0] // 2**k), -(-size[1] // 2**k)) for k in range(most if levels is None else levels)]
 
 
-def reduce(gpu: Gpu, fine: Image, coarse: Image, how: Filter) -> None:
-    """Make a level of the next finer one."""
-    _step(gpu, "reduce", fine, coarse, how, {"NEAREST": int(how.nearest)})
+def reduce(gpu: Gpu, fine: Image, coarse: Image, how: Filter, guide: Image | None = None) -> None:
+    """Make a level of the next finer one. guide: an image of the fine one's size, whose weights count and
+    which, with `Filter.front`, tells which samples are in front; None: the fine one itself."""
+    _step(gpu, "reduce", fine, coarse, how, {"NEAREST": int(how.nearest)}, guide=guide)
 
 
 def expand(gpu: Gpu, coarse: Image, fine: Image, how: Filter) -> None:
     """Make a level of the next coarser one."""
     _step(gpu, "expand", coarse, fine, how, {"SIGN": 0})
+
+
+def fill(
+    gpu: Gpu,
+    coarse: Image,
+    fine: Image,
+    how: Filter,
+    guides: tuple[Image, Image] | None = None,
+    enough: float = 0.0,
+) -> None:
+    """Give the samples of a level that are not there what the next coarser level, expanded, has in their
+    places, where its weight is enough. guides: images of the sizes of both, coarse and fine, in the place of
+    which they count, as in `reduce`; None: these themselves."""
+    its_guide, known = guides or (coarse, fine)
+    defines = {"SIGN": 0, "FILLS": 1}
+    _step(gpu, "expand", coarse, fine, how, defines, guide=its_guide, known=known, enough=enough)
 
 
 def subtract_expanded(gpu: Gpu, image: Image, coarse: Image, detail: Image, how: Filter) -> None:
@@ -157,16 +181,28 @@ def _step(
     source: Image,
     result: Image,
     how: Filter,
-    defines: dict[str, int],
+    defines: Mapping[str, int],
     detail: Image | None = None,
+    guide: Image | None = None,
+    known: Image | None = None,
+    enough: float = 0.0,
 ) -> None:
-    """Run shaders/pyramid/NAME.comp for each sample of the result."""
+    """Run shaders/pyramid/NAME.comp for each sample of the result. guide: has the weights that count in place
+    of the source's; known: in place of the result's."""
+    guide = guide or source
     _check(name, source, result, detail)
+    _check(name, guide, known or result, channels=False)
     taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
     taken = {"CHANNELS": f"{result.channels}u", "FIRST": how.first, "COUNT": len(how.taps)}
-    program = gpu.compute(f"pyramid/{name}.comp", {**defines, **taken, "TAPS": f"float[]({taps})"})
+    given = {"FRONT": int(how.front), "FILLS": 0, **defines, **taken, "TAPS": f"float[]({taps})"}
+    program = gpu.compute(f"pyramid/{name}.comp", given)
     source.samples.bind(Texture.SAMPLES)
-    source.weights.bind(Texture.WEIGHTS)
+    guide.weights.bind(Texture.WEIGHTS)
+    if how.front:
+        guide.samples.bind(Texture.GUIDE)
+    if known is not None:
+        known.weights.bind(Texture.DETAIL_WEIGHTS)
+        gpu.set(program, enough=enough)
     if detail is not None:
         detail.samples.bind(Texture.DETAIL)
         detail.weights.bind(Texture.DETAIL_WEIGHTS)
@@ -177,13 +213,15 @@ def _step(
         gpu.dispatch(program, result.size[0] * result.size[1])
 
 
-def _check(name: str, source: Image, result: Image, detail: Image | None) -> None:
-    """Raise ValueError where images do not belong together."""
+def _check(
+    name: str, source: Image, result: Image, detail: Image | None = None, channels: bool = True
+) -> None:
+    """Raise ValueError where images do not belong together. channels: whether theirs must be as many."""
     fine, coarse = (source, result) if name == "reduce" else (result, source)
     images = [image for image in (source, result, detail) if image is not None]
     if coarse.size != sizes(fine.size, 2)[1] or (detail is not None and detail.size != fine.size):
         raise ValueError(f"no levels that follow one another: {[image.size for image in images]}")
-    if len({image.channels for image in images}) > 1:
+    if channels and len({image.channels for image in images}) > 1:
         raise ValueError("levels with different channels")
     if result is detail or result is source:
         raise ValueError("a level cannot be made in place")

@@ -77,12 +77,21 @@ def scatter(
         if listed is not None:
             listed.bind()
 
-    with gpu.timers.measure("depth"):
-        visits.send(gpu, "scatter/best.glsl", bind, PASS=0)
+    take_keys(gpu, visits, keys)
     take_items(gpu, visits, keys, best)
     if listed is not None:
         with gpu.timers.measure("list"):
             visits.send(gpu, "scatter/best.glsl", bind, PASS=2)
+
+
+def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:
+    """The first step of `scatter`: keep the least key of each cell, and of what `keys` holds."""
+
+    def bind(_: Program) -> None:
+        keys.buffer.bind_to_storage_buffer(Storage.KEYS)
+
+    with gpu.timers.measure("depth"):
+        visits.send(gpu, "scatter/best.glsl", bind, PASS=0)
 
 
 def take_items(gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.BufferTexture) -> None:

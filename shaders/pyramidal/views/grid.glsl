@@ -1,5 +1,6 @@
 // Four neighbouring samples, and the triangles between those of one surface (Farooq 2013, 8.6.1).
 #include "common/view.glsl"
+#include "common/triangle.glsl"
 #include "range/samples.glsl"
 
 // A sample in the picture. there: whether it is one, and between near and far.
@@ -49,29 +50,6 @@ int triangles(RangeView v, int level, Corner a, Corner b, Corner c, Corner d) {
     return abs(a.depth - d.depth) <= abs(b.depth - c.depth) ? 6 : 9;
 }
 
-// Twice the area to one side of an edge, from the corner that comes first, so that triangles that share it agree.
-float beside(Corner from, Corner to, vec2 pixel) {
-    precise vec2 edge = to.pixel - from.pixel, away = pixel - from.pixel;
-    precise float area = edge.x * away.y - edge.y * away.x;
-    return area;
-}
+vec3 shares_at(Corner x, Corner y, Corner z, vec2 pixel) { return shares_at(x.pixel, y.pixel, z.pixel, pixel); }
 
-// Shares of a triangle's corners at a pixel, not divided by their sum; all of one sign inside.
-vec3 shares_at(Corner x, Corner y, Corner z, vec2 pixel) {
-    return vec3(beside(y, z, pixel), -beside(x, z, pixel), beside(x, y, pixel));
-}
-
-bool is_inside(vec3 shares) {
-    return all(greaterThanEqual(shares, vec3(0.0))) || all(lessThanEqual(shares, vec3(0.0)));
-}
-
-// The depth of a triangle's plane at a pixel, between those of its corners.
-float depth_at(Corner x, Corner y, Corner z, vec3 shares) {
-    precise vec3 inverse = view_perspective ? 1.0 / vec3(-x.place.z, -y.place.z, -z.place.z) : vec3(1.0);
-    precise float sum = shares.x + shares.y + shares.z;
-    precise float depth = view_perspective
-        ? sum / (shares.x * inverse.x + shares.y * inverse.y + shares.z * inverse.z)
-        : -(shares.x * x.place.z + shares.y * y.place.z + shares.z * z.place.z) / sum;
-    float low = -max(x.place.z, max(y.place.z, z.place.z)), high = -min(x.place.z, min(y.place.z, z.place.z));
-    return sum == 0.0 ? low : clamp(depth, low, high);
-}
+vec3 depths_of(Corner x, Corner y, Corner z) { return -vec3(x.place.z, y.place.z, z.place.z); }

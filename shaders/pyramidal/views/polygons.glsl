@@ -19,7 +19,7 @@ void visit_triangle(Corner x, Corner y, Corner z, float front, uint own, int par
     vec2 low = min(x.pixel, min(y.pixel, z.pixel)), high = max(x.pixel, max(y.pixel, z.pixel));
     ivec2 first = max(ivec2(ceil(low - 0.5)), ivec2(0)), last = min(ivec2(floor(high - 0.5)), view_size - 1);
 #if CULL_BACK
-    if (beside(x, y, z.pixel) * front < 0.0) return;
+    if (beside(x.pixel, y.pixel, z.pixel) * front < 0.0) return;
 #endif
     int every = part == 0 ? 1 : parts;
     if (part > 0) first.y += (part - 1 + parts - first.y % parts) % parts;
@@ -27,7 +27,7 @@ void visit_triangle(Corner x, Corner y, Corner z, float front, uint own, int par
         for (int column = first.x; column <= last.x; ++column) {
             vec3 shares = shares_at(x, y, z, vec2(column, row) + 0.5);
             if (!is_inside(shares)) continue;
-            uint key = floatBitsToUint(depth_at(x, y, z, shares));
+            uint key = floatBitsToUint(depth_at(depths_of(x, y, z), shares));
             visit(uint(row * view_size.x + column), key, own);
         }
 }

@@ -16,9 +16,9 @@ from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
 from .. import FrameView, Limit, Suited
+from ..surfels.packed import WAYS, draw_depths, draw_splats
 from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
-from .splatting import WAYS, draw_depths, draw_splats
 from .values import VALUES as VALUES
 from .values import give_value
 

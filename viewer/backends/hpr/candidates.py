@@ -33,8 +33,8 @@ class Candidates:
     rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. keys: R32UI, its key.
     spots: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector that it
     lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where a sector has it or it
-    lies in none. sectors: what `rows` are of; shaders that include hpr/sectors.glsl take it as `params`, with
-    `defines`.
+    lies in none. state: another object after each `find`. sectors: what `rows` are of; shaders that include
+    hpr/sectors.glsl take it as `params`, with `defines`.
 
     Raises InputError for more sectors or points than the driver takes.
     """
@@ -61,6 +61,8 @@ class Candidates:
         self._todo, self._changed = (IndexList(gpu, sectors.count) for _ in range(2))
         self._near = IndexList(gpu, max(points, 1))
         self.steps, self.looked_at = 0, points
+        self.state = object()
+        self.distinct = points  # places that points have, as far as that is known
 
     @property
     def nbytes(self) -> int:
@@ -99,7 +101,7 @@ class Candidates:
         it is 0; `visible` is then left as it is. clip: planes, points below one of which are left out, and
         not visible.
         """
-        self.sectors, self.steps = sectors, steps
+        self.sectors, self.steps, self.state = sectors, steps, object()
         gpu, shift = self._gpu, self._cell_shift()
         gl.clear_words(self._occupied.buffer, 0)
 
@@ -131,7 +133,7 @@ class Candidates:
     def _cell_shift(self) -> int:
         """Halvings of the grid, until its cells are so few for the points that none inside is empty by
         chance."""
-        most = max(_EMPTY_BELOW * self.points, 1.0)
+        most = max(_EMPTY_BELOW * self.distinct, 1.0)
         edge = self.sectors.edge
         return min(max(math.ceil(math.log2(self.sectors.count / most) / 2), 0), edge.bit_length())
 

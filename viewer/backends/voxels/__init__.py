@@ -25,7 +25,7 @@ from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...view import View
-from .. import NO_DETAIL, NO_SPACING, FrameView, Limit
+from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, FrameView, Limit
 from ..surfels.passes import blends
 from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
@@ -35,19 +35,16 @@ ROWS = "octants"
 BLENDS = True
 DERIVES_ON_THREAD = True
 
-_AROUND_ALL = (
-    "octants divide the cube around the points, upright: others, or turned ones, lie in other octants"
-)
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
 # Rows of the stability suite that octants cannot hold in principle.
 LIMITS = {
-    "rotated by 37 degrees": (Limit(0.007, _AROUND_ALL, _IN_CUBES), Limit(0.001, _AROUND_ALL)),
-    "near plane inside the cloud": (Limit(0.01, _AROUND_ALL, _IN_CUBES), Limit(0.001, _AROUND_ALL)),
-    "eye inside the cloud": (Limit(0.04, _AROUND_ALL, _IN_CUBES), Limit(0.01, _AROUND_ALL)),
-    "zoomed in on 10^-3 of the scan": (Limit(0.007, _AROUND_ALL, _IN_CUBES), Limit(0.001, _AROUND_ALL)),
+    "rotated by 37 degrees": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
+    "near plane inside the cloud": (Limit(0.01, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
+    "eye inside the cloud": (Limit(0.04, AROUND_ALL, _IN_CUBES), Limit(0.01, AROUND_ALL)),
+    "zoomed in on 10^-3 of the scan": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
     "zoomed in on 10^-6 of the scan": (Limit(0.99, NO_DETAIL, _IN_CUBES), Limit(0.65, NO_DETAIL)),
-    "collinear points": Limit(0.015, _AROUND_ALL),
+    "collinear points": Limit(0.015, AROUND_ALL),
     "collinear points end on, perspective": Limit(0.01, NO_SPACING),
     "collinear points end on, orthographic": Limit(0.01, NO_SPACING),
 }

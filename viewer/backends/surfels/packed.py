@@ -1,6 +1,6 @@
-"""Drawing splats that a compute pass made of bare positions (Preiner 2012, section 7).
+"""Packed splats: drawing what a compute pass of another backend made of bare positions (Preiner 2012, 7).
 
-The ways of the surfels backend, in one pass or in two; normals are those of the splats, as the pose has none.
+The ways of surfels, in one pass or in two; normals are those of the splats, as the pose has none.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ...gpu.context import Gpu
 from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
-from ..surfels.passes import blend, blend_by_tiles
-from ..surfels.splats import FRAGMENT, SURFEL, Splats
-from ..surfels.tiles import FALLBACK, TileLists, show_all, show_smaller, show_with, tile_lists
+from .passes import blend, blend_by_tiles
+from .splats import FRAGMENT, SURFEL, Splats
+from .tiles import FALLBACK, TileLists, show_all, show_smaller, show_with, tile_lists
 
 WAYS = ("tiles", "tbo", "pull")  # how packed points become splats
 _SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it
@@ -46,7 +46,7 @@ def draw_splats(
     splats = _splats(radius_scale, epsilon)
     _draw(points, surface, splats, _instancing(surface, instancing, two), two, refine)
     if not two:
-        _take_normals(points, surface)
+        take_normals(points.array("splats"), surface)
 
 
 def draw_depths(
@@ -112,7 +112,7 @@ def _shrunk(points: Points, surface: Surface, splats: Splats, lists: TileLists |
     by_row, count = surface.keep(_ByRow), len(points.pose.cloud)
     radii = by_row.reserve("radii", count, gl.R32F)
     defines = {"TILES": int(lists is not None), **points.defines}
-    program = gpu.compute("auto_splats/shrink.comp", defines, params=splats)
+    program = gpu.compute("surfels/packed/shrink.comp", defines, params=splats)
     with gpu.timers.measure("shrink"):
         gpu.set(program, slack=_SLACK)
         points.bind(program)
@@ -153,14 +153,14 @@ class _ByRow:
         self._gpu.discard(*self._texels.values())
 
 
-def _take_normals(points: Points, surface: Surface) -> None:
-    """Take each pixel's normal from the splat that it shows."""
+def take_normals(splats: gl.BufferTexture, surface: Surface) -> None:
+    """Take each pixel's normal from the splat that it shows. splats: by row, as `Points.buffers` has them."""
     gpu, covered = surface.gpu, surface.list_covered()
     with gpu.timers.measure("normals"):
-        points.array("splats").bind(Texture.SPLATS)
+        splats.bind(Texture.SPLATS)
         surface.rows.bind(Texture.ROWS)
         surface.bind_own("normal")
-        covered.run(gpu.compute("auto_splats/normals.comp"))
+        covered.run(gpu.compute("surfels/packed/normals.comp"))
 
 
 def _instancing(surface: Surface, setting: str, two: bool) -> str:

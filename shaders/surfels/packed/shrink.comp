@@ -1,6 +1,6 @@
 // The radii of splats, those of hidden points no larger than what hides these. TILES: the forms of their discs as well,
 // and which disc each row has.
-#include "auto_splats/hidden.glsl"
+#include "surfels/packed/hidden.glsl"
 #include "common/item.glsl"
 
 layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float new_radii[]; };

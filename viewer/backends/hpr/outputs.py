@@ -1,0 +1,47 @@
+"""Outputs: what is drawn of the points that are visible."""
+
+from __future__ import annotations
+
+from ...gpu.amplify import Points
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Surface
+from ...look import wants_normals
+from .. import FrameView
+from ..points import draw_squares
+from ..surfels.packed import draw_splats, take_normals
+from .calibration import EyeCalibration
+from .candidates import Candidates
+from .faces import draw_faces
+from .reconstruction import fill_between
+from .splats import SectorSplats
+
+OUTPUTS = ("points", "faces", "splats", "reconstruction")
+
+
+def show_visible(
+    pose: GpuPose,
+    frame: FrameView,
+    surface: Surface,
+    candidates: Candidates,
+    calibration: EyeCalibration,
+) -> bool:
+    """Show the visible points, which candidates tell, as the parameters say; True if a later call would show
+    more of them."""
+    params, nearest = frame.params, candidates
+    splats = surface.keep(SectorSplats)
+    if params.output != "points" or wants_normals(surface.look):
+        nearest = splats.of_visible(pose, candidates, calibration, surface)
+    if params.output == "faces":
+        draw_faces(pose, surface, nearest, candidates.visible, splats, params.longest)
+    elif params.output == "splats":
+        buffers = {name: splats[name] for name in ("splats", "looks")}
+        points = Points(pose, use_radii=True, count=len(pose.cloud), buffers=buffers, elliptical=False)
+        draw_splats(points, surface, radius_scale=params.radius_scale, two=True)
+    else:
+        pixels = params.point_size if params.output == "points" else 1
+        draw_squares(pose, frame, surface, pixels, candidates.visible)
+        if params.output == "reconstruction":
+            fill_between(pose, surface, splats, params.radius_scale)
+        elif wants_normals(surface.look):
+            take_normals(splats["splats"], surface)
+    return surface.stats.share < 1
