@@ -16,7 +16,7 @@ layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 
 const int RUN = 8;
 uniform int stride;
-const float FARTHEST = 4.0;  // (1.5 + 1)^2 strides
+const float FARTHEST = 6.0;  // of strides, squared: behind more, hardly a point is visible
 
 void main() {
     uint first = item() * uint(RUN), found = 0u, bits = 0u;

@@ -19,7 +19,7 @@ layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 
 const int LOOKED_AT = 9;
 const int ROUNDS = 4;
-const float REACH = 1.5, ROUNDED = 0.02;  // strides
+const float REACH = 2.5, ROUNDED = 0.02;  // strides
 uniform int stride;  // sectors between those that are looked at
 
 void main() {

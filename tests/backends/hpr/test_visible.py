@@ -75,7 +75,7 @@ def test_it_comes_to_what_the_exact_operator_says(seen, eye: tuple[float, ...]) 
         found = np.isin(np.arange(len(points)), seen(points, eye, radius=radius, sectors=sectors))
         shares.append((found != exact).sum() / exact.sum())
     # Near the eye, points lie so far apart that others are seen between them.
-    most = (0.06, 0.04, 0.05) if eye[2] == 4 else (0.2, 0.12, 0.12)
+    most = (0.06, 0.04, 0.05) if eye[2] == 4 else (0.25, 0.17, 0.17)
     assert all(share < limit for share, limit in zip(shares, most, strict=True)), shares
 
 

@@ -87,7 +87,9 @@ class EyeCalibration:
         """The search in sectors of these directions, so many along an edge."""
         finer = edge / self.sectors.edge
         sectors = self.sectors.divided(edge)
-        return SectorSearch(sectors, max(int(self.spacing * finer), 1), max(round(finer), 1))
+        # A little short does: points are compared with the candidates around as well.
+        steps = max(int(self.spacing * finer + 0.4), 1)
+        return SectorSearch(sectors, steps, math.ceil(finer))
 
 
 def calibrate(
