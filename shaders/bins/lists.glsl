@@ -11,7 +11,7 @@ uint visited = 0u;
 #elif PASS == 1 && ORDERED
 layout(std430, binding = STORAGE_VISITS) writeonly buffer Pairs { uvec2 pairs[]; };
 #elif PASS == 1
-layout(std430, binding = STORAGE_VISITS) writeonly buffer List { uint list[]; };
+layout(std430, binding = STORAGE_VISITS) writeonly buffer Entries { uint entries[]; };
 #endif
 
 void visit(uint cell, uint key, uint item_id) {
@@ -25,6 +25,6 @@ void visit(uint cell, uint key, uint item_id) {
     if (at < uint(pairs.length())) pairs[at] = uvec2(cell, item_id);
 #else
     uint at = atomicAdd(cursors[cell], 1u);
-    if (at < uint(list.length())) list[at] = item_id;
+    if (at < uint(entries.length())) entries[at] = item_id;
 #endif
 }

@@ -82,6 +82,8 @@ class Texture(IntEnum):
     HOMES = auto()  # sector and key of each row
     OCCUPIED = auto()  # cells of sectors that points fall into
     VISIBLE = auto()  # rows that are
+    COPIES = auto()  # rows in whose place a lower one is
+    SIGHTS = auto()  # spots, and how far each covers what lies behind
     # What is shown of visible points.
     CANDIDATES = auto()  # a row for each sector
     SPACINGS = auto()
@@ -168,6 +170,7 @@ class Storage(IntEnum):
     STAMPS = 6
     NEXT_ROWS = 7
     VISIBLE = 0
+    SIGHTS = 6
     # What is shown of visible points, beside two lists, splats and looks; and levels of pyramids.
     SPACINGS = 1
     JOINED = 6

@@ -26,10 +26,10 @@ SIZE = (64, 48)
 
 @pytest.fixture(scope="module")
 def seen(renderer: Renderer):  # type: ignore[no-untyped-def]
-    """seen(points, eye, ...): what `visible_points` gives, on the renderer's context."""
+    """seen(points, eye, ...): what `visible_points` gives for the hull, on the renderer's context."""
 
     def seen(points: ArrayLike | Pose, eye: ArrayLike = EYE, **how: object) -> NDArray[np.uint32]:
-        return visible_points(points, eye, gpu=renderer.gpu, **how)  # type: ignore[arg-type]
+        return visible_points(points, eye, gpu=renderer.gpu, **{"mode": "hull", **how})  # type: ignore[arg-type]
 
     return seen
 

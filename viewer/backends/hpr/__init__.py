@@ -30,6 +30,7 @@ from .. import AROUND_ALL, NO_DETAIL, FrameView, Limit
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
 from .candidates import UNLIMITED, Candidates
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
+from .covering import Covering, Sample, copies_in
 from .exact import SeenPoints, as_cloud, flipping
 from .outputs import OUTPUTS, show_visible
 from .sectors import Sectors
@@ -51,7 +52,7 @@ LIMITS = {
     "normals parallel to y": Limit(0.02, AROUND_ALL, {"output": ("splats",)}),
     "points of a body x1000": Limit(0.03, NO_DETAIL),
 }
-MODES = ("hull",)
+MODES = ("combined", "hull")
 _DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, igea and dragon each
 _QUALITY = 0.5
 _SHOWN = "Shown"
@@ -130,6 +131,15 @@ class Params:
         high=1e9,
         group="Visibility",
     )
+    mode: str = param(
+        MODES[0],
+        "hull: points of the hull of the flipped ones; combined: corrected by which points cover which, so "
+        "that radius and sectors matter little",
+        choices=MODES,
+        title="Visible by",
+        basic=True,
+        group="Visibility",
+    )
     sectors: int | None = param(
         None,
         "Sectors in all, k; auto: from the quality",
@@ -170,6 +180,7 @@ class _Seen:
     def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
         self._gpu = gpu
         self._candidates: Candidates | None = None
+        self._covering: Covering | None = None
         self._pose: weakref.ref[GpuPose] | None = None
         self._sought: tuple[object, ...] = ()
         self._chosen: dict[str, str] = {}
@@ -178,7 +189,7 @@ class _Seen:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        return self._candidates.nbytes if self._candidates else 0
+        return sum(each.nbytes for each in (self._candidates, self._covering) if each)
 
     def look(self, pose: GpuPose, frame: FrameView, surface: Surface) -> Candidates:
         """The candidates of a picture."""
@@ -194,6 +205,7 @@ class _Seen:
             params.radius,
             params.sectors,
             params.steps,
+            params.mode,
         )
         # What is found at rest is in all directions, and stays while the camera turns.
         sides = side_planes(frame.view, body) if frame.moving else None
@@ -231,19 +243,31 @@ class _Seen:
             self._gpu.discard(self._candidates)
             self._candidates = None
             self._candidates = Candidates(self._gpu, sectors, len(pose.cloud))
-        self._candidates.find(
-            pose.array("positions"), *search, sample=None if rows is None else (rows, count), clip=clip
-        )
+        only = None if rows is None else (rows, count)
+        self._candidates.find(pose.array("positions"), *search, sample=only, clip=clip)
+        if params.mode == "combined":
+            self._correct(pose, self._candidates, found, only)
         self._chosen = {
             "radius": "parallel rays" if math.isinf(found.radius) else f"{found.radius:.4g}",
             "sectors": f"{sectors.count:,} ({sectors.mapping})",
             "steps": str(search.steps),
         }
 
+    def _correct(
+        self, pose: GpuPose, candidates: Candidates, found: EyeCalibration, sample: Sample | None
+    ) -> None:
+        if self._covering is None or self._covering.points != candidates.points:
+            self._gpu.discard(self._covering)
+            self._covering = None
+            self._covering = Covering(self._gpu, candidates.points)
+        repeated = copies_in(pose) if sample is None else None
+        self._covering.correct(candidates, found.spacing / found.sectors.edge, repeated, sample)
+
     def release(self) -> None:
         """Delete what it holds on the GPU."""
-        if self._candidates is not None:
-            self._candidates.release()
+        for each in (self._candidates, self._covering):
+            if each is not None:
+                each.release()
 
 
 def _directions(pose: GpuPose, view: View) -> tuple[Sectors, Body]:
@@ -298,7 +322,7 @@ def visible_points(
     radius: float | None = None,
     sectors: int | None = None,
     steps: int | None = None,
-    mode: str = "hull",
+    mode: str = "combined",
     gpu: Gpu | None = None,
 ) -> NDArray[np.uint32]:
     """The points that an eye sees: ids (M,) uint32, ascending.
@@ -307,8 +331,9 @@ def visible_points(
     left out because a coordinate is not finite. eye: (3,), absolute. radius: R of the flip, scan units, not
     less than the distance to the farthest point; sectors: how many, k; steps: of propagation at most; None:
     as `calibrated` says. mode: "hull" takes the points on the hull of the flipped ones, as the sectors find
-    it. Of points in one place one is visible, and so is a point in the eye itself. gpu: None takes a context
-    of its own, which is kept. Raises InputError, NoOpenGLError.
+    it; "combined" corrects them by what covers what (`Covering`). Of points in one place one is visible, and
+    so is a point in the eye itself. gpu: None takes a context of its own, which is kept. Raises InputError,
+    NoOpenGLError.
     """
     if mode not in MODES:
         raise unknown_name("mode", mode, MODES)
@@ -323,10 +348,20 @@ def visible_points(
     candidates = Candidates(gpu, search.sectors, len(cloud))
     try:
         candidates.find(pose.array("positions"), *search)
+        if mode == "combined":
+            _correct(pose, candidates, found)
         rows = candidates.visible_rows()
     finally:
         candidates.release()
     return rows if cloud.ids is None else cloud.ids[rows]
+
+
+def _correct(pose: GpuPose, candidates: Candidates, found: EyeCalibration) -> None:
+    covering = Covering(pose.gpu, candidates.points)
+    try:
+        covering.correct(candidates, found.spacing / found.sectors.edge, copies_in(pose))
+    finally:
+        covering.release()
 
 
 @cache

@@ -50,13 +50,27 @@ def _body(cloud: PointCloud) -> Body:
     return Body(center + cloud.origin, max(radius, least) * _ROOM, _distinct(cloud.positions))
 
 
+def copies(cloud: PointCloud) -> NDArray[np.uint32]:
+    """1 for each point, (N,), in whose place one of a lower row is, else 0."""
+    words = _words(cloud.positions)
+    order = words.argsort(kind="stable")
+    flags = np.zeros(len(words), np.uint32)
+    flags[order[1:]] = words[order[1:]] == words[order[:-1]]
+    return flags
+
+
 def _distinct(positions: NDArray[np.float32]) -> int:
+    words = _words(positions)
+    words.sort()
+    return 1 + int(np.count_nonzero(words[1:] != words[:-1]))
+
+
+def _words(positions: NDArray[np.float32]) -> NDArray[np.uint64]:
+    """A word for each point, the same for those in one place and for next to no others."""
     words = (positions + np.float32(0)).view(np.uint32).astype(np.uint64)  # + 0: no negative zero
     mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
     mixed = (mixed ^ mixed >> np.uint64(29)) + words[:, 1] * np.uint64(0xBF58476D1CE4E5B9)
-    mixed = (mixed ^ mixed >> np.uint64(32)) + words[:, 2] * np.uint64(0x94D049BB133111EB)
-    mixed.sort()
-    return 1 + int(np.count_nonzero(mixed[1:] != mixed[:-1]))
+    return (mixed ^ mixed >> np.uint64(32)) + words[:, 2] * np.uint64(0x94D049BB133111EB)
 
 
 class SectorSearch(NamedTuple):
