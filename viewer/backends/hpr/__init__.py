@@ -43,14 +43,12 @@ FINDS_NORMALS = True
 LIMITS = {
     "rotated by 37 degrees": Limit(0.01, AROUND_ALL),
     "near plane inside the cloud": Limit(0.01, AROUND_ALL),
-    "eye inside the cloud": Limit(0.01, AROUND_ALL),
     "zoomed in on 10^-3 of the scan": Limit(0.25, NO_DETAIL),
     "zoomed in on 10^-6 of the scan": Limit(0.25, NO_DETAIL),
     "zoomed out x10^6": Limit(0.02, AROUND_ALL),
     "zoomed out x10^9": Limit(0.02, AROUND_ALL),
     "collinear points": Limit(0.02, AROUND_ALL),
     "normals parallel to y": Limit(0.02, AROUND_ALL, {"output": ("splats",)}),
-    "points of a body x1000": Limit(0.03, NO_DETAIL),
 }
 MODES = ("combined", "hull")
 _DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, igea and dragon each
