@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -170,6 +170,12 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     candidates = seen.look(pose, frame, surface)
     assert seen.calibration is not None
     return show_visible(pose, frame, surface, candidates, seen.calibration)
+
+
+def mark_visible(pose: GpuPose, frame: FrameView, surface: Surface) -> gl.BufferTexture:
+    """Flags for other backends, R32UI, a texel a row: 1 where the eye sees a point, as with the default
+    parameters. The pose has points."""
+    return surface.keep(_Seen).look(pose, replace(frame, params=Params()), surface).visible
 
 
 class _Seen:

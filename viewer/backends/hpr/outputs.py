@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ...gpu.amplify import Points
 from ...gpu.pose import GpuPose
+from ...gpu.squares import draw_squares
 from ...gpu.surface import Surface
 from ...look import wants_normals
 from .. import FrameView
-from ..points import draw_squares
 from ..surfels.packed import draw_splats, take_normals
 from .calibration import EyeCalibration
 from .candidates import Candidates
@@ -39,7 +39,7 @@ def show_visible(
         draw_splats(points, surface, radius_scale=params.radius_scale, two=True)
     else:
         pixels = params.point_size if params.output == "points" else 1
-        draw_squares(pose, frame, surface, pixels, candidates.visible)
+        draw_squares(pose, surface, pixels, frame.share, candidates.visible)
         if params.output == "reconstruction":
             fill_between(pose, surface, splats, params.radius_scale)
         elif wants_normals(surface.look):

@@ -1,0 +1,40 @@
+"""Points that hide what lies behind them: drawing and picking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scenes import NOTHING, sphere
+
+from viewer.analysis.pick import pick
+from viewer.backends.hpr import visible_points
+from viewer.camera import Camera
+from viewer.gpu.surface import Surface
+from viewer.scan.points import PointCloud
+
+Draw = Callable[..., Surface]
+SIZE = (160, 120)
+CLOUD = PointCloud.from_arrays(sphere(3000).positions)
+CAMERA = Camera(eye=(0.4, 0.3, 4.0), target=(0, 0, 0), fov_y=40)
+
+
+def test_the_back_is_not_seen_through_gaps(draw: Draw) -> None:
+    plain = draw(CLOUD, CAMERA, SIZE)
+    hiding = draw(CLOUD, CAMERA, SIZE, params={"hide_hidden": True})
+    away = CLOUD.positions + CLOUD.origin
+    faces_eye = np.einsum("ij,ij->i", away, np.array(CAMERA.eye) - away) > 0
+    seen, shown = (surface.id[surface.id != NOTHING] for surface in (plain, hiding))
+    assert (~faces_eye[seen]).sum() > 200
+    assert (~faces_eye[shown]).mean() < 0.06
+    assert faces_eye[shown].sum() > 0.9 * faces_eye[seen].sum()
+    assert set(shown) <= set(visible_points(CLOUD.positions + CLOUD.origin, CAMERA.eye).tolist())
+
+
+def test_what_is_hidden_is_never_picked(draw: Draw) -> None:
+    hiding = draw(CLOUD, CAMERA, SIZE, params={"hide_hidden": True, "point_size": 3})
+    visible = set(visible_points(CLOUD.positions + CLOUD.origin, CAMERA.eye).tolist())
+    picks = [pick(hiding, x, y, spacing=False) for y in range(20, 100, 5) for x in range(30, 130, 5)]
+    ids = [picked.id for picked in picks if picked is not None]
+    assert len(ids) > 100
+    assert set(ids) <= visible
