@@ -234,14 +234,14 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         data: dict[str, Any] = json.loads(path.read_text())
         measured = data["document"]["parts"]["measurements"]
         measured["all"][0]["note"] = "left"
-        data["document"]["backend"] = "hpr"
+        data["document"]["backend"] = "cubist"
         path.write_text(json.dumps(data))
         hands.press("Home", "ctrl+4")
         app.drop(path)
         app.told("these cannot be read: parts.measurements")
-        app.told("This Scan4D has no renderer 'hpr': .* draws in its place")
+        app.told("This Scan4D has no renderer 'cubist': .* draws in its place")
         state = app.see(frame=1)
-        assert state.document["backend"] == "hpr"
+        assert state.document["backend"] == "cubist"
         assert state.document["camera"] == data["document"]["camera"]
         assert state.document["bookmarks"] == data["document"]["bookmarks"]
         assert state.document["parts"]["measurements"] == measured

@@ -282,6 +282,7 @@ class Browser:
         entered, self._text = widgets.edit_path("##path", self._text, returns)
         widgets.tooltip("A folder, a file, or a pattern such as frame%04d.ply; Enter goes there")
         if entered:
+            imgui.set_nav_cursor_visible(False)  # the next Enter is for the rows
             self._enter_text()
 
     def _draw_known(self) -> None:
