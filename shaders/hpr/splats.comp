@@ -17,7 +17,7 @@ layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; }
 layout(std430, binding = STORAGE_SPACINGS) writeonly buffer Spacings { float spacings[]; };
 
 const float steps[] = STEPS;
-const float LEANING = 0.75;  // spacings that a splat reaches, since it may lean, but not beyond twice its sectors
+const float LEANING = 1.0;  // spacings that a splat reaches, since it may lean, but not far beyond its sectors
 const float OUTSIDE = 1.5;   // spacings that it reaches at most: candidates at outlines have sectors far outside
 
 void main() {
@@ -29,7 +29,7 @@ void main() {
     float spacing = width * (numbers[4] > 0.0 ? numbers[3] / numbers[4] : 1.0);
     uint key = texelFetch(keys, int(row)).r;
     float reach = uintBitsToFloat(NO_DEPTH - 1u - key) + 0.5 * width;
-    float radius = min(max(reach, min(LEANING * spacing, 2.0 * reach)), OUTSIDE * spacing);
+    float radius = min(max(reach, min(LEANING * spacing, 3.0 * reach)), OUTSIDE * spacing);
     vec3 normal = vec3(numbers[0], numbers[1], numbers[2]);
     if (normal == vec3(0.0)) {
         vec3 to_eye = view_perspective ? -to_view(texelFetch(positions, int(row)).xyz) : vec3(0.0, 0.0, 1.0);

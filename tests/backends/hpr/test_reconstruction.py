@@ -31,7 +31,7 @@ def test_it_closes_a_sphere_up_to_its_outline(draw: Draw) -> None:
     outline = np.count_nonzero(np.diff(inside, axis=1)) + np.count_nonzero(np.diff(inside, axis=0))
     middle = inside & (normal @ camera.rotation()[2] > 0.3)
     assert covered[middle].all()
-    assert (covered & ~inside).sum() < 2 * outline, "a spacing is 3 pixels"
+    assert (covered & ~inside).sum() < 2.5 * outline, "a spacing is 3 pixels"
     off = np.abs(surface.depth[middle] - depth[middle])
     assert off.mean() < 0.01
     assert off.max() < 0.15

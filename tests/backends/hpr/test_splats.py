@@ -112,7 +112,7 @@ def test_normals_and_sizes_are_those_of_the_plain_version(renderer: Renderer, na
     off = 1 - np.einsum("ij,ij->i", normals[told], expected[told])
     assert (off > 1e-4).mean() < 0.005, "but for triangles seen from their edge, and sums of a step"
     size = reach + 0.5 * widths_of(scene, eye)
-    size = np.minimum(np.maximum(size, np.minimum(0.75 * spacings, 2 * size)), 1.5 * spacings)
+    size = np.minimum(np.maximum(size, np.minimum(spacings, 3 * size)), 1.5 * spacings)
     np.testing.assert_allclose(radii[seen], size[seen], rtol=0.02)
     splats.release()
 
@@ -125,7 +125,7 @@ def test_splats_close_a_sphere_and_have_its_normals(draw: Draw) -> None:
     inside, covered = np.isfinite(depth), np.isfinite(surface.depth)
     assert (inside & ~covered).mean() < 1e-3
     both = inside & covered & (normal @ camera.rotation()[2] > 0.3)
-    np.testing.assert_allclose(surface.depth[both], depth[both], atol=0.02)
+    np.testing.assert_allclose(surface.depth[both], depth[both], atol=0.05)
     cosine = np.einsum("ijk,ijk->ij", surface.normal, normal)[both]
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 2
 
