@@ -4,7 +4,8 @@ Machado e Silva 2014: the operator of Katz 2007, for which the points on the hul
 visible, by sectors of directions, each of which keeps the point whose flip lies farthest along it (3 to 5).
 Its radius and the number of sectors and steps are found as in 6. Unlike there, angles are divided evenly to
 both sides, so that sectors are alike up to 45 degrees off the middle, and an eye nearer than that has six
-such grids around it, as the faces of a cube.
+such grids around it, as the faces of a cube; and points that are no sector's are compared with the candidates
+around them, which keeps those that share a sector and needs fewer of these.
 """
 
 from __future__ import annotations

@@ -32,9 +32,10 @@ class Candidates:
 
     rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. keys: R32UI, its key.
     spots: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector that it
-    lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where a sector has it or it
-    lies in none. state: another object after each `find`. sectors: what `rows` are of; shaders that include
-    hpr/sectors.glsl take it as `params`, with `defines`.
+    lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where it is on the hull of
+    the flipped candidates around it, or lies in no sector, so that nothing is known that hides it. state:
+    another object after each `find`. sectors: what `rows` are of; shaders that include hpr/sectors.glsl take
+    it as `params`, with `defines`.
 
     Raises InputError for more sectors or points than the driver takes.
     """
