@@ -9,6 +9,7 @@ layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
 #endif
 #include "hpr/sights.glsl"
 
+uniform float clear;  // of the reach
 layout(binding = TEXTURE_SPOTS) uniform samplerBuffer spots;
 layout(binding = TEXTURE_SIGHTS) uniform samplerBuffer sights;
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
@@ -70,7 +71,7 @@ void main() {
         if (!find_sight(sight.xyz, face, other)) continue;
         float aside = angle_between(own, other);
         float before = depth_before(other, own);
-        if (aside > sight.w || before <= (aside > 0.0 ? CLEAR * sight.w + STEEP * aside : 0.0)) continue;
+        if (aside > sight.w || before <= (aside > 0.0 ? clear * sight.w + STEEP * aside : 0.0)) continue;
         if (other.xy == own.xy) {
             covered = uvec2(~0u);
             break;

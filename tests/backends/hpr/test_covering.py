@@ -13,7 +13,7 @@ from scenes import sphere
 from viewer.backends.hpr import visible_points
 from viewer.backends.hpr.calibration import calibrate
 from viewer.backends.hpr.candidates import Candidates
-from viewer.backends.hpr.covering import CLEAR, ENOUGH, REACH, ROUNDS, STEEP, Covering, levels
+from viewer.backends.hpr.covering import CLEAR, ENOUGH, REACH, ROUNDS, STEEP, Covering, clearance, levels
 from viewer.backends.hpr.exact import exact_visible_points
 from viewer.backends.hpr.sectors import Sectors
 from viewer.camera import Camera
@@ -161,6 +161,31 @@ def test_uneven_density_leaves_no_hole() -> None:
     seen, before = seen_of(points, at), before_horizon(points, at)
     assert seen[before > 0.1].mean() > 0.98
     assert seen[before < -0.5].mean() < 0.02
+
+
+@pytest.mark.parametrize("noise", [1.0, 2.0])
+def test_noise_hides_less_than_from_the_exact_operator(noise: float) -> None:
+    """Noise in distances between points, against the exact operator at the best of some radii."""
+    rng = np.random.default_rng(4)
+    points, at = spread(), np.array([0.2, 0.1, 3.0])
+    truth = before_horizon(points, at) > 0
+    noisy = points + rng.normal(0, noise * SPACING, points.shape)
+    farthest = float(np.linalg.norm(noisy - at, axis=1).max())
+    exact = []
+    for times in (10, 30, 100, 300, 1000, 3000):
+        hull = np.zeros(COUNT, bool)
+        hull[exact_visible_points(noisy, at, times * farthest)] = True
+        exact.append(errors(hull, truth))
+    assert errors(seen_of(noisy, at), truth) < min(exact) - 5
+
+
+def test_clearance_is_more_where_there_is_noise() -> None:
+    rng = np.random.default_rng(4)
+    noise = rng.normal(0, SPACING, (COUNT, 3))
+    clear = [clearance(PointCloud.from_arrays(spread() + by * noise)) for by in (0.0, 0.5, 2.0)]
+    assert clear[0] == CLEAR
+    assert CLEAR < clear[1] < clear[2]
+    assert clearance(PointCloud.from_arrays(np.zeros((9, 3)))) == CLEAR
 
 
 def test_the_same_each_time() -> None:

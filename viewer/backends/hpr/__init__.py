@@ -31,7 +31,7 @@ from .. import AROUND_ALL, NO_DETAIL, FrameView, Limit
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
 from .candidates import UNLIMITED, Candidates
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
-from .covering import Covering, Sample, copies_in
+from .covering import Covering, Sample, clearance, copies_in
 from .exact import SeenPoints, as_cloud, flipping
 from .outputs import OUTPUTS, show_visible
 from .sectors import Sectors
@@ -266,7 +266,8 @@ class _Seen:
             self._covering = None
             self._covering = Covering(self._gpu, candidates.points)
         repeated = copies_in(pose) if sample is None else None
-        self._covering.correct(candidates, found.spacing / found.sectors.edge, repeated, sample)
+        spacing = found.spacing / found.sectors.edge
+        self._covering.correct(candidates, spacing, clearance(pose.stored), repeated, sample)
 
     def release(self) -> None:
         """Delete what it holds on the GPU."""
@@ -364,7 +365,9 @@ def visible_points(
 def _correct(pose: GpuPose, candidates: Candidates, found: EyeCalibration) -> None:
     covering = Covering(pose.gpu, candidates.points)
     try:
-        covering.correct(candidates, found.spacing / found.sectors.edge, copies_in(pose))
+        covering.correct(
+            candidates, found.spacing / found.sectors.edge, clearance(pose.stored), copies_in(pose)
+        )
     finally:
         covering.release()
 

@@ -11,6 +11,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...errors import InputError
 from ...gpu import gl
 from ...gpu.bindings import Storage, Texture
@@ -19,6 +22,8 @@ from ...gpu.compact import IndexList, list_flagged
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits
+from ...scan.points import PointCloud
+from ...scan.spacing import nearest_rows
 from .calibration import body_of, copies
 from .candidates import Candidates
 from .sectors import Sectors
@@ -30,9 +35,36 @@ STEEP = 1.0  # and how much farther for each length aside
 ENOUGH = 6  # points in a ball that tell how far apart they lie
 _BALL = 2.5  # its radius, in usual distances between points; it is doubled where there are too few
 _LEVELS = 3
+_LOOKED_AT = 8_000_000  # distances from point to point that tell of noise
+_ROUGH = 0.22  # off the plane of the nearest, in distances between points: detail, up to that
+_NOISY = 8.0  # the clearance for what is more, in distances between points
 _CELL = 1.25  # edge of the cells that discs are listed by, in usual distances between points
 
 Sample = tuple[gl.BufferTexture, int]  # rows that are looked at in place of all, and how many
+
+
+def clearance(cloud: PointCloud) -> float:
+    """Clearance behind a disc, in its reach, within which it covers nothing beside it: more where noise lifts
+    points off the surface, as some of them tell; found once for each cloud."""
+    return cloud.remember(_clearance)
+
+
+def _clearance(cloud: PointCloud) -> float:
+    if body_of(cloud).count < len(cloud):
+        cloud = PointCloud(positions=cloud.positions[copies(cloud) == 0], origin=cloud.origin)
+    rows = np.linspace(0, len(cloud) - 1, min(max(_LOOKED_AT // len(cloud), 8), 64)).astype(int)
+    found = [_roughness(cloud.positions[nearest_rows(cloud, row)]) for row in rows.tolist()]
+    return CLEAR + _NOISY * max(float(np.median(found)) - _ROUGH, 0.0) / REACH
+
+
+def _roughness(points: NDArray[np.float32]) -> float:
+    """How far points (N, 3) around one lie off their plane, in distances between them."""
+    away = points.astype(np.float64)
+    if len(away) < 2 * ENOUGH:
+        return 0.0
+    away -= away.mean(axis=0)
+    apart = np.sqrt((away * away).sum(axis=1).max() * np.pi / len(away))
+    return float(np.linalg.svd(away, compute_uv=False)[2] / np.sqrt(len(away) - 3) / apart)
 
 
 def copies_in(pose: GpuPose) -> gl.BufferTexture | None:
@@ -66,14 +98,16 @@ class Covering:
         self,
         candidates: Candidates,
         spacing: float,
+        clear: float = CLEAR,
         repeated: gl.BufferTexture | None = None,
         sample: Sample | None = None,
     ) -> None:
         """Correct what is visible.
 
         candidates: of as many points; their `visible` is what the hull says, and is changed. spacing: usual
-        distance between visible points, as a share of a face of the sectors. repeated: `copies_in` of
-        the pose, where all points are looked at. sample: as `Candidates.find` had it.
+        distance between visible points, as a share of a face of the sectors. clear: `clearance` of the cloud.
+        repeated: `copies_in` of the pose, where all points are looked at. sample: as `Candidates.find` had
+        it.
         """
         for again in range(ROUNDS):
             with self._gpu.timers.measure("list"):
@@ -81,7 +115,7 @@ class Covering:
             with self._gpu.timers.measure("spread"):
                 self._find_spread(candidates, spacing, sample)
             with self._gpu.timers.measure("cover"):
-                self._cover(candidates, spacing, repeated, sample, again > 0)
+                self._cover(candidates, spacing, clear, repeated, sample, again > 0)
 
     def _list_visible(
         self, candidates: Candidates, repeated: gl.BufferTexture | None, sample: Sample | None
@@ -124,6 +158,7 @@ class Covering:
         self,
         candidates: Candidates,
         spacing: float,
+        clear: float,
         repeated: gl.BufferTexture | None,
         sample: Sample | None,
         listed: bool,
@@ -131,10 +166,11 @@ class Covering:
         """Find what the discs leave visible, of all points or of those that are."""
         cells = _cells(candidates.sectors, _CELL * spacing)
         self._list_by_cell(candidates, cells, sample, discs=True)
-        defines = {"LISTED": int(listed), "COPIES": int(repeated is not None), "CLEAR": CLEAR, "STEEP": STEEP}
+        defines = {"LISTED": int(listed), "COPIES": int(repeated is not None), "STEEP": STEEP}
         program = self._gpu.compute(
             "hpr/cover.comp", {**defines, **_sampled(sample), **candidates.defines}, params=cells
         )
+        self._gpu.set(program, clear=clear)
         candidates.spots.bind(Texture.SPOTS)
         candidates.homes.bind(Texture.HOMES)
         self._sights.bind(Texture.SIGHTS)
