@@ -12,15 +12,10 @@ from ..gpu.squares import LARGEST_SQUARE, draw_squares
 from ..gpu.surface import Surface
 from ..params import param
 from ..scan.pose import Pose
-from . import NO_DETAIL, FrameView, Limit, Suited
+from . import FrameView, Suited
 from .hpr import mark_visible
 
 TITLE = "Points"
-_HIDING = {"hide_hidden": (True,)}
-LIMITS = {
-    "zoomed in on 10^-3 of the scan": Limit(0.09, NO_DETAIL, _HIDING),
-    "zoomed in on 10^-6 of the scan": Limit(0.09, NO_DETAIL, _HIDING),
-}
 
 
 @dataclass(frozen=True)
