@@ -43,7 +43,9 @@ def test_render_takes_parameters_by_name_and_explains_wrong_ones() -> None:
     thin = viewer.render(sphere(3000), size=(60, 40), backend="surfels", radius_scale=0.3)
     thick = viewer.render(sphere(3000), size=(60, 40), backend="surfels")
     assert thin.coverage.sum() < thick.coverage.sum()
-    with pytest.raises(InputError, match=r"unknown parameter of 'points' 'radius'. Known: point_size"):
+    with pytest.raises(
+        InputError, match=r"unknown parameter of 'points' 'radius'. Known: hide_hidden, point_size"
+    ):
         viewer.render(sphere(10), backend="points", radius=2)
 
 

@@ -49,7 +49,7 @@ from viewer.renderer import Renderer
         (["--size", "0x5"], ["0x5"]),
         (["--size", "100000x100000"], ["too large", "--size"]),
         (["--backend", "nope"], ["'nope'", *backends()]),
-        (["--backend", "points", "--set", "nope=1"], ["'nope'", "Known: point_size"]),
+        (["--backend", "points", "--set", "nope=1"], ["'nope'", "Known: hide_hidden, point_size"]),
         (["--backend", "points", "--set", "point_size=-1"], ["point_size", "0 to 32"]),
         (["--backend", "points", "--set", "point_size=big"], ["point_size", "'big'"]),
         (["--set", "size"], ["'size'", "key=value"]),

@@ -307,7 +307,11 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
     ]  # fmt: skip
     assert stats["device"] == renderer.gpu.device
     assert stats["timer"] in ("query", "finish")
-    assert (stats["backend"], stats["params"], stats["size"]) == ("points", {"point_size": 2}, [96, 64])
+    assert (stats["backend"], stats["params"], stats["size"]) == (
+        "points",
+        {"point_size": 2, "hide_hidden": False},
+        [96, 64],
+    )
     assert stats["bytes_gpu"] > 2000 * 12
     assert stats["peak_rss"] > 10e6
     assert [f["pose"] for f in stats["frames"]] == [1, 2]

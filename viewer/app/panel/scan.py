@@ -11,6 +11,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from ...backends import backend
 from ...files import printable
 from ...geometry import AXES
+from ...output.marks import number
 from ...scan.guessed_unit import guess_unit
 from ...scan.points import UNKNOWN_UNIT
 from ...scan.times import FPS_LIMITS, TIMES_FILE
@@ -80,7 +81,8 @@ class ScanSection:
         widgets.fact("Points", f"{pose.count:,}{dropped}")
         bounds = self.steering.bounds(pose)
         scale = self.playback.scale
-        size = " x ".join(f"{scale.factor * edge:.4g}" for edge in bounds.high - bounds.low)
+        edges = scale.factor * (bounds.high - bounds.low)
+        size = " x ".join(number(edge, edge) for edge in edges)
         widgets.fact("Size", f"{size} {scale.unit}")
         widgets.fact("Stored", _stored(pose))
         if estimated := _estimated(pose, *self.session.document.chosen(pose)):

@@ -38,7 +38,7 @@ LIMITS = {
     "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
 }
 
-_FEW = 1000  # points
+_FEW = 200  # points
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbors", "Splats", "Speed"
 
 
