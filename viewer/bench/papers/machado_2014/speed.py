@@ -59,7 +59,8 @@ def speeds(bench: Bench, view: JudgedView) -> Row:
     surfaces = {mode: Surface(gpu, bench.settings.size) for mode in MODES}
 
     def picture(mode: str, turn: int) -> None:
-        params = backend(BACKEND).params({"mode": mode} if len(MODES) > 1 else {})
+        told = {"mode": mode} if len(MODES) > 1 else {}
+        params = backend(BACKEND).params({"output": "points", **told})
         draw(bench.renderer, Request(pose, eyes[turn % 2], BACKEND, params, LOOK), surfaces[mode])
         gpu.ctx.finish()
 
