@@ -204,7 +204,7 @@ def test_speeds_are_of_one_run(renderer: Renderer, view: JudgedView) -> None:
     bench = Bench(renderer, BenchSettings(size=(160, 120), repeat=1))
     row = speed.speeds(bench, view)
     for kind in ("busy_ms", "wall_ms"):
-        assert set(row[kind]) == {EXACT, *MODES, speed.CALL}
+        assert set(row[kind]) == {EXACT, *MODES, speed.PICTURE}
         assert min(row[kind].values()) > 0
     assert 0 < row["visible"] < len(view.cloud)
 
@@ -254,7 +254,7 @@ GROWN = [
         "nbytes": 2_000_000, "held": 0.25, "inside": 0.5, "visible": 800, "error": 6.0, **WHERE,
     },
 ]  # fmt: skip
-TIMES = {EXACT: 400.0, HULL: 40.0, COMBINED: 50.0, speed.CALL: 100.0}
+TIMES = {EXACT: 400.0, HULL: 40.0, COMBINED: 50.0, speed.PICTURE: 100.0}
 TIMED = [{"scene": "igea", "sectors": 40_000, "visible": 800, "busy_ms": TIMES, "wall_ms": TIMES, **WHERE}]
 MADE = hpr.digest(JUDGED, GROWN, TIMED)
 

@@ -15,7 +15,7 @@ from ...report.plots import curves, png
 from ...report.results import GROWTH, SPEEDS, VISIBILITY, Row
 from . import accuracy
 from .pictures import GROWTH_PICTURE
-from .speed import CALL, paper
+from .speed import PICTURE, paper
 from .verdicts import AUTOMATIC, BEST, COMBINED, EXACT, HULL, HULL_AT_4M, KATZ, pooled
 
 NAME, PAGE = "hpr", "hpr.md"
@@ -176,7 +176,7 @@ def _speed(measurements: Sequence[Measurement]) -> str:
     """Table 1: the paper's pictures a second as milliseconds, and ours."""
     head = [
         "scene", "machine", "points", "k", "visible", "exact, ms", "hull, ms", "times as fast",
-        "combined, ms", "times as fast", "a call of `visible_points`, ms",
+        "combined, ms", "times as fast", "a picture, ms",
     ]  # fmt: skip
     lines = []
     for line in paper()["speed"]:
@@ -190,7 +190,7 @@ def _speed(measurements: Sequence[Measurement]) -> str:
         for row in each["speeds"]:
             taken = row[kind]
             exact, hull, combined = (taken.get(name, np.nan) for name in (EXACT, HULL, COMBINED))
-            shown = [exact, hull, exact / hull, combined, exact / combined, taken[CALL]]
+            shown = [exact, hull, exact / hull, combined, exact / combined, taken[PICTURE]]
             counts = [spaced(row[name]) for name in ("n", "sectors", "visible")]
             lines.append([f"`{row['scene']}`", each["device"], *counts, *map(three_digits, shown)])
     return markdown_table(head, lines, left=("scene", "machine"))

@@ -1,10 +1,9 @@
-"""Time of the exact operator beside that of pictures by sectors, by turns in one run (Table 1).
+"""Time of the exact operator beside that by sectors, by turns in one run (Table 1).
 
-The exact one is open3d's, which is faster than ours by what that does for far eyes and large radii.
-
-A picture is one more, from another eye: the scan lies on the GPU already, calibration and candidates are
-found anew, and the visible points drawn. Processor time is of all threads, the driver's included: what the
-work takes where OpenGL is software; wall time counts where it is a card.
+The exact one is open3d's, which is faster than ours by what that does for far eyes and large radii. Those by
+sectors are calls of the library function from one eye and another, with all that it uploads and reads back.
+Processor time is of all threads, the driver's included: what the work takes where OpenGL is software; wall
+time counts where it is a card.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from ...run import LOOK, Bench, undisturbed
 from .verdicts import EXACT, HULL, SCENES, JudgedView, moments, row_of, views
 
 BACKEND = "hpr"
-CALL = "call"  # of the library function, with all that it uploads and reads back
+PICTURE = "picture"  # by the backend as it is
 _STEP = 0.5  # degrees from one picture to the next
 
 
@@ -56,18 +55,20 @@ def speeds(bench: Bench, view: JudgedView) -> Row:
     gpu, pose = bench.renderer.gpu, Pose(0, 0.0, "", view.cloud)
     found = calibrated(pose, view.eye)
     eyes = [view.camera, view.camera.orbited(_STEP, 0)]
-    surfaces = {mode: Surface(gpu, bench.settings.size) for mode in MODES}
+    surface = Surface(gpu, bench.settings.size)
 
-    def picture(mode: str, turn: int) -> None:
-        told = {"mode": mode} if len(MODES) > 1 else {}
-        params = backend(BACKEND).params({"output": "points", **told})
-        draw(bench.renderer, Request(pose, eyes[turn % 2], BACKEND, params, LOOK), surfaces[mode])
+    def picture(turn: int) -> None:
+        params = backend(BACKEND).params({})
+        draw(bench.renderer, Request(pose, eyes[turn % 2], BACKEND, params, LOOK), surface)
         gpu.ctx.finish()
+
+    def call(mode: str, turn: int) -> None:
+        visible_points(pose, eyes[turn % 2].eye, mode=mode, gpu=gpu)
 
     ways: dict[str, Callable[[int], object]] = {
         EXACT: lambda turn: scan.hidden_point_removal(eyes[turn % 2].eye, found.radius),
-        **{mode: partial(picture, mode) for mode in surfaces},
-        CALL: lambda turn: visible_points(pose, eyes[turn % 2].eye, mode=HULL, gpu=gpu),
+        **{mode: partial(call, mode) for mode in MODES},
+        PICTURE: picture,
     }
     taken: dict[str, list[tuple[float, float]]] = {name: [] for name in ways}
     with undisturbed():
@@ -76,8 +77,7 @@ def speeds(bench: Bench, view: JudgedView) -> Row:
                 busy, wall = time.process_time(), time.perf_counter()
                 way(turn)
                 taken[name].append((time.process_time() - busy, time.perf_counter() - wall))
-    for surface in surfaces.values():
-        surface.release()
+    surface.release()
     medians = {name: 1e3 * np.median(times[1:], axis=0) for name, times in taken.items()}
     return {
         "sectors": chosen_search(found, None, None)[0].count,
