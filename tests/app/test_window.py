@@ -317,8 +317,8 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
     app.act(PANEL, ("item_input_value", f"{size}/##value", 32))
     app.settle()
     after = assert_true_picture(app)
-    assert before.description["params"] == {"point_size": 0}
-    assert after.description["params"] == {"point_size": 32}
+    assert before.description["params"]["point_size"] == 0
+    assert after.description["params"]["point_size"] == 32
     app.act(PANEL, ("item_drag_with_delta", f"{size}/##value", (-300, 0)))
     app.settle()
     assert difference(Screenshot(app).pixels, before.pixels) == 0
@@ -328,7 +328,7 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
         ("item_click", f"{size}/{icons.ICON_FA_ARROW_ROTATE_LEFT}"),
     )
     app.settle()
-    assert assert_true_picture(app).description["params"] == {"point_size": 1}, "the default"
+    assert assert_true_picture(app).description["params"]["point_size"] == 1, "the default"
 
 
 def test_acting_on_a_widget_or_a_window_that_is_not_there_fails(app: RunningApp) -> None:

@@ -165,7 +165,7 @@ def test_a_picture_is_saved_as_it_was_while_the_window_goes_on_and_can_be_cancel
     app.see(frame=3)
     screen.do("key", "p")
     app.see(is_saving=True)
-    screen.do("key", "Escape")
+    screen.do("sleep", 0.5, "key", "Escape")  # once it is shown as work
     app.told("Cancelled: Drawing the picture to save")
     app.settle()
     assert set(path.parent.glob("scan4d_*")) == there

@@ -39,6 +39,7 @@ DEVIATION = np.sin(7 * CLOUD.positions[:, 0].astype(float)) + 5e8  # far from ze
 _STORED = 2 * 3**0.5 * 0.5 * (1 / 2047 + 2 / 32767)
 _WEIGHED = 1.5 * (4 * np.pi / len(CLOUD)) ** 0.5 / 50
 OF_POINTS = [one.name for one in backends().values() if one.rows == "points"]
+SECTORS = "hpr"  # goes by sectors of directions along the scan's axes, which turn with the pose
 
 
 def turned(angle: float, to: tuple[float, float, float]) -> Rigid:
@@ -172,7 +173,7 @@ def test_a_pose_that_is_shifted_gives_the_very_picture(
 
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-@pytest.mark.parametrize("backend", OF_POINTS)
+@pytest.mark.parametrize("backend", [name for name in OF_POINTS if name != SECTORS])
 @pytest.mark.parametrize("place", [TURNED, turned(2.5, (1e6, -2e6, 3e5))], ids=["near", "far"])
 def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(
     renderer: Renderer, backend: str, projection: str, place: Rigid
@@ -203,6 +204,22 @@ def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(
         np.testing.assert_allclose(found["value"][covered], expected["value"][covered], atol=0.3)
         color_step = np.abs(found["color"][covered] - expected["color"][covered])
         assert np.quantile(color_step, most) == 0
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_sectors_of_a_turned_pose_show_nearly_what_those_of_turned_points_do(
+    renderer: Renderer, projection: str
+) -> None:
+    there = Pose(0, 0.0, "x", moved(CLOUD, TURNED))
+    camera = camera_of(there.cloud, projection)
+    one = drawn(renderer, POSE, camera, Layers(place=TURNED), SECTORS)
+    other = drawn(renderer, there, camera, None, SECTORS)
+    covered = (one.row != NOTHING) & (other.row != NOTHING)
+    assert covered.sum() > 1000
+    assert (covered == (one.row != NOTHING) | (other.row != NOTHING)).mean() > 0.99
+    assert (one.row == other.row).mean() > 0.9
+    apart = np.abs(one.arrays()["depth"][covered] - other.arrays()["depth"][covered])
+    assert np.quantile(apart, 0.99) < (4 * np.pi / len(CLOUD)) ** 0.5, "a spacing"
 
 
 def positions(surface: Surface) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from viewer.backends import backend, backends
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
-from viewer.gpu import gl
+from viewer.gpu import gl, squares
 from viewer.gpu.context import headless
 from viewer.gpu.surface import Surface
 from viewer.look import Look, color_table
@@ -182,10 +182,9 @@ def test_only_what_is_read_is_uploaded(renderer: Renderer) -> None:
 def test_sparse_points_list_their_pixels_as_a_search_would(
     draw: Draw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = backend("points").module
     sparse = draw(CLOUD, CAMERA, (300, 200), "points", Look())
     assert "compact" in sparse.stats.skipped
-    monkeypatch.setattr(module, "_LIST_BELOW", 0)
+    monkeypatch.setattr(squares, "_LIST_BELOW", 0)
     searched = draw(CLOUD, CAMERA, (300, 200), "points", Look())
     assert "compact" not in searched.stats.skipped
     np.testing.assert_array_equal(sparse.image(), searched.image())

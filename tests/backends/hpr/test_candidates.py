@@ -37,6 +37,7 @@ def find(renderer: Renderer) -> Find:
     """find(points, sectors, steps, ...): their candidates."""
 
     def find(points: NDArray[np.float32], sectors: Sectors, steps: int, **how: object) -> Candidates:
+        renderer.gpu.activate()
         candidates = Candidates(renderer.gpu, sectors, len(points))
         candidates.find(texels(renderer.gpu, points, gl.RGB32F), sectors, steps, **how)  # type: ignore[arg-type]
         return candidates
