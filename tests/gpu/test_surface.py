@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, sphere
 
-from viewer.backends import backend, backends
+from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
