@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,10 +37,10 @@ def texels(gpu: Gpu, values: NDArray, texel_format: int) -> gl.BufferTexture:
 def find(renderer: Renderer) -> Find:
     """find(points, sectors, steps, ...): their candidates."""
 
-    def find(points: NDArray[np.float32], sectors: Sectors, steps: int, **how: object) -> Candidates:
+    def find(points: NDArray[np.float32], sectors: Sectors, steps: int, **how: Any) -> Candidates:
         renderer.gpu.activate()
         candidates = Candidates(renderer.gpu, sectors, len(points))
-        candidates.find(texels(renderer.gpu, points, gl.RGB32F), sectors, steps, **how)  # type: ignore[arg-type]
+        candidates.find(texels(renderer.gpu, points, gl.RGB32F), sectors, steps, **how)
         return candidates
 
     return find

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,14 +24,15 @@ from viewer.scan.pose import Pose
 
 EYE = np.array([0.0, 0.0, 4.0])
 SIZE = (64, 48)
+Seen = Callable[..., NDArray[np.uint32]]
 
 
 @pytest.fixture(scope="module")
-def seen(renderer: Renderer):  # type: ignore[no-untyped-def]
+def seen(renderer: Renderer) -> Seen:
     """seen(points, eye, ...): what `visible_points` gives for the hull, on the renderer's context."""
 
-    def seen(points: ArrayLike | Pose, eye: ArrayLike = EYE, **how: object) -> NDArray[np.uint32]:
-        return visible_points(points, eye, gpu=renderer.gpu, **{"mode": "hull", **how})  # type: ignore[arg-type]
+    def seen(points: ArrayLike | Pose, eye: ArrayLike = EYE, **how: Any) -> NDArray[np.uint32]:
+        return visible_points(points, eye, gpu=renderer.gpu, **{"mode": "hull", **how})
 
     return seen
 
@@ -41,7 +44,7 @@ def bumpy(count: int = 6000) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("distance", [1.6, 4.0, 1e3])
-def test_of_a_sphere_the_front_is_seen_and_the_back_is_not(seen, distance: float) -> None:  # type: ignore[no-untyped-def]
+def test_of_a_sphere_the_front_is_seen_and_the_back_is_not(seen: Seen, distance: float) -> None:
     """Near and far: all that faces the eye, but for the rim."""
     normals = np.asarray(sphere(8000).positions, np.float64)
     rows = seen(normals, [0, 0, distance])
@@ -51,7 +54,7 @@ def test_of_a_sphere_the_front_is_seen_and_the_back_is_not(seen, distance: float
     assert found[facing < -0.2].mean() < 0.002
 
 
-def test_what_lies_behind_something_is_hidden(seen) -> None:  # type: ignore[no-untyped-def]
+def test_what_lies_behind_something_is_hidden(seen: Seen) -> None:
     """The smaller of two spheres, wholly behind the other."""
     front, behind = np.asarray(sphere(8000).positions), 0.5 * np.asarray(sphere(2000).positions)
     rows = seen(np.concatenate([front, behind - [0, 0, 3]]))
@@ -59,13 +62,13 @@ def test_what_lies_behind_something_is_hidden(seen) -> None:  # type: ignore[no-
     assert (rows < 8000).all()
 
 
-def test_an_eye_inside_sees_all_around(seen) -> None:  # type: ignore[no-untyped-def]
+def test_an_eye_inside_sees_all_around(seen: Seen) -> None:
     points = np.asarray(sphere(8000).positions)
     assert len(seen(points, [0.3, 0.2, 0.1])) > 0.998 * len(points)
 
 
 @pytest.mark.parametrize("eye", [(0, 0, 4), (1.1, 0.6, -0.4)])
-def test_it_comes_to_what_the_exact_operator_says(seen, eye: tuple[float, ...]) -> None:  # type: ignore[no-untyped-def]
+def test_it_comes_to_what_the_exact_operator_says(seen: Seen, eye: tuple[float, ...]) -> None:
     points = bumpy()
     radius = calibrated(points, eye).radius
     exact = np.isin(np.arange(len(points)), exact_visible_points(points, eye, radius))
@@ -81,7 +84,7 @@ def test_it_comes_to_what_the_exact_operator_says(seen, eye: tuple[float, ...]) 
 
 @pytest.mark.parametrize("decades", [2, 5, 8])
 @pytest.mark.parametrize("scale", [1e-12, 1e12])
-def test_radius_and_scale_may_be_extreme(seen, decades: int, scale: float) -> None:  # type: ignore[no-untyped-def]
+def test_radius_and_scale_may_be_extreme(seen: Seen, decades: int, scale: float) -> None:
     """The same points are seen at any scale, more with a larger radius, nearly all with the largest."""
     points = bumpy(3000)
     radius = 10.0**decades * 5
@@ -92,13 +95,13 @@ def test_radius_and_scale_may_be_extreme(seen, decades: int, scale: float) -> No
 
 
 @pytest.mark.parametrize("distance", [1e4, 1e6])
-def test_an_eye_far_away_sees_what_it_sees_from_less_far(seen, distance: float) -> None:  # type: ignore[no-untyped-def]
+def test_an_eye_far_away_sees_what_it_sees_from_less_far(seen: Seen, distance: float) -> None:
     points = bumpy(3000)
     near, far = seen(points, [0, 0, 1e3]), seen(points, [0, 0, distance])
     assert len(np.setxor1d(near, far)) < 0.01 * len(near)
 
 
-def test_ids_are_those_of_the_file(seen) -> None:  # type: ignore[no-untyped-def]
+def test_ids_are_those_of_the_file(seen: Seen) -> None:
     points = bumpy(2000)
     holes = np.insert(points, [0, 7, 1500], np.nan, axis=0)
     expected = np.flatnonzero(np.isfinite(holes[:, 0]))[seen(points)]
@@ -107,7 +110,7 @@ def test_ids_are_those_of_the_file(seen) -> None:  # type: ignore[no-untyped-def
     np.testing.assert_array_equal(seen(pose), expected)
 
 
-def test_few_points_are_seen(seen) -> None:  # type: ignore[no-untyped-def]
+def test_few_points_are_seen(seen: Seen) -> None:
     assert seen(np.zeros((0, 3))).tolist() == []
     assert seen([[1.0, 2, 3]]).tolist() == [0]
     assert seen([[1.0, 2, 3]] * 4).tolist() == [0], "of points in one place the first"
@@ -115,7 +118,7 @@ def test_few_points_are_seen(seen) -> None:  # type: ignore[no-untyped-def]
     assert seen([[0.0, 0, 0], [0, 0, -2]]).tolist() == [0], "one behind the other"
 
 
-def test_what_makes_no_sense_is_refused(seen) -> None:  # type: ignore[no-untyped-def]
+def test_what_makes_no_sense_is_refused(seen: Seen) -> None:
     points = bumpy(100)
     with pytest.raises(InputError, match="not a viewpoint"):
         seen(points, [0, 0, np.nan])
