@@ -18,8 +18,12 @@ setup: ## system libraries, and .venv with all dependencies; what is there is le
 run: setup ## open the demo scan, or yours: make run SCAN=path (without a display: into out/)
 	.venv/bin/scan4d view $(if $(SCAN),"$(SCAN)") --fallback out --force
 
+# Most shaders run a few times here: Mesa's software driver compiles them in less time without optimising, and
+# test-all has it optimise. Processes that tests start find modules compiled, whatever the environment says.
+test: export GALLIVM_PERF := nopt
+test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the tests, without the slow ones; a process for each core: make test WORKERS=0 has but one
-	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile -m "not slow"
+	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-all: setup ## all tests
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile

@@ -11,16 +11,21 @@ from viewer.camera import Camera
 from viewer.gpu.amplify import FEEDS
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 from viewer.view import View
 
 NOTHING = 0xFFFFFFFF
 
 
+DRAWS_POINTS = [
+    one.name for one in backends().values()
+    if one.draws(Pose.of(0, 0.0, "one", PointCloud.from_arrays(np.zeros((1, 3)))))
+]  # fmt: skip
 BUFFERS = tuple(feed for feed in FEEDS if feed != "gs")  # feeds that give the same bits: test_same_bits.py
 
 
 def variants() -> list[str]:
-    """All backends by name, each in every way that changes its shaders but not its picture.
+    """All backends that draw points, by name, each in every way that changes its shaders but not its picture.
 
     "surfels instancing=gs". One of those that give the same bits: "auto" is one of the others, feeds from
     buffers agree.
@@ -35,7 +40,7 @@ def variants() -> list[str]:
             if word not in ("auto", *BUFFERS[1:])
         ]
 
-    return [variant for one in backends().values() for variant in ways(one) or [one.name]]
+    return [variant for name in DRAWS_POINTS for variant in ways(backends()[name]) or [name]]
 
 
 def of_variant(name: str) -> tuple[str, dict[str, object]]:

@@ -15,8 +15,9 @@ import pytest
 
 from viewer.backends import backends
 from viewer.bench import measuring
-from viewer.bench.papers.farooq_2013 import farooq
+from viewer.bench.papers.farooq_2013 import farooq, laplacian
 from viewer.bench.papers.machado_2014 import hpr
+from viewer.bench.papers.marsik_2010 import codeword
 from viewer.bench.papers.preiner_2012 import preiner
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
 from viewer.bench.report import defaults_page, scene_table
@@ -90,7 +91,9 @@ def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: boo
     assert page.read_text(encoding="utf-8") == made
 
 
-@pytest.mark.parametrize("made", [scene_table, defaults_page, measuring, hpr], ids=lambda made: made.NAME)
+@pytest.mark.parametrize(
+    "made", [scene_table, defaults_page, measuring, hpr, laplacian, codeword], ids=lambda made: made.NAME
+)
 def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
     page = ROOT / "docs" / made.PAGE
     files = sorted((ROOT / "docs" / "data").glob(f"{made.NAME}*.json"))
@@ -106,7 +109,7 @@ def test_each_place_of_a_table_has_what_makes_it() -> None:
     """A suite of the benchmark, or a script of docs/tables; and none of them makes one without a place."""
     made = [
         (suite.PAGE, key)
-        for suite in (scene_table, defaults_page, measuring, hpr)
+        for suite in (scene_table, defaults_page, measuring, hpr, laplacian, codeword)
         for key in suite.tables(
             [suite.read_measurement(next((ROOT / "docs" / "data").glob(f"{suite.NAME}*")))]
         )

@@ -21,7 +21,7 @@ LAYERS = (
         "look", "view", "task", "helper", "native", "signals", "unfinished",
     },
     {"scan"},
-    {"mesh"},
+    {"mesh", "codewords"},
     {"simulate", "gpu"},
     {"backends"},
     {"renderer", "frame", "timing"},

@@ -71,7 +71,7 @@ def render_frame(
     pose = renderer.resident(request.pose)
     request.layers.check(request.pose)
     backend, params = chosen = _chosen(request)
-    view = _view(request, surface.size)
+    view = view_of(request, surface.size)
     pose.center(view.origin)
     prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
     look = request.look
@@ -188,7 +188,7 @@ def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms
     backend, params = _chosen(request)
     if not backend.draws_samples(request.pose, params) and not renderer.merge(pose):
         return False
-    pose.center(_view(request, size).origin)
+    pose.center(view_of(request, size).origin)
     return pose.upload(pose.names_of(backend.needs(request.pose, params)), budget_ms)
 
 
@@ -196,14 +196,14 @@ def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int] | No
     """Whether nothing has to be merged, estimated or derived for a picture of this size, pixels; or what has
     to be cannot, which drawing it will tell. size: None leaves out what is derived for one view alone."""
     by_camera = size is not None and _chosen(request)[0].derived_by_camera
-    return renderer.is_prepared(_want(request, _view(request, size) if by_camera and size else None))
+    return renderer.is_prepared(_want(request, view_of(request, size) if by_camera and size else None))
 
 
 def prepare(renderer: Renderer, request: Request, size: tuple[int, int]) -> bool:
     """Have workers make what a picture of this size needs, before anything else; whether it is there. Raises
     what that has failed with."""
     pose, (backend, params) = renderer.resident(request.pose), _chosen(request)
-    view = _view(request, size)
+    view = view_of(request, size)
     return renderer.prepare(pose, backend, params, request.look, wait=False, view=view) is not None
 
 
@@ -230,7 +230,8 @@ def colorable(request: Request) -> Request:
     return request if look is request.look else replace(request, look=look)
 
 
-def _view(request: Request, size: tuple[int, int]) -> View:
+def view_of(request: Request, size: tuple[int, int]) -> View:
+    """The view that a request shows its pose by, in a picture of this size, pixels."""
     pose, camera, place = request.pose, request.camera, request.layers.place
     origin = origin_near(camera, size, pose.origin, place)
     bounds = drawn_bounds(pose, camera)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -233,6 +234,12 @@ def _scalar(look: Look, scalars: Collection[str]) -> str | None:
 def wants_normals(look: Look) -> bool:
     """Whether the look cannot be drawn without normals."""
     return look.light in ("head", "fixed") or look.color_by == "normal"
+
+
+def light_direction(look: Look) -> tuple[float, float, float]:
+    """Direction to the fixed light, view space: azimuth 0 and elevation 0 is where the eye is."""
+    a, e = math.radians(look.azimuth), math.radians(look.elevation)
+    return math.cos(e) * math.sin(a), math.sin(e), math.cos(e) * math.cos(a)
 
 
 def rgba(text: str, name: str = "colour") -> tuple[int, int, int, int]:

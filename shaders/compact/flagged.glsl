@@ -9,6 +9,6 @@ void take_sum(uint i, uint sum) {
     if (found > 0u) list[sum] = i;
     if (i == word_count - 1u) {
         list_count = (sum + found) * EACH;
-        groups_x = columns_for(list_count);
+        groups_x = columns_for(list_count, groups_y);
     }
 }

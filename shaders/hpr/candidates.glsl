@@ -1,15 +1,16 @@
 // A point's cell is its sector, its key how far its flip lies along the sector's direction. The first pass keeps each
-// point's spot, sector and key, so that positions are read once, and notes which cells of sectors points fall into.
-// FILTERED: points that are not visible are left out. SAMPLED: a list says which points there are.
+// point's spot, sector and key, so that positions are read once, and, CELLS, notes which cells of sectors points fall into.
+// FILTERED: points that are not visible are left out.
+#include "hpr/drawn_row.glsl"
 #include "hpr/sectors.glsl"
 
-#if SAMPLED
-layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
-#endif
 #if PASS == 0
 uniform vec4 clip;  // points are left out where this plane is below 0
 uniform mat4 sides;  // or one of these four, its columns
+#if CELLS
 uniform int cell_shift;
+layout(std430, binding = STORAGE_OCCUPIED) buffer Occupied { uint occupied[]; };
+#endif
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if FILTERED
@@ -17,7 +18,6 @@ layout(binding = TEXTURE_VISIBLE) uniform usamplerBuffer visible;
 #endif
 layout(std430, binding = STORAGE_POINT_SPOTS) buffer Spots { float spots[]; };
 layout(std430, binding = STORAGE_HOMES) buffer Homes { uvec2 homes[]; };
-layout(std430, binding = STORAGE_OCCUPIED) buffer Occupied { uint occupied[]; };
 
 uvec2 home_of(uint row, vec3 position) {
     vec3 spot;
@@ -31,9 +31,11 @@ uvec2 home_of(uint row, vec3 position) {
     uint sector = sector_of(spot);
     if (sector == NOTHING) return uvec2(NOTHING, 0u);
     ivec3 place = place_of(sector);
+#if CELLS
     int cells = ((edge - 1) >> cell_shift) + 1;
     ivec2 cell = place.xy >> cell_shift;
     occupied[(place.z * cells + cell.y) * cells + cell.x] = 1u;
+#endif
     return uvec2(sector, key_of(spot, direction_at(place)));
 }
 #else
@@ -41,11 +43,7 @@ layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
 #endif
 
 void scatter(uint i) {
-#if SAMPLED
-    uint row = texelFetch(drawn_rows, int(i)).r;
-#else
-    uint row = i;
-#endif
+    uint row = drawn_row(i);
 #if PASS == 0
 #if FILTERED
     if (texelFetch(visible, int(row)).r == 0u) {

@@ -1,26 +1,16 @@
 // Whether points are visible: those are hidden that others surround, before them, whose discs reach them. Those that lie
-// on one side only may be the same surface, seen aslant. LISTED: of listed points; else of all. COPIES: but for those
-// in whose place a lower row is.
+// on one side only may be the same surface, seen aslant. An invocation for each disc, which looks at those in the
+// cells around.
 #include "common/item.glsl"
-#if LISTED
 #include "common/list.glsl"
-#else
-layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
-#endif
-#include "hpr/sights.glsl"
+#include "hpr/windows.glsl"
 
 uniform float clear;  // of the reach
-layout(binding = TEXTURE_SPOTS) uniform samplerBuffer spots;
-layout(binding = TEXTURE_SIGHTS) uniform samplerBuffer sights;
+layout(binding = TEXTURE_SIGHTS) uniform samplerBuffer discs;
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;
-#if SAMPLED
-layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
-#endif
-#if COPIES
-layout(binding = TEXTURE_COPIES) uniform usamplerBuffer copies;
-#endif
-layout(std430, binding = STORAGE_VISIBLE) buffer Visible { uint visible[]; };
+layout(binding = TEXTURE_WINDOWS) uniform isamplerBuffer windows;
+layout(std430, binding = STORAGE_VISIBLE) writeonly buffer Visible { uint visible[]; };
 
 // One of 64 parts of a turn, alike under half turns.
 uint part_of(vec2 apart) {
@@ -41,43 +31,39 @@ bool has_half_turn(uvec2 parts) {
 
 void main() {
     uint i = item();
-#if LISTED
     if (i >= list_count) return;
-    i = list[i];
-#else
-    if (i >= item_count || texelFetch(homes, int(i)).r == NOTHING) return;
-#endif
-#if SAMPLED
-    uint row = texelFetch(drawn_rows, int(i)).r;
-#else
-    uint row = i;
-#endif
-#if COPIES
-    if (texelFetch(copies, int(row)).r != 0u) {
-        visible[row] = 0u;
-        return;
-    }
-#endif
-    vec3 spot = texelFetch(spots, int(row)).xyz, own;
-    uint cell = sector_of(spot);
-    if (cell == NOTHING) return;
-    int face = face_at(spot);
-    find_sight(spot, face, own);
+    vec4 own = texelFetch(discs, int(i));
+    if (own.w < 0.0) return;
+    uint entry = texelFetch(listed, int(i)).r;
+    ivec3 place = ivec3(cell_of(own.xy), face_in(entry));
+    int window = max(WINDOW, texelFetch(windows, block_at(ivec3(block_of(place.xy), place.z))).r);
+    // Seen from the eye along the point's own direction, another lies at turned * apart / (ahead + skew . apart): the
+    // tangent of the angle between them, over that of half a face.
+    float t2 = tangent * tangent, out_from = dot(own.xy, own.xy), ahead = 1.0 + t2 * out_from;
+    float stretch = sqrt(ahead), along = out_from > 0.0 ? (1.0 - stretch) / out_from : 0.0;
+    vec3 turned = vec3(stretch + along * own.x * own.x, along * own.x * own.y, stretch + along * own.y * own.y);
+    vec2 skew = t2 * own.xy;
     uvec2 covered = uvec2(0u);
-    int last = int(texelFetch(starts, int(cell) + 1).r);
-    for (int j = int(texelFetch(starts, int(cell)).r); j < last; ++j) {
-        vec4 sight = texelFetch(sights, int(texelFetch(listed, j).r));
-        vec3 other;
-        if (!find_sight(sight.xyz, face, other)) continue;
-        float aside = angle_between(own, other);
-        float before = depth_before(other, own);
-        if (aside > sight.w || before <= (aside > 0.0 ? clear * sight.w + STEEP * aside : 0.0)) continue;
-        if (other.xy == own.xy) {
-            covered = uvec2(~0u);
-            break;
+    ivec2 low = max(place.xy - window, ivec2(0)), high = min(place.xy + window, ivec2(line_length() - 1));
+    for (int y = low.y; y <= high.y; ++y) {
+        int line = int(cell_at(ivec3(0, y, place.z)));
+        int last = int(texelFetch(starts, line + high.x + 1).r);
+        for (int j = int(texelFetch(starts, line + low.x).r); j < last; ++j) {
+            vec4 other = texelFetch(discs, j);
+            vec2 apart = other.xy - own.xy;
+            float scale = ahead + dot(skew, apart), reach = abs(other.w);
+            vec2 away = vec2(dot(turned.xy, apart), dot(turned.yz, apart));
+            float squared = dot(away, away), reached = reach * scale;
+            float behind = (own.z - other.z) * scale;
+            float least = depth_unit(other.z) * (clear * reached + STEEP * sqrt(squared));
+            bool covers = scale > 0.0 && squared <= reached * reached;
+            if (squared == 0.0) {
+                if (covers && behind > 0.0) covered = uvec2(~0u);
+            } else if (covers && behind > least) {
+                uint part = part_of(away);
+                covered |= part < 32u ? uvec2(1u << part, 0u) : uvec2(0u, 1u << (part - 32u));
+            }
         }
-        uint part = part_of(other.xy - own.xy);
-        covered |= part < 32u ? uvec2(1u << part, 0u) : uvec2(0u, 1u << (part - 32u));
     }
-    visible[row] = uint(has_half_turn(~covered));
+    visible[row_in(entry)] = uint(has_half_turn(~covered));
 }

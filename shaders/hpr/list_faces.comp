@@ -1,7 +1,6 @@
 // Lists the quads of sectors that have faces in the picture, those of more than LARGE pixels apart; and marks the points
 // that are corners of a face, in the picture or not.
 #include "common/item.glsl"
-#include "common/list.glsl"
 #include "hpr/next_list.glsl"
 #include "hpr/drawn_faces.glsl"
 

@@ -4,15 +4,13 @@
 // touched once a run.
 #include "common/item.glsl"
 #include "common/list.glsl"
+#include "hpr/drawn_row.glsl"
 #include "hpr/sectors.glsl"
 
 uniform uint point_count;
 layout(std430, binding = STORAGE_VISIBLE) buffer Visible { uint visible[]; };
 layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
 layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;
-#if SAMPLED
-layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
-#endif
 
 const int RUN = 8;
 uniform int stride;
@@ -27,11 +25,7 @@ void main() {
         uvec2 home = texelFetch(homes, int(i)).rg;
         bool near = home.x != NOTHING;
         if (near) near = key_from(home.y) - key_from(texelFetch(keys, int(home.x)).r) <= most;
-#if SAMPLED
-        uint row = texelFetch(drawn_rows, int(i)).r;
-#else
-        uint row = i;
-#endif
+        uint row = drawn_row(i);
         visible[row] = uint(home.x == NOTHING && home.y == 0u);
         bits |= uint(near) << n;
         found += uint(near);

@@ -3,7 +3,6 @@
 // list, each once; but for the LAST step. Nobody reads what others write in the same pass, so that the result is the
 // same in any order.
 #include "common/item.glsl"
-#include "common/list.glsl"
 #include "hpr/next_list.glsl"
 #include "hpr/sectors.glsl"
 

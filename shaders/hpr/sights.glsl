@@ -13,7 +13,8 @@ int face_at(vec3 spot) {
 bool find_sight(vec3 spot, int face, out vec3 sight) {
 #if CUBE
     vec3 turned = to_face(spot, face);
-    sight = vec3(turned.yz / turned.x, length(spot));
+    precise vec2 tangents = turned.yz / turned.x;
+    sight = vec3(tangents, length(spot));
     return turned.x > 0.0;
 #else
     sight = spot;
@@ -21,19 +22,5 @@ bool find_sight(vec3 spot, int face, out vec3 sight) {
 #endif
 }
 
-// How far a point lies before another, over its own distance.
-float depth_before(vec3 sight, vec3 other) {
-#if CUBE
-    return (other.z - sight.z) / sight.z;
-#else
-    return (other.z - sight.z) / (1.0 / lateral + tangent * sight.z);
-#endif
-}
-
-// The sine of the angle between two points.
-float angle_between(vec3 sight, vec3 other) {
-    vec2 apart = other.xy - sight.xy;
-    float turn = tangent * (sight.x * apart.y - sight.y * apart.x), t2 = tangent * tangent;
-    float lengths = (1.0 + t2 * dot(sight.xy, sight.xy)) * (1.0 + t2 * dot(other.xy, other.xy));
-    return sqrt((dot(apart, apart) + turn * turn) / lengths);
-}
+// A depth that a length beside the eye's ray takes up at this depth, as sights have both.
+float depth_unit(float far) { return CUBE == 1 ? far : 1.0 / lateral + tangent * far; }

@@ -7,15 +7,13 @@
 // their edges (Agmon 1954).
 #include "common/item.glsl"
 #include "common/list.glsl"
+#include "hpr/drawn_row.glsl"
 #include "hpr/sectors.glsl"
 
 layout(std430, binding = STORAGE_VISIBLE) buffer Visible { uint visible[]; };
 layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
 layout(binding = TEXTURE_BEST) uniform usamplerBuffer rows;
 layout(binding = TEXTURE_SPOTS) uniform samplerBuffer spots;
-#if SAMPLED
-layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
-#endif
 
 const int LOOKED_AT = 9;
 const int ROUNDS = 4;
@@ -26,11 +24,7 @@ void main() {
     uint i = item();
     if (i >= list_count) return;
     i = list[i];
-#if SAMPLED
-    uint row = texelFetch(drawn_rows, int(i)).r;
-#else
-    uint row = i;
-#endif
+    uint row = drawn_row(i);
     vec3 spot = texelFetch(spots, int(row)).xyz;
     ivec3 place = place_of(texelFetch(homes, int(i)).r);
     float scale = 1.0 / (float(stride) * sector_size());

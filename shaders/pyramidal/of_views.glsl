@@ -144,46 +144,66 @@ float weight_of(RangeView v, int level, vec2 pixel, float cosine) {
     return clamp(2.0 * mix(low, high, part.y) - 1.0, 0.0, 1.0) * max(cosine, 0.0) * max(cosine, 0.0);
 }
 
+// What a view sees at a place. pixel: its coordinate there; nearest: the sample there, of the level that was looked at.
+// cosine: of the surface's normal and the direction to the pod. ahead: how far the view's surface is from the place
+// towards its pod. alpha: confidence, to the mask's edge.
+struct LookedUp {
+    vec2 pixel;
+    ivec2 nearest;
+    float cosine, ahead, alpha;
+    vec3 color;
+};
+
 vec3 direction_to_pod(RangeView v, vec3 place) {
     return v.kind == RANGE_HEIGHT ? turned(v.screen, vec3(0.0, 0.0, 1.0)) : normalize(to_screen_view(v, vec3(0.0)) - place);
 }
 
-// What another view shows at a place (screen view space) of a surface with a normal; its weight, 0: nothing. ahead: how far
-// its surface is from the place towards its pod.
-float other_view(RangeView v, int level, vec3 place, vec3 normal, out float ahead, out Seen seen) {
-    seen = UNSEEN;
-    ahead = 0.0;
-    vec3 to_pod_there = direction_to_pod(v, place);
-    float cosine = dot(normal, to_pod_there);
-    if (cosine <= 0.1) return 0.0;
+// Looks a place (screen view space) of a surface with a normal up in a view; false where that sees another surface there,
+// more than `agree` samples away, or none.
+bool look_up(RangeView v, int level, vec3 place, vec3 normal, float agree, out LookedUp found) {
+    found = LookedUp(vec2(0.0), ivec2(0), dot(normal, direction_to_pod(v, place)), 0.0, 0.0, vec3(0.0));
+    if (found.cosine <= 0.1) return false;
     vec3 projected = project_to(v, place);
-    RangeLevel found = range_level(v, level);
+    RangeLevel range = range_level(v, level);
     vec2 uv = pixel_to_level(v, level, projected.xy);
-    if (!(all(greaterThanEqual(uv, vec2(0.0))) && all(lessThanEqual(uv, vec2(found.size - 1))))) return 0.0;
-    ivec2 first = min(ivec2(uv), found.size - 2);
+    if (!(all(greaterThanEqual(uv, vec2(0.0))) && all(lessThanEqual(uv, vec2(range.size - 1))))) return false;
+    ivec2 first = min(ivec2(uv), range.size - 2);
     vec2 part = uv - vec2(first);
-    if (any(lessThan(found.size, ivec2(2)))) return 0.0;
-    float depth = 0.0, closest = 0.0;
+    if (any(lessThan(range.size, ivec2(2)))) return false;
+    float depth = 0.0;
     float spacing_there = sample_spacing(v, level, projected.z);
     for (int k = 0; k < 4; ++k) {
         ivec2 at = first + ivec2(k & 1, k >> 1);
-        int index = sample_index(found, at);
+        int index = sample_index(range, at);
         float share = ((k & 1) != 0 ? part.x : 1.0 - part.x) * ((k >> 1) != 0 ? part.y : 1.0 - part.y);
         if (share == 0.0) continue;
         float there = sample_depth(index);
         vec4 look = sample_look(index);
-        if (look.a == 0.0 || abs(there - projected.z) > (AGREE + 1.0 / cosine) * spacing_there) return 0.0;
+        if (look.a == 0.0 || abs(there - projected.z) > (agree + 1.0 / found.cosine) * spacing_there) return false;
         depth += share * there;
+        found.alpha += share * look.a;
 #if COLOR
-        seen.color += share * to_linear(look.rgb);
+        found.color += share * to_linear(look.rgb);
 #endif
     }
-    ahead = projected.z - depth;
-    if (abs(ahead) > AGREE * spacing_there) return 0.0;
+    found.pixel = projected.xy;
+    found.nearest = ivec2(uv + 0.5);
+    found.ahead = projected.z - depth;
+    return abs(found.ahead) <= agree * spacing_there;
+}
+
+// What another view shows at a place of a surface with a normal; its weight, 0: nothing. ahead: how far its surface is from
+// the place towards its pod.
+float other_view(RangeView v, int level, vec3 place, vec3 normal, out float ahead, out Seen seen) {
+    LookedUp found;
+    bool sees = look_up(v, level, place, normal, AGREE, found);
+    seen = Seen(found.color, vec3(0.0), 0.0);
+    ahead = found.ahead;
+    if (!sees) return 0.0;
 #if NORMAL
-    seen.normal = normal_of(v, sample_index(found, ivec2(uv + 0.5)));
+    seen.normal = normal_of(v, sample_index(range_level(v, level), found.nearest));
 #endif
-    return weight_of(v, level, projected.xy, cosine);
+    return weight_of(v, level, found.pixel, found.cosine);
 }
 
 // Blends what other views see of the surface that a pixel shows. normal: of it, screen view space, unit length.

@@ -148,7 +148,7 @@ def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Calla
     assert not is_afresh(), "nothing that is prepared goes by the camera"
 
 
-@pytest.mark.parametrize("backend", ["surfels", "voxels"])
+@pytest.mark.parametrize("backend", ["surfels", pytest.param("voxels", marks=pytest.mark.slow)])
 def test_a_second_lap_needs_no_work(renderer: Noting, start: Callable, backend: str) -> None:
     playback, ahead = start(backend)
     playback.toggle(0.0)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scenes import sphere
 from test_window import Screenshot, on_screen, shown
-from virtual_screen import PANEL, ROOT, RunningApp, running_app, virtual_screen
+from virtual_screen import PANEL, ROOT, SIZE, RunningApp, running_app, virtual_screen
 
 from viewer.analysis.pick import pick
 from viewer.gpu.surface import EMPTY, Surface
@@ -22,7 +22,6 @@ from viewer.scan.points import PointCloud
 
 pytestmark = pytest.mark.slow
 
-SIZE = (1280, 720)
 FACES = ("face_a.npz", "face_b.npz")
 MOUTH = (-24.0, -62.0, 92.0), (24.0, -62.0, 92.0)  # its corners
 NOSE, LEFT_EYE, RIGHT_EAR = (0.0, -28.5, 109.5), (31.0, 10.0, 74.0), (-84.0, 0.0, -18.0)  # of the demo, mm

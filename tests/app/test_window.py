@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
-from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, Screen, running_app
+from scenes import DRAWS_POINTS
+from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, running_app, virtual_screen
 from written import picture
 
 from viewer import cli
 from viewer.analysis.pick import pick
-from viewer.backends import backends
 from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.document.recording import Recording
@@ -33,7 +33,14 @@ from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.view import View
 
+SIZE = (1280, 720)
 MARK = 15  # pixels, height of the text of marks
+
+
+@pytest.fixture(scope="module")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
+        yield screen
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +191,7 @@ def test_opens_plays_scrubs_switches_and_saves_what_is_shown(app: RunningApp) ->
     app.see(frame=3, backend="auto_splats")
     before = assert_true_picture(app)
     assert before.description["pose"] == 3
-    names = list(backends())
+    names = DRAWS_POINTS
     after = names.index("auto_splats") + 1
     for name in (*names[after:], *names[:after]):  # all round
         app.screen.do("key", "b")
@@ -331,6 +338,7 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
     assert assert_true_picture(app).description["params"]["point_size"] == 1, "the default"
 
 
+@pytest.mark.slow
 def test_acting_on_a_widget_or_a_window_that_is_not_there_fails(app: RunningApp) -> None:
     for window, widget in ((PANEL, "k/##nothing"), ("nothing", "k/##value")):
         with pytest.raises(AssertionError, match=r"Unable to locate|doesn't seem to exist"):

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, running_app
 
-SIZE = (1280, 720)
-FRAMES, POINTS = 16, 20_000
-CHOSEN = ("surfels", "voxels")  # of which points alone need normals, and octrees
+FRAMES, POINTS = 16, 10_000
+# Of which points alone need normals, and octrees.
+CHOSEN = ("surfels", pytest.param("voxels", marks=pytest.mark.slow))
 
 
 @pytest.fixture(scope="module")
@@ -24,12 +24,6 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for number in range(FRAMES):
         np.save(scan / f"{number:02}.npy", sphere(POINTS, radius=1 + 0.02 * number).positions)
     return scan
-
-
-@pytest.fixture(scope="module")
-def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
-    with virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen:
-        yield screen
 
 
 @pytest.fixture
@@ -126,6 +120,7 @@ def test_the_first_picture_is_of_points_and_another_renderer_takes_over_from_the
     assert {state.backend for state in app.pictures(surfels)} == {"surfels", "voxels"}
 
 
+@pytest.mark.slow
 def test_jumping_about_drops_what_was_queued(app: RunningApp) -> None:
     choose(app, "surfels")
     screen = app.screen

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from virtual_screen import RunningApp, Screen, running_app
 
@@ -26,6 +27,7 @@ def lowest_button(app: RunningApp) -> tuple[int, int]:
     return left + int(x.min() + x.max()) // 2, top + y
 
 
+@pytest.mark.slow
 def test_new_frames_come_in_by_the_button_that_reloads(screen: Screen, tmp_path: Path) -> None:
     scan = tmp_path / "scan"
     scan.mkdir()

@@ -150,6 +150,7 @@ def wait_until(holds: Callable[[], object]) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_path: Path, scan: Path) -> None:
     with running_app(screen, tmp_path, scan) as app:
         hands = Hands(app)

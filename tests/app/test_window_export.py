@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from range_scenes import sphere_view
 from scenes import sphere
-from virtual_screen import ROOT, RunningApp, running_app, virtual_screen
+from virtual_screen import ROOT, SIZE, RunningApp, running_app, virtual_screen
 from written import film
 
 from viewer.document.recording import Recording
@@ -23,7 +23,6 @@ from viewer.output.marks import INK, Marks
 from viewer.scan import formats
 from viewer.scan.formats.exr import write_views
 
-SIZE = (1280, 720)
 COUNT = 6  # frames
 LEFT = (SIZE[0] - 34 * 16) // 2  # of the dialog
 

@@ -129,6 +129,7 @@ def levels(app: RunningApp) -> Iterator[RunningApp]:
     app.choose(PANEL, "light/##value", "###auto")
 
 
+@pytest.mark.slow
 def test_each_level_has_its_key(levels: RunningApp) -> None:
     app, before = levels, shown(levels).copy()
     on = counted(app)

@@ -142,6 +142,7 @@ def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:
     assert app.frames()[-1] == 0
 
 
+@pytest.mark.slow
 def test_backgrounds_by_what_they_are_for_are_shown_and_saved(app: RunningApp) -> None:
     left, top, *_ = app.view()
     corner = np.s_[top + 60 : top + 120, left + 20 : left + 80]

@@ -144,6 +144,7 @@ def test_a_picture_at_rest_becomes_smooth_and_any_act_goes_first(app: RunningApp
     assert app.settle().samples == 1
 
 
+@pytest.mark.slow
 def test_a_picture_is_saved_as_it_was_while_the_window_goes_on_and_can_be_cancelled(app: RunningApp) -> None:
     screen = app.screen
     app.choose(PANEL, "quality/##value", "###fine")

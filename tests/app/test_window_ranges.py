@@ -75,6 +75,7 @@ def test_an_end_that_is_no_longer_automatic_begins_where_it_was(app: RunningApp)
     assert look_of(app.state)["low"] is None
 
 
+@pytest.mark.slow
 def test_a_saved_picture_is_drawn_again_in_the_same_colours(app: RunningApp) -> None:
     app.choose(PANEL, "color_by/##value", "###displacement")
     app.see(spans(0, HIGHEST))

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, PATIENCE, RunningApp, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, SIZE, RunningApp, running_app, virtual_screen
 
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
-SIZE = (1280, 720)
 _SPHERE = 500_000  # points without normals: estimating takes seconds
 
 
@@ -108,6 +107,7 @@ def go_to(app: RunningApp, scan: Path) -> None:
     raise AssertionError(f"{scan} is not in the list")
 
 
+@pytest.mark.slow
 def test_closing_ends_the_process_while_a_scan_is_read(app: RunningApp, folder: Path) -> None:
     go_to(app, folder / "0_small.npy")
     app.screen.do("key", "Next")

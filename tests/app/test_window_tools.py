@@ -364,6 +364,7 @@ def pixels(path: Path) -> np.ndarray:
         return np.array(image)[..., :3]
 
 
+@pytest.mark.slow
 def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:

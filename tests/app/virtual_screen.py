@@ -27,7 +27,7 @@ from viewer.document.saved_session import SavedSession, kept_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PANEL = "panel/settings"  # name of the window's part with the parameters
-SIZE = (1280, 720)  # of the screen that tests share, pixels
+SIZE = (1024, 640)  # of the screen that tests share, pixels
 PATIENCE = 120.0  # seconds until what does not come about counts as failed
 
 Found = TypeVar("Found")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -149,6 +150,8 @@ def test_levels_meet_without_holes(draw: Draw) -> None:
 
 # --- what is skipped ------------------------------------------------------------------
 
+QUICK = {("points", True, False), ("polygons", True, True)}  # together both values of what differs most
+
 
 def assert_same(one: Surface, other: Surface) -> None:
     """Depths, numbers, levels and pictures are the same bits."""
@@ -157,9 +160,13 @@ def assert_same(one: Surface, other: Surface) -> None:
     np.testing.assert_array_equal(one.image(), other.image())
 
 
-@pytest.mark.parametrize("cull_back", [False, True])
-@pytest.mark.parametrize("lod", [True, False])
-@pytest.mark.parametrize("primitive", ["points", "polygons"])
+@pytest.mark.parametrize(
+    ("primitive", "lod", "cull_back"),
+    [
+        pytest.param(*ways, marks=() if ways in QUICK else pytest.mark.slow)
+        for ways in product(("points", "polygons"), (True, False), (False, True))
+    ],
+)
 def test_skipping_changes_no_picture(draw: Draw, primitive: str, lod: bool, cull_back: bool) -> None:
     """From before and behind, near and far, beside it, and with the pods' surfaces behind the eye."""
     rng = np.random.default_rng(8)

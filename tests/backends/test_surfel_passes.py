@@ -109,10 +109,10 @@ def test_discs_that_are_seen_edge_on_weigh_no_more_than_others(draw: Draw) -> No
 
 def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
     """Of what two pods with noise saw: at most half as many holes; outline and spill within a pixel."""
-    mesh, size = tessellation.torus_mesh(), (480, 320)
+    mesh, size = tessellation.torus_mesh(), (240, 160)
     pods = rig(mesh.bounds, around(2), aspect=4 / 3, up="+y")
     noise = Faults(noise=0.5 / 190 * mesh.bounds.radius)  # 0.5 mm of a head
-    pose = Pose.of(0, 0.0, "", capture(mesh, pods, (640, 480), [noise] * 2, seed=0, frame=0))
+    pose = Pose.of(0, 0.0, "", capture(mesh, pods, (320, 240), [noise] * 2, seed=0, frame=0))
     camera = Camera.orbit(mesh.bounds, 20, 30, aspect=1.5)
     truth = trace(mesh, camera, size)
     scanned = visible_pixels(mesh, truth, pods)

@@ -74,7 +74,7 @@ def exact(surface: Surface) -> tuple[NDArray, NDArray]:
 
 
 @pytest.mark.parametrize("least", [0.0, 0.25])
-@pytest.mark.parametrize("depth", [3, 5, 21])
+@pytest.mark.parametrize("depth", [3, pytest.param(5, marks=pytest.mark.slow), 21])
 @every_camera
 def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, least: float) -> None:
     fixed = {"shape": "cubes", "max_depth": depth, "least": least, "pixel_threshold": 0.25}

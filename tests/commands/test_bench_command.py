@@ -196,7 +196,7 @@ def test_a_damaged_scene_is_left_out_and_the_others_are_measured(run: Run, tmp_p
     assert not (tmp_path / "none" / "report.html").exists()
 
 
-@pytest.mark.parametrize("views", [0, 2])
+@pytest.mark.parametrize("views", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_ctrl_c_before_the_first_row_leaves_former_results(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, views: int
 ) -> None:

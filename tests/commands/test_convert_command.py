@@ -11,6 +11,7 @@ from command_line import Run
 from scenes import sphere
 from small_scans import cloud_at, names
 
+from viewer.backends.hpr import visible_points
 from viewer.frame import backend_for
 from viewer.scan import formats
 from viewer.scan.estimate import estimate
@@ -142,3 +143,32 @@ def test_convert_refuses_estimates_that_a_format_does_not_hold(
     assert f"'{out[1:]}' files hold no {flag}" in message
     assert f"or leave out --{flag}" in message
     assert not names(tmp_path)
+
+
+def test_convert_keeps_what_an_eye_sees(run: Run, scans: Path, tmp_path: Path) -> None:
+    """Of all poses, with all that the points have."""
+    eye = (0.5, 0.25, 9.0)
+    done = run("convert", scans / "sequence", tmp_path / "out%03d.ply", "--visible-from", "0.5,0.25,9")
+    assert done.code == 0
+    kept, total = 0, 0
+    for index in range(5):
+        before, after = cloud_at(index), formats.read(tmp_path / f"out{index:03d}.ply")
+        rows = visible_points(before.world(), eye)
+        assert 0 < len(rows) < len(before)
+        np.testing.assert_array_equal(after.world(), before.world(rows))
+        kept, total = kept + len(rows), total + len(before)
+    assert done.out.startswith(f"{kept:,} of {total:,} points are seen, ")
+    one = run("convert", scans / "ball.npz", tmp_path / "a.npz", "--visible-from=0,0,5")
+    ball, seen = formats.read(scans / "ball.npz"), formats.read(tmp_path / "a.npz")
+    rows = visible_points(ball.world(), (0, 0, 5))
+    assert one.out == f"{len(rows):,} of {len(ball):,} points are seen\n{tmp_path / 'a.npz'}\n"
+    for name in ("normals", "colors", "radii"):
+        np.testing.assert_array_equal(getattr(seen, name), getattr(ball, name)[rows])
+    np.testing.assert_array_equal(seen.scalars["height"], ball.scalars["height"][rows])
+
+
+@pytest.mark.parametrize("text", ["1,2", "1,2,x", "1,2,nan"])
+def test_convert_refuses_what_is_no_place_of_an_eye(text: str, run: Run, scans: Path, tmp_path: Path) -> None:
+    done = run("convert", scans / "ball.npz", tmp_path / "a.ply", "--visible-from", text)
+    assert done.code == 2
+    assert "not a place" in done.err

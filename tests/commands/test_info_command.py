@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
-from small_scans import ROOT, cloud_at
+from small_scans import ROOT, SMALL, cloud_at
 
+from viewer.codewords.stream import read_stream
+from viewer.codewords.words import decode_words
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
@@ -86,3 +88,33 @@ def test_info_and_convert_import_no_gl(scans: Path) -> None:
         capture_output=True, text=True, cwd=ROOT, check=True,
     )  # fmt: skip
     assert done.stdout.splitlines()[-1] == ""
+
+
+@pytest.mark.parametrize("quality", ["table", "exact"])
+def test_info_of_code_words(run: Run, scans: Path, tmp_path: Path, quality: str) -> None:
+    path = tmp_path / "a.cw"
+    run("render", scans / "ball.npz", "-o", path, *SMALL, "--set", f"quality={quality}")
+    stream = read_stream(path)
+    done = run("info", path, "--json")
+    assert (done.code, done.err) == (0, "")
+    facts = json.loads(done.out)
+    assert (facts["name"], facts["size"], facts["words"]) == ("a.cw", list(stream.size), len(stream))
+    assert facts["depth"] == {
+        "nearest": stream.near, "farthest": stream.far, "error": stream.depth_error(),
+    }  # fmt: skip
+    assert facts["finer"] == (quality == "exact")
+    assert 0 < facts["elements"] <= 2000
+    for name, values in decode_words(stream.words).items():
+        assert facts["fields"][name] == [values.min(), values.max()]
+    assert facts["tiles"] == decode_words(stream.words)["mode"].sum()
+    text = run("info", path).out
+    assert f"{len(stream):,}, {facts['tiles']:,} of them tiles" in text
+    low, high = facts["fields"]["z"]
+    assert f"z           9 bits, {low:g} to {high:g}" in text
+
+
+def test_info_of_code_words_without_any(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.cw").write_bytes(b"SCAN4DCW")
+    done = run("info", tmp_path / "a.cw")
+    assert done.code == 2
+    assert "is no file of code words" in done.err

@@ -194,7 +194,7 @@ def _draw(path: Path) -> None:
         pose = timeline.pose(0)
         camera = Camera.orbit(pose.cloud.bounds(), aspect=SIZE[0] / SIZE[1])
         surface = Surface(renderer.gpu, SIZE)
-        for name in backends():
+        for name in (one.name for one in backends().values() if one.draws(pose)):
             look = Look(color_by=next(iter(pose.cloud.scalars), "auto").replace("auto", "depth"))
             while render_frame(renderer, Request(pose, camera, name, None, look), surface):
                 pass

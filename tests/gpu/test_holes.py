@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scenes import looking_down_z, sphere
+from scenes import DRAWS_POINTS, looking_down_z, sphere
 from test_filled import FLAT, around, linear, slope
 
-from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.gpu import gl
 from viewer.gpu.shade import shade
@@ -79,7 +78,7 @@ def test_what_surrounds_a_scan_is_no_hole(draw: Draw) -> None:
     assert not red[radius > edge].any()
 
 
-@pytest.mark.parametrize("name", [*backends(), "filling"])
+@pytest.mark.parametrize("name", [*DRAWS_POINTS, "filling"])
 def test_every_renderer_shows_its_holes(draw: Draw, name: str) -> None:
     which = filling.BACKEND if name == "filling" else name
     plain = draw(slope(), CAMERA, SIZE, which, FLAT).image().copy()

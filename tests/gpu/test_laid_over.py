@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import NOTHING, sphere, sphere_mesh
+from scenes import DRAWS_POINTS, NOTHING, sphere, sphere_mesh
 
 from viewer.analysis.measure import End, Measurement, reading_of
 from viewer.analysis.pick import is_seen, pick
@@ -86,7 +86,7 @@ def camera_of(cloud: PointCloud, projection: str = "perspective") -> Camera:
     return Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3, projection=projection)
 
 
-@pytest.mark.parametrize("backend", list(backends()))
+@pytest.mark.parametrize("backend", DRAWS_POINTS)
 def test_numbers_come_without_the_points(renderer: Renderer, backend: str) -> None:
     own, layers = Renderer(renderer.gpu), Layers({"deviation": DEVIATION})
     look, camera = Look(color_by="deviation", light="flat"), camera_of(CLOUD)
@@ -150,7 +150,7 @@ def test_what_is_no_layer_is_told(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-@pytest.mark.parametrize("backend", list(backends()))
+@pytest.mark.parametrize("backend", DRAWS_POINTS)
 def test_a_pose_that_is_shifted_gives_the_very_picture(
     renderer: Renderer, backend: str, projection: str
 ) -> None:

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import NOTHING, sphere
+from scenes import DRAWS_POINTS, NOTHING, sphere
 
-from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
@@ -131,7 +130,7 @@ def test_impossible_sizes_are_explained(renderer: Renderer, size: tuple[int, int
         Surface(renderer.gpu, size)
 
 
-@pytest.mark.parametrize("name", list(backends()))
+@pytest.mark.parametrize("name", DRAWS_POINTS)
 def test_passes_add_up_to_the_frame(renderer: Renderer, name: str) -> None:
     cloud = sphere(200_000)
     surface = Surface(renderer.gpu, (960, 640))
@@ -249,6 +248,7 @@ def test_colours_by_id_are_those_of_the_file(draw: Draw) -> None:
     np.testing.assert_array_equal(whole.image()[same], part.image()[same])
 
 
+@pytest.mark.slow
 def test_more_pixels_than_one_dimension_of_a_dispatch_takes(renderer: Renderer) -> None:
     size = (8192, 2304)  # 73 728 work groups of covered pixels
     x, y = np.array([-1.0, 1, 1, -1]) * 9, np.array([-1.0, -1, 1, 1]) * 9

@@ -258,6 +258,7 @@ def test_the_shipped_file_is_small() -> None:
     assert asset_path().stat().st_size < 2_000_000
 
 
+@pytest.mark.slow
 def test_sampling_repeats_itself() -> None:
     first, again = (sampling.sample(4000, seed=5) for _ in range(2))
     np.testing.assert_array_equal(first.positions, again.positions)

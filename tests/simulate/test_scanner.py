@@ -178,6 +178,27 @@ def test_nothing_is_measured_beyond_the_grazing_angle() -> None:
     assert len(cosine) == np.count_nonzero(np.degrees(np.arccos(every)) <= 60)
 
 
+def test_gain_is_that_of_linear_light_and_changes_nothing_else() -> None:
+    gains = (1.1, 1.0, 0.5)
+    (true,), (cast,) = scan(Faults(), 1), scan(Faults(gain=gains), 1)
+    assert true.color is not None
+    assert cast.color is not None
+    assert true.color[true.valid()].min() > 0.1
+    factors = cast.color[true.valid()].astype(float) / true.color[true.valid()]
+    assert np.abs(factors / gains - 1).max() < 2 * np.finfo(np.float16).eps
+    assert same(replace(cast, color=true.color), true)
+
+
+def test_a_wrong_calibration_turns_what_was_measured_about_the_eye() -> None:
+    (true,), (wrong,) = scan(Faults(), 1), scan(Faults(calibration_error=1.0), 1)
+    assert same(replace(wrong, world_to_camera=true.world_to_camera), true)
+    assert np.abs(wrong.eye - true.eye).max() < 1e-12
+    before, after = true.positions() - true.eye, wrong.positions() - true.eye
+    assert np.abs(after[:, 1] - before[:, 1]).max() < 1e-6  # about the upright axis
+    turned = np.degrees(np.arctan2(after[:, 0], -after[:, 2]) - np.arctan2(before[:, 0], -before[:, 2]))
+    assert np.abs(turned + 1).max() < 1e-4  # to the left: towards -x, as seen from in front
+
+
 def test_depths_that_are_none_are_holes() -> None:
     for noise in (100.0, 1e300):
         (view,) = scan(Faults(noise=noise), 1)
@@ -188,7 +209,7 @@ def test_depths_that_are_none_are_holes() -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [("noise", -1), ("noise", np.nan), ("noise", np.inf), ("disparity", -0.1), ("dropouts", 1.1),
-     ("outliers", np.nan), ("grazing", 91)],
+     ("outliers", np.nan), ("grazing", 91), ("gain", (1.0, -1.0, 1.0)), ("gain", (1.0, 1.0, np.inf))],
 )  # fmt: skip
 def test_faults_that_cannot_be_are_one_message(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"{name} is"):
@@ -323,6 +344,30 @@ def test_azimuths_name_the_pods(simulate: Simulate, tetrahedron: Path, tmp_path:
     assert views[0].fy == pytest.approx(12 / np.tan(np.radians(10)))
 
 
+def test_gain_and_calibration_error_may_differ_from_pod_to_pod(
+    simulate: Simulate, tetrahedron: Path, tmp_path: Path
+) -> None:
+    def scanned(*flags: str) -> tuple[RangeView, ...]:
+        assert simulate(tetrahedron, "-o", tmp_path / "a.exr", "--size", "32x24", "--force", *flags) == (
+            0,
+            "",
+        )
+        return exr.read(tmp_path / "a.exr")
+
+    def colors(views: tuple[RangeView, ...]) -> list[np.ndarray]:
+        return [np.asarray(view.color, float)[view.valid()].mean(axis=0) for view in views]
+
+    true = scanned()
+    cast = scanned("--gain", "0.5", "0.9,0.8,0.7", "--calibration-error", "0,2")
+    for before, after, gain in zip(colors(true), colors(cast), (0.5, (0.9, 0.8, 0.7)), strict=True):
+        assert np.allclose(after, before * gain, rtol=2e-3)
+    assert np.array_equal(true[0].world_to_camera, cast[0].world_to_camera)
+    turn = cast[1].world_to_camera[:3, :3] @ true[1].world_to_camera[:3, :3].T
+    assert np.degrees(np.arccos((np.trace(turn) - 1) / 2)) == pytest.approx(2)
+    both = scanned("--gain", "0.5")
+    assert np.allclose(colors(both), 0.5 * np.array(colors(true)), rtol=2e-3)
+
+
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
@@ -339,6 +384,10 @@ def test_azimuths_name_the_pods(simulate: Simulate, tetrahedron: Path, tmp_path:
         (("--grazing", "100"), "grazing is 100"),
         (("--disparity=-1",), "disparity is -1"),
         (("--dropouts", "1"), "holds no points"),
+        (("--gain", "1,2"), "neither one factor"),
+        (("--gain", "1", "2", "3"), "3 values for 2 pods"),
+        (("--gain=-1",), "gain is -1"),
+        (("--calibration-error", "181"), "calibration error is 181"),
         (("--fov", "180"), "fov_y"),
         (("--size", "0x5"), "no size"),
         (("--size", "100000x100000"), "too large"),

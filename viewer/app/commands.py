@@ -177,8 +177,8 @@ def _look_switch(parameter: Parameter) -> Command[App]:
 
 
 def _renderers(app: App) -> Iterator[Item]:
-    for name, backend in backends().items():
-        yield backend.title, partial(app.rendering.choose, name), name == app.rendering.backend
+    for name in app.rendering.choices:
+        yield backends()[name].title, partial(app.rendering.choose, name), name == app.rendering.backend
 
 
 def _themes(app: App) -> Iterator[Item]:

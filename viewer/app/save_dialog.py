@@ -9,52 +9,28 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from ..errors import InputError
-from ..files import absolute, printable
-from . import widgets
+from ..files import absolute
+from .path_dialog import PathDialog
 
 
-class SaveDialog:
-    """is_open: whether the dialog is."""
+class SaveDialog(PathDialog):
+    """Asks for the name, and says where a file of that name is there already."""
 
     def __init__(self, title: str, about: str, suffix: str, save: Callable[[Path], None]) -> None:
         """about: what is saved, a line. suffix: of the file, added where it is missing. save: writes the
         file; it raises InputError where that cannot be."""
-        self._title, self._about, self._suffix, self._save = title, about, suffix, save
-        self._path = ""
-        self._problem = ""  # why it could not be saved under that name
-        self._takes_keyboard = False
-        self.is_open = False
+        super().__init__(title, about)
+        self._suffix, self._save = suffix, save
 
     def ask(self, path: Path) -> None:
         """Open the dialog. path: that is offered."""
-        self._path, self._problem = str(path), ""
-        self.is_open = self._takes_keyboard = True
+        self._open(str(path))
 
-    def draw(self) -> None:
-        """Declare the dialog, while it is open."""
-        with widgets.modal(self._title, self.is_open) as is_drawn:
-            if is_drawn:
-                self._draw_inside()
-                if not self.is_open:
-                    imgui.close_current_popup()
-
-    def _draw_inside(self) -> None:
-        imgui.text(self._about)
-        if self._takes_keyboard:
-            imgui.set_keyboard_focus_here()
-            self._takes_keyboard = False
-        imgui.set_next_item_width(-1)
-        changed, self._path = widgets.edit_path("##path", self._path)
-        if changed:
-            self._problem = ""
-        is_entered = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    def _draw_below(self, is_entered: bool) -> None:
         exists = self._exists
-        imgui.text_wrapped(printable(self._problem) or ("This file is there already." if exists else ""))
+        self._draw_problem("This file is there already." if exists else "")
         if imgui.button("Replace" if exists else "Save") or (is_entered and not exists):
-            self._try_to_save()
-        imgui.same_line()
-        if imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
-            self.is_open = False
+            self._try(self._save, lambda text: named_file(text, self._suffix))
 
     @property
     def _exists(self) -> bool:
@@ -62,14 +38,6 @@ class SaveDialog:
             return os.path.exists(named_file(self._path, self._suffix))
         except InputError:
             return False
-
-    def _try_to_save(self) -> None:
-        try:
-            self._save(named_file(self._path, self._suffix))
-        except InputError as error:
-            self._problem, self._takes_keyboard = str(error), True
-        else:
-            self.is_open = False
 
 
 def named_file(text: str, suffix: str) -> Path:

@@ -202,6 +202,10 @@ class Backend:
         """Names of what it needs of this pose: "normals", "radii", "views"."""
         return self.module.needs(pose, params)
 
+    def draws(self, pose: Pose) -> bool:
+        """Whether it draws this pose, and does not need range views that are none of it."""
+        return bool(pose.views) or "views" not in self.needs(pose, self.params())
+
     def draws_samples(self, pose: Pose, params: Any) -> bool:
         """Whether it draws this pose from samples of its range views alone: nothing is read of its points."""
         return set(self.needs(pose, params)) == {"views"}

@@ -7,7 +7,7 @@ Where a backend cannot hold a row in principle, its module says so and what it h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -152,11 +152,11 @@ def difference(
     one: RgbdImage, other: RgbdImage, depth_step: float = _DEPTH_STEP, color_step: float = _COLOR_STEP
 ) -> Difference:
     """Compare two pictures of one size. Steps in pixel widths and in levels of 255."""
-    covered = np.isfinite(one.depth)
-    both = covered & np.isfinite(other.depth)
+    covered, other_covered = (~np.isposinf(each.depth) for each in (one, other))  # NaN is another depth
+    both = covered & other_covered
     depth = np.abs(np.where(both, one.depth, 0) - np.where(both, other.depth, 0))
     color = np.abs(one.color - other.color)
-    same = (covered == np.isfinite(other.depth)) & (depth < depth_step) & (color.max(axis=2) < color_step)
+    same = (covered == other_covered) & (depth < depth_step) & (color.max(axis=2) < color_step)
     if not same.any():
         return Difference(1.0, 0.0, 0.0)
     return Difference(1 - float(same.mean()), float(depth[same].mean()), float(color[same].mean()))
@@ -217,7 +217,7 @@ class Row:
     """One line of the suite: a shot, and a variant that must give its picture.
 
     summed: the tolerance where a rasteriser adds up what a pixel shows: of a backend that blends, fed as is
-    told. None: the same.
+    told. None: the same. setting: parameters of a backend, by name; the row is for those that have them all.
     """
 
     name: str
@@ -225,6 +225,11 @@ class Row:
     variant: Callable[[PointView], PointView]
     tolerance: Tolerance
     summed: Tolerance | None = None
+    setting: Mapping[str, Any] = field(default_factory=dict)
+
+    def is_for(self, backend: Backend) -> bool:
+        """Whether a backend has the parameters that the row sets."""
+        return self.setting.keys() <= {parameter.name for parameter in backend.parameters}
 
     def tolerance_of(self, backend: Backend, params: Any = None) -> Tolerance:
         """How far apart a backend's pictures may be. params: None: its defaults."""
@@ -237,13 +242,15 @@ class Row:
         return next((limit for limit in backend.limits.get(self.name, ()) if limit.applies(params)), None)
 
     def compare(self, renderer: Renderer, backend: Backend, params: Any = None) -> Outcome:
-        """Draw both and compare them. params: of the backend; None: its defaults. Raises InputError as
-        `picture` does."""
+        """Draw both and compare them; a picture of nothing is none that holds. params: of the backend, but
+        for those that the row sets; None: its defaults. Raises InputError as `picture` does."""
+        params = replace(backend.params() if params is None else params, **self.setting)
         shot = self.shot()
         one, other = (picture(renderer, backend, s, params) for s in (shot, self.variant(shot)))
         found = difference(one, other)
         coarse = difference(one, other, *_COARSE_STEPS).pixels
-        held = self.tolerance_of(backend, params).holds(found)
+        shown = not np.isposinf(one.depth).all()
+        held = shown and self.tolerance_of(backend, params).holds(found)
         return Outcome(found, held, self.limit_of(backend, params), coarse)
 
 
@@ -287,6 +294,7 @@ def rows() -> Iterator[Row]:
     yield from _sized()
     yield from _arranged()
     yield from _spoilt()
+    yield from _flipped()
 
 
 def _rounded(kind: type, at: float, source: str, unit: float = _UNIT) -> Tolerance:
@@ -573,3 +581,20 @@ def _spoilt() -> Iterator[Row]:
 
     for name, value in (("zero", 0.0), ("negative", -1.0), ("NaN", np.nan)):
         yield Row(f"{name} radii", closed, partial(PointView.filled, name="radii", value=value), FLOAT32)
+
+
+def _flipped() -> Iterator[Row]:
+    """Points that are flipped at spheres far larger than the scan, from outside and inside."""
+
+    def inside() -> PointView:
+        return replace(_body(), camera=Camera((0, 0, 0), (0.6, 0, 0), fov_y=60))
+
+    for place, shot in (("around", _body), ("inside", inside)):
+        for power in (2, 4, 6, 8):
+            yield Row(
+                f"a sphere of 10^{power} times the size, {place}",
+                shot,
+                partial(PointView.moved, scale=10.0 ** (-6 if power % 4 else 6)),
+                FLOAT32,
+                setting={"mode": "hull", "radius": 10.0**power},
+            )

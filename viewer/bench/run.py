@@ -192,6 +192,8 @@ class Bench:
     def numerics(self, names: Sequence[str]) -> Iterator[Row]:
         """The lines of the stability suite, for each backend; what one cannot draw is its limit."""
         for name, row in product(names, numerics.rows()):
+            if not row.is_for(backend(name)):
+                continue
             try:
                 outcome = row.compare(self.renderer, backend(name))
                 found, held = outcome.found, outcome.held
@@ -238,6 +240,8 @@ class Bench:
             except InputError as error:
                 self.note(f"{subject.name}: {contender.backend} is left out: {error}")
                 del tallies[contender]
+                for _ in range(self.settings.views - view + self.walks(group)):
+                    self.tick()  # of what it will not be drawn for
                 continue
             tally.covered.append(100 * float((surface.coverage > 0).mean()))
             tally.errors.append(judge.errors(surface) if judge else {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,11 +22,13 @@ from ..look import COLOR_BY, Look, drawable, is_open_range, with_range
 from ..output.export import numbered
 from ..output.marks import Legend
 from ..renderer import Renderer
+from ..scan.pods import first_camera
+from ..scan.pose import Pose
 from ..scan.ranges import ValueRanges
 from ..scan.timeline import Timeline
 from ..scan.times import typical_rate
 from ..scan.upright import Upright
-from ._scans import frame_title
+from ._scans import frame_title, framing
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,26 @@ def turntable_camera(
     turned = (Camera.orbit(bounds, front + azimuth, aspect=aspect, up=up) for azimuth in azimuths)
     distance = max(camera.distance for camera in turned)
     return lambda shot: Camera.orbit(bounds, front + shot.azimuth, distance=distance, up=up)
+
+
+def shot_cameras(
+    args: Namespace,
+    timeline: Timeline,
+    shots: list[Shot],
+    size: tuple[int, int],
+    upright: Upright,
+    first: Pose,
+) -> Callable[[Shot], Camera]:
+    """The camera of each shot, fitted as the arguments say. first: the first pose that can be read."""
+    aspect = size[0] / size[1]
+    bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
+    if args.turntable:
+        return turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, upright)
+    if args.orbit:
+        camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=upright.up)
+    else:
+        camera = first_camera(first.views, bounds, aspect, upright)
+    return lambda shot: camera
 
 
 def check_color_source(

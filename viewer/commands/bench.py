@@ -28,8 +28,13 @@ from ..bench.measuring import measure_distances, write_measuring
 from ..bench.papers.farooq_2013 import pyramids
 from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
 from ..bench.papers.farooq_2013.farooq import write_farooq
+from ..bench.papers.farooq_2013.laplacian import NAME as LAPLACIAN
+from ..bench.papers.farooq_2013.laplacian import write_laplacian
 from ..bench.papers.farooq_2013.large_views import measure_large_views
 from ..bench.papers.farooq_2013.playing import measure_playing
+from ..bench.papers.farooq_2013.splines import PICTURE as SEAM_PICTURE
+from ..bench.papers.farooq_2013.splines import SCENES as SEAM_SCENES
+from ..bench.papers.farooq_2013.splines import measure_alone, measure_bands, measure_seams, measure_sizes
 from ..bench.papers.machado_2014.accuracy import SCENES as VISIBILITY_SCENES
 from ..bench.papers.machado_2014.accuracy import measure_visibility
 from ..bench.papers.machado_2014.growth import measure_growth
@@ -37,6 +42,11 @@ from ..bench.papers.machado_2014.hpr import NAME as HPR
 from ..bench.papers.machado_2014.hpr import write_hpr
 from ..bench.papers.machado_2014.pictures import ERROR_PICTURE, GROWTH_PICTURE, SECTOR_PICTURE
 from ..bench.papers.machado_2014.speed import measure_speeds
+from ..bench.papers.marsik_2010.codeword import NAME as CODEWORD
+from ..bench.papers.marsik_2010.codeword import write_codeword
+from ..bench.papers.marsik_2010.words import SCENES as WORD_SCENES
+from ..bench.papers.marsik_2010.words import SIZES as WORD_SIZES
+from ..bench.papers.marsik_2010.words import measure_pixels, measure_tables, measure_times
 from ..bench.papers.preiner_2012 import auto_splats
 from ..bench.papers.preiner_2012.fits import measure_fits
 from ..bench.papers.preiner_2012.preiner import NAME as PREINER
@@ -54,6 +64,8 @@ from ..bench.report.defaults_page import write_defaults
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
+    ALONE,
+    BAND_TIMES,
     DISTANCES,
     FITS,
     GROWTH,
@@ -62,11 +74,16 @@ from ..bench.report.results import (
     NUMERICS,
     OCTREE_SIZES,
     OCTREES,
+    PICTURE_SIZES,
     PLAYING,
     RESULTS,
+    SEAMS,
     SEARCHES,
     SPEEDS,
     VISIBILITY,
+    WORD_PIXELS,
+    WORD_TABLES,
+    WORD_TIMES,
     Row,
     compare,
     read_rows,
@@ -149,6 +166,30 @@ _WITH_PAGES = {
         usual=BenchSettings(size=(400, 300), views=2, frames=0),
         quick=(VISIBILITY_SCENES[:1], 1),
     ),
+    "laplacian": _PageSuite(
+        lambda *_: [],
+        write_laplacian,
+        LAPLACIAN,
+        SEAM_SCENES,
+        others={
+            SEAMS: measure_seams,
+            ALONE: measure_alone,
+            PICTURE_SIZES: measure_sizes,
+            BAND_TIMES: measure_bands,
+        },
+        pictures=(SEAM_PICTURE,),
+        usual=BenchSettings(size=(640, 480), views=3, frames=0),
+        quick=(SEAM_SCENES[:1], 1),
+    ),
+    "codeword": _PageSuite(
+        lambda *_: [],
+        write_codeword,
+        CODEWORD,
+        WORD_SCENES,
+        others={WORD_TIMES: measure_times, WORD_PIXELS: measure_pixels, WORD_TABLES: measure_tables},
+        usual=BenchSettings(size=WORD_SIZES[0], views=1, repeat=9, frames=0),
+        quick=(WORD_SCENES[:1], 1),
+    ),
     "slomp": _PageSuite(lambda *_: slomp.groups(), write_table_two, TABLE_TWO),
     "octrees": _PageSuite(
         lambda *_: octrees.groups(),
@@ -173,7 +214,7 @@ _WITH_PAGES = {
     ),
 }
 _SUITES = ("scenes", "numerics", *_WITH_PAGES)
-_WITHOUT_RESULTS = (MEASURING, HPR)  # suites that draw no pictures of scenes
+_WITHOUT_RESULTS = (MEASURING, HPR, LAPLACIAN, CODEWORD)  # suites that draw no pictures of scenes
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -371,7 +412,7 @@ def _free_beside(path: Path) -> Path:
 
 
 def _lines(names: Sequence[str]) -> int:
-    return len(names) * sum(1 for _ in numerics.rows())
+    return sum(row.is_for(backend(name)) for name in names for row in numerics.rows())
 
 
 def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str], others: Iterable[str]) -> None:

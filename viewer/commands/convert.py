@@ -2,16 +2,20 @@
 
 OUT is a file for one pose, or for a sequence a numbered pattern such as out%04d.ply, with
 the times beside it in times.csv; a .svo holds all poses and their times. What the scan lacks of
-normals and radii can be estimated and stored, so that nobody waits for it when the scan is shown.
+normals and radii can be estimated and stored, so that nobody waits for it when the scan is shown. The points
+that an eye sees may be written alone.
 """
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+import math
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..bounds import Bounds
 from ..errors import InputError
@@ -51,6 +55,12 @@ def add_arguments(parser: ArgumentParser) -> None:
         parser.add_argument(
             f"--{name}", action="store_true", help=f"estimate and store {name}, where it has none"
         )
+    parser.add_argument(
+        "--visible-from",
+        type=_eye,
+        metavar="X,Y,Z",
+        help="only the points that an eye here sees, in scan units",
+    )
     group = parser.add_argument_group("octrees (.svo)").add_mutually_exclusive_group()
     group.add_argument(
         "--delta",
@@ -65,12 +75,15 @@ def run(args: Namespace) -> int:
     """Write the chosen poses, by default all; broken frames among several are left out."""
     stop = _stop(args)
     _check_holds(args)
+    poses = _Poses(_wanted(args), args.visible_from)
     with open_timeline(args, args.scan) as timeline:
         indices = chosen_poses(args, timeline) or list(range(len(timeline)))
         if args.out.suffix.lower() in formats.scan_suffixes():
-            _write_scan(args, timeline, indices, stop)
+            _write_scan(args, timeline, indices, stop, poses)
         else:
-            _write_frames(args, timeline, indices)
+            _write_frames(args, timeline, indices, poses)
+    if poses.eye is not None:
+        tell(poses.counts())
     tell(args.out)
     return 0
 
@@ -90,15 +103,49 @@ def _wanted(args: Namespace) -> list[str]:
     return [name for name in _ESTIMATES if getattr(args, name)]
 
 
-def _poses(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
-    """The poses, with what is asked for and they lack estimated."""
-    for pose in read_poses(timeline, indices):
-        missing = [name for name in _wanted(args) if getattr(pose.overview, name) is None]
-        if missing:
-            estimates: dict[str, Any] = {**estimate(pose, missing)}
-            yield pose.with_cloud(replace(pose.cloud, **estimates))
-        else:
-            yield pose
+def _eye(text: str) -> tuple[float, ...]:
+    try:
+        eye = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        eye = ()
+    if len(eye) != 3 or not all(map(math.isfinite, eye)):
+        raise ArgumentTypeError(f"'{text}' is not a place X,Y,Z such as 0,1.5,3")
+    return eye
+
+
+class _Poses:
+    """The poses as they are written: with what is asked for and they lack estimated, and of the points those
+    that an eye sees, if there is one. estimates: names."""
+
+    def __init__(self, estimates: Sequence[str], eye: tuple[float, ...] | None) -> None:
+        self._estimates, self.eye = estimates, eye
+        self._seen: list[int] = []
+        self._all = 0
+
+    def of(self, timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
+        """Read and yield them."""
+        for pose in read_poses(timeline, indices):
+            missing = [name for name in self._estimates if getattr(pose.overview, name) is None]
+            if missing:
+                estimates: dict[str, Any] = {**estimate(pose, missing)}
+                pose = pose.with_cloud(replace(pose.cloud, **estimates))
+            yield pose if self.eye is None else self._visible(pose, self.eye)
+
+    def _visible(self, pose: Pose, eye: tuple[float, ...]) -> Pose:
+        from ..backends.hpr import visible_points
+
+        cloud = pose.cloud
+        ids = visible_points(pose, eye)
+        rows = ids if cloud.ids is None else np.searchsorted(cloud.ids, ids)
+        self._seen.append(len(rows))
+        self._all += len(cloud)
+        return replace(pose, points=cloud.of_rows(rows))
+
+    def counts(self) -> str:
+        """How many points are seen, as a line."""
+        told = f"{sum(self._seen):,} of {self._all:,} points are seen"
+        each = f", {min(self._seen):,} to {max(self._seen):,} in each of {len(self._seen)} poses"
+        return told + (each if len(self._seen) > 1 else "")
 
 
 def _stop(args: Namespace) -> Stop | None:
@@ -113,7 +160,9 @@ def _stop(args: Namespace) -> Stop | None:
     return Stop(**told) if told else None
 
 
-def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], stop: Stop | None) -> None:
+def _write_scan(
+    args: Namespace, timeline: Timeline, indices: Sequence[int], stop: Stop | None, chosen: _Poses
+) -> None:
     out = args.out
     check_output(out, formats.scan_suffixes(), several=False)
     if is_pattern(out):
@@ -122,7 +171,7 @@ def _write_scan(args: Namespace, timeline: Timeline, indices: Sequence[int], sto
     with progress(len(indices)) as tick:
 
         def poses() -> Iterator[Pose]:
-            for pose in _poses(args, timeline, indices):
+            for pose in chosen.of(timeline, indices):
                 yield pose
                 tick()
 
@@ -139,13 +188,13 @@ def _around(timeline: Timeline, indices: Sequence[int]) -> Bounds:
     return bounds if len(indices) == 1 else bounds.grown(_MARGIN * float((bounds.high - bounds.low).max()))
 
 
-def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> None:
+def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int], chosen: _Poses) -> None:
     known = sorted([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
     check_output(args.out, known, several=len(indices) > 1)
     claim(frame_outputs(args.out, indices, timeline), scan_inputs(timeline), args.force)
     with frame_files(args.out) as file_of, progress(len(indices)) as tick:
         remarks = set()
-        for pose in _poses(args, timeline, indices):
+        for pose in chosen.of(timeline, indices):
             remarks.add(formats.write(file_of(pose), pose.cloud, pose.views))
             tick()
     for remark in remarks - {None}:

@@ -35,6 +35,7 @@ _OPTIONAL_EXTENSIONS = (
     "GL_NV_shader_atomic_int64",
 )
 _MOST_DEVICES = 16
+_WITHOUT_GL = "Pictures need none of it with 'scan4d render SCAN --backend codeword --no-gl -o picture.png'."
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -63,7 +64,8 @@ def run(args: Namespace) -> int:
     if trouble is None:
         print("Scan4D can draw here." if display() else "Scan4D can draw here, but not open a window.")
         return 0
-    print(f"Scan4D cannot draw here. {trouble.hint}")
+    print(f"Scan4D cannot draw with OpenGL here. {trouble.hint}")
+    print(_WITHOUT_GL)
     return trouble.exit_code
 
 

@@ -1,14 +1,18 @@
-"""Tell what a scan holds; reads its first readable pose alone."""
+"""Tell what a scan holds, of which its first readable pose alone is read; or a file of code words."""
 
 from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..codewords.stream import SUFFIX, WordStream, read_stream
+from ..codewords.words import FIELDS, decode_words
 from ..errors import shortened
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
@@ -26,6 +30,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Print it."""
+    if args.scan.lower().endswith(SUFFIX):
+        words = stream_facts(args.scan, read_stream(args.scan))
+        print(json.dumps(words, indent=2, allow_nan=False) if args.json else _stream_as_text(words))
+        return 0
     with open_timeline(args, args.scan) as timeline:
         facts = scan_facts(timeline, first_readable(timeline))
     print(json.dumps(facts, indent=2, allow_nan=False) if args.json else _as_text(facts))
@@ -59,6 +67,26 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
             for name, values in _attributes(cloud).items()
         },
     }  # fmt: skip
+
+
+def stream_facts(path: str, stream: WordStream) -> dict[str, Any]:
+    """Facts of a stream of code words, as plain values. Depths in scan units."""
+    fields = decode_words(stream.words)
+    return {
+        "name": Path(path).name,
+        "size": list(stream.size),
+        "strips": stream.strips,
+        "words": len(stream),
+        "tiles": int(fields["mode"].sum()),
+        "elements": len(np.unique(stream.ids)),
+        "bytes": stream.nbytes,
+        "projection": "perspective" if stream.perspective else "orthographic",
+        "depth": {"nearest": stream.near, "farthest": stream.far, "error": stream.depth_error()},
+        "finer": stream.finer is not None,
+        "materials": len(stream.materials),
+        "background": list(stream.background),
+        "fields": {name: _range(values) for name, values in fields.items()},
+    }
 
 
 def _view_facts(view: RangeView) -> dict[str, Any]:
@@ -108,6 +136,31 @@ def _as_text(facts: dict[str, Any]) -> str:
         span = "no finite value" if attribute["range"] is None else "{:g} to {:g}".format(*attribute["range"])
         columns = f" x {attribute['columns']}" if attribute["columns"] > 1 else ""
         rows.append((name, f"{attribute['type']}{columns}, {span}"))
+    return _in_columns(rows)
+
+
+def _stream_as_text(facts: dict[str, Any]) -> str:
+    depth = facts["depth"]
+    told = "finer than Z" if facts["finer"] else f"to {depth['error']:.3g}"
+    rows = [
+        ("code words", facts["name"]),
+        ("picture", "{} x {} pixels".format(*facts["size"])),
+        ("strips", f"{facts['strips']}"),
+        ("words", f"{facts['words']:,}, {facts['tiles']:,} of them tiles, of {facts['elements']:,} elements"),
+        ("projection", facts["projection"]),
+        ("depth", f"{depth['nearest']:g} to {depth['farthest']:g}, {told}"),
+        ("materials", f"{facts['materials']}"),
+        ("background", ", ".join(map(str, facts["background"]))),
+        ("memory", f"{facts['bytes'] / 1e6:.1f} MB"),
+    ]
+    for name, span in facts["fields"].items():
+        shown = "none" if span is None else "{:g} to {:g}".format(*span)
+        rows.append((name, f"{FIELDS[name][1]} bits, {shown}"))
+    return _in_columns(rows)
+
+
+def _in_columns(rows: Sequence[tuple[str, Any]]) -> str:
+    """Names and what is told of each, below one another."""
     shown = [(escaped(shortened(name)), escaped(str(value))) for name, value in rows]
     width = max(len(name) for name, _ in shown)
     return "\n".join(f"{name:{width}}  {value}" for name, value in shown)

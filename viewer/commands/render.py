@@ -3,7 +3,8 @@
 OUT is a .png, .exr or .npz file, a .mp4 film, or for several pictures a numbered pattern
 such as out%04d.png. PNG and MP4 show the look; EXR and NPZ hold what each pixel sees.
 The camera is fitted to the first pose drawn and stays where it is. --replay draws again what
-a recording or a picture tells.
+a recording or a picture tells. --no-gl draws without OpenGL, from code words, and may write
+these as .cw files; such a file is drawn again where SCAN names it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -30,8 +31,6 @@ from ..output.marks import MARKS, Legend, marks_of
 from ..params import parse
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
-from ..scan.pods import first_camera
-from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.upright import Upright
 from ..timing import draw
@@ -39,6 +38,7 @@ from . import _arguments as arguments
 from . import _drawing as drawing
 from . import _replay as replay
 from . import _stats as stats
+from . import _without_gl as without_gl
 from ._console import progress, say, tell, warn
 from ._drawing import Plan, Shot
 from ._outputs import add_force_argument, claim
@@ -47,7 +47,6 @@ from ._scans import (
     add_pose_arguments,
     chosen_poses,
     frame_title,
-    framing,
     open_timeline,
     read_poses,
     told_upright,
@@ -80,6 +79,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     picture.add_argument("--size", type=arguments.size, metavar="WxH", help="default 1920x1280")
     picture.add_argument(
         "--backend", metavar="NAME", help="default: surfels where normals are stored, else points"
+    )
+    picture.add_argument(
+        "--no-gl", action="store_true", help="without OpenGL, which needs not be there: --backend codeword"
     )
     picture.add_argument(
         "--set", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
@@ -119,6 +121,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Draw what is asked for; broken frames among several are left out."""
+    if without_gl.is_asked(args):
+        return without_gl.run(args)
     if args.repeat and not args.stats:
         raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
     if args.stats:
@@ -217,7 +221,7 @@ def _requests(
     camera_of = None if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
         chosen = chosen or backend_for(pose, args.backend, values)
-        camera_of = camera_of or _camera(args, timeline, shots, size, upright, pose)
+        camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
         own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
         if own is not look:
             title = frame_title(timeline, pose.index)
@@ -225,26 +229,6 @@ def _requests(
         for shot in shots:
             if shot.pose == pose.index:
                 yield shot, Request(pose, camera_of(shot), *chosen, own)
-
-
-def _camera(
-    args: Namespace,
-    timeline: Timeline,
-    shots: list[Shot],
-    size: tuple[int, int],
-    upright: Upright,
-    first: Pose,
-) -> Callable[[Shot], Camera]:
-    """The camera of each shot, fitted. first: the first pose that can be read."""
-    aspect = size[0] / size[1]
-    bounds = framing(timeline, list(dict.fromkeys(shot.pose for shot in shots)))
-    if args.turntable:
-        return drawing.turntable_camera(bounds, [shot.azimuth for shot in shots], aspect, upright)
-    if args.orbit:
-        camera = Camera.orbit(bounds, *args.orbit, aspect=aspect, up=upright.up)
-    else:
-        camera = first_camera(first.views, bounds, aspect, upright)
-    return lambda shot: camera
 
 
 def _assignment(text: str) -> tuple[str, str]:

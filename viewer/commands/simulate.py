@@ -7,9 +7,10 @@ a numbered pattern such as out%04d.exr, with the times beside it in times.csv.
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 from ..geometry import UP
@@ -87,6 +88,14 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--grazing", type=float, default=90.0, metavar="DEGREES", help="no depth beyond this incidence"
     )
     faults.add_argument(
+        "--gain", type=_factors, nargs="+", action="extend", metavar="G|R,G,B",
+        help="times the colour, linear light; for all pods or for each",
+    )  # fmt: skip
+    faults.add_argument(
+        "--calibration-error", type=_numbers, default=(0.0,), metavar="DEGREES[,DEGREES...]",
+        help="the stored calibration is turned so far to the left; for all pods or for each",
+    )  # fmt: skip
+    faults.add_argument(
         "--seed", type=arguments.seed, default=0, metavar="N", help="of all chance, default 0"
     )
 
@@ -119,14 +128,22 @@ def run(args: Namespace) -> int:
 
 def _faults(args: Namespace, pods: int) -> list[Faults]:
     """The faults of each pod."""
-    if len(args.noise) not in (1, pods):
-        raise InputError(
-            f"{len(args.noise)} values for {pods} pods", "--noise", "Give one for all, or one a pod"
-        )
     common = Faults(
         disparity=args.disparity, dropouts=args.dropouts, outliers=args.outliers, grazing=args.grazing
     )
-    return [replace(common, noise=args.noise[pod % len(args.noise)]) for pod in range(pods)]
+    each = {
+        "noise": _for_each("--noise", args.noise, pods),
+        "gain": _for_each("--gain", args.gain or [(1.0, 1.0, 1.0)], pods),
+        "calibration_error": _for_each("--calibration-error", args.calibration_error, pods),
+    }
+    return [replace(common, **{name: values[pod] for name, values in each.items()}) for pod in range(pods)]
+
+
+def _for_each(flag: str, values: Sequence[Any], pods: int) -> Sequence[Any]:
+    """A value for each pod, of one for all or one for each."""
+    if len(values) not in (1, pods):
+        raise InputError(f"{len(values)} values for {pods} pods", flag, "Give one for all, or one a pod")
+    return values if len(values) == pods else [values[0]] * pods
 
 
 def _faces_reader(timeline: Timeline, shared: Path | None) -> Callable[[int], Faces]:
@@ -156,3 +173,11 @@ def _numbers(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise ArgumentTypeError(f"'{text}' is no number, nor several with commas such as 0.5,1.0") from None
+
+
+def _factors(text: str) -> tuple[float, ...]:
+    """Factors of red, green and blue, of one for all or three."""
+    factors = _numbers(text)
+    if len(factors) not in (1, 3):
+        raise ArgumentTypeError(f"'{text}' is neither one factor nor those of red, green and blue")
+    return factors if len(factors) == 3 else 3 * factors

@@ -83,7 +83,9 @@ class Texture(IntEnum):
     OCCUPIED = auto()  # cells of sectors that points fall into
     VISIBLE = auto()  # rows that are
     COPIES = auto()  # rows in whose place a lower one is
-    SIGHTS = auto()  # spots, and how far each covers what lies behind
+    LIMITS = auto()  # of cells, beyond which points are hidden
+    WINDOWS = auto()  # of blocks of cells: how many cells aside discs lie that reach into them
+    SIGHTS = auto()  # of listed points, and how far each covers what lies behind
     # What is shown of visible points.
     CANDIDATES = auto()  # a row for each sector
     SPACINGS = auto()
@@ -91,6 +93,11 @@ class Texture(IntEnum):
     # Means of pictures.
     LIGHT = auto()  # of bytes
     ENCODED = auto()  # bytes of light
+    # Code words.
+    ELEMENTS = auto()  # points in steps of the table
+    SHAPES = auto()  # the table
+    SHAPE_ROWS = auto()  # of shapes larger than a word
+    MATERIALS = auto()  # of points
     SCRATCH = auto()  # where buffers become textures
 
 
@@ -170,18 +177,33 @@ class Storage(IntEnum):
     STAMPS = 6
     NEXT_ROWS = 7
     VISIBLE = 0
+    LIMITS = 0
     SIGHTS = 6
+    WINDOWS = 7
     # What is shown of visible points, beside two lists, splats and looks; and levels of pyramids.
     SPACINGS = 1
     JOINED = 6
     LOOK_SAMPLES = 2
     COLOR_SAMPLES = 3
+    # Views that are merged, beside a Surface, or a list.
+    VIEW_PICTURE = 0
+    MERGED = 1
+    WINNERS = 4
+    BANDS = 4
+    BAND_SHARES = 5
+    MERGED_BANDS = 6
     # Samples of range views: a level that is made.
     RANGE_DEPTHS = 0
     RANGE_LOOKS = 1
     RANGE_XY = 2
     RANGE_TILES = 0
     RANGE_VALUES = 0
+    # Code words: elements; and what is written line by line, beside the cursors of bins.
+    ELEMENTS = 0
+    HEADS = 1
+    SPREAD = 2
+    LINE_WORDS = 1
+    RANKS = 2
 
 
 @unique

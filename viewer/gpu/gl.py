@@ -39,6 +39,7 @@ from .bindings import Texture  # noqa: E402
 from .constants import NOTHING  # noqa: E402
 
 RG32UI = 0x823C
+RGB32I = 0x8D83
 RGB32UI = 0x8D71
 RG32F = 0x8230
 RGB32F = 0x8815

@@ -21,7 +21,12 @@ def is_sampled(rows: NDArray[np.uint32], share: float) -> NDArray[np.bool_]:
     of 2^k, it takes that share. Rows of a scan that follow one another lie side by side as a
     rule, so that the gaps are much more even than by lot.
     """
-    return _scrambled(_reversed_bits(rows)) < share * 2.0**32
+    return lots(rows) < share * 2.0**32
+
+
+def lots(rows: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """The place of each row, (N,), in the shuffled order of all there can be: (N,)."""
+    return _scrambled(_reversed_bits(rows))
 
 
 def _scrambled(x: NDArray[np.uint32]) -> NDArray[np.uint32]:

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import up_vector
-from ..look import HOLE_COLOR, HOLE_REACH, LEVEL_COLORS, Look, color_table, rgba, value_source
+from ..look import (
+    HOLE_COLOR,
+    HOLE_REACH,
+    LEVEL_COLORS,
+    Look,
+    color_table,
+    light_direction,
+    rgba,
+    value_source,
+)
 from ..scan.ranges import robust_range
 from . import gl
 from .bindings import Storage, Texture
@@ -56,6 +65,8 @@ def shade(surface: Surface, look: Look) -> None:
     color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
     if color == "own" and cloud.colors is None and not surface.is_own("color"):
         color = "plain"
+    if surface.is_lit:
+        color, by_level, look = "own", False, replace(look, light="flat", eye_dome=False)
     # Photographs have the light that they were taken in, and what depth cameras measure is rougher than that.
     photographed = surface.samples is not None and color == "own" and not by_level
     has_normals = cloud.normals is not None or "normals" in surface.needs or surface.is_own("normal")
@@ -162,7 +173,7 @@ def _shading(surface: Surface, look: Look, by_log: bool) -> _Shading:
         background=_fractions(look.background),
         height_axis=(*surface.height_axis, 0.0),
         to_world=_columns(surface.layers.place.rotation),
-        light=(*_direction(look.azimuth, look.elevation), 0.0),
+        light=(*light_direction(look), 0.0),
         phong=(look.ambient, look.diffuse, look.specular, look.shininess),
         value_range=ends,
         eye_dome_strength=look.eye_dome_strength,
@@ -212,9 +223,3 @@ def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:
 
 def _level_colors(gpu: Gpu, colors: tuple[str, ...]) -> gl.BufferTexture:
     return gl.BufferTexture(gpu.ctx.buffer(bytes(byte for color in colors for byte in rgba(color))), gl.RGBA8)
-
-
-def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
-    """Direction to the fixed light, view space: azimuth 0 and elevation 0 is where the eye is."""
-    a, e = math.radians(azimuth), math.radians(elevation)
-    return math.cos(e) * math.sin(a), math.sin(e), math.cos(e) * math.cos(a)

@@ -91,6 +91,7 @@ class Surface:
     look: what it is drawn for, and shaded in last; shaded_by: what did it, None before. layers: over the
     pose. needs: names of what the backend has of the pose, stored or estimated. finds: the numbers that the
     backend finds for rows, by name, unless the scan or a layer has one of that name.
+    is_lit: whether the backend's own colours are as the look asks for, light included.
     color_range: where the colour map began and ended when it was shaded, None where none was used.
     samples: the points of range views whose samples the rows are; None where these are points.
     """
@@ -131,6 +132,7 @@ class Surface:
         self.covered = IndexList(gpu, width * height)
         self._covered_known = False
         self._written: set[str] = set()
+        self.is_lit = False
         self.drawn: dict[str, object] = {}
         self._blended: tuple[str | None, str] | None = None  # the source that its own values are of, and up
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
@@ -158,6 +160,7 @@ class Surface:
         self.bind_view()
         self._covered_known = False
         self._written.clear()
+        self.is_lit = False
         self.stats = Stats()
 
     def take_changes(self, wanted: dict[str, object]) -> frozenset[str]:
@@ -253,9 +256,10 @@ class Surface:
             self._kept[make] = make(self.gpu, self.size)
         return self._kept[make]  # type: ignore[return-value]
 
-    def own(self, name: str) -> gl.BufferTexture:
+    def own(self, name: str, is_lit: bool = False) -> gl.BufferTexture:
         """A channel that the backend writes itself in this frame for every covered pixel: it is shown in
-        place of what the row has. Where nothing is, it is unread. As buffers:
+        place of what the row has. Where nothing is, it is unread. is_lit: of colours, whether they are what
+        the look asks for, coloured and lit by the backend itself: shading takes them as they are. As buffers:
 
         color: RGBA8, sRGB, the alpha being what it covers of the pixel
         normal: 3 floats, along the pose's axes, of any length; 0: unknown
@@ -265,6 +269,7 @@ class Surface:
         if name not in self._own:
             self._own[name] = self._texels(name)
         self._written.add(name)
+        self.is_lit = self.is_lit or is_lit
         if name == "value":
             self._blended = self.value_source, self.look.up
         if name == "level":

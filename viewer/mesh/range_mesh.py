@@ -30,7 +30,7 @@ def triangulated(views: Sequence[RangeView]) -> Mesh:
     points = merge(views, normals=True)
     faces, before = [], 0
     for view in views:
-        own = _faces(view)
+        own = triangles_of(view)
         faces.append(own + np.uint32(before))
         before += int(np.count_nonzero(view.valid()))
     if not sum(map(len, faces)):
@@ -63,7 +63,7 @@ def was_scanned(views: Sequence[RangeView], points: Rays) -> NDArray[np.bool_]:
     return scanned
 
 
-def _faces(view: RangeView) -> Triangles:
+def triangles_of(view: RangeView) -> Triangles:
     """The triangles of one view: rows of its valid pixels, counterclockwise as its pod sees them."""
     valid = view.valid()
     number = (np.cumsum(valid) - 1).reshape(valid.shape).astype(np.uint32)

@@ -130,6 +130,12 @@ def write_png(image: NDArray[np.uint8], path: Path | str, description: str | Non
         _write_png(image, temporary, description)
 
 
+def write_arrays(arrays: dict[str, NDArray], path: Path | str) -> None:
+    """Write arrays as an .npz file. Raises InputError."""
+    with whole_file(path) as temporary:
+        _write_npz(arrays, temporary)
+
+
 def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
     image = surface.image()
     if legend is None:

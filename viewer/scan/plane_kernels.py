@@ -42,9 +42,9 @@ def _rotate(a: NDArray[np.float64], v: NDArray[np.float64], p: int, q: int) -> N
 
 
 @compiled
-def _fit(
+def fit_plane(
     sums: NDArray[np.float64],
-    count: int,
+    count: float,
     a: NDArray[np.float64],
     v: NDArray[np.float64],
     normal: NDArray[np.float32],
@@ -129,7 +129,7 @@ def fit_nested(
             sums[7] += y * z
             sums[8] += z * x
             if i + 1 == counts[j]:
-                _fit(sums, i + 1, a, v, normals[m, j], widths[m, j])
+                fit_plane(sums, i + 1, a, v, normals[m, j], widths[m, j])
                 j += 1
 
 

@@ -174,6 +174,15 @@ class PointCloud:
             offsets += self.remainders
         return replace(self, positions=offsets.astype(np.float32), remainders=None)
 
+    def of_rows(self, rows: NDArray[np.integer]) -> PointCloud:
+        """Some of the points: rows (M,), ascending. They keep their ids."""
+        names = ("positions", "normals", "colors", "radii", "axes", "remainders")
+        arrays = {name: getattr(self, name) for name in names}
+        kept = {name: values[rows] for name, values in arrays.items() if values is not None}
+        ids = rows.astype(np.uint32) if self.ids is None else self.ids[rows]
+        scalars = {name: values[rows] for name, values in self.scalars.items()}
+        return replace(self, **kept, scalars=scalars, ids=ids)
+
     def splat_reach(self) -> NDArray[np.float32]:
         """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
         assert self.radii is not None

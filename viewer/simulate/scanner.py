@@ -34,7 +34,8 @@ class Faults:
     noise: standard deviation of depth, scan units, where the surface faces the pod at the subject's distance.
     disparity: the step that disparity is rounded to, pixels; 0: exact. dropouts, outliers: fractions of the
     pixels that see the surface, and of those that then measure it. grazing: the steepest incidence that is
-    measured, degrees. Raises InputError.
+    measured, degrees. gain: factors of red, green and blue, of linear light. calibration_error: degrees by
+    which its stored calibration is turned to the left of the true one, about its eye. Raises InputError.
     """
 
     noise: float = 0.0
@@ -42,16 +43,19 @@ class Faults:
     dropouts: float = 0.0
     outliers: float = 0.0
     grazing: float = 90.0
+    gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    calibration_error: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, most in (
-            ("noise", np.inf),
-            ("disparity", np.inf),
-            ("dropouts", 1),
-            ("outliers", 1),
-            ("grazing", 90),
+        for name, value, most in (
+            ("noise", self.noise, np.inf),
+            ("disparity", self.disparity, np.inf),
+            ("dropouts", self.dropouts, 1),
+            ("outliers", self.outliers, 1),
+            ("grazing", self.grazing, 90),
+            *(("gain", factor, np.inf) for factor in self.gain),
+            ("calibration error", self.calibration_error, 180),
         ):
-            value = getattr(self, name)
             if not (0 <= value <= most and np.isfinite(value)):
                 limits = "0 or more" if most == np.inf else f"0 to {most}"
                 raise InputError(f"a scanner's {name} is {value}, expected {limits}")
@@ -111,8 +115,8 @@ def capture(
 ) -> tuple[RangeView, ...]:
     """Measure one frame with each pod. size: (width, height), pixels. faults: one a pod.
 
-    Depth is NaN and the mask False where nothing is measured; colour is that of the scene, confidence the
-    cosine of the incidence. Raises InputError for sizes that are no picture or too large.
+    Depth is NaN and the mask False where nothing is measured; colour is that of the scene times the gain,
+    confidence the cosine of the incidence. Raises InputError for sizes that are no picture or too large.
     """
     if size[0] * size[1] > _MOST_PIXELS:
         raise InputError(
@@ -151,13 +155,14 @@ def _measure(
         stored = depth.astype(np.float32)
     measured = picture.covered & ~steep & (lost >= faults.dropouts) & (stored > 0) & np.isfinite(stored)
 
+    rotation = _to_the_left(faults.calibration_error) @ view.rotation
     to_camera = np.eye(4)
-    to_camera[:3, :3] = view.rotation
-    to_camera[:3, 3] = -view.rotation @ np.array(pod.eye)
+    to_camera[:3, :3] = rotation
+    to_camera[:3, 3] = -rotation @ np.array(pod.eye)
     return RangeView(
         depth=np.where(measured, stored, np.float32(np.nan)),
         mask=measured,
-        color=picture.color.astype(np.float16),
+        color=(picture.color * np.array(faults.gain, np.float32)).astype(np.float16),
         confidence=np.where(measured, cosine, 0).astype(np.float32),
         fx=view.scale,
         fy=view.scale,
@@ -173,3 +178,9 @@ def _quantised(depth: NDArray[np.float64], disparity_at_1: float, step: float) -
     """Depths whose disparity is a whole number of steps; inf where that is none."""
     steps = np.rint(disparity_at_1 / depth / step)
     return np.divide(disparity_at_1, steps * step, out=np.full(depth.shape, np.inf), where=steps > 0)
+
+
+def _to_the_left(degrees: float) -> NDArray[np.float64]:
+    """The rotation, (3, 3), that comes to world to camera where the camera turns to its left."""
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cosine, 0, -sine], [0, 1, 0], [sine, 0, cosine]])

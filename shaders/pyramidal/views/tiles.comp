@@ -7,7 +7,7 @@
 #include <params>
 #include "range/tiles.glsl"
 
-layout(std430, binding = STORAGE_TILE_COUNTS) buffer Counts { uint counts[]; };  // as viewer/backends/pyramidal/views.py names them
+layout(std430, binding = STORAGE_TILE_COUNTS) buffer Counts { uint counts[]; };  // as viewer/backends/pyramidal/views.py names them; then those drawn of each view
 
 uniform int capacity;  // of the list
 
@@ -61,6 +61,7 @@ void main() {
 #endif
     atomicAdd(counts[cause], 1u);
     if (cause != TILES_DRAWN) return;
+    atomicAdd(counts[TILES_CAUSES + uint(at.x)], 1u);
     int count = POLYGONS != 0 && pixels_apart(v, at.y, bounds) > LARGE ? parts : 1;
     for (int part = 0; part < count; ++part) {
         uint place = reserve(uint(RANGE_TILE)) / uint(RANGE_TILE);

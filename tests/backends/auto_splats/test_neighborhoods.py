@@ -200,7 +200,7 @@ def test_rings_close(noise: float, draw: Callable[..., Surface]) -> None:
     assert np.median(tilts) < (8 if noise else 0.5)
 
 
-@pytest.mark.parametrize("k", [3, 4, 7, 16, pytest.param(32, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("k", [3, 16, *(pytest.param(k, marks=pytest.mark.slow) for k in (4, 7, 32))])
 @pytest.mark.parametrize("name", ["bumpy", "copied", "lattice", "strays", "three-points"])
 def test_any_number_of_neighbors(name: str, k: int) -> None:
     scene = SCENES[name]()
@@ -304,7 +304,7 @@ def real(data_dir: Path) -> Callable[[str], BareScene]:
     "name",
     [
         "two-bunnies",
-        "dragon-scans",
+        pytest.param("dragon-scans", marks=pytest.mark.slow),
         "sequences/hands_knot_5",
         "sequences/waving_cat_16",
         "sequences/kitti_lidar_street_10",

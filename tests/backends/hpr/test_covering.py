@@ -3,6 +3,8 @@ density; and on scans with faces it errs less than the exact operator."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +12,12 @@ import pytest
 from numpy.typing import NDArray
 from scenes import sphere
 
-from viewer.backends.hpr import visible_points
-from viewer.backends.hpr.calibration import calibrate
-from viewer.backends.hpr.candidates import Candidates
-from viewer.backends.hpr.covering import CLEAR, ENOUGH, REACH, ROUNDS, STEEP, Covering, clearance, levels
-from viewer.backends.hpr.exact import exact_visible_points
+from viewer.backends.hpr import calibrated, visible_points
+from viewer.backends.hpr.calibration import EyeCalibration, body_of, calibrate
+from viewer.backends.hpr.covering import CLEAR, REACH, STEEP, Covering
+from viewer.backends.hpr.exact import SeenPoints, exact_visible_points, flipping, hull_rows
 from viewer.backends.hpr.sectors import Sectors
+from viewer.backends.hpr.spacing import ENOUGH, Spacings
 from viewer.camera import Camera
 from viewer.frame import Renderer
 from viewer.gpu.pose import GpuPose
@@ -23,6 +25,7 @@ from viewer.mesh.reference import visible
 from viewer.mesh.triangles import read_mesh
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.scan.spacing import typical_spacing
 
 COUNT = 3000
 SPACING = np.sqrt(4 * np.pi / COUNT)
@@ -50,30 +53,67 @@ def before_horizon(points: Floats, eye: Floats) -> Floats:
 # --- the plain twin -----------------------------------------------------------------------
 
 
-def covered_ones(away: Floats, flags: Flags, balls: tuple[float, ...]) -> Flags:
-    """What one round leaves of the points that are looked at, flags being those that cover."""
+def apart_at(points: Floats) -> Floats:
+    """How far apart points lie around each, by how many lie in a ball of two usual distances, or of twice
+    that and so on where these are fewer than six."""
+    between = np.linalg.norm(points[:, None] - points[None], axis=2)
+    found, ball = np.full(len(points), np.nan), 2 * typical_spacing(PointCloud.from_arrays(points))
+    while np.isnan(found).any():
+        count = (between <= ball).sum(axis=1)
+        new = np.isnan(found) & (count >= ENOUGH)
+        found[new] = ball * np.sqrt(np.pi / count[new])
+        ball *= 2
+    return found
+
+
+def uncovered_ones(away: Floats, spacings: Floats) -> Flags:
+    """Points, offsets from the eye, that no others cover."""
     distance = np.linalg.norm(away, axis=1)
-    unit = away / distance[:, None]
-    rows = np.flatnonzero(flags)
+    unit, reach = away / distance[:, None], REACH * spacings / distance
     # Angles by the cross product, which is exact for small ones.
-    aside = np.linalg.norm(np.cross(unit[:, None], unit[None, rows]), axis=2)
-    aside[unit @ unit[rows].T <= 0] = np.inf
-    deeper = (distance[:, None] - distance[None, rows]) / distance[None, rows]
-    reach = np.full(len(rows), np.nan)
-    for ball in balls:
-        near = aside[rows] ** 2 + ((distance[None, rows] - distance[rows, None]) / distance[rows, None]) ** 2
-        count = (near <= ball**2).sum(axis=1)
-        found = np.isnan(reach) & ((count >= ENOUGH) | (ball == balls[-1]))
-        reach[found] = (REACH * ball * np.sqrt(np.pi / np.maximum(count, ENOUGH)))[found]
+    aside = np.linalg.norm(np.cross(unit[:, None], unit[None]), axis=2)
+    aside[unit @ unit.T <= 0] = np.inf
+    deeper = (distance[:, None] - distance[None]) / distance[None]
     left = np.zeros(len(away), bool)
     for i, direction in enumerate(unit):
         covers = (aside[i] <= reach) & (deeper[i] > CLEAR * reach + STEEP * aside[i])
         one = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
         two = np.cross(direction, one)
-        turns = np.sort(np.arctan2(unit[rows[covers]] @ two, unit[rows[covers]] @ one))
+        turns = np.sort(np.arctan2(unit[covers] @ two, unit[covers] @ one))
         gaps = np.diff(np.append(turns, turns[0] + 2 * np.pi)) if len(turns) else np.array([2 * np.pi])
         left[i] = gaps.max() > np.pi * (1 - 1 / 64)
     return left
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Points on the GPU, an eye, and what is found of them."""
+
+    pose: GpuPose
+    found: EyeCalibration
+
+    @classmethod
+    def of(cls, renderer: Renderer, points: Floats, eye: Floats, mapping: str) -> Watched:
+        cloud = PointCloud.from_arrays(points)
+        pose, body = GpuPose(renderer.gpu, Pose(0, 0.0, "", cloud)), body_of(cloud)
+        around = Sectors.around(body.center, body.radius, eye, pose.origin)
+        assert around.mapping == mapping
+        return cls(pose, calibrate(cloud, around, pose.origin, 2.0))
+
+    def seen(self, finer: float = 1.0, front: bool = True) -> Flags:
+        """finer: than they usually are, the cells."""
+        covering = Covering(self.pose.gpu, len(self.pose.cloud))
+        covering.find(
+            self.pose.array("positions"),
+            self.pose.keep(Spacings).texels,
+            self.found.sectors,
+            self.found.spacing / self.found.sectors.edge / finer,
+            front=front,
+        )
+        seen = np.zeros(len(self.pose.cloud), bool)
+        seen[covering.visible_rows()] = True
+        covering.release()
+        return seen
 
 
 SCENES = {
@@ -83,36 +123,46 @@ SCENES = {
 }
 
 
+def scene() -> Floats:
+    """A rough sphere, a smaller one in it, and one in its wall."""
+    rng = np.random.default_rng(5)
+    points = np.concatenate([spread(900), 0.4 * spread(500), spread(300) * 0.2 + [0.3, 0.5, 0.6]])
+    return points * rng.uniform(0.97, 1.03, (len(points), 1))
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_it_does_what_its_plain_twin_does(renderer: Renderer, name: str) -> None:
     """Where gaps are half a turn to a 64th, and where rounding decides, it may differ."""
-    eye, mapping = SCENES[name]
-    rng = np.random.default_rng(5)
-    points = np.concatenate([spread(900), 0.4 * spread(500), spread(300) * 0.2 + [0.3, 0.5, 0.6]])
-    points *= rng.uniform(0.97, 1.03, (len(points), 1))
-    cloud = PointCloud.from_arrays(points)
-    pose = GpuPose(renderer.gpu, Pose(0, 0.0, "", cloud))
-    around = Sectors.around(np.zeros(3), 1.1, eye, pose.origin)
-    assert around.mapping == mapping
-    found = calibrate(cloud, around, pose.origin, 2.0)
-    search = found.with_sectors(found.sectors.edge)
-    sectors = search.sectors
-    spacing = found.spacing / found.sectors.edge
-    candidates, covering = Candidates(renderer.gpu, sectors, len(points)), Covering(renderer.gpu, len(points))
-    candidates.find(pose.array("positions"), *search)
-    expected = np.zeros(len(points), bool)
-    expected[candidates.visible_rows()] = True
-    away = cloud.world() - eye
-    for again in range(ROUNDS):
-        flags = covered_ones(away, expected, levels(sectors, spacing))
-        expected = expected & flags if again else flags
-    covering.correct(candidates, spacing)
-    got = np.zeros(len(points), bool)
-    got[candidates.visible_rows()] = True
-    covering.release()
-    candidates.release()
+    (eye, mapping), points = SCENES[name], scene()
+    got = Watched.of(renderer, points, eye, mapping).seen(front=False)
+    expected = uncovered_ones(points - eye, apart_at(points))
     assert 50 < got.sum() < len(points) - 50
-    assert np.count_nonzero(got != expected) <= 0.02 * len(points)
+    assert np.count_nonzero(got != expected) <= 0.01 * len(points)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_cells_do_not_matter(renderer: Renderer, name: str) -> None:
+    """Discs that reach far beyond the cells that they usually reach are found all the same."""
+    watched = Watched.of(renderer, scene(), *SCENES[name])
+    expected = watched.seen(front=False)
+    for finer in (0.3, 1.5):
+        np.testing.assert_array_equal(watched.seen(finer, front=False), expected)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_left_out_at_first_is_hidden(renderer: Renderer, name: str) -> None:
+    """Nearly all of it: where a gap is narrower than the cells that tell the front, what no disc reaches."""
+    watched = Watched.of(renderer, scene(), *SCENES[name])
+    assert np.count_nonzero(watched.seen() != watched.seen(front=False)) <= 0.003 * len(scene())
+
+
+def test_spacings_are_those_of_the_plain_twin(renderer: Renderer) -> None:
+    rng = np.random.default_rng(3)
+    sparse = rng.uniform(3, 9, (200, 3))
+    points = np.concatenate([spread(2000), sparse])
+    pose = GpuPose(renderer.gpu, Pose(0, 0.0, "", PointCloud.from_arrays(points)))
+    found = np.frombuffer(pose.keep(Spacings).texels.buffer.read(), np.float32)
+    np.testing.assert_allclose(found, apart_at(pose.stored.world()), rtol=1e-5)
 
 
 # --- what is known exactly ------------------------------------------------------------------
@@ -179,15 +229,6 @@ def test_noise_hides_less_than_from_the_exact_operator(noise: float) -> None:
     assert errors(seen_of(noisy, at), truth) < min(exact) - 5
 
 
-def test_clearance_is_more_where_there_is_noise() -> None:
-    rng = np.random.default_rng(4)
-    noise = rng.normal(0, SPACING, (COUNT, 3))
-    clear = [clearance(PointCloud.from_arrays(spread() + by * noise)) for by in (0.0, 0.5, 2.0)]
-    assert clear[0] == CLEAR
-    assert CLEAR < clear[1] < clear[2]
-    assert clearance(PointCloud.from_arrays(np.zeros((9, 3)))) == CLEAR
-
-
 def test_the_same_each_time() -> None:
     rng = np.random.default_rng(7)
     points = spread() * rng.uniform(0.9, 1.1, (COUNT, 1))
@@ -212,14 +253,21 @@ def test_scale_does_not_matter(scale: float) -> None:
 
 # --- scans with faces ------------------------------------------------------------------------
 
-# Percent of errors at most, and by how many percentage points at least they are fewer than those of the exact
-# operator at the radius that is best for it. Of igea none at all would be 4 points fewer.
-MODELS = {
-    "stanford_armadillo_43243": (6.5, 3.0),
-    "cyberware_igea_134345": (2.0, 1.5),
-    "stanford_dragon_437645": (4.0, 2.5),
+# Percent of errors at most.
+MODELS = {"stanford_armadillo_43243": 5.7, "cyberware_igea_134345": 1.4, "stanford_dragon_437645": 2.9}
+RADII = (3e3, 1e4, 2e4)  # distances of the farthest point, of which the best for each view is taken
+BEST, AUTOMATIC = "best", "automatic"
+WANTED = 5.0  # percentage points by which the exact operator errs more
+ARMADILLO, IGEA, DRAGON = MODELS
+# Where it is not so many.
+SHORT = {
+    (ARMADILLO, BEST): "4.5 points: 4.2 % against 8.8 %",
+    (ARMADILLO, AUTOMATIC): "4.6 points: 4.2 % against 8.8 %",
+    (IGEA, BEST): "2.9 points: 1.1 % against 4.0 %, so that none at all would not do",
+    (IGEA, AUTOMATIC): "3.6 points: 1.1 % against 4.7 %, so that none at all would not do",
+    (DRAGON, BEST): "4.0 points: 2.6 % against 6.6 %",
+    (DRAGON, AUTOMATIC): "4.0 points: 2.6 % against 6.6 %",
 }
-RADII = (3e3, 1e4, 2e4)  # distances of the farthest point
 
 
 def errors(seen: Flags, truth: Flags) -> float:
@@ -227,23 +275,39 @@ def errors(seen: Flags, truth: Flags) -> float:
     return 100 * np.count_nonzero(seen != truth) / np.count_nonzero(seen & truth)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MODELS)
-def test_it_errs_less_than_the_exact_operator(data_dir: Path, name: str) -> None:
-    most, fewer = MODELS[name]
-    mesh = read_mesh(data_dir / "models" / f"{name}.ply")
-    found, exact = [], []
+@cache
+def errors_of(path: Path) -> tuple[float, dict[str, float]]:
+    """Errors on a model, the means of two views: its own, and those of the exact operator by its radius."""
+    mesh = read_mesh(path)
+    found, best, automatic = [], [], []
     for azimuth, elevation in ((30, 10), (200, -20)):
         camera = Camera.orbit(mesh.points.bounds(), azimuth, elevation)
         eye = np.array(camera.eye)
         truth = visible(mesh, mesh.points.positions, camera)
-        seen = np.zeros(len(truth), bool)
-        seen[visible_points(mesh.points, eye)] = True
-        found.append(errors(seen, truth))
-        farthest = float(np.linalg.norm(mesh.points.world() - eye, axis=1).max())
-        hulls = np.zeros((len(RADII), len(truth)), bool)
-        for hull, times in zip(hulls, RADII, strict=True):
-            hull[exact_visible_points(mesh.points, eye, times * farthest)] = True
-        exact.append(min(errors(hull, truth) for hull in hulls))
-    assert np.mean(found) < most
-    assert np.mean(exact) - np.mean(found) > fewer
+        seen = SeenPoints.of(mesh.points, eye)
+        farthest = float(seen.distance.max())
+        radii = [calibrated(mesh.points, eye).radius, *(times * farthest for times in RADII)]
+        called = [visible_points(mesh.points, eye), *(hull_rows(seen, flipping(seen, r)) for r in radii)]
+        mine, *exact = (errors(np.isin(np.arange(len(truth)), rows), truth) for rows in called)
+        found.append(mine)
+        automatic.append(exact[0])
+        best.append(min(exact))
+    return float(np.mean(found)), {BEST: float(np.mean(best)), AUTOMATIC: float(np.mean(automatic))}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODELS)
+def test_it_errs_less_than_the_exact_operator(data_dir: Path, name: str) -> None:
+    found, exact = errors_of(data_dir / "models" / f"{name}.ply")
+    assert found < MODELS[name]
+    assert found < 0.6 * min(exact.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "radius"),
+    [pytest.param(*case, marks=pytest.mark.xfail(strict=True, reason=why)) for case, why in SHORT.items()],
+)
+def test_the_exact_operator_errs_five_points_more(data_dir: Path, name: str, radius: str) -> None:
+    found, exact = errors_of(data_dir / "models" / f"{name}.ply")
+    assert exact[radius] - found >= WANTED

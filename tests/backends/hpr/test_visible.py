@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 from scenes import sphere
 
-from viewer.backends.hpr import calibrated, visible_points
+from viewer.backends.hpr import HULL, MODES, Params, calibrated, visible_points
 from viewer.backends.hpr.exact import exact_visible_points
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -50,8 +50,21 @@ def test_of_a_sphere_the_front_is_seen_and_the_back_is_not(seen: Seen, distance:
     rows = seen(normals, [0, 0, distance])
     facing = normals @ [0, 0, 1] - 1 / distance  # 0 at the horizon
     found = np.isin(np.arange(len(normals)), rows)
-    assert found[facing > 0.1].mean() > 0.998
-    assert found[facing < -0.2].mean() < 0.002
+    assert found[facing > 0.05].all()
+    assert not found[facing < -0.15].any()
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="10 % are missed: slanted ones reach farthest along directions beside those that are compared",
+)
+def test_with_a_small_radius_the_front_of_a_sphere_is_seen(seen: Seen) -> None:
+    """As the exact operator sees it."""
+    points = np.asarray(sphere(8000).positions, np.float64)
+    radius = 100 * float(np.linalg.norm(points - EYE, axis=1).max())
+    facing = points @ [0, 0, 1] - 1 / 4 > 0.1
+    assert np.isin(np.flatnonzero(facing), exact_visible_points(points, EYE, radius)).all()
+    assert np.isin(np.flatnonzero(facing), seen(points, radius=radius)).all()
 
 
 def test_what_lies_behind_something_is_hidden(seen: Seen) -> None:
@@ -67,19 +80,37 @@ def test_an_eye_inside_sees_all_around(seen: Seen) -> None:
     assert len(seen(points, [0.3, 0.2, 0.1])) > 0.998 * len(points)
 
 
-@pytest.mark.parametrize("eye", [(0, 0, 4), (1.1, 0.6, -0.4)])
+BESIDE = pytest.mark.xfail(
+    strict=True,
+    reason="as many sectors, 23, 12 and 11 %: points lie farther apart there than they are compared",
+)
+
+
+@pytest.mark.parametrize("eye", [(0, 0, 4), pytest.param((1.1, 0.6, -0.4), marks=BESIDE)])
 def test_it_comes_to_what_the_exact_operator_says(seen: Seen, eye: tuple[float, ...]) -> None:
+    """From afar, and from beside the surface."""
+    shares = shares_apart(seen, eye)
+    assert all(share < limit for share, limit in zip(shares, (0.06, 0.04, 0.05), strict=True)), shares
+
+
+@pytest.mark.slow
+def test_beside_the_surface_it_comes_near_what_the_exact_operator_says(seen: Seen) -> None:
+    shares = shares_apart(seen, (1.1, 0.6, -0.4))
+    assert all(share < limit for share, limit in zip(shares, (0.25, 0.13, 0.12), strict=True)), shares
+
+
+def shares_apart(seen: Seen, eye: tuple[float, ...]) -> list[float]:
+    """How many points, of those that the exact operator sees, are told otherwise, with more and more
+    sectors."""
     points = bumpy()
-    radius = calibrated(points, eye).radius
-    exact = np.isin(np.arange(len(points)), exact_visible_points(points, eye, radius))
-    shares: list[float] = []
+    found = calibrated(points, eye)
+    exact = np.isin(np.arange(len(points)), exact_visible_points(points, eye, found.radius))
+    shares = []
     for factor in (0.25, 1, 4):
-        sectors = round(factor * calibrated(points, eye).sectors.count)
-        found = np.isin(np.arange(len(points)), seen(points, eye, radius=radius, sectors=sectors))
-        shares.append((found != exact).sum() / exact.sum())
-    # Near the eye, points lie so far apart that others are seen between them.
-    most = (0.06, 0.04, 0.05) if eye[2] == 4 else (0.25, 0.17, 0.17)
-    assert all(share < limit for share, limit in zip(shares, most, strict=True)), shares
+        sectors = round(factor * found.sectors.count)
+        rows = seen(points, eye, radius=found.radius, sectors=sectors)
+        shares.append((np.isin(np.arange(len(points)), rows) != exact).sum() / exact.sum())
+    return shares
 
 
 @pytest.mark.parametrize("decades", [2, 5, 8])
@@ -129,18 +160,22 @@ def test_what_makes_no_sense_is_refused(seen: Seen) -> None:
 
 
 class Drawn:
-    """Pictures of one surface, and of new ones."""
+    """Pictures of one surface, and of new ones, in one mode."""
 
-    def __init__(self, renderer: Renderer) -> None:
-        self.renderer = renderer
+    def __init__(self, renderer: Renderer, mode: str = MODES[0]) -> None:
+        self.renderer, self.params = renderer, Params(mode=mode)
         self.pose = Pose(0, 0.0, "", PointCloud.from_arrays(bumpy(), normals=bumpy()))
         self.surface = Surface(renderer.gpu, SIZE)
 
     def draw(
-        self, camera: Camera, surface: Surface | None = None, look: Look | None = None, **how: object
+        self,
+        camera: Camera,
+        surface: Surface | None = None,
+        look: Look | None = None,
+        **how: object,
     ) -> Surface:
         surface = surface or self.surface
-        request = Request(self.pose, camera, "hpr", look=look or Look(light="flat"))
+        request = Request(self.pose, camera, "hpr", self.params, look or Look(light="flat"))
         while render_frame(self.renderer, request, surface, **how):  # type: ignore[arg-type]
             pass
         return surface
@@ -148,19 +183,20 @@ class Drawn:
     def check(self, camera: Camera, skipped: bool, **how: object) -> None:
         """What is drawn on the surface, skipping or not, is what a new one shows."""
         found = self.draw(camera, **how)
-        assert ("candidates" in found.stats.skipped) is skipped
+        assert ("visible" in found.stats.skipped) is skipped
         new = self.draw(camera, Surface(self.renderer.gpu, SIZE), **how)
-        assert "candidates" not in new.stats.skipped
+        assert "visible" not in new.stats.skipped
         np.testing.assert_array_equal(found.row, new.row)
         np.testing.assert_array_equal(found.depth, new.depth)
 
 
 @pytest.mark.parametrize("eye", [(0.0, 0, 4), (0.2, 0.1, 0.3)])
+@pytest.mark.parametrize("mode", MODES)
 def test_nothing_is_found_again_while_pose_and_eye_stand_still(
-    renderer: Renderer, eye: tuple[float, float, float]
+    renderer: Renderer, mode: str, eye: tuple[float, float, float]
 ) -> None:
     """Other looks, and other directions from the same eye."""
-    drawn, camera = Drawn(renderer), Camera(eye, (0.1, 0.2, -1.0))
+    drawn, camera = Drawn(renderer, mode), Camera(eye, (0.1, 0.2, -1.0))
     drawn.check(camera, skipped=False)
     drawn.check(camera, skipped=True)
     drawn.check(camera, skipped=True, look=Look(light="head"))
@@ -173,7 +209,7 @@ def test_nothing_is_found_again_while_pose_and_eye_stand_still(
 
 
 def test_fewer_sectors_while_it_moves_and_all_at_rest(renderer: Renderer) -> None:
-    drawn, camera = Drawn(renderer), Camera((0.0, 0, 4))
+    drawn, camera = Drawn(renderer, HULL), Camera((0.0, 0, 4))
 
     def sectors(**how: object) -> int:
         return drawn.draw(camera, **how).stats.counted["points"]()["sectors"]
@@ -204,7 +240,7 @@ def test_while_it_moves_only_the_field_of_view_is_looked_at(
 
 
 def test_statistics_tell_what_was_looked_at(renderer: Renderer) -> None:
-    drawn = Drawn(renderer)
+    drawn = Drawn(renderer, HULL)
     stats = drawn.draw(Camera((0.0, 0, 4))).stats
     found = stats.counted["points"]()
     assert found["in"] == 6000

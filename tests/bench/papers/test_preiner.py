@@ -226,6 +226,7 @@ def test_fits_of_a_sphere_are_nearly_right(renderer: Renderer) -> None:
     assert found["turned"] < 0.5
 
 
+@pytest.mark.slow
 def test_searches_are_timed_beside_trees(renderer: Renderer) -> None:
     bench = Bench(renderer, BenchSettings(size=(320, 240), repeat=1))
     pose, camera = Pose(0, 0.0, "sphere", fits.bare(sphere(4000))), Camera((0.0, 0.0, 4.0))

@@ -338,6 +338,7 @@ def test_a_broken_picture_is_said(tmp_path: Path) -> None:
         write_report(folder)
 
 
+@pytest.mark.slow
 def test_pictures_and_plots_of_former_results_are_not_told(folder: Path) -> None:
     for stale in (picture_path(folder, "cube", "points"), folder / "plots" / "stale.png"):
         stale.parent.mkdir(exist_ok=True)

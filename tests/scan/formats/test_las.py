@@ -58,7 +58,7 @@ def test_real_files_hold_as_many_points_as_stated(data_dir: Path) -> None:
             assert len(read(data_dir / name)) == count, name
 
 
-@pytest.mark.parametrize("suffix", [".las", ".laz"])
+@pytest.mark.parametrize("suffix", [".las", pytest.param(".laz", marks=pytest.mark.slow)])
 def test_damaged_files_are_refused_in_one_message(suffix: str, tmp_path: Path) -> None:
     path = save(tmp_path / f"a{suffix}")
     whole = path.read_bytes()

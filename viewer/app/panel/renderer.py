@@ -19,7 +19,7 @@ def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
     """Declare the section."""
     name, _ = session.document.chosen(pose)
     imgui.set_next_item_width(-1)
-    chosen = widgets.combo("backend", name, list(backends()), {n: b.title for n, b in backends().items()})
+    chosen = widgets.combo("backend", name, rendering.choices, {n: b.title for n, b in backends().items()})
     widgets.tooltip(f"{name}: {backend(name).help}")
     if chosen != name:
         rendering.choose(chosen)

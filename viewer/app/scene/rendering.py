@@ -68,10 +68,17 @@ class Rendering:
         document = self._session.document
         return document.backend is None and not document.params and document.look == Look(up=document.look.up)
 
+    @property
+    def choices(self) -> list[str]:
+        """The names of the backends that draw the pose, and of the one that is chosen."""
+        pose = self._playback.pose
+        found = backends().values()
+        return [one.name for one in found if pose is None or one.name == self.backend or one.draws(pose)]
+
     def step(self, by: int) -> None:
         """Draw with the next backend, 1, or the one before, -1."""
         if self.backend is not None:
-            names = list(backends())
+            names = self.choices
             self.choose(names[(names.index(self.backend) + by) % len(names)])
 
     @property

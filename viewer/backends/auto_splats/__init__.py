@@ -15,7 +15,7 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import FrameView, Limit, Suited
+from .. import NO_SPACING, FrameView, Limit, Suited
 from ..surfels.packed import WAYS, draw_depths, draw_splats
 from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
@@ -36,6 +36,8 @@ KEPT = {
 }
 LIMITS = {
     "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
+    "collinear points end on, perspective": Limit(0.001, NO_SPACING),
+    "collinear points end on, orthographic": Limit(0.001, NO_SPACING),
 }
 
 _FEW = 200  # points

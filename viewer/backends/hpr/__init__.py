@@ -31,10 +31,12 @@ from .. import AROUND_ALL, NO_DETAIL, FrameView, Limit
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
 from .candidates import UNLIMITED, Candidates
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
-from .covering import Covering, Sample, clearance, copies_in
+from .covering import CLEAR, CLEAR_OF_NOISE, Covering, Sample
 from .exact import SeenPoints, as_cloud, flipping
+from .noise import noise_of
 from .outputs import OUTPUTS, show_visible
 from .sectors import Sectors
+from .spacing import Spacings, copies_in, steady_points
 
 TITLE = "Visible points"
 BLENDS = True
@@ -44,17 +46,19 @@ FINDS_NORMALS = True
 LIMITS = {
     "rotated by 37 degrees": Limit(0.01, AROUND_ALL),
     "near plane inside the cloud": Limit(0.01, AROUND_ALL),
-    "zoomed in on 10^-3 of the scan": Limit(0.25, NO_DETAIL),
-    "zoomed in on 10^-6 of the scan": Limit(0.25, NO_DETAIL),
+    "zoomed in on 10^-3 of the scan": Limit(0.05, NO_DETAIL),
+    "zoomed in on 10^-6 of the scan": Limit(0.05, NO_DETAIL),
     "zoomed out x10^6": Limit(0.02, AROUND_ALL),
     "zoomed out x10^9": Limit(0.02, AROUND_ALL),
     "collinear points": Limit(0.02, AROUND_ALL),
     "normals parallel to y": Limit(0.02, AROUND_ALL, {"output": ("splats",)}),
 }
-MODES = ("combined", "hull")
+HULL = "hull"
+MODES = ("combined", HULL)
 _DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, igea and dragon each
 _QUALITY = 0.5
-_SHOWN = "Shown"
+_SHOWN, _VISIBLE = "Shown", "Visibility"
+_OF_HULL = {"mode": (HULL,)}
 _MOVING = 0.5  # of the quality while the picture moves
 _MOST_SECTORS = 1 << 24
 _EYE_BITS = 36  # of its place
@@ -69,7 +73,7 @@ class Params:
         "What is drawn of the visible points: they themselves; faces between neighbours; splats; or what "
         "closes the picture between them",
         choices=OUTPUTS,
-        sweep=("faces", "splats"),
+        sweep=("faces", "reconstruction", "splats"),
         title="Shown as",
         basic=True,
         group=_SHOWN,
@@ -101,6 +105,15 @@ class Params:
         group=_SHOWN,
         when={"output": ("splats", "reconstruction")},
     )
+    mode: str = param(
+        MODES[0],
+        "hull: points of the hull of the flipped ones; combined: those that no others cover, by how far "
+        "apart they lie, which finds what the hull drops in folds and hides what it shows behind gaps",
+        choices=MODES,
+        title="Visible by",
+        basic=True,
+        group=_VISIBLE,
+    )
     quality: float = param(
         _QUALITY,
         "Sectors, as many times those of which half would have a point",
@@ -108,7 +121,8 @@ class Params:
         high=64,
         sweep=(0.25, 0.5, 1, 4),
         basic=True,
-        group="Visibility",
+        group=_VISIBLE,
+        when=_OF_HULL,
     )
     depth: float = param(
         _DEPTH,
@@ -119,7 +133,8 @@ class Params:
         title="Hides from",
         sweep=(1, 2, 4),
         basic=True,
-        group="Visibility",
+        group=_VISIBLE,
+        when=_OF_HULL,
     )
     radius: float | None = param(
         None,
@@ -128,16 +143,8 @@ class Params:
         type=float,
         low=1,
         high=1e9,
-        group="Visibility",
-    )
-    mode: str = param(
-        MODES[0],
-        "hull: points of the hull of the flipped ones; combined: corrected by which points cover which, so "
-        "that radius and sectors matter little",
-        choices=MODES,
-        title="Visible by",
-        basic=True,
-        group="Visibility",
+        group=_VISIBLE,
+        when=_OF_HULL,
     )
     sectors: int | None = param(
         None,
@@ -145,7 +152,8 @@ class Params:
         type=int,
         low=1,
         high=_MOST_SECTORS,
-        group="Visibility",
+        group=_VISIBLE,
+        when=_OF_HULL,
     )
     steps: int | None = param(
         None,
@@ -153,7 +161,8 @@ class Params:
         type=int,
         low=0,
         high=UNLIMITED,
-        group="Visibility",
+        group=_VISIBLE,
+        when=_OF_HULL,
     )
 
 
@@ -179,53 +188,99 @@ def mark_visible(pose: GpuPose, frame: FrameView, surface: Surface) -> gl.Buffer
     return surface.keep(_Seen).look(pose, replace(frame, params=Params()), surface).visible
 
 
-class _Seen:
-    """The candidates that a surface showed last, and what for."""
+class _Search:
+    """Searches for visible points, with the room that the last one took."""
 
-    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+    def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self._candidates: Candidates | None = None
         self._covering: Covering | None = None
-        self._pose: weakref.ref[GpuPose] | None = None
-        self._sought: tuple[object, ...] = ()
-        self._chosen: dict[str, str] = {}
-        self.calibration: EyeCalibration | None = None  # for the candidates
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         return sum(each.nbytes for each in (self._candidates, self._covering) if each)
 
-    def look(self, pose: GpuPose, frame: FrameView, surface: Surface) -> Candidates:
-        """The candidates of a picture."""
+    def hull(
+        self, pose: GpuPose, search: SectorSearch, sample: Sample | None = None, clip: Planes = EVERYWHERE
+    ) -> Candidates:
+        """Find the points on the hull of the flipped ones."""
+        count = len(pose.cloud)
+        if self._candidates is None or not self._candidates.fits(search.sectors, count):
+            self._gpu.discard(self._candidates)
+            self._candidates = None
+            self._candidates = Candidates(self._gpu, search.sectors, count)
+        self._candidates.find(pose.array("positions"), *search, sample=sample, clip=clip)
+        return self._candidates
+
+    def uncovered(
+        self,
+        pose: GpuPose,
+        found: EyeCalibration,
+        sample: Sample | None = None,
+        share: float = 1.0,
+        clip: Planes = EVERYWHERE,
+    ) -> Covering:
+        """Find the points that no others cover. share: of all points, that the sample is of."""
+        if self._covering is None or self._covering.points != len(pose.cloud):
+            self._gpu.discard(self._covering)
+            self._covering = None
+            self._covering = Covering(self._gpu, len(pose.cloud))
+        self._covering.find(
+            steady_points(pose),
+            pose.keep(Spacings).texels,
+            found.sectors,
+            found.spacing / found.sectors.edge,
+            _clearance(pose),
+            repeated=copies_in(pose),
+            sample=sample,
+            share=share,
+            clip=clip,
+        )
+        return self._covering
+
+    def release(self) -> None:
+        """Delete what it holds on the GPU."""
+        for each in (self._candidates, self._covering):
+            if each is not None:
+                each.release()
+
+
+class _Seen(_Search):
+    """The visible points that a surface showed last, and what for."""
+
+    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+        super().__init__(gpu)
+        self._found: Candidates | Covering | None = None
+        self._pose: weakref.ref[GpuPose] | None = None
+        self._sought: tuple[object, ...] = ()
+        self._chosen: dict[str, str] = {}
+        self.calibration: EyeCalibration | None = None  # for what was found
+
+    def look(self, pose: GpuPose, frame: FrameView, surface: Surface) -> Candidates | Covering:
+        """Find the visible points of a picture, unless they are known."""
         params: Params = frame.params
         directions, body = _directions(pose, frame.view)
         near, sample = near_plane(frame.view, body), surface.take_sample(frame.share)
-        sought = (
-            sample[1],
-            directions,
-            near,
-            params.quality,
-            params.depth,
-            params.radius,
-            params.sectors,
-            params.steps,
-            params.mode,
-        )
+        hull = (params.quality, params.depth, params.radius, params.sectors, params.steps)
+        sought = (sample[1], directions, near, *(hull if params.mode == HULL else ()))
         # What is found at rest is in all directions, and stays while the camera turns.
         sides = side_planes(frame.view, body) if frame.moving else None
+        if params.mode != HULL and sides == EVERYWHERE[1:]:
+            sides = None  # nothing else is coarser
         stats = surface.stats
-        known = self._candidates is not None and self._pose is not None and self._pose() is pose
+        known = self._found is not None and self._pose is not None and self._pose() is pose
         if known and self._sought in ((sought, None), (sought, sides)):
-            stats.skipped["candidates"] = "pose and eye stand still"
+            stats.skipped["visible"] = "pose and eye stand still"
         else:
-            self._find(pose, directions, (near, *(sides or EVERYWHERE[1:])), frame, sample)
+            clip = (near, *(sides or EVERYWHERE[1:]))
+            self._find(pose, directions, clip, frame, sample, surface.stats.share)
             self._pose, self._sought = weakref.ref(pose), (sought, sides)
-        assert self._candidates is not None
+        assert self._found is not None
         stats.chosen.update(self._chosen)
-        stats.counted["points"] = self._candidates.count
+        stats.counted["points"] = self._found.count
         stats.simplified = self._sought[1] is not None
-        return self._candidates
+        return self._found
 
     def _find(
         self,
@@ -234,6 +289,7 @@ class _Seen:
         clip: Planes,
         frame: FrameView,
         sample: tuple[gl.BufferTexture | None, int],
+        share: float,
     ) -> None:
         params: Params = frame.params
         radius = None if params.radius is None else params.radius * directions.farthest
@@ -241,39 +297,35 @@ class _Seen:
         drawn = count / len(pose.cloud)
         found = calibrate(pose.stored, directions, pose.origin, params.depth, radius, drawn)
         self.calibration = found
+        only = None if rows is None else (rows, count)
+        if params.mode != HULL:
+            self._found, self._chosen = self.uncovered(pose, found, only, share, clip), {}
+            return
         quality = params.quality * (_MOVING if frame.moving else 1.0)
         search = chosen_search(found, params.sectors, params.steps, quality)
-        sectors = search.sectors
-        if self._candidates is None or not self._candidates.fits(sectors, len(pose.cloud)):
-            self._gpu.discard(self._candidates)
-            self._candidates = None
-            self._candidates = Candidates(self._gpu, sectors, len(pose.cloud))
-        only = None if rows is None else (rows, count)
-        self._candidates.find(pose.array("positions"), *search, sample=only, clip=clip)
-        if params.mode == "combined":
-            self._correct(pose, self._candidates, found, only)
+        self._found = self.hull(pose, search, only, clip)
         self._chosen = {
             "radius": "parallel rays" if math.isinf(found.radius) else f"{found.radius:.4g}",
-            "sectors": f"{sectors.count:,} ({sectors.mapping})",
+            "sectors": f"{search.sectors.count:,} ({search.sectors.mapping})",
             "steps": str(search.steps),
         }
 
-    def _correct(
-        self, pose: GpuPose, candidates: Candidates, found: EyeCalibration, sample: Sample | None
-    ) -> None:
-        if self._covering is None or self._covering.points != candidates.points:
-            self._gpu.discard(self._covering)
-            self._covering = None
-            self._covering = Covering(self._gpu, candidates.points)
-        repeated = copies_in(pose) if sample is None else None
-        spacing = found.spacing / found.sectors.edge
-        self._covering.correct(candidates, spacing, clearance(pose.stored), repeated, sample)
 
-    def release(self) -> None:
-        """Delete what it holds on the GPU."""
-        for each in (self._candidates, self._covering):
-            if each is not None:
-                each.release()
+class _Asked(_Search):
+    """Searches of `visible_points`: the cloud that was asked for last stays on the GPU, so that it is
+    uploaded once for all eyes."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        super().__init__(gpu)
+        self._pose: GpuPose | None = None
+
+    def pose_of(self, cloud: PointCloud) -> GpuPose:
+        """The cloud on the GPU."""
+        if self._pose is None or self._pose.stored is not cloud:
+            self._pose = None
+            self._gpu.collect()
+            self._pose = GpuPose(self._gpu, Pose(0, 0.0, "", cloud))
+        return self._pose
 
 
 def _directions(pose: GpuPose, view: View) -> tuple[Sectors, Body]:
@@ -336,10 +388,11 @@ def visible_points(
     points: a pose, or (N, 3) absolute; ids count the points that it came with, also those that are
     left out because a coordinate is not finite. eye: (3,), absolute. radius: R of the flip, scan units, not
     less than the distance to the farthest point; sectors: how many, k; steps: of propagation at most; None:
-    as `calibrated` says. mode: "hull" takes the points on the hull of the flipped ones, as the sectors find
-    it; "combined" corrects them by what covers what (`Covering`). Of points in one place one is visible, and
-    so is a point in the eye itself. gpu: None takes a context of its own, which is kept. Raises InputError,
-    NoOpenGLError.
+    as `calibrated` says; the hull alone goes by these. mode: "hull" takes the points on the hull of the
+    flipped ones, as the sectors find it; "combined" those that no others cover (`Covering`). Of points in one
+    place one is visible, and so is a point in the eye itself. gpu: None takes a context of its own, which is
+    kept. What was found of a pose is kept until another is asked for, so that further eyes take less. Raises
+    InputError, NoOpenGLError.
     """
     if mode not in MODES:
         raise unknown_name("mode", mode, MODES)
@@ -350,26 +403,15 @@ def visible_points(
     search = chosen_search(found, sectors, steps)
     gpu.activate()
     gpu.collect()
-    pose = GpuPose(gpu, Pose(0, 0.0, "", cloud))
-    candidates = Candidates(gpu, search.sectors, len(cloud))
-    try:
-        candidates.find(pose.array("positions"), *search)
-        if mode == "combined":
-            _correct(pose, candidates, found)
-        rows = candidates.visible_rows()
-    finally:
-        candidates.release()
+    asked = gpu.keep(_Asked)
+    pose = asked.pose_of(cloud)
+    rows = (asked.hull(pose, search) if mode == HULL else asked.uncovered(pose, found)).visible_rows()
     return rows if cloud.ids is None else cloud.ids[rows]
 
 
-def _correct(pose: GpuPose, candidates: Candidates, found: EyeCalibration) -> None:
-    covering = Covering(pose.gpu, candidates.points)
-    try:
-        covering.correct(
-            candidates, found.spacing / found.sectors.edge, clearance(pose.stored), copies_in(pose)
-        )
-    finally:
-        covering.release()
+def _clearance(pose: GpuPose) -> float:
+    noise = noise_of(pose.stored)
+    return max(CLEAR, CLEAR_OF_NOISE * noise.deviation / noise.spacing) if noise.stands_out else CLEAR
 
 
 @cache

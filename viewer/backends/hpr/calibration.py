@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...gpu.sample import lots
 from ...scan.points import NOTHING, PointCloud, strided
 from .sectors import Sectors
 
@@ -51,12 +52,20 @@ def _body(cloud: PointCloud) -> Body:
 
 
 def copies(cloud: PointCloud) -> NDArray[np.uint32]:
-    """1 for each point, (N,), in whose place one of a lower row is, else 0."""
+    """The first of `lots` of the points of lower rows in each point's place, (N,); NOTHING: it has none.
+
+    So that it is told whether a sample has one: where that lot is below the sample's share of 2^32.
+    """
     words = _words(cloud.positions)
     order = words.argsort(kind="stable")
-    flags = np.zeros(len(words), np.uint32)
-    flags[order[1:]] = words[order[1:]] == words[order[:-1]]
-    return flags
+    again = words[order[1:]] == words[order[:-1]]
+    place = np.concatenate(([0], np.cumsum(~again)))
+    # Places of higher numbers have less in the upper half: there the least begins anew.
+    lot = np.minimum(lots(order.astype(np.uint32)), NOTHING - 1) | (place[-1] - place).astype(np.uint64) << 32
+    least = np.minimum.accumulate(lot).astype(np.uint32)
+    found = np.full(len(words), NOTHING, np.uint32)
+    found[order[1:][again]] = least[:-1][again]
+    return found
 
 
 def _distinct(positions: NDArray[np.float32]) -> int:

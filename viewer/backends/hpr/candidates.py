@@ -121,7 +121,7 @@ class Candidates:
 
         self.looked_at = self.points if sample is None else sample[1]
         sampled = {"SAMPLED": int(sample is not None)}
-        defines = {"FILTERED": int(among is not None), **sampled, **self.defines}
+        defines = {"FILTERED": int(among is not None), "CELLS": 1, **sampled, **self.defines}
         visits = Visits("hpr/candidates.glsl", self.looked_at, bind, defines, sectors)
         with gpu.timers.measure("candidates"):
             scatter(gpu, visits, self.keys, self.rows)

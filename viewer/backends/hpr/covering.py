@@ -1,15 +1,16 @@
-"""Covering: which points others cover, by how far apart points lie; it corrects what the hull says.
+"""Covering: which points others cover, by how far apart points lie.
 
 The hull of the flipped points drops what lies in folds, and shows what lies behind gaps between points: its
-one radius stands for the density and the bends of the whole surface. Here a visible point covers a disc, a
-little wider than the distance to its neighbours. What lies behind it is hidden where discs come from all
-around: on a surface that is seen aslant, nearer points lie on one side only, however steep it is. So neither
-normals nor faces are needed, and points may lie as unevenly as they like.
+one radius stands for the density and the bends of the whole surface. Here each point covers a disc, a little
+wider than the distance to its neighbours. What lies behind it is hidden where discs come from all around: on
+a surface that is seen aslant, nearer points lie on one side only, however steep it is. So neither normals nor
+faces are needed, and points may lie as unevenly as they like.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,228 +19,229 @@ from ...errors import InputError
 from ...gpu import gl
 from ...gpu.bindings import Storage, Texture
 from ...gpu.bins import Bins
-from ...gpu.compact import IndexList, list_flagged
+from ...gpu.compact import IndexList
+from ...gpu.constants import NO_DEPTH
 from ...gpu.context import Gpu, Program
-from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits
-from ...scan.points import PointCloud
-from ...scan.spacing import nearest_rows
-from .calibration import body_of, copies
-from .candidates import Candidates
+from ...gpu.scatter import Visits, take_keys
+from ...scan.points import NOTHING
+from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 
-ROUNDS = 2  # the first gives folds back, which then cover what lies behind them
-REACH = 1.9  # of a disc, in distances between points
+REACH = 1.8  # of a disc, in distances between points
 CLEAR = 0.05  # of the reach: how far behind a point others may lie, beside it, that it does not cover
+CLEAR_OF_NOISE = 0.4  # where some is left: times what it was, in distances between points
 STEEP = 1.0  # and how much farther for each length aside
-ENOUGH = 6  # points in a ball that tell how far apart they lie
-_BALL = 2.5  # its radius, in usual distances between points; it is doubled where there are too few
-_LEVELS = 3
-_LOOKED_AT = 8_000_000  # distances from point to point that tell of noise
-_ROUGH = 0.22  # off the plane of the nearest, in distances between points: detail, up to that
-_NOISY = 8.0  # the clearance for what is more, in distances between points
-_CELL = 1.25  # edge of the cells that discs are listed by, in usual distances between points
+_FRONT = 2.5  # edge of the cells that tell what is far behind, in usual distances between points
+_BEHIND = 1.2  # of such cells: how far
+_CELL = 0.7  # edge of the cells that discs are listed by, in usual distances between points
+_WINDOW = 3  # of these cells that a disc usually reaches
+_FARTHEST = 64  # of these cells that a disc reaches at most
+_BLOCK = 8  # of these cells
+_RUN = 8  # points that an invocation of hpr/near_front.comp looks at
+_FACE_BITS = 3
 
 Sample = tuple[gl.BufferTexture, int]  # rows that are looked at in place of all, and how many
 
 
-def clearance(cloud: PointCloud) -> float:
-    """Clearance behind a disc, in its reach, within which it covers nothing beside it: more where noise lifts
-    points off the surface, as some of them tell; found once for each cloud."""
-    return cloud.remember(_clearance)
-
-
-def _clearance(cloud: PointCloud) -> float:
-    if body_of(cloud).count < len(cloud):
-        cloud = PointCloud(positions=cloud.positions[copies(cloud) == 0], origin=cloud.origin)
-    rows = np.linspace(0, len(cloud) - 1, min(max(_LOOKED_AT // len(cloud), 8), 64)).astype(int)
-    found = [_roughness(cloud.positions[nearest_rows(cloud, row)]) for row in rows.tolist()]
-    return CLEAR + _NOISY * max(float(np.median(found)) - _ROUGH, 0.0) / REACH
-
-
-def _roughness(points: NDArray[np.float32]) -> float:
-    """How far points (N, 3) around one lie off their plane, in distances between them."""
-    away = points.astype(np.float64)
-    if len(away) < 2 * ENOUGH:
-        return 0.0
-    away -= away.mean(axis=0)
-    apart = np.sqrt((away * away).sum(axis=1).max() * np.pi / len(away))
-    return float(np.linalg.svd(away, compute_uv=False)[2] / np.sqrt(len(away) - 3) / apart)
-
-
-def copies_in(pose: GpuPose) -> gl.BufferTexture | None:
-    """The copies in a pose: which points have one of a lower row in their place; None: none has."""
-    if body_of(pose.stored).count == len(pose.cloud):
-        return None
-    return pose.packed(copies, texel_format=gl.R32UI)
-
-
 class Covering:
-    """Corrects `Candidates.visible`. Holds 16 bytes a point, lists of visible points, and lists of discs.
+    """Finds which points are visible, since no others cover them.
+
+    visible: R32UI, a texel a row, 1 where it is, or lies in no cell, so that nothing is known that hides it.
+    state: another object after each `find`. Holds up to 44 bytes a point, from an eye near the scan 100, and
+    lists of cells.
 
     Raises InputError for more points than the driver takes.
     """
 
     def __init__(self, gpu: Gpu, points: int) -> None:
         self._gpu, self.points = gpu, points
-        if 16 * points > gpu.max_storage_bytes:
+        if 16 * points > gpu.max_storage_bytes or points >= 1 << 32 - _FACE_BITS:
             raise InputError(f"{points:,} points are more than this driver takes")
-        self._sights = gl.BufferTexture(gpu.ctx.buffer(reserve=16 * max(points, 1)), gl.RGBA32F)
-        self._visible, self._todo, self._sparse = (IndexList(gpu, points) for _ in range(3))
+        self._held: dict[str, gl.BufferTexture] = {}
+        self._lists: dict[str, IndexList] = {}
         self._bins = Bins(gpu, 1)
+        self.visible = self._texels("visible", points, gl.R32UI, 1)
+        self.looked_at = points
+        self.state = object()
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        lists = (self._visible, self._todo, self._sparse)
-        return self._sights.buffer.size + self._bins.nbytes + sum(each.nbytes for each in lists)
+        held = sum(each.buffer.size for each in self._held.values())
+        return held + self._bins.nbytes + sum(each.nbytes for each in self._lists.values())
 
-    def correct(
+    def count(self) -> dict[str, int]:
+        """How many points there are, and became visible; waits for the GPU."""
+        return {"in": self.looked_at, "visible": len(self.visible_rows())}
+
+    def find(
         self,
-        candidates: Candidates,
+        positions: gl.BufferTexture,
+        spacings: gl.BufferTexture,
+        sectors: Sectors,
         spacing: float,
         clear: float = CLEAR,
+        *,
         repeated: gl.BufferTexture | None = None,
         sample: Sample | None = None,
+        share: float = 1.0,
+        clip: Planes = EVERYWHERE,
+        front: bool = True,
     ) -> None:
-        """Correct what is visible.
+        """Find which points are visible.
 
-        candidates: of as many points; their `visible` is what the hull says, and is changed. spacing: usual
-        distance between visible points, as a share of a face of the sectors. clear: `clearance` of the cloud.
-        repeated: `copies_in` of the pose, where all points are looked at. sample: as `Candidates.find` had
-        it.
+        positions: RGB32F, a texel a point, relative to the origin of the sectors. spacings: R32F, how far
+        apart points lie around each, scan units. sectors: say how directions are divided, by any number.
+        spacing: usual distance between visible points, as a share of a face of the sectors. clear: behind
+        discs, in their reach. repeated: `copies_in` of the pose. sample: rows that are looked at in place
+        of all, R32UI, and how many. share: of all points, that the sample is of. clip: planes, points
+        below one of which are left out, and not visible.
+        front: points that lie far behind others are left out first.
         """
-        for again in range(ROUNDS):
-            with self._gpu.timers.measure("list"):
-                self._list_visible(candidates, repeated, sample)
-            with self._gpu.timers.measure("spread"):
-                self._find_spread(candidates, spacing, sample)
-            with self._gpu.timers.measure("cover"):
-                self._cover(candidates, spacing, clear, repeated, sample, again > 0)
+        self.state = object()
+        self.looked_at = self.points if sample is None else sample[1]
+        near_cells = sectors.divided(max(round(1 / (_CELL * spacing)), 1))
+        sampled = {"SAMPLED": int(sample is not None), "CUBE": int(sectors.mapping == "cube")}
+        with self._gpu.timers.measure("front"):
+            self._find_front(positions, sectors, spacing, sampled, sample, clip, front)
+        with self._gpu.timers.measure("near"):
+            near = self._list_near(near_cells, sampled, repeated, sample, share)
+        with self._gpu.timers.measure("discs"):
+            self._list_discs(near, near_cells, sampled, spacings)
+        with self._gpu.timers.measure("cover"):
+            self._cover(near, near_cells, sampled, clear)
 
-    def _list_visible(
-        self, candidates: Candidates, repeated: gl.BufferTexture | None, sample: Sample | None
-    ) -> None:
-        def bind(_: Program) -> None:
-            candidates.visible.bind(Texture.VISIBLE)
-            candidates.homes.bind(Texture.HOMES)
-            _bind_sample(sample)
-            if repeated is not None:
-                repeated.bind(Texture.COPIES)
-
-        flags, count = "hpr/visible_items.glsl", candidates.looked_at
-        defines = {"COPIES": int(repeated is not None), **_sampled(sample)}
-        list_flagged(self._gpu, flags, count, self._visible, bind, defines)
-
-    def _find_spread(self, candidates: Candidates, spacing: float, sample: Sample | None) -> None:
-        """Find how far the discs of visible points reach, from finer to coarser cells."""
-        gpu, todo, sparse = self._gpu, self._visible, self._sparse
-        for level in range(_LEVELS):
-            cells = _cells(candidates.sectors, _BALL * spacing * 2**level)
-            self._list_by_cell(candidates, cells, sample, discs=False)
-            last = level == _LEVELS - 1
-            defines = {"LAST": int(last), "ENOUGH": f"{ENOUGH}u", "REACH": REACH}
-            program = gpu.compute(
-                "hpr/cover_spread.comp",
-                {**defines, **_sampled(sample), **candidates.defines},
-                params=cells,
-            )
-            gpu.set(program, ball=_ball(cells))
-            sparse.clear()
-            sparse.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
-            candidates.spots.bind(Texture.SPOTS)
-            self._bind_lists()
-            _bind_sample(sample)
-            self._sights.buffer.bind_to_storage_buffer(Storage.SIGHTS)
-            todo.run(program)
-            todo, sparse = sparse, self._todo if todo is self._visible else todo
-
-    def _cover(
+    def _find_front(
         self,
-        candidates: Candidates,
+        positions: gl.BufferTexture,
+        sectors: Sectors,
         spacing: float,
-        clear: float,
+        sampled: dict[str, int],
+        sample: Sample | None,
+        clip: Planes,
+        front: bool,
+    ) -> None:
+        """Find how far away points are, and beyond which distance those of a cell are hidden."""
+        gpu = self._gpu
+        cells = sectors.divided(max(round(1 / (_FRONT * spacing)), 1)).weighted(0.0)
+        spots = self._texels("spots", self.points, gl.RGB32F, 3)
+        homes = self._texels("homes", self.points, gl.RG32UI, 2)
+        keys = self._texels("keys", cells.count, gl.R32UI, 1)
+        limits = self._texels("limits", cells.count, gl.R32F, 1)
+
+        def bind(program: Program) -> None:
+            positions.bind(Texture.POSITIONS)
+            spots.buffer.bind_to_storage_buffer(Storage.POINT_SPOTS)
+            homes.buffer.bind_to_storage_buffer(Storage.HOMES)
+            _bind_sample(sample)
+            gpu.set(program, clip=clip[0], sides=tuple(chain.from_iterable(clip[1:])))
+
+        defines = {"FILTERED": 0, "CELLS": 0, **sampled}
+        visits = Visits("hpr/candidates.glsl", self.looked_at, bind, defines, cells)
+        gl.clear_words(keys.buffer, NO_DEPTH)
+        take_keys(gpu, visits, keys)
+        program = gpu.compute(
+            "hpr/front.comp", {"CUBE": sampled["CUBE"], "ROOM": _BEHIND if front else 1e30}, params=cells
+        )
+        keys.bind(Texture.KEYS)
+        limits.buffer.bind_to_storage_buffer(Storage.LIMITS)
+        gpu.dispatch(program, cells.count)
+
+    def _list_near(
+        self,
+        cells: Sectors,
+        sampled: dict[str, int],
         repeated: gl.BufferTexture | None,
         sample: Sample | None,
-        listed: bool,
-    ) -> None:
-        """Find what the discs leave visible, of all points or of those that are."""
-        cells = _cells(candidates.sectors, _CELL * spacing)
-        self._list_by_cell(candidates, cells, sample, discs=True)
-        defines = {"LISTED": int(listed), "COPIES": int(repeated is not None), "STEEP": STEEP}
-        program = self._gpu.compute(
-            "hpr/cover.comp", {**defines, **_sampled(sample), **candidates.defines}, params=cells
-        )
-        self._gpu.set(program, clear=clear)
-        candidates.spots.bind(Texture.SPOTS)
-        candidates.homes.bind(Texture.HOMES)
-        self._sights.bind(Texture.SIGHTS)
-        self._bind_lists()
+        share: float,
+    ) -> IndexList:
+        gpu, faces = self._gpu, 3 if sampled["CUBE"] else 1
+        near = self._list("near", faces * self.points)
+        defines = {"COPIES": int(repeated is not None), "FARTHEST": _FARTHEST, **sampled}
+        program = gpu.compute("hpr/near_front.comp", defines, params=cells)
+        near.clear()
+        near.bind()
+        self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
+        self._held["homes"].bind(Texture.HOMES)
+        self._held["spots"].bind(Texture.SPOTS)
+        self._held["limits"].bind(Texture.LIMITS)
         _bind_sample(sample)
         if repeated is not None:
             repeated.bind(Texture.COPIES)
-        candidates.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
-        if listed:
-            self._visible.run(program)
-        else:
-            self._gpu.dispatch(program, candidates.looked_at)
+            gpu.set(program, lots=min(math.ceil(share * 2.0**32), NOTHING))
+        gpu.set(program, point_count=self.looked_at)
+        gpu.dispatch(program, -(-self.looked_at // _RUN))
+        return near
 
-    def _list_by_cell(
-        self,
-        candidates: Candidates,
-        cells: Sectors,
-        sample: Sample | None,
-        discs: bool,
+    def _list_discs(
+        self, near: IndexList, cells: Sectors, sampled: dict[str, int], spacings: gl.BufferTexture
     ) -> None:
-        """List the visible points by the cells that they, or their discs, lie in."""
-        if self._bins.cells != cells.count:
+        gpu, faces = self._gpu, cells.count // cells.edge**2
+        edge = cells.edge + (2 * _FARTHEST if sampled["CUBE"] else 0)
+        if self._bins.cells != faces * edge**2:
             self._bins.release()
-            self._bins = Bins(self._gpu, cells.count)
+            self._bins = Bins(gpu, faces * edge**2)
 
         def bind(_: Program) -> None:
-            self._visible.bind()
-            candidates.spots.bind(Texture.SPOTS)
-            self._sights.bind(Texture.SIGHTS)
-            _bind_sample(sample)
+            near.bind()
+            self._held["spots"].bind(Texture.SPOTS)
 
-        defines = {"DISCS": int(discs), **_sampled(sample), **candidates.defines}
-        visits = Visits("hpr/cover_cells.glsl", self.points, bind, defines, cells, self._visible)
+        defines = {"FARTHEST": _FARTHEST, **sampled}
+        visits = Visits("hpr/cover_cells.glsl", near.capacity, bind, defines, cells, near)
         self._bins.count(visits)
-        self._bins.fill(visits)
+        self._bins.fill(visits, near.capacity)
+        discs = self._texels("discs", near.capacity, gl.RGBA32F, 4)
+        windows = self._texels("windows", faces * (edge // _BLOCK + 1) ** 2, gl.R32I, 1)
+        gl.clear_words(windows.buffer, 0)
+        program = gpu.compute(
+            "hpr/cover_discs.comp", {"REACH": REACH, "WINDOW": _WINDOW, **defines}, params=cells
+        )
+        self._held["spots"].bind(Texture.SPOTS)
+        spacings.bind(Texture.SPACINGS)
+        self._bins.items.bind(Texture.LISTED)
+        discs.buffer.bind_to_storage_buffer(Storage.SIGHTS)
+        windows.buffer.bind_to_storage_buffer(Storage.WINDOWS)
+        gpu.set(program, sparser=math.sqrt(self.points / self.looked_at))
+        near.run(program)
 
-    def _bind_lists(self) -> None:
+    def _cover(self, near: IndexList, cells: Sectors, sampled: dict[str, int], clear: float) -> None:
+        defines = {"STEEP": STEEP, "WINDOW": _WINDOW, "FARTHEST": _FARTHEST, **sampled}
+        program = self._gpu.compute("hpr/cover.comp", defines, params=cells)
+        self._gpu.set(program, clear=clear)
+        self._held["discs"].bind(Texture.SIGHTS)
+        self._held["windows"].bind(Texture.WINDOWS)
         self._bins.starts.bind(Texture.STARTS)
         self._bins.items.bind(Texture.LISTED)
+        self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
+        near.run(program)
+
+    def visible_rows(self) -> NDArray[np.uint32]:
+        """The rows that are visible, ascending; waits for the GPU."""
+        flags = np.frombuffer(self.visible.buffer.read(), np.uint32, self.points)
+        return np.flatnonzero(flags).astype(np.uint32)
+
+    def _texels(self, name: str, count: int, texel_format: int, words: int) -> gl.BufferTexture:
+        """Room for so many texels, kept by name."""
+        nbytes, held = 4 * words * max(count, 1), self._held.get(name)
+        if held is None or not nbytes <= held.buffer.size <= 4 * nbytes:
+            self._gpu.discard(held)
+            self._held[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+        return self._held[name]
+
+    def _list(self, name: str, capacity: int) -> IndexList:
+        held = self._lists.get(name)
+        if held is None or held.capacity != capacity:
+            self._gpu.discard(held)
+            self._lists[name] = IndexList(self._gpu, capacity)
+        return self._lists[name]
 
     def release(self) -> None:
         """Delete all of it."""
-        self._sights.release()
         self._bins.release()
-        for each in (self._visible, self._todo, self._sparse):
-            each.release()
-
-
-def levels(sectors: Sectors, spacing: float) -> tuple[float, ...]:
-    """The radii of the balls in which points are counted, as angles, or units for parallel rays."""
-    return tuple(
-        _ball(_cells(sectors, _BALL * spacing * 2**level)) * (sectors.tangent or 1.0)
-        for level in range(_LEVELS)
-    )
-
-
-def _ball(cells: Sectors) -> float:
-    """The largest that lies within the cells around its own, also at the corners of a face, where cells are
-    smaller."""
-    return 2 * cells.half_angle / cells.edge / math.sqrt(1 + cells.tangent**2)
-
-
-def _cells(sectors: Sectors, size: float) -> Sectors:
-    """Cells of the same directions, about so large, a share of a face."""
-    return sectors.divided(max(round(1 / size), 1))
-
-
-def _sampled(sample: Sample | None) -> dict[str, object]:
-    return {"SAMPLED": int(sample is not None)}
+        for texels in self._held.values():
+            texels.release()
+        for listed in self._lists.values():
+            listed.release()
 
 
 def _bind_sample(sample: Sample | None) -> None:

@@ -11,6 +11,7 @@ from .. import FrameView
 from ..surfels.packed import draw_splats, take_normals
 from .calibration import EyeCalibration
 from .candidates import Candidates
+from .covering import Covering
 from .faces import draw_faces
 from .reconstruction import fill_between
 from .splats import SectorSplats
@@ -22,24 +23,25 @@ def show_visible(
     pose: GpuPose,
     frame: FrameView,
     surface: Surface,
-    candidates: Candidates,
+    seen: Candidates | Covering,
     calibration: EyeCalibration,
 ) -> bool:
-    """Show the visible points, which candidates tell, as the parameters say; True if a later call would show
-    more of them."""
-    params, nearest = frame.params, candidates
-    splats = surface.keep(SectorSplats)
+    """Show the visible points as the parameters say; True if a later call would show more of them.
+
+    seen: knows which they are.
+    """
+    params, splats = frame.params, surface.keep(SectorSplats)
     if params.output != "points" or wants_normals(surface.look):
-        nearest = splats.of_visible(pose, candidates, calibration, surface)
+        nearest = splats.of_visible(pose, seen, calibration, surface)
     if params.output == "faces":
-        draw_faces(pose, surface, nearest, candidates.visible, splats, params.longest)
+        draw_faces(pose, surface, nearest, seen.visible, splats, params.longest)
     elif params.output == "splats":
         buffers = {name: splats[name] for name in ("splats", "looks")}
         points = Points(pose, use_radii=True, count=len(pose.cloud), buffers=buffers, elliptical=False)
         draw_splats(points, surface, radius_scale=params.radius_scale, two=True)
     else:
         pixels = params.point_size if params.output == "points" else 1
-        draw_squares(pose, surface, pixels, frame.share, candidates.visible)
+        draw_squares(pose, surface, pixels, frame.share, seen.visible)
         if params.output == "reconstruction":
             fill_between(pose, surface, splats, params.radius_scale)
         elif wants_normals(surface.look):

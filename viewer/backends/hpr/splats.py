@@ -16,6 +16,7 @@ from ...gpu.scatter import CellSums, FixedPoint, Visits, take_keys
 from ...gpu.surface import Surface
 from .calibration import EyeCalibration, body_of
 from .candidates import Candidates
+from .covering import Covering
 
 _INFINITE = 1e12  # weight, from which on nearness alone counts but for ties
 _MOST_SECTORS = 1 << 22  # of which 24 bytes are kept
@@ -54,14 +55,18 @@ class SectorSplats:
         return self._texels[name]
 
     def of_visible(
-        self, pose: GpuPose, candidates: Candidates, calibration: EyeCalibration, surface: Surface
+        self,
+        pose: GpuPose,
+        seen: Candidates | Covering,
+        calibration: EyeCalibration,
+        surface: Surface,
     ) -> Candidates:
         """Find the splats of the visible points, unless they are known. Returns sectors whose rows are those
         of them that are nearest to their directions, as a flip at an infinite radius gives them.
 
-        candidates: know which points are visible. calibration: says how densely they lie.
+        seen: knows which points are visible. calibration: says how densely they lie.
         """
-        if self._map is not None and self._state is candidates.state:
+        if self._map is not None and self._state is seen.state:
             surface.stats.skipped["splats"] = "visible points are those of the last picture"
             return self._map
         sectors = calibration.sectors
@@ -72,10 +77,10 @@ class SectorSplats:
             self._map = None
             self._map = Candidates(self._gpu, sectors, len(pose.cloud))
         self._map.distinct = body_of(pose.stored).count
-        nearest, among = sectors.weighted(_INFINITE), candidates.visible
+        nearest, among = sectors.weighted(_INFINITE), seen.visible
         self._map.find(pose.array("positions"), nearest, _GAPS * steps, among=among)
         self.find(pose, self._map)
-        self._state = candidates.state
+        self._state = seen.state
         return self._map
 
     def find(self, pose: GpuPose, candidates: Candidates) -> None:

@@ -7,14 +7,14 @@ a quarter, ... of its size; what the picture lacks shows through from the finest
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...gpu.bindings import Texture
 from ...gpu.pose import GpuPose
-from ...gpu.pyramid import BOX, GAUSSIAN, NEAREST, Filter
+from ...gpu.pyramid import BINOMIAL, BOX, GAUSSIAN, NEAREST, Filter
 from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
 from ...params import param
@@ -44,6 +44,7 @@ LIMITS = {
     "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
 }
 
+_FILTERS = {"box": BOX, "gaussian": GAUSSIAN, "binomial": BINOMIAL, "nearest": NEAREST}
 _FILLING = {"fill": (True,)}
 _LEVELS, _HIDDEN, _VIEWS, _SMOOTHING = "Levels", "Hidden points", "Range images", "Anti-aliasing"
 
@@ -144,7 +145,7 @@ class Params:
     filter: str = param(
         "box",
         "What coarser levels of range images are made by",
-        choices=("box", "gaussian", "nearest"),
+        choices=tuple(_FILTERS),
         group=_VIEWS,
     )
     blend: str = param(
@@ -182,7 +183,7 @@ class Params:
     @property
     def reduction(self) -> Filter:
         """The filter of coarser levels."""
-        return {"box": BOX, "gaussian": GAUSSIAN, "nearest": NEAREST}[self.filter]
+        return _FILTERS[self.filter]
 
     @property
     def shown(self) -> tuple[int, ...]:
@@ -235,11 +236,24 @@ def suits(pose: Pose) -> Suited | None:
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter, show, hide, fill; complete where all samples shall be drawn."""
-    params = _coarser(frame.params, frame.share) if pose.views else frame.params
-    source = _source(pose, params, surface)
-    visits = source.visits(surface, frame.share)
+    return draw_filled(pose, frame.params, frame.share, surface)
+
+
+def draw_filled(
+    pose: GpuPose,
+    params: Params,
+    share: float,
+    surface: Surface,
+    merge: Callable[[ViewSource, Sequence[str]], None] | None = None,
+) -> bool:
+    """Draw as `draw` does. merge: given range views, changes what pixels show of the nearest surface before
+    what has no sample is filled from them: called with the source and the channels that they have, of which
+    normals are one then."""
+    params = _coarser(params, share) if pose.views else params
+    source = _source(pose, params, surface, merge is not None)
+    visits = source.visits(surface, share)
     scatter(surface.gpu, visits, surface.depths, surface.rows)
-    refinable = frame.share < 1 if pose.views else surface.stats.share < 1
+    refinable = share < 1 if pose.views else surface.stats.share < 1
     fills, hides = params.shown != (0,), params.hide and not source.is_closed
     channels = source.channels(surface)
     spreads = params.antialias != "off" and not source.is_closed and "color" in channels
@@ -249,6 +263,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         )
     else:
         surface.stats.skipped["fill"] = "level 0 alone is shown"
+    if merge is not None and isinstance(source, ViewSource):
+        merge(source, channels)
     if source.is_closed:
         surface.stats.skipped["hide"] = "polygons hide what is behind them"
     if not (fills or hides):
@@ -327,7 +343,7 @@ def _fill(
         holes.run(program)
 
 
-def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
+def _source(pose: GpuPose, params: Params, surface: Surface, normals: bool) -> SampleSource:
     joined = bool(pose.views) and params.primitive == "polygons"
     spacing = pose.samples.spacing if pose.views else pose.stored.remember(_spacing)
     margin = _MARGIN_OF_JOINED if joined else _MARGIN
@@ -351,7 +367,7 @@ def _source(pose: GpuPose, params: Params, surface: Surface) -> SampleSource:
     )
     if not pose.views:
         return PointSource(pose, values)
-    return ViewSource(pose, surface, params, values)
+    return ViewSource(pose, surface, params, values, normals)
 
 
 def _spacing(cloud: PointCloud) -> float:

@@ -37,13 +37,24 @@ class DrawnTiles:
 
     def read(self) -> dict[str, int]:
         """Numbers of tiles of the levels that were looked at, by what became of them."""
-        return dict(zip(COUNTS, np.frombuffer(self.counts.read(), np.uint32).tolist(), strict=True))
+        return dict(zip(COUNTS, self._read()[: len(COUNTS)], strict=True))
 
-    def reserve(self, tiles: int) -> None:
-        """Make room for a list of so many tiles."""
+    def read_views(self) -> list[int]:
+        """The numbers of the views that have any tile in the picture; waits for the GPU."""
+        return [view for view, drawn in enumerate(self._read()[len(COUNTS) :]) if drawn]
+
+    def reserve(self, tiles: int, views: int) -> None:
+        """Make room for a list of so many tiles, of so many views."""
         if tiles > self.listed.capacity:
             self._gpu.discard(self.listed)
             self.listed = IndexList(self._gpu, tiles, RANGE_TILE)
+        nbytes = 4 * (len(COUNTS) + views)
+        if self.counts.size != nbytes:
+            self._gpu.discard(self.counts)
+            self.counts = self._gpu.ctx.buffer(reserve=nbytes)
+
+    def _read(self) -> list[int]:
+        return np.frombuffer(self.counts.read(), np.uint32).tolist()
 
     def release(self) -> None:
         """Delete everything."""
@@ -51,28 +62,31 @@ class DrawnTiles:
 
 
 class ViewSource:
-    """The samples of a pose's range views."""
+    """The samples of a pose's range views, `samples`."""
 
     parts: Mapping[str, str] = {"source": "pyramidal/of_views.glsl"}
     is_made = True
 
-    def __init__(self, pose: GpuPose, surface: Surface, params: Any, values: Any) -> None:
-        """params: of the backend. values: what shaders read in `<params>`."""
+    def __init__(
+        self, pose: GpuPose, surface: Surface, params: Any, values: Any, normals: bool = False
+    ) -> None:
+        """params: of the backend. values: what shaders read in `<params>`. normals: whether pixels are to
+        have them whatever the look."""
         self.params = values
         self.is_closed = params.primitive == "polygons"
         self._blend = MODES.index(params.blend) if len(pose.views) > 1 else 0
-        self._pose, self._params, self._view = pose, params, surface.view
-        self._samples = pose.samples
-        self.count = self._samples.count
+        self._pose, self._params, self._view, self._lit = pose, params, surface.view, normals
+        self.samples = pose.samples
+        self.count = self.samples.count
         self._tiles = surface.keep(DrawnTiles)
-        self._tiles.reserve(self._samples.tile_count + _SPARE)
+        self._tiles.reserve(self.samples.tile_count + _SPARE, len(pose.views))
         self._texels: dict[str, gl.BufferTexture] = {}
-        self._samples.reduce(params.reduction)
+        self.samples.reduce(params.reduction)
 
     def defines(self, channels: Sequence[str]) -> dict[str, object]:
         params = self._params
         return {
-            **self._samples.defines,
+            **self.samples.defines,
             "POLYGONS": int(params.primitive == "polygons"),
             "FRAMED": int(params.primitive == "points"),
             "CULL_BACK": int(params.cull_back),
@@ -84,11 +98,11 @@ class ViewSource:
         }
 
     def channels(self, surface: Surface) -> list[str]:
-        found = ["color"] if self._samples.has_color else []
-        if lit := wants_lit(surface.look):
+        found = ["color"] if self.samples.has_color else []
+        if lit := self._lit or wants_lit(surface.look):
             found.append("normal")
         if lit or self._blend:
-            self._texels["normal"] = self._samples.normals(self._tiles.listed)
+            self._texels["normal"] = self.samples.normals(self._tiles.listed)
         if (values := surface.row_values) is not None:
             found.append("value")
             self._texels["value"] = values
@@ -105,7 +119,7 @@ class ViewSource:
             tiles.counts.bind_to_storage_buffer(Storage.TILE_COUNTS)
             self.bind()
             gpu.set(program, capacity=tiles.listed.capacity)
-            gpu.dispatch(program, self._samples.tile_count)
+            gpu.dispatch(program, self.samples.tile_count)
         surface.show_samples()
         surface.stats.counted["tiles"] = tiles.read
 
@@ -117,7 +131,7 @@ class ViewSource:
         return Visits(cells, 0, bind, {**defines, "SUMS": 0}, self.params, tiles.listed)
 
     def bind(self) -> None:
-        self._samples.bind(self._view)
+        self.samples.bind(self._view)
         for name, unit in (("normal", Texture.RANGE_NORMALS), ("value", Texture.VALUES)):
             if name in self._texels:
                 self._texels[name].bind(unit)
@@ -129,4 +143,5 @@ def wants_lit(look: Look) -> bool:
 
 
 def _causes() -> dict[str, object]:
-    return {f"TILES_{name.upper()}": f"{number}u" for number, name in enumerate(COUNTS)}
+    numbers = {f"TILES_{name.upper()}": f"{number}u" for number, name in enumerate(COUNTS)}
+    return {**numbers, "TILES_CAUSES": f"{len(COUNTS)}u"}

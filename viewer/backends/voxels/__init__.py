@@ -38,6 +38,11 @@ DERIVES_ON_THREAD = True
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
 # Rows of the stability suite that octants cannot hold in principle.
+# A cube around one point has no size: nothing is seen of it where nothing is enlarged to a pixel.
+_NOT_ENLARGED = tuple(
+    Limit(0.0, NO_SPACING, when)
+    for when in ({"instancing": ("gs", "ubo", "tbo", "pull", "tiles")}, {"passes": ("one",)})
+)
 LIMITS = {
     "rotated by 37 degrees": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
     "near plane inside the cloud": (Limit(0.01, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
@@ -47,6 +52,9 @@ LIMITS = {
     "collinear points": Limit(0.015, AROUND_ALL),
     "collinear points end on, perspective": Limit(0.01, NO_SPACING),
     "collinear points end on, orthographic": Limit(0.01, NO_SPACING),
+    **dict.fromkeys(
+        ("one point x1000", "zoomed in on 10^-3 of a splat", "zoomed in on 10^-6 of a splat"), _NOT_ENLARGED
+    ),
 }
 KEPT = {
     "cull_back": "open scans, and eyes inside: 1.5 % of the pixels of the bunny, which has no base, show "

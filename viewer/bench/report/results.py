@@ -21,6 +21,10 @@ OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
 SEARCHES, FITS = "searches.jsonl", "fits.jsonl"
 DISTANCES = "distances.jsonl"
+SEAMS, ALONE, PICTURE_SIZES, BAND_TIMES = (
+    "seams.jsonl", "alone.jsonl", "picture-sizes.jsonl", "band-times.jsonl",
+)  # fmt: skip
+WORD_TIMES, WORD_PIXELS, WORD_TABLES = "word-times.jsonl", "word-pixels.jsonl", "word-tables.jsonl"
 VISIBILITY, GROWTH, SPEEDS = "visibility.jsonl", "growth.jsonl", "speeds.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
@@ -41,6 +45,13 @@ _NEEDED: dict[str, dict[str, Any]] = {
     VISIBILITY: {"scene": str, "n": int, "noise": int | float, "method": str, "radius": str, "by_view": list},
     GROWTH: {"scene": str, "n": int, "method": str, "visible": int, "error": int | float},
     SPEEDS: {"scene": str, "n": int, "sectors": int, "busy_ms": dict, "wall_ms": dict},
+    SEAMS: {"scene": str, "way": str, "by_view": list},
+    ALONE: {"scene": str, "way": str, "by_view": list},
+    PICTURE_SIZES: {"scene": str, "way": str, "zoom": int | float, "by_view": list},
+    BAND_TIMES: {"scene": str, "way": str, "pods": int, "wall_ms": int | float, "passes": dict},
+    WORD_TIMES: {"scene": str, "n": int, "size": list, "busy_ms": dict, "wall_ms": dict},
+    WORD_PIXELS: {"scene": str, "projection": str, "quality": str, "ids": int | float},
+    WORD_TABLES: {"steps": str, "busy_ms": dict, "nbytes": int, "bitmap_bytes": int},
     FITS: {"scene": str, "noise": int | float, "params": dict, "found_inside": dict, "found_band": dict},
 }  # fmt: skip
 

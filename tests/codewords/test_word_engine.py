@@ -1,0 +1,135 @@
+"""The engine of code words and its plain twin: the same to the bit, whatever the window."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from word_scenes import GREY, front_view, scattered, streams
+
+from viewer.codewords.encode import encode_elements
+from viewer.codewords.engine import NO_KEY, NO_WORD, CodePicture, draw_words, draw_words_plainly
+from viewer.codewords.lighting import Materials
+from viewer.codewords.stream import WordStream
+from viewer.codewords.words import FIELDS, encode_words
+from viewer.errors import InputError
+
+FULL = 0b111000_111000_111000_111000  # all eight columns
+
+
+def same(a: CodePicture, b: CodePicture) -> bool:
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("image", "keys", "places"))
+
+
+def stream_of(
+    size: tuple[int, int],
+    words: list[tuple[int, dict[str, int]]],
+    ids: list[int],
+    materials: Materials = GREY,
+) -> WordStream:
+    """A stream of one strip. words: line and fields that are not 0 of each, the lines ascending."""
+    fields = {name: np.array([given.get(name, 0) for _, given in words], int) for name in FIELDS}
+    lines = [line for line, _ in words]
+    line_starts = np.searchsorted(lines, np.arange(size[1] + 1)).astype(np.int64)
+    return WordStream(
+        size=size, stride=size[0], line_starts=line_starts,
+        words=encode_words(fields), ids=np.array(ids, np.uint32), near=1.0, far=2.0, materials=materials,
+        background=(1, 2, 3, 4),
+    )  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(streams(), st.integers(8, 40))
+def test_the_engine_draws_as_its_twin_with_any_window(stream: WordStream, window: int) -> None:
+    plain = draw_words_plainly(stream)
+    assert same(draw_words(stream), plain)
+    assert same(draw_words(stream, window), plain)
+    assert same(draw_words_plainly(stream, window), plain)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_encoded_scenes_are_drawn_the_same(exact: bool) -> None:
+    for seed, size in enumerate([(70, 40), (1, 1), (7, 9), (530, 12)]):
+        view = front_view(size, perspective=bool(seed % 2))
+        stream = encode_elements(scattered(120, size, seed), view, GREY, exact=exact)
+        picture = draw_words(stream)
+        assert picture.covered.any()
+        assert same(picture, draw_words_plainly(stream, 8))
+
+
+@settings(max_examples=60, deadline=None)
+@given(stream=streams(), processors=st.integers(1, 9))
+def test_threads_share_a_picture(stream: WordStream, processors: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("viewer.scan.octree.threads._SHARE", 1)
+        patch.setattr("os.cpu_count", lambda: processors)
+        assert same(draw_words(stream), draw_words_plainly(stream))
+
+
+def test_the_nearest_word_is_seen_and_ties_go_to_the_lowest_id_then_to_the_first() -> None:
+    scans = {"scans": FULL, "mode": 1}
+    words = [
+        (0, {**scans, "z": 5, "material": 0}),
+        (1, {**scans, "z": 4, "material": 1}),
+        (2, {**scans, "z": 5, "material": 1}),
+        (3, {**scans, "z": 5, "material": 0}),
+        (3, {**scans, "z": 5, "material": 0}),
+    ]
+    picture = draw_words(stream_of((8, 8), words, [9, 8, 7, 7, 7]))
+    assert picture.places[:, 0].tolist() == [0, 1, 1, 1, 1, 2, 3, NO_WORD]
+    assert picture.keys[:, 0].tolist() == [5, 4, 4, 4, 4, 5, 5, NO_KEY]
+
+
+def test_depths_at_both_ends_are_seen_before_nothing() -> None:
+    words = [(0, {"scans": FULL, "z": 511}), (0, {"scans": FULL, "z": 0, "x": 8})]
+    picture = draw_words(stream_of((16, 8), words, [0, 1]))
+    assert picture.covered.all()
+    assert np.array_equal(np.unique(picture.depths()), [1.0, 2.0])
+    assert picture.ids()[0, [0, 15]].tolist() == [0, 1]
+
+
+def test_what_is_right_of_a_strip_or_below_the_picture_is_cut_off() -> None:
+    picture = draw_words(stream_of((11, 10), [(7, {"scans": FULL, "x": 10})], [3]))
+    assert np.argwhere(picture.covered).tolist() == [[7, 10], [8, 10], [9, 10]]
+
+
+def test_a_stream_of_no_words_is_the_background() -> None:
+    stream = stream_of((5, 6), [], [])
+    for picture in (draw_words(stream), draw_words_plainly(stream)):
+        assert (picture.image == [1, 2, 3, 4]).all()
+        assert (picture.ids() == NO_WORD).all()
+        assert np.isinf(picture.depths()).all()
+
+
+def test_a_picture_can_lie_behind() -> None:
+    behind = np.random.default_rng(0).integers(0, 256, (8, 12, 4)).astype(np.uint8)
+    picture = draw_words(stream_of((12, 8), [(0, {"scans": FULL, "diffuse": 127})], [0]), background=behind)
+    assert np.array_equal(picture.image[:, 8:], behind[:, 8:])
+    assert (picture.image[:, :8, 3] == 255).all()
+    assert same(
+        picture,
+        draw_words_plainly(stream_of((12, 8), [(0, {"scans": FULL, "diffuse": 127})], [0]), 9, behind),
+    )
+    with pytest.raises(InputError, match="background of shape"):
+        draw_words(stream_of((5, 5), [], []), background=behind)
+
+
+def test_a_window_below_eight_lines_is_refused() -> None:
+    with pytest.raises(InputError, match="window of 7 lines"):
+        draw_words(stream_of((5, 5), [], []), 7)
+
+
+def test_light_is_ambient_diffuse_and_specular() -> None:
+    materials = Materials(
+        *(np.array([row], np.uint16) for row in ([100, 0, 0], [0, 4095, 2000], [900, 0, 4095]))
+    )
+    for diffuse, specular in ((0, 0), (127, 0), (0, 127), (63, 64), (127, 127)):
+        words = [(0, {"scans": FULL, "diffuse": diffuse, "specular": specular})]
+        image = draw_words(stream_of((8, 8), words, [0], materials)).image
+        parts = [index / 128 if index < 64 else (index + 1) / 128 for index in (diffuse, specular)]
+        light = np.array([100 + 900 * parts[1], 4095 * parts[0], 2000 * parts[0] + 4095 * parts[1]]) / 4095
+        expected = np.where(
+            light < 0.0031308, light * 12.92, 1.055 * light.clip(1e-9, 1) ** (1 / 2.4) - 0.055
+        )
+        assert np.abs(image[0, 0, :3] - 255 * expected.clip(0, 1)).max() < 1.6  # steps of dark light are wide

@@ -1,0 +1,121 @@
+"""`scan4d render --no-gl`, and files of code words: where OpenGL is, and where none is to be had at all."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from small_scans import FRAMES, SMALL, finish, front, names, process, stored
+from written import film, picture
+
+from viewer.codewords.engine import draw_words, draw_words_plainly
+from viewer.codewords.settings import Params, words_of
+from viewer.codewords.stream import read_stream
+from viewer.frame import Request, view_of
+from viewer.look import Look
+from viewer.scan import formats
+from viewer.scan.pose import Pose
+
+LIBRARIES = ("libEGL.so", "libGL.so", "libOpenGL.so.0", "libGLdispatch.so.0", "libGLX.so.0")
+
+
+@pytest.fixture
+def without_opengl(tmp_path: Path) -> dict[str, str]:
+    """An environment in which no library of OpenGL can be loaded."""
+    if not sys.platform.startswith("linux"):
+        pytest.skip("libraries are found by LD_LIBRARY_PATH")
+    folder = tmp_path / "broken"
+    folder.mkdir()
+    for name in LIBRARIES:
+        (folder / name).touch()
+        (folder / f"{name}.1").touch()
+    return {"LD_LIBRARY_PATH": str(folder)}
+
+
+def test_a_machine_without_opengl(without_opengl: dict[str, str], scans: Path, tmp_path: Path) -> None:
+    scan, out = scans / "ball.npz", tmp_path / "out"
+    out.mkdir()
+    assert finish(process("render", scan, "-o", out / "a.png", *SMALL, **without_opengl)).code == 3
+    done = finish(process("doctor", **without_opengl))
+    assert (done.code, done.err) == (3, "")
+    assert "scan4d render SCAN --backend codeword --no-gl -o picture.png" in done.out
+    options = ("--backend", "codeword", "--no-gl")
+    done = finish(process("render", scan, "-o", out / "a.png", *SMALL, *options, **without_opengl))
+    assert done == (0, f"{out / 'a.png'}\n", "")
+    done = finish(process("render", scan, "-o", out / "a.cw", *SMALL, **without_opengl))
+    assert done == (0, f"{out / 'a.cw'}\n", "")
+    done = finish(process("render", out / "a.cw", "-o", out / "b.png", **without_opengl))
+    assert done == (0, f"{out / 'b.png'}\n", "")
+    assert np.array_equal(picture(out / "a.png"), picture(out / "b.png"))
+    assert (picture(out / "a.png")[32, 48] != picture(out / "a.png")[0, 0]).any()
+
+
+def test_normals_that_cannot_be_estimated(
+    without_opengl: dict[str, str], scans: Path, tmp_path: Path
+) -> None:
+    np.save(tmp_path / "bare.npy", formats.read(scans / "ball.npz").world())
+    arguments = ("render", tmp_path / "bare.npy", "-o", tmp_path / "a.png", *SMALL, "--no-gl")
+    done = finish(process(*arguments, **without_opengl))
+    told = "no normals and radii can be estimated here: discs face the eye and they are of one size"
+    assert (done.code, done.err) == (0, f"scan4d: {told}\n")
+    assert len(np.unique(picture(tmp_path / "a.png").reshape(-1, 4), axis=0)) > 10  # by depth
+
+
+def test_a_picture_is_what_the_twin_draws(run: Run, scans: Path, tmp_path: Path) -> None:
+    for quality in ("table", "exact"):
+        options = ("--no-gl", "--set", f"quality={quality}", "radius_scale=1.5", "--look", "light=fixed")
+        out = tmp_path / f"{quality}.png"
+        assert run("render", scans / "ball.npz", "-o", out, *SMALL, *options).code == 0
+        cloud = formats.read(scans / "ball.npz")
+        pose = Pose(0, 0.0, "ball", cloud)
+        view = view_of(Request(pose, front(cloud)), (96, 64))
+        params = Params(quality=quality, radius_scale=1.5)
+        stream = words_of(pose, view, Look(light="fixed", up=pose.upright.up), params)
+        assert np.array_equal(picture(out), draw_words_plainly(stream).image)
+
+
+def test_films_patterns_turntables_and_arrays(run: Run, scans: Path, tmp_path: Path) -> None:
+    scan = scans / "sequence"
+    assert run("render", scan, "--no-gl", "--all", "-o", tmp_path / "a.mp4", *SMALL).code == 0
+    images, _ = film(tmp_path / "a.mp4")
+    assert len(images) == FRAMES
+    done = run("render", scan, "--no-gl", "--poses", "0:2", "-o", tmp_path / "p%d.cw", *SMALL)
+    assert done.code == 0
+    assert run("render", scan, "--no-gl", "--turntable", 3, "-o", tmp_path / "t%d.npz", *SMALL).code == 0
+    assert names(tmp_path) == ["a.mp4", "p0.cw", "p1.cw", "t0.npz", "t1.npz", "t2.npz"]
+    arrays = stored(tmp_path / "t0.npz")
+    covered = np.isfinite(arrays["depth"])
+    assert covered.any()
+    assert ((arrays["id"] == 0xFFFFFFFF) == ~covered).all()
+    assert (arrays["picture"][covered, 3] == 255).all()
+    stream = read_stream(tmp_path / "p1.cw")
+    assert draw_words(stream).covered.any()
+
+
+def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_path: Path) -> None:
+    scan, words = scans / "ball.npz", tmp_path / "a.cw"
+    assert run("render", scan, "-o", words, *SMALL).code == 0
+    for arguments, told in (
+        ((scan, "-o", "a.png", "--no-gl", "--backend", "surfels"), "'surfels' needs OpenGL"),
+        ((scan, "-o", "a.png", "--no-gl", "--marks", "stamp"), "--marks: is for pictures that OpenGL draws"),
+        ((scan, "-o", "a.png", "--no-gl", "--quality", "fine"), "--quality: is for"),
+        ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
+        ((scan, "-o", "a.png", "--no-gl", "--set", "normals=60"), "60 normals have none in the middle"),
+        ((scan, "-o", "a.png", "--no-gl", "--set", "sises=3"), "Did you mean 'sizes'"),
+        ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),
+        ((words, "-o", "a.png", "--size", "10x10"), "--size: cannot be chosen"),
+        ((words, "-o", "a.png", "--look", "light=flat"), "--look: cannot be chosen"),
+        ((words, "-o", words), "cannot write '.cw' files"),
+        ((tmp_path / "none.cw", "-o", "a.png"), "no such file or folder"),
+    ):
+        done = run("render", *arguments)
+        assert (done.code, done.out) == (2, ""), arguments
+        assert told in done.err, arguments
+        assert done.err.count("\n") == 1
+    words.write_bytes(words.read_bytes()[:-1])
+    done = run("render", words, "-o", tmp_path / "a.png")
+    assert done == (2, "", f"scan4d: {words}: is cut short. Save it again\n")
+    assert names(tmp_path) == ["a.cw"]

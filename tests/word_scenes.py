@@ -1,0 +1,82 @@
+"""Elements and streams for tests of code words."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+
+from viewer.bounds import Bounds
+from viewer.camera import Camera
+from viewer.codewords.encode import Elements
+from viewer.codewords.lighting import Materials
+from viewer.codewords.stream import FINE_DEPTHS, WordStream
+from viewer.codewords.words import FIELDS, encode_words
+from viewer.view import View
+
+GREY = Materials.of_palette(np.array([[200, 190, 180], [90, 120, 150]], np.uint8), 0.2, 0.7, 0.3)
+
+
+def front_view(size: tuple[int, int], perspective: bool = False) -> View:
+    """A view along -z from (0, 0, 100) of the plane z = 0, where a pixel is one unit, its middle at 0."""
+    height = float(size[1])
+    camera = Camera(
+        eye=(0, 0, 100), target=(0, 0, 0), near=1, far=1000,
+        projection="perspective" if perspective else "orthographic", height=height,
+        fov_y=float(np.degrees(2 * np.arctan(height / 200))),
+    )  # fmt: skip
+    half = np.array([size[0] / 2, size[1] / 2, 50.0])
+    return View.of(camera, size, np.zeros(3), Bounds(-half, half))
+
+
+def scattered(count: int, size: tuple[int, int], seed: int, radius: float = 3.0) -> Elements:
+    """Elements about a picture and beyond its edges, with all kinds of normals."""
+    rng = np.random.default_rng(seed)
+    positions = rng.uniform(-0.6, 0.6, (count, 3)) * [*size, 60]
+    normals = rng.normal(size=(count, 3))
+    radii = radius * rng.uniform(0.2, 3.0, count)
+    return Elements(
+        positions=positions.astype(np.float32),
+        materials=(np.arange(count) % 2).astype(np.uint8),
+        normals=normals.astype(np.float32),
+        radii=radii.astype(np.float32),
+    )
+
+
+def one_element(position: tuple[float, float, float], radius: float, normal: Any = (0, 0, 1)) -> Elements:
+    return Elements(
+        positions=np.array([position], np.float32),
+        materials=np.zeros(1, np.uint8),
+        normals=np.array([normal], np.float32),
+        radii=np.array([radius], np.float32),
+    )
+
+
+@st.composite
+def streams(draw: st.DrawFn, finer: bool | None = None) -> WordStream:
+    """Streams of any words: ids that several have, depths that are equal, bitmaps beyond the edges."""
+    size = draw(st.tuples(st.integers(1, 30), st.integers(1, 20)))
+    stride = draw(st.integers(max(1, size[0] // 3), size[0]))
+    strips = -(-size[0] // stride)
+    lines = draw(st.lists(st.integers(0, strips * size[1] - 1), max_size=25))
+    lines.sort()
+    count = len(lines)
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    fields = {name: rng.integers(0, 1 << bits, count) for name, (_, bits) in FIELDS.items()}
+    fields["z"] = rng.choice([0, 1, 255, 511], count)
+    fields["material"] = rng.integers(0, len(GREY), count)
+    left = np.array(lines, int) // size[1] * stride
+    fields["x"] = rng.integers(0, np.minimum(stride, size[0] - left)) if count else np.zeros(0, int)
+    ids = rng.integers(0, 12, count).astype(np.uint32)
+    line_starts = np.searchsorted(lines, np.arange(strips * size[1] + 1))
+    for start, end in pairwise(line_starts):
+        ids[start:end].sort()
+    has_finer = draw(st.booleans()) if finer is None else finer
+    steps = rng.integers(-4, 5, (count, 3)) * [FINE_DEPTHS // 8, FINE_DEPTHS // 64, FINE_DEPTHS // 64]
+    return WordStream(
+        size=size, stride=stride, line_starts=line_starts.astype(np.int64), words=encode_words(fields),
+        ids=ids, near=2.0, far=5.0, materials=GREY, background=(10, 20, 30, 255),
+        perspective=draw(st.booleans()), finer=steps.astype(np.int32) if has_finer else None,
+    )  # fmt: skip

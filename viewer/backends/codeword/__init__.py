@@ -1,0 +1,173 @@
+"""Discs from tables of shapes, as code words of 64 bits, drawn by whole numbers in bands.
+
+Maršík 2010: points are encoded line by line, with the shape of their disc by its quantised size and normal;
+an engine draws the words in a window that slides down the picture. Here a work group draws each band of it.
+See viewer/codewords/ for words, tables and lighting, and docs/codeword.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...codewords import settings
+from ...codewords.lighting import Materials
+from ...codewords.settings import uniform_radius, word_look, words_of
+from ...codewords.stream import WordStream
+from ...gpu.amplify import Points
+from ...gpu.context import Gpu
+from ...gpu.pose import GpuPose
+from ...gpu.surface import Surface
+from ...look import Look
+from ...params import param
+from ...scan.layers import Layers
+from ...scan.points import PointCloud
+from ...scan.pose import Pose
+from .. import FrameView, Limit, Suited
+from .encoder import encode_points
+from .engine import Sheet, WordBuffers, draw_bands
+
+TITLE = "Code words"
+
+_HELD = (
+    "words hold places, shapes, depths and colours in steps: the last bit moves some by a whole step, what "
+    "else there is moves the steps, and a disc that reaches the plane of the eye has no outline to hold"
+)
+_OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
+_EXACT = {"quality": ("exact",)}
+LIMITS = {
+    "zoomed in on 10^-3 of a splat": Limit(0.0, _HELD, _EXACT),
+    "zoomed in on 10^-6 of a splat": Limit(0.0, _HELD, _EXACT),
+    "near plane inside the cloud": Limit(0.0, _HELD, _OF_PALETTE),
+    "zoomed in on 10^-3 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
+    "zoomed in on 10^-6 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
+    "an outlier at 10^6 times the size": Limit(0.0, _HELD, _OF_PALETTE),
+    "eye inside the cloud": Limit(1.0, _HELD, _OF_TABLE),
+    "zoomed out x10^6": Limit(0.07, _HELD, _OF_TABLE),
+    "zero radii": Limit(0.0, _HELD, _OF_TABLE),
+    "negative radii": Limit(0.0, _HELD, _OF_TABLE),
+    "NaN radii": Limit(0.0, _HELD, _OF_TABLE),
+}
+
+
+@dataclass(frozen=True)
+class Params(settings.Params):
+    """Parameters of code words."""
+
+    lighting: str = param(
+        "common",
+        "common: colours and light of all backends; own: Phong by the words' indices, materials and whole "
+        "numbers, one colour for each disc",
+        choices=("common", "own"),
+        sweep=("common", "own"),
+        group="Light",
+    )
+
+
+def needs(pose: Pose, params: Params) -> tuple[str, ...]:
+    """Normals, and radii where they shall be the points' own."""
+    return ("normals", "radii") if params.radius == "own" else ("normals",)
+
+
+def suits(pose: Pose) -> Suited | None:
+    """None: `surfels` draws the same points better."""
+    return None
+
+
+def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+    """Encode and draw; complete where all points shall be drawn."""
+    params: Params = frame.params
+    surface.stats.faces_away = params.cull_back
+    if not len(pose.cloud):
+        surface.clear()
+        return False
+    is_lit = params.lighting == "own"
+    # Colours of words that nobody sees need not be found.
+    look = surface.look if is_lit else replace(surface.look, color_by="plain")
+    words = surface.keep(WordBuffers)
+    made = _encoded_here if params.quality == "table" else _encoded_on_cpu
+    sheet, materials = made(pose, frame, surface, look, words)
+    lit = (surface.own("color", is_lit=True).buffer, materials) if is_lit else None
+    draw_bands(words, sheet, params.window, surface.depths.buffer, surface.rows.buffer, lit)
+    return surface.stats.share < 1
+
+
+def _encoded_here(
+    pose: GpuPose, frame: FrameView, surface: Surface, look: Look, words: WordBuffers
+) -> tuple[Sheet, Materials]:
+    """Words of the table, and their materials."""
+    params: Params = frame.params
+    own = params.radius == "own" and pose.cloud.radii is not None
+    points = Points.of(pose, surface, frame.share, use_radii=own)
+    known = pose.pose.with_cloud(pose.cloud)
+    materials, index, light = word_look(known, frame.view, look, surface.layers)
+    radius = uniform_radius(pose.cloud, params)
+    several = index if len(materials) > 1 else None
+    return encode_points(points, frame.view, words, params, light, radius, several), materials
+
+
+def _encoded_on_cpu(
+    pose: GpuPose, frame: FrameView, surface: Surface, look: Look, words: WordBuffers
+) -> tuple[Sheet, Materials]:
+    """Words of exact outlines, which take float64, and their materials."""
+    params: Params = frame.params
+    part = surface.keep(_Sampled).take(pose, surface, frame.share)
+    with surface.gpu.timers.measure("encode"):
+        stream = words_of(part.pose, frame.view, look, part.enlarged(params), part.layers(surface.layers))
+    is_lit = params.lighting == "own"
+    sheet = words.take_encoded(part.in_pose(stream), len(pose.cloud), frame.view.base, is_lit)
+    return sheet, stream.materials
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Points that are drawn. rows: in the pose that they are of; None: all. pose: these alone."""
+
+    pose: Pose
+    rows: NDArray[np.uint32] | None = None
+    share: float = 1.0
+
+    def enlarged(self, params: Params) -> Params:
+        """Parameters with which they cover what all do; a radius that goes by their spacing does so."""
+        by_spacing = params.radius == "uniform" or self.pose.cloud.radii is None
+        factor = 1.0 if by_spacing else 1 / math.sqrt(self.share)
+        return replace(params, radius_scale=params.radius_scale * factor)
+
+    def layers(self, layers: Layers) -> Layers:
+        """Layers with their numbers alone."""
+        if self.rows is None:
+            return layers
+        return replace(layers, scalars={name: values[self.rows] for name, values in layers.scalars.items()})
+
+    def in_pose(self, stream: WordStream) -> WordStream:
+        """The stream with rows of the whole pose as ids."""
+        return stream if self.rows is None else replace(stream, ids=self.rows[stream.ids])
+
+
+class _Sampled:
+    """The points of a preview, kept until those of another one are asked for."""
+
+    nbytes = 0  # on the GPU
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._of: tuple[PointCloud, float] | None = None
+        self._part: _Part | None = None
+
+    def take(self, pose: GpuPose, surface: Surface, share: float) -> _Part:
+        """The share of the points that `Surface.take_sample` chooses; 1: all."""
+        texels, count = surface.take_sample(share)
+        if texels is None:
+            self.release()
+            return _Part(pose.pose.with_cloud(pose.cloud))
+        if self._part is None or self._of is None or self._of[0] is not pose.cloud or self._of[1] != share:
+            rows = np.frombuffer(texels.buffer.read(4 * count), np.uint32)
+            sampled = Pose(0, 0.0, "sample", pose.cloud.of_rows(rows))
+            self._of, self._part = (pose.cloud, share), _Part(sampled, rows, count / len(pose.cloud))
+        return self._part
+
+    def release(self) -> None:
+        """Forget them."""
+        self._of = self._part = None

@@ -1,0 +1,109 @@
+"""Noise: how far points lie off the surface that they are samples of, and points without it.
+
+It is told by the nearest neighbours of some points, of which so many are taken that they reach several times
+as far as noise does: their distances to a quadric, since a plane would take bends of the surface for noise.
+Points are then moved to planes through those around, weighted by a B-spline (moving least squares, Alexa
+2003).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scan.points import NOTHING, PointCloud
+from ...scan.spacing import nearest_rows
+from .calibration import body_of, copies
+
+_LOOKED_AT = 8_000_000  # distances from point to point that tell of noise
+_PLACES = (8, 64)  # at least and at most, where it is looked for
+_NEAREST = (16, 64, 256, 1024, 4096)  # points there, of which the fewest that reach far enough are taken
+_NEAR = 0.25  # of how far they reach: the most noise that they tell
+_TERMS = 6  # of a quadric
+_DETAIL = 0.16  # in distances between points: up to that, it may be detail of the surface
+_CELLS = (2.5, 2.6)  # the edge of those that are averaged, in distances between points and in deviations
+_OUTLIERS = 0.5  # deviation, in distances between points, from which on some need a second time
+_FARTHEST = 4.0  # deviations that a point is moved at most, each time
+_ENOUGH = 2.0  # points, by their weights, that tell a plane
+_MOST_CELLS = 1 << 20  # to each side of the middle; what lies farther off stays where it is
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a cloud. deviation: the standard deviation of points off their surface; spacing: the distance
+    between neighbours. Scan units."""
+
+    deviation: float
+    spacing: float
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it is more than may be detail of the surface."""
+        return self.deviation > _DETAIL * self.spacing
+
+
+def noise_of(cloud: PointCloud) -> Noise:
+    """The noise of a cloud, the median of some places; none where there are few points. Found once."""
+    return cloud.remember(_noise)
+
+
+def _noise(cloud: PointCloud) -> Noise:
+    noise = Noise(0.0, 0.0)
+    if not len(cloud):
+        return noise
+    if body_of(cloud).count < len(cloud):
+        cloud = PointCloud(positions=cloud.positions[copies(cloud) == NOTHING], origin=cloud.origin)
+    places = min(max(_LOOKED_AT // len(cloud), _PLACES[0]), _PLACES[1])
+    rows = np.linspace(0, len(cloud) - 1, places).astype(int).tolist()
+    for nearest in _NEAREST:
+        if 2 * nearest > len(cloud):
+            break
+        near = [cloud.positions[nearest_rows(cloud, row, nearest)] for row in rows]
+        shares, reaches = np.array([_off_quadric(points.astype(np.float64)) for points in near]).T
+        spacing = float(np.median(reaches)) * float(np.sqrt(np.pi / nearest))
+        noise = Noise(float(np.median(shares * reaches)), spacing)
+        if np.median(shares) < _NEAR:
+            break
+    return noise
+
+
+def _off_quadric(points: NDArray[np.float64]) -> tuple[float, float]:
+    """How far points (N, 3) lie off the quadric through them, in shares of how far they reach; and that."""
+    away = points - points.mean(axis=0)
+    reach = float(np.sqrt((away * away).sum(axis=1).max()))
+    if reach == 0:
+        return 0.0, 0.0
+    away /= reach
+    x, y, z = np.linalg.svd(away, full_matrices=False)[2] @ away.T
+    terms, _ = np.linalg.qr(np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1))
+    off = z - terms @ (terms.T @ z)
+    return float(np.sqrt((off * off).sum() / (len(points) - _TERMS))), reach
+
+
+def steady_positions(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
+    """Points of a cloud with less of its noise, (N, 3), relative to its origin."""
+    edge = float(np.hypot(_CELLS[0] * noise.spacing, _CELLS[1] * noise.deviation))
+    points = cloud.positions.astype(np.float64)
+    if cloud.remainders is not None:
+        points += cloud.remainders
+    for _ in range(2 if noise.deviation > _OUTLIERS * noise.spacing else 1):
+        points = _moved_to_planes(points, edge, _FARTHEST * noise.deviation)
+    return points.astype(np.float32)
+
+
+def _moved_to_planes(points: NDArray[np.float64], edge: float, farthest: float) -> NDArray[np.float64]:
+    """Points moved to the planes of those around, (N, 3). edge: of cells, a third of how far the B-spline
+    reaches."""
+    from .noise_kernels import move_to_planes
+
+    places = (points - np.median(points, axis=0)) / edge + _MOST_CELLS
+    rows = np.flatnonzero(((places > 1) & (places < 2 * _MOST_CELLS - 1)).all(axis=1))
+    cells = np.floor(places[rows]).astype(np.int64)
+    codes = (cells[:, 0] << 42) + (cells[:, 1] << 21) + cells[:, 2]
+    order = codes.argsort(kind="stable")
+    firsts = np.flatnonzero(np.diff(codes[order], prepend=-1, append=-1))
+    moves = np.zeros((len(points), 3))
+    move_to_planes(places, rows[order], firsts, codes[order][firsts[:-1]], _ENOUGH, farthest / edge, moves)
+    return points + edge * moves

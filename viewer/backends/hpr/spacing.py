@@ -1,0 +1,102 @@
+"""Spacings: how far apart the points of a pose lie, around each of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...gpu import gl
+from ...gpu.bindings import Storage, Texture
+from ...gpu.bins import Bins
+from ...gpu.compact import IndexList
+from ...gpu.context import Program
+from ...gpu.pose import GpuPose
+from ...gpu.scatter import Visits
+from ...scan.points import NOTHING, PointCloud
+from ...scan.spacing import typical_spacing
+from .calibration import body_of, copies
+from .noise import noise_of, steady_positions
+
+ENOUGH = 6  # points in a ball that tell how far apart they lie
+_BALL = 2.0  # its radius, in usual distances between points; it is doubled where there are too few
+_LEVELS = 6
+_PER_PLACE = 4  # points, in the table of voxels
+
+
+def copies_in(pose: GpuPose) -> gl.BufferTexture | None:
+    """The copies in a pose: `copies` as texels, R32UI; None: there are none."""
+    if body_of(pose.stored).count == len(pose.cloud):
+        return None
+    return pose.packed(copies, texel_format=gl.R32UI)
+
+
+def steady_points(pose: GpuPose) -> gl.BufferTexture:
+    """The positions of a pose, with less noise where there is some."""
+    noise = noise_of(pose.stored)
+    if not noise.stands_out:
+        return pose.array("positions")
+    return pose.packed(steady_positions, noise, texel_format=gl.RGB32F)
+
+
+def _usual(cloud: PointCloud) -> float:
+    """The usual distance between points, copies aside, scan units."""
+    if noise_of(cloud).stands_out:
+        return noise_of(cloud).spacing
+    if body_of(cloud).count < len(cloud):
+        cloud = PointCloud(positions=cloud.positions[copies(cloud) == NOTHING], origin=cloud.origin)
+    return typical_spacing(cloud)
+
+
+class Spacings:
+    """The distance between neighbours around each point of a pose, without noise, by the number of them
+    in a ball.
+
+    texels: R32F, a texel a row, scan units. They lie in space, so that they are the same for all eyes; kept
+    with the pose (`GpuPose.keep`).
+    """
+
+    def __init__(self, pose: GpuPose) -> None:
+        self.texels = gl.BufferTexture(pose.gpu.ctx.buffer(reserve=4 * max(len(pose.cloud), 1)), gl.R32F)
+        with pose.gpu.timers.measure("spacings"):
+            self._find(pose)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.texels.buffer.size
+
+    def _find(self, pose: GpuPose) -> None:
+        gpu, count, repeated = pose.gpu, len(pose.cloud), copies_in(pose)
+        places = 1 << max(count // _PER_PLACE, 1).bit_length()
+        bins, todo, sparse = Bins(gpu, places), IndexList(gpu, count), IndexList(gpu, count)
+        todo.write(np.arange(count, dtype=np.uint32))
+        edge = 2 * _BALL * pose.stored.remember(_usual)
+        for level in range(_LEVELS):
+            if not len(todo):
+                break
+
+            def bind(program: Program, per_voxel: float = 1 / (edge * 2**level)) -> None:
+                gpu.set(program, per_voxel=per_voxel, table_mask=places - 1)
+                steady_points(pose).bind(Texture.POSITIONS)
+                if repeated is not None:
+                    repeated.bind(Texture.COPIES)
+
+            defines = {"COPIES": int(repeated is not None)}
+            visits = Visits("hpr/voxel_items.glsl", count, bind, defines)
+            bins.count(visits)
+            bins.fill(visits, count)
+            last = level == _LEVELS - 1
+            program = gpu.compute("hpr/spacing.comp", {"LAST": int(last), "ENOUGH": f"{ENOUGH}u"})
+            bind(program)
+            bins.starts.bind(Texture.STARTS)
+            bins.items.bind(Texture.LISTED)
+            self.texels.buffer.bind_to_storage_buffer(Storage.SPACINGS)
+            sparse.clear()
+            sparse.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
+            todo.run(program)
+            todo, sparse = sparse, todo
+        for each in (bins, todo, sparse):
+            each.release()
+
+    def release(self) -> None:
+        """Delete it."""
+        self.texels.release()

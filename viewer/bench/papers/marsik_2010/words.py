@@ -1,0 +1,185 @@
+"""Code words measured: time beside other ways to draw, pixels beside surfels of the same radii, tables.
+
+The paper's model, a bone of 25,816 elements, is not to be had: scenes are surfaces with as many. Processor
+time is of all threads, the driver's included: what the work takes where OpenGL is software; wall time counts
+where it is a card. Ways take turns, from a camera that moves between pictures.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ....backends import backend
+from ....camera import PROJECTIONS, Camera
+from ....codewords import settings as words
+from ....codewords.engine import draw_words
+from ....codewords.tables import PAPER, Steps, shape_table
+from ....errors import InputError
+from ....frame import Request, render_frame, view_of
+from ....gpu.constants import NOTHING
+from ....gpu.surface import Surface
+from ....scan.pose import Pose
+from ....timing import draw
+from ...plan import Group
+from ...report.results import Row
+from ...run import LOOK, Bench, undisturbed
+
+SCENES = ("torus", "horse", "armadillo")
+COUNT = 25_816  # elements of the paper's bone, Fig. 6
+SIZES = ((640, 480), (1024, 768))
+BACKEND = "codeword"
+WITHOUT_GL = "without OpenGL"
+_SEEN_FROM = (30.0, 20.0)  # degrees
+_STEP = 0.5  # degrees from one picture to the next
+_TABLES = {"paper": PAPER, "finer": Steps(sizes=65, size_parts=8, normals=121, normal_parts=10)}
+
+
+@dataclass(frozen=True)
+class WayToDraw:
+    """A way to draw. backend: which; empty: words on the CPU alone. params: of it."""
+
+    name: str
+    backend: str
+    params: dict[str, Any]
+
+
+WAYS = (
+    WayToDraw("codeword", BACKEND, {}),
+    WayToDraw("codeword, lighting own", BACKEND, {"lighting": "own"}),
+    WayToDraw("codeword, exact", BACKEND, {"quality": "exact"}),
+    WayToDraw(WITHOUT_GL, "", {}),
+    WayToDraw(f"{WITHOUT_GL}, exact", "", {"quality": "exact"}),
+    WayToDraw("surfels, one pass", "surfels", {"passes": "one", "radius": "own", "epsilon": 0.0}),
+    WayToDraw("points", "points", {}),
+)
+
+
+def measure_times(
+    bench: Bench, scenes: Sequence[str] = SCENES, count: int = COUNT, sizes: Sequence[tuple[int, int]] = SIZES
+) -> Iterator[Row]:
+    """Yield a row for each scene and picture size: medians of processor and wall time a picture, ms."""
+    for name, pose, up in _scenes(bench, scenes, count):
+        for size in sizes:
+            surface, camera = Surface(bench.renderer.gpu, size), _camera(pose, size, up)
+            turns = [camera, camera.orbited(_STEP, 0)]
+            taken: dict[str, list[tuple[float, float]]] = {way.name: [] for way in WAYS}
+            with undisturbed():
+                for turn in range(2 + bench.settings.repeat):
+                    for way in WAYS:
+                        busy, wall = time.process_time(), time.perf_counter()
+                        _draw(bench, way, pose, turns[turn % 2], surface)
+                        taken[way.name].append((time.process_time() - busy, time.perf_counter() - wall))
+            surface.release()
+            medians = {way: 1e3 * np.median(times[2:], axis=0) for way, times in taken.items()}
+            yield {
+                **_row(bench, name, pose, size),
+                "busy_ms": {way: round(float(busy), 2) for way, (busy, _) in medians.items()},
+                "wall_ms": {way: round(float(wall), 2) for way, (_, wall) in medians.items()},
+            }
+
+
+def measure_pixels(
+    bench: Bench, scenes: Sequence[str] = SCENES, count: int = COUNT, size: tuple[int, int] = SIZES[0]
+) -> Iterator[Row]:
+    """Yield a row for each scene, projection and quality: how code words differ from surfels in one pass
+    without blending, with the same radii."""
+    surfels = next(way for way in WAYS if way.backend == "surfels")
+    for name, pose, up in _scenes(bench, scenes, count):
+        for projection in PROJECTIONS:
+            camera = _camera(pose, size, up, projection)
+            discs = _surface(bench, surfels.backend, surfels.params, pose, camera, size)
+            for quality in ("table", "exact"):
+                drawn = _surface(bench, BACKEND, {"quality": quality}, pose, camera, size)
+                row = {**_row(bench, name, pose, size), "projection": projection, "quality": quality}
+                yield row | pixel_errors(drawn, discs, pose)
+                drawn.release()
+            discs.release()
+
+
+def pixel_errors(drawn: Surface, discs: Surface, pose: Pose) -> dict[str, float]:
+    """Differences of a picture from that of discs.
+
+    ids, covered: percent of the pixels that either covers. depth: largest difference where both show one
+    point, of the scan's radius. normal: median angle where both show any, degrees.
+    """
+    ids, others = drawn.id, discs.id
+    either, both = (ids != NOTHING) | (others != NOTHING), (ids != NOTHING) & (others != NOTHING)
+    same = both & (ids == others)
+    off = np.abs(drawn.depth[same] - discs.depth[same])
+    cosines = np.einsum("...i,...i", drawn.normal[both], discs.normal[both])
+    return {
+        "ids": round(100 * float((ids != others)[either].mean()), 3),
+        "covered": round(100 * float(1 - both[either].mean()), 3),
+        "depth": float(f"{off.max(initial=0) / pose.bounds.radius:.2g}"),
+        "normal": round(float(np.degrees(np.arccos(np.clip(np.median(cosines), -1, 1)))), 2),
+    }
+
+
+def measure_tables(bench: Bench, scenes: Sequence[str] = ()) -> Iterator[Row]:
+    """Yield a row for each set of steps: how long its table takes, and bytes of it and of bitmaps. scenes:
+    any, tables are of none."""
+    for name, steps in _TABLES.items():
+        taken = []
+        for _ in range(max(bench.settings.repeat, 1)):
+            start = time.process_time()
+            table = shape_table.__wrapped__(steps)  # past the cache
+            taken.append(1e3 * (time.process_time() - start))
+        yield {
+            "steps": name,
+            "sizes": steps.sizes,
+            "normals": steps.normals,
+            "busy_ms": {"table": round(float(np.median(taken)), 1)},
+            "nbytes": table.nbytes,
+            "bitmap_bytes": table.bitmap_bytes,
+            **bench.where(),
+        }
+
+
+def _scenes(bench: Bench, scenes: Sequence[str], count: int) -> Iterator[tuple[str, Pose, str]]:
+    """Name, pose and upward axis of each scene; what cannot be had is noted and left out."""
+    for scene in scenes:
+        try:
+            subject = bench.subject(Group(scene, (), count=count))
+            yield subject.name, subject.moment(0).pose, subject.up
+        except InputError as error:
+            bench.note(f"{scene} is left out: {error}")
+
+
+def _camera(pose: Pose, size: tuple[int, int], up: str, projection: str = "perspective") -> Camera:
+    return Camera.orbit(pose.bounds, *_SEEN_FROM, aspect=size[0] / size[1], up=up, projection=projection)
+
+
+def _draw(bench: Bench, way: WayToDraw, pose: Pose, camera: Camera, surface: Surface) -> None:
+    """A picture, ready to be looked at."""
+    if way.backend:
+        params = backend(way.backend).params(way.params)
+        draw(bench.renderer, Request(pose, camera, way.backend, params, LOOK), surface)
+        bench.renderer.gpu.ctx.finish()
+    else:
+        view = view_of(Request(pose, camera), surface.size)
+        draw_words(words.words_of(pose, view, LOOK, words.Params(**way.params)))
+
+
+def _surface(
+    bench: Bench, name: str, params: dict[str, Any], pose: Pose, camera: Camera, size: tuple[int, int]
+) -> Surface:
+    surface = Surface(bench.renderer.gpu, size)
+    render_frame(bench.renderer, Request(pose, camera, name, backend(name).params(params), LOOK), surface)
+    return surface
+
+
+def _row(bench: Bench, scene: str, pose: Pose, size: tuple[int, int]) -> Row:
+    return {
+        "scene": scene,
+        "n": pose.count,
+        "params": {},
+        "size": list(size),
+        "repeat": bench.settings.repeat,
+        "seed": bench.settings.seed,
+        **bench.where(),
+    }

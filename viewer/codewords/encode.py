@@ -1,0 +1,198 @@
+"""Encoding: from points and a view to a stream of code words.
+
+This is the part that works with fractions, float64: projection, the two light terms, and what is rounded of
+these. Each number that goes into a word is one fraction rounded to the nearest step (halves to even) after it
+was held within its range, and nothing is decided by comparing two fractions of different elements but for the
+least and the largest depth. A last bit that another machine rounds otherwise moves one element by one step in
+one field; what follows is whole numbers.
+
+    x, y            the centre, to the nearest corner of pixels: off by half a pixel at most in each
+    size, normal    of the disc whose image is the element's ellipse, to first order round its centre; see
+                    `tables`. n' is held within the table's range, along its direction
+    Z               what is linear over planes in the picture, 0 to 511 over the range of all centres drawn
+    DIFFUSE, ...    127 times cosine and highlight
+
+With exact outlines size and normal are not rounded, nor is the centre: a pixel is covered where its centre is
+inside of the disc's image, perspective included, and depth follows the disc's plane, see `WordStream.finer`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..view import View
+from .lighting import Materials
+from .stream import FINE_DEPTHS, STEEPEST_DEPTHS, WordStream, check_picture_size, strip_width
+from .tables import PAPER, Steps, shape_table
+from .words import DEPTHS
+
+LEAST_RADIUS = 0.7072  # pixels: a smaller disc may miss all pixel centres
+MOST_WORDS = 1 << 27  # of a picture
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Points with what code words need of them, N of each.
+
+    positions: (N, 3) float32, relative to the view's origin. normals: (N, 3) float32, or None; a missing one
+    faces the eye. radii: (N,) float32, scan units, or None. axes: (N, 4) float32 half-axes of ellipses, as
+    `PointCloud` has them, or None. materials: (N,) uint8. radius: of points without one of their own.
+    """
+
+    positions: NDArray[np.float32]
+    materials: NDArray[np.uint8]
+    normals: NDArray[np.float32] | None = None
+    radii: NDArray[np.float32] | None = None
+    axes: NDArray[np.float32] | None = None
+    radius: float = 1.0
+
+
+@dataclass(frozen=True)
+class Light:
+    """White light on code words. direction: towards it, view space; None: it is where the eye is.
+    shininess: Phong's exponent. is_lit: False: all words are as bright as their materials' diffuse colour."""
+
+    direction: tuple[float, float, float] | None = None
+    shininess: float = 24.0
+    is_lit: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """Elements that a picture may show, M of them, projected and in steps.
+
+    rows: (M,) uint32, which ones. shapes: (M, 7) int32, and planes: (M, 10) float64, see `encode_kernels`.
+    near, far: depths from the view's base that the least and the largest Z stand for, scan units.
+    """
+
+    rows: NDArray[np.uint32]
+    shapes: NDArray[np.int32]
+    planes: NDArray[np.float64]
+    near: float
+    far: float
+
+
+def encode_elements(
+    elements: Elements,
+    view: View,
+    materials: Materials,
+    light: Light = Light(),  # a frozen value
+    *,
+    steps: Steps = PAPER,
+    exact: bool = False,
+    radius_scale: float = 1.0,
+    cull_back: bool = False,
+    background: tuple[int, int, int, int] = (0, 0, 0, 255),
+) -> WordStream:
+    """Code words of what a view shows of some points; ids are their rows. Float64 throughout.
+
+    exact: outlines and depths are not quantised to the steps, see above. radius_scale: factor on radii.
+    cull_back: whether elements that face away are left out. Raises InputError where there are too many.
+    """
+    check_picture_size(view.size)
+    found = project_elements(elements, view, light, steps, exact, radius_scale, cull_back)
+    depths, finer = _depths(found.planes, found.near, found.far, view.perspective, exact)
+    line_starts, words, ids, fine = emit_words(found, elements.materials, view.size, steps, depths, finer)
+    return WordStream(
+        size=view.size, stride=strip_width(view.size[0]), line_starts=line_starts, words=words, ids=ids,
+        near=found.near + view.base, far=found.far + view.base, materials=materials, background=background,
+        perspective=view.perspective, finer=fine,
+    )  # fmt: skip
+
+
+def project_elements(
+    elements: Elements,
+    view: View,
+    light: Light,
+    steps: Steps = PAPER,
+    exact: bool = False,
+    radius_scale: float = 1.0,
+    cull_back: bool = False,
+) -> Projected:
+    """The elements that a view may show, in steps; arguments as those of `encode_elements`."""
+    from .encode_kernels import PLANE_COLUMNS, SHAPE_COLUMNS, project
+
+    count = len(elements.positions)
+    rows, spread = np.empty(count, np.uint32), np.empty(2)
+    shapes, planes = np.empty((count, SHAPE_COLUMNS), np.int32), np.empty((count, PLANE_COLUMNS))
+    none = np.empty((0, 3), np.float32)
+    direction = light.direction or (0.0, 0.0, 1.0)
+    drawn = project(
+        elements.positions,
+        none if elements.normals is None else elements.normals,
+        np.empty(0, np.float32) if elements.radii is None else elements.radii,
+        np.empty((0, 4), np.float32) if elements.axes is None else elements.axes,
+        np.column_stack([view.rotation, view.translation]),
+        np.array([*view.size, *view.center, view.scale, view.near, view.far]),
+        np.array([elements.radius, radius_scale, LEAST_RADIUS]),
+        np.array([*direction, light.shininess]),
+        _parts(steps),
+        np.array([view.perspective, light.is_lit, light.direction is None, cull_back, exact]),
+        rows, shapes, planes, spread,
+    )  # fmt: skip
+    near, far = (float(end) for end in spread) if drawn else (1.0, 1.0)
+    return Projected(rows[:drawn], shapes[:drawn], planes[:drawn], near, far)
+
+
+def emit_words(
+    found: Projected,
+    materials: NDArray[np.uint8],
+    size: tuple[int, int],
+    steps: Steps,
+    depths: NDArray[np.int32],
+    finer: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint32], NDArray[np.int32] | None]:
+    """(line_starts, words, ids, finer), as `WordStream` has them, of elements.
+
+    materials: (N,) of all points. size: of the picture. depths: (M,), Z of each. finer: (M, 3), in steps, at
+    the corner and a pixel right and down, of exact outlines; None: they are those of the table. Raises
+    InputError where there are too many words.
+    """
+    from .encode_kernels import emit
+
+    width, height = size
+    stride, exact, table = strip_width(width), finer is not None, shape_table(steps)
+    cursor = np.zeros(-(-width // stride) * height, np.int64)
+    given = (
+        size, stride, _parts(steps), table.entries, table.rows, table.reach, exact,
+        found.rows, materials[found.rows], found.shapes, found.planes, depths,
+        np.empty((len(depths), 3)) if finer is None else finer,
+    )  # fmt: skip
+    emit(*given, cursor, np.empty(0, np.uint64), np.empty(0, np.uint32), np.empty((0, 3), np.int32))
+    starts = np.concatenate([[0], np.cumsum(cursor)])
+    if (total := int(starts[-1])) > MOST_WORDS:
+        raise InputError(
+            f"{total:,} code words in one picture", hint="Move away, or draw smaller splats with radius_scale"
+        )
+    words, ids = np.empty(total, np.uint64), np.empty(total, np.uint32)
+    fine = np.empty((total if exact else 0, 3), np.int32)
+    if total:
+        emit(*given, starts[:-1].copy(), words, ids, fine)
+    return starts, words, ids, fine if exact else None
+
+
+def _parts(steps: Steps) -> NDArray[np.int64]:
+    """Steps as the compiled loops have them."""
+    return np.array([steps.size_parts, steps.steepest, steps.normal_parts])
+
+
+def _depths(
+    planes: NDArray[np.float64], near: float, far: float, perspective: bool, exact: bool
+) -> tuple[NDArray[np.int32], NDArray[np.float64] | None]:
+    """Z of elements, (M,), and finer depths, (M, 3) where outlines are exact: at their corners, and how much
+    these grow a pixel right and down; of discs that are steeper than words hold, all of it as the centre."""
+    start, end = (1 / near, 1 / far) if perspective else (near, far)
+    span = (end - start) or 1.0
+    centers = (planes[:, 0] - start) / span
+    z = np.rint(np.clip(centers, 0, 1) * (DEPTHS - 1)).astype(np.int32)
+    if not exact:
+        return z, None
+    finer = (planes[:, 1:4] - [start, 0, 0]) * (FINE_DEPTHS / span)
+    steep = (np.abs(finer[:, 1:]) > STEEPEST_DEPTHS).any(axis=1)
+    finer[steep] = 0
+    finer[steep, 0] = centers[steep] * FINE_DEPTHS
+    return z, finer

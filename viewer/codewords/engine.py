@@ -1,0 +1,151 @@
+"""Engine of code words on the CPU: whole numbers alone, the same picture everywhere.
+
+Maršík 2010, 2.4: a window of some lines slides down the picture, strip by strip. A word is drawn when the
+window's first line is its own; then this line can receive nothing more, and is flushed. As bitmaps have
+eight rows, any window of eight lines or more gives the same picture.
+
+The rule: of the words that cover a pixel, that with the least depth is seen; of those the one with the
+lowest id; of these the first in the stream. Depth is Z, or, where the stream has finer ones, depth + x right
++ y down at the pixel's place (x, y) in the word's bitmap. What lies right of a strip or below the picture is
+cut off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..scan.octree.threads import ranges, threads_for, together
+from ..scan.points import NOTHING
+from .lighting import LIGHT_BYTES
+from .stream import WordStream
+from .tables import BITMAP
+from .words import decode_words, row_spans
+
+WINDOW = 16  # lines
+_PIXELS = 16  # that a word covers, about
+NO_WORD = NOTHING
+NO_KEY = 0x7FFFFFFF  # depth where nothing is, behind all others
+
+
+@dataclass(frozen=True, eq=False)
+class CodePicture:
+    """Picture that an engine draws, row 0 at the top.
+
+    image: (H, W, 4) uint8 sRGB and alpha. keys: (H, W) int32, depths as the stream counts them, NO_KEY for
+    nothing. places: (H, W) uint32, of the words that are seen, in the stream, NO_WORD for none.
+    """
+
+    stream: WordStream
+    image: NDArray[np.uint8]
+    keys: NDArray[np.int32]
+    places: NDArray[np.uint32]
+
+    @property
+    def covered(self) -> NDArray[np.bool_]:
+        """(H, W): whether a pixel shows anything."""
+        return self.keys != NO_KEY
+
+    def depths(self) -> NDArray[np.float32]:
+        """(H, W): scan units, +inf for nothing."""
+        return np.where(self.covered, self.stream.depths(self.keys), np.float32(np.inf))
+
+    def ids(self) -> NDArray[np.uint32]:
+        """(H, W): of the points that are seen, NO_WORD for none."""
+        ids = np.append(self.stream.ids, np.uint32(NO_WORD))
+        return ids[np.minimum(self.places, len(self.stream))]
+
+
+def draw_words(
+    stream: WordStream, window: int = WINDOW, background: NDArray[np.uint8] | None = None
+) -> CodePicture:
+    """Draw a stream, compiled, on several threads. See `draw_words_plainly` for the rules in a few lines.
+
+    window: lines, at least eight. background: (H, W, 4) uint8 that is drawn over; None: the stream's colour.
+    Raises InputError.
+    """
+    from .engine_kernels import slide
+
+    picture = begun(stream, window, background)
+    materials = stream.materials
+    no_finer = np.empty((0, 3), np.int32)
+    coefficients = np.stack([materials.ambient, materials.diffuse, materials.specular]).astype(np.int32)
+
+    def drawn(strip: int, top: int, bottom: int) -> None:
+        left, height = strip * stream.stride, stream.size[1]
+        slide(
+            height, left, min(stream.stride, stream.size[0] - left), top, bottom,
+            stream.line_starts[strip * height : (strip + 1) * height + 1], stream.words, stream.ids,
+            no_finer if stream.finer is None else stream.finer, coefficients, LIGHT_BYTES, window,
+            picture.image, picture.keys, picture.places,
+        )  # fmt: skip
+
+    together(_PIXELS * len(stream), [partial(drawn, *part) for part in _parts(stream)])
+    return picture
+
+
+def _parts(stream: WordStream) -> list[tuple[int, int, int]]:
+    """(strip, first line, last line + 1) of parts that threads draw, each of about as many words."""
+    height, found = stream.size[1], []
+    for strip in range(stream.strips):
+        starts = stream.line_starts[strip * height : (strip + 1) * height + 1]
+        shares = np.linspace(starts[0], starts[-1], threads_for(_PIXELS * len(stream)) + 1)[1:-1]
+        borders = np.concatenate([[0], np.searchsorted(starts[:-1], shares), [height]])
+        found += [(strip, top, bottom) for top, bottom in ranges(borders)]
+    return found
+
+
+def draw_words_plainly(
+    stream: WordStream, window: int = WINDOW, background: NDArray[np.uint8] | None = None
+) -> CodePicture:
+    """Draw a stream as `draw_words` does, slow and obvious: the twin of all engines."""
+    picture, (width, height) = begun(stream, window, background), stream.size
+    fields = decode_words(stream.words)
+    colors = stream.materials.colors(fields["material"], fields["diffuse"], fields["specular"])
+    for strip in range(stream.strips):
+        left = strip * stream.stride
+        columns = min(stream.stride, width - left)
+        keys = np.full((window, columns), NO_KEY, np.int64)
+        places = np.full((window, columns), NO_WORD, np.int64)
+        for y in range(height):
+            line = strip * height + y
+            for place in range(int(stream.line_starts[line]), int(stream.line_starts[line + 1])):
+                x = int(fields["x"][place])
+                for row, (first, last) in enumerate(row_spans(int(stream.words[place]))):
+                    for column in range(first, min(last, columns - 1 - x) + 1):
+                        at = (y + row) % window, x + column  # below the picture it is never flushed
+                        key = int(fields["z"][place])
+                        if stream.finer is not None:
+                            key = int(stream.finer[place] @ np.array([1, column, row]))
+                        rank = key, int(stream.ids[place]), place
+                        if rank < (keys[at], _id(stream, places[at]), places[at]):
+                            keys[at], places[at] = key, place
+            seen = keys[y % window] != NO_KEY
+            part = slice(left, left + columns)
+            picture.image[y, part][seen, :3] = colors[places[y % window][seen]]
+            picture.image[y, part][seen, 3] = 255
+            picture.keys[y, part], picture.places[y, part] = keys[y % window], places[y % window]
+            keys[y % window], places[y % window] = NO_KEY, NO_WORD
+    return picture
+
+
+def _id(stream: WordStream, place: int) -> int:
+    return NO_WORD if place == NO_WORD else int(stream.ids[place])
+
+
+def begun(stream: WordStream, window: int, background: NDArray[np.uint8] | None) -> CodePicture:
+    """A picture of which nothing is drawn yet. Raises InputError."""
+    width, height = stream.size
+    if window < BITMAP:
+        raise InputError(f"a window of {window} lines", hint=f"A bitmap has {BITMAP}")
+    if background is not None and background.shape != (height, width, 4):
+        what = f"a background of shape {background.shape} for a picture of {width} x {height} pixels"
+        raise InputError(what, hint="Give one of (height, width, 4)")
+    image = np.empty((height, width, 4), np.uint8)
+    image[:] = stream.background if background is None else background
+    keys = np.full((height, width), NO_KEY, np.int32)
+    return CodePicture(stream, image, keys, np.full((height, width), NO_WORD, np.uint32))

@@ -1,0 +1,91 @@
+"""The inner loop of the engine of code words, compiled by numba; see `engine`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan.octree.compiled import compiled
+from ..scan.points import NOTHING
+from .tables import BITMAP
+
+_NO_KEY = np.int32(0x7FFFFFFF)
+_NO_WORD = np.uint32(NOTHING)
+
+
+@compiled
+def slide(
+    height: int,
+    left: int,
+    columns: int,
+    top: int,
+    bottom: int,
+    line_starts: NDArray[np.int64],
+    words: NDArray[np.uint64],
+    ids: NDArray[np.uint32],
+    finer: NDArray[np.int32],
+    materials: NDArray[np.int32],
+    light_bytes: NDArray[np.uint8],
+    window: int,
+    image: NDArray[np.uint8],
+    keys: NDArray[np.int32],
+    places: NDArray[np.uint32],
+) -> None:
+    """Slide a window down a part of a strip.
+
+    left, columns: of the strip. top, bottom: lines that are flushed, the last one not. line_starts: of the
+    strip alone, (height + 1,). materials: (3, M, 3), I_0, k_d and k_s. image, keys, places: as `CodePicture`
+    has them, of what is not drawn.
+    """
+    has_finer = len(finer) > 0
+    most = len(light_bytes) - 1
+    window_keys = np.full((window, columns), _NO_KEY, np.int32)
+    window_places = np.full((window, columns), _NO_WORD, np.uint32)
+    for y in range(max(top - BITMAP + 1, 0), bottom):
+        for place in range(line_starts[y], line_starts[y + 1]):
+            low = np.uint32(words[place] & np.uint64((1 << 32) - 1))
+            high = np.uint32(words[place] >> np.uint64(32))
+            scans = np.int32(low >> np.uint32(1)) & 0xFFFFFF
+            x = np.int32(high >> np.uint32(14)) & 511
+            key = np.int32(high >> np.uint32(23))
+            is_tile = low & np.uint32(1) != 0
+            right = grown_down = np.int32(0)
+            if has_finer:
+                key, right, grown_down = finer[place, 0], finer[place, 1], finer[place, 2]
+            for row in range(min(4 if is_tile else 8, height - y)):
+                span = scans >> (6 * (row if row < 4 else 7 - row))
+                first, last = span & 7, span >> 3 & 7
+                if row >= 4:
+                    first, last = 7 - last, 7 - first
+                slot = (y + row) % window
+                for column in range(first, min(last, columns - 1 - x) + 1):
+                    here = np.int32(key + column * right + row * grown_down)
+                    before = window_keys[slot, x + column]
+                    if here < before or (
+                        here == before and ids[place] < ids[window_places[slot, x + column]]
+                    ):
+                        window_keys[slot, x + column] = here
+                        window_places[slot, x + column] = place
+        slot = y % window
+        for column in range(columns):
+            place = window_places[slot, column]
+            window_places[slot, column] = _NO_WORD
+            if place == _NO_WORD:
+                continue
+            key, window_keys[slot, column] = window_keys[slot, column], _NO_KEY
+            if y < top:
+                continue
+            at = left + column
+            keys[y, at] = key
+            places[y, at] = place
+            diffuse = np.int32(words[place] >> np.uint64(25)) & 127
+            specular = np.int32(words[place] >> np.uint64(32)) & 127
+            material = np.int32(words[place] >> np.uint64(39)) & 127
+            diffuse += diffuse >> 6
+            specular += specular >> 6
+            for channel in range(3):
+                lit = materials[1, material, channel] * diffuse
+                lit += materials[2, material, channel] * specular
+                light = min(materials[0, material, channel] + (lit + 64 >> 7), most)
+                image[y, at, channel] = light_bytes[light]
+            image[y, at, 3] = 255

@@ -1,0 +1,204 @@
+"""What of a pose, a look and parameters becomes code words: colours as materials, light, sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import up_vector
+from ..look import Look, color_table, light_direction, rgba, value_source
+from ..params import param
+from ..scan.layers import NO_LAYERS, Layers
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from ..scan.ranges import robust_range
+from ..scan.spacing import typical_spacing
+from ..srgb import bytes_from_light, light_from_bytes
+from ..view import View
+from .encode import Elements, Light, encode_elements
+from .lighting import Materials, map_palette, mapped, palette_of
+from .stream import WordStream
+from .tables import Steps
+
+_RADIUS_PER_SPACING = 1.5  # closes a surface that is evenly covered
+_LUMA = np.array([0.2126, 0.7152, 0.0722])
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of code words."""
+
+    quality: str = param(
+        "table",
+        "table: shapes, places and depths in the steps of the paper; exact: outlines are the discs' own, and "
+        "depth follows their planes",
+        choices=("table", "exact"),
+        sweep=("table", "exact"),
+        group="Words",
+        basic=True,
+    )
+    sizes: int = param(
+        17, "Number of radii in the table", low=2, high=65, group="Words", when={"quality": ("table",)}
+    )
+    size_parts: int = param(
+        2, "Radii of the table to a pixel", low=1, high=8, group="Words", when={"quality": ("table",)}
+    )
+    normals: int = param(
+        61,
+        "Number of values of n'x, and of n'y, in the table; odd",
+        low=3,
+        high=121,
+        group="Words",
+        when={"quality": ("table",)},
+    )
+    normal_parts: int = param(
+        5,
+        "Values of n'x and n'y to 1, which is a tilt by 45 degrees",
+        low=1,
+        high=20,
+        group="Words",
+        when={"quality": ("table",)},
+    )
+    radius: str = param(
+        "own",
+        "own: the scan's own, estimated where it has none; uniform: one for all",
+        choices=("own", "uniform"),
+        group="Splats",
+    )
+    radius_scale: float = param(
+        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group="Splats", basic=True
+    )
+    cull_back: bool = param(False, "Leave out discs that face away", group="Splats")
+    window: int = param(
+        16, "Lines of the window that slides down the picture", low=8, high=64, affects="speed", group="Speed"
+    )
+
+    @property
+    def steps(self) -> Steps:
+        """Steps of the table. Raises InputError."""
+        return Steps(self.sizes, self.size_parts, self.normals, self.normal_parts)
+
+
+def words_of(pose: Pose, view: View, look: Look, params: Params, layers: Layers = NO_LAYERS) -> WordStream:
+    """Code words of a pose as a view shows it; ids are rows of its cloud. view: from an origin of positions.
+
+    Points without a normal face the eye, those without a radius have one for all. Raises InputError for what
+    the scan or the parameters do not allow.
+    """
+    materials, index, lights = word_look(pose, view, look, layers)
+    return encode_elements(
+        elements_of(pose, view, params, index),
+        view,
+        materials,
+        lights,
+        steps=params.steps,
+        exact=params.quality == "exact",
+        radius_scale=params.radius_scale,
+        cull_back=params.cull_back,
+        background=rgba(look.background),
+    )
+
+
+def elements_of(pose: Pose, view: View, params: Params, materials: NDArray[np.uint8]) -> Elements:
+    """The points of a pose as elements. materials: (N,), of each."""
+    cloud, own = pose.cloud, params.radius != "uniform"
+    if (cloud.origin != view.origin).any():
+        cloud = cloud.centered(view.origin)
+    return Elements(
+        positions=cloud.positions,
+        materials=materials,
+        normals=cloud.normals,
+        radii=cloud.radii if own else None,
+        axes=cloud.axes if own else None,
+        radius=uniform_radius(pose.cloud, params),
+    )
+
+
+def uniform_radius(cloud: PointCloud, params: Params) -> float:
+    """The radius of points without one of their own, scan units; 1 where there is none of these."""
+    suffices = params.radius != "uniform" and cloud.radii is not None and bool((cloud.radii > 0).all())
+    return 1.0 if suffices or not len(cloud) else _RADIUS_PER_SPACING * cloud.remember(typical_spacing)
+
+
+def word_look(
+    pose: Pose, view: View, look: Look, layers: Layers = NO_LAYERS
+) -> tuple[Materials, NDArray[np.uint8], Light]:
+    """Materials, which of them each point is of, (N,), and the light. Raises InputError for a number that
+    the pose has not."""
+    palette, index = point_materials(pose, view, look, layers)
+    lights = word_lights(look, pose.cloud.normals is not None)
+    shares = (look.ambient, look.diffuse, look.specular) if lights.is_lit else (0.0, 1.0, 0.0)
+    return Materials.of_palette(palette, *shares), index, lights
+
+
+def word_lights(look: Look, has_normals: bool) -> Light:
+    """The light of a look; automatic: from the eye where there are normals. Eye-dome lighting, which needs
+    the depths around a pixel, is none of words'."""
+    kind = look.light if look.light != "auto" else "head" if has_normals else "flat"
+    direction = light_direction(look) if kind == "fixed" else None
+    return Light(direction, look.shininess, kind != "flat")
+
+
+def point_materials(
+    pose: Pose, view: View, look: Look, layers: Layers = NO_LAYERS
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Colours of materials, (M, 3) sRGB, and the material of each point, (N,): what the look colours by.
+
+    Up to 128 colours of points stay as they are; of more, 128 are chosen. Numbers have 127 colours of
+    the look's map. Raises InputError for a number that the pose has not.
+    """
+    cloud, scalars = pose.cloud, {**pose.cloud.scalars, **layers.scalars}
+    source = value_source(look, scalars)
+    if source is not None:
+        values, low, high = _values(pose, view, look, layers, source)
+        table = map_palette(color_table(look.color_map), rgba(look.plain))
+        return table, mapped(values, low, high)
+    if look.color_by == "normal" and cloud.normals is not None:
+        return palette_of(_direction_colors(layers.place.directions(cloud.normals)))
+    if look.color_by == "id":
+        return palette_of(_id_colors(np.arange(len(cloud)) if cloud.ids is None else cloud.ids))
+    if look.color_by in ("plain", "normal") or cloud.colors is None:
+        return np.array([rgba(look.plain)[:3]], np.uint8), np.zeros(len(cloud), np.uint8)
+    palette, index = cloud.remember(_own_palette)
+    if look.color_by == "level":  # all of it was measured, which is grey
+        grey = bytes_from_light(light_from_bytes(palette) @ _LUMA)
+        return np.repeat(grey[:, None], 3, axis=1), index
+    return palette, index
+
+
+def _own_palette(cloud: PointCloud) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    assert cloud.colors is not None
+    return palette_of(cloud.colors)
+
+
+def _values(pose: Pose, view: View, look: Look, layers: Layers, source: str) -> tuple[NDArray, float, float]:
+    """Numbers of all points that a look colours by, and the ends of its colour map."""
+    if source == "depth":
+        relative = pose.cloud.positions + (pose.origin - view.origin)
+        values = view.depths(relative) + view.base
+    elif source == "height":
+        values = layers.place.points(pose.cloud.world()) @ up_vector(look.up)
+    else:
+        values = np.asarray({**pose.cloud.scalars, **layers.scalars}[source], np.float64)
+    low, high = look.low, look.high
+    if low is None or high is None:
+        found = robust_range(values)
+        low, high = found[0] if low is None else low, found[1] if high is None else high
+    return values, low, high
+
+
+def _direction_colors(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = np.nan_to_num(normals / length, nan=0.0, posinf=0.0, neginf=0.0)
+    return np.rint((0.5 * unit + 0.5).clip(0, 1) * 255).astype(np.uint8)
+
+
+def _id_colors(ids: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """Colours that tell neighbouring numbers apart, as shade/shade.comp has them."""
+    mixed = ids.astype(np.uint32) * np.uint32(2654435761)
+    mixed ^= mixed >> np.uint32(16)
+    parts = mixed[:, None] >> np.array([0, 8, 16], np.uint32)
+    return (64 + (parts & np.uint32(127)) * 3 // 2).astype(np.uint8)

@@ -1,0 +1,253 @@
+"""Streams of code words: what an engine is sent for one picture. They can be saved, as `.cw` files.
+
+A picture is cut into strips of at most 512 columns, as a word's X has nine bits. Each strip has its words
+line by line, from the top: a line holds those whose first row it is, by ascending id. Z counts what is linear
+over a plane in the picture, as depth buffers do: depth in parallel views, and its inverse in perspective.
+
+A `.cw` file, all little-endian:
+
+    8 bytes    "SCAN4DCW"
+    uint32     version 1; flags (1: perspective, 2: finer depths); width; height; strips; materials
+    uint64     words
+    float64    nearest depth (Z = 0); farthest depth (Z = 511), scan units
+    4 bytes    background, sRGB and alpha
+    uint32     first column of each strip
+    uint32     words in each line, all lines of the first strip, then those of the next one
+    uint64     the words
+    uint32     an id for each word
+    int32 x 3  for each word, with finer depths: see `WordStream.finer`
+    uint16     materials x 3 each: I_0, k_d, k_s
+    uint32     CRC-32 of all before
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, explained
+from ..files import open_plain, whole_file
+from .lighting import Materials
+from .words import COLUMNS, DEPTHS, FIELDS
+
+SUFFIX = ".cw"
+FINE_DEPTHS = 1 << 24  # steps of finer depths from the nearest to the farthest
+STEEPEST_DEPTHS = 1 << 26  # that finer depths may grow by in a pixel
+_MAGIC, _VERSION = b"SCAN4DCW", 1
+_PERSPECTIVE, _FINER = 1, 2
+_HEADER = struct.Struct("<8s6IQdd4s")
+_CHECKSUM = struct.Struct("<I")
+_MOST_PIXELS = 1 << 26
+_LONGEST_EDGE = 1 << 15
+_NEAREST, _FARTHEST = 1e-30, 1e30  # scan units, whose inverses float32 holds too
+
+
+@dataclass(frozen=True, eq=False)
+class WordStream:
+    """Words of a picture in the order that an engine takes them.
+
+    size: (width, height). stride: columns of a strip, but for the last one, which has what is left.
+    line_starts: (strips * height + 1,) int64: the words of line y of strip s are those from number
+    line_starts[s * height + y] on. words: (N,) uint64. ids: (N,) uint32: of the points that they are of.
+    near, far: depths that Z = 0 and 511 stand for, scan units. materials: of the lighting. background: sRGB
+    and alpha. perspective: whether Z counts inverse depths.
+
+    finer: None, or (N, 3) int32 beside the words: depth at the first row and left column of a word's bitmap,
+    and how much it grows a pixel to the right and a pixel down, with FINE_DEPTHS steps from near to far.
+    It takes the place of Z. Sums within a bitmap stay within 32 bits.
+
+    Raises InputError where it is no stream that an engine can draw.
+    """
+
+    size: tuple[int, int]
+    stride: int
+    line_starts: NDArray[np.int64]
+    words: NDArray[np.uint64]
+    ids: NDArray[np.uint32]
+    near: float
+    far: float
+    materials: Materials
+    background: tuple[int, int, int, int] = (0, 0, 0, 255)
+    perspective: bool = True
+    finer: NDArray[np.int32] | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        check_picture_size(self.size)
+        if not 1 <= self.stride <= COLUMNS:
+            raise InputError(f"strips of {self.stride} columns, of 1 to {COLUMNS} that there may be")
+        self._check_lines()
+        self._check_depths()
+        self._check_words()
+
+    def _check_lines(self) -> None:
+        count = len(self.words)
+        starts = self.line_starts
+        if len(starts) != self.strips * self.size[1] + 1 or starts[0] != 0 or starts[-1] != count:
+            raise InputError("lines of code words do not hold as many words as there are")
+        if (np.diff(starts) < 0).any():
+            raise InputError("a line of code words begins before the one above it")
+        if len(self.ids) != count or (self.finer is not None and self.finer.shape != (count, 3)):
+            raise InputError("not as many ids, or finer depths, as there are code words")
+
+    def _check_depths(self) -> None:
+        least = _NEAREST if self.perspective else -_FARTHEST
+        if not least <= self.near <= self.far <= _FARTHEST:
+            raise InputError(f"depths of code words from {self.near:g} to {self.far:g}")
+        limits = np.array([1 << 30, STEEPEST_DEPTHS, STEEPEST_DEPTHS])
+        if self.finer is not None and (np.abs(self.finer.astype(np.int64)) > limits).any():
+            raise InputError("finer depths of code words are beyond 2^30, or grow by more than 2^26 a pixel")
+
+    def _check_words(self) -> None:
+        at, bits = FIELDS["material"]
+        if len(self.words) == 0:
+            return
+        if int((self.words >> np.uint64(at) & np.uint64((1 << bits) - 1)).max()) >= len(self.materials):
+            raise InputError(f"a code word is of a material beyond the {len(self.materials)} that there are")
+        strip = np.repeat(np.arange(self.strips), np.diff(self.line_starts[:: self.size[1]]))
+        at, bits = FIELDS["x"]
+        x = (self.words >> np.uint64(at) & np.uint64((1 << bits) - 1)).astype(np.int64)
+        if (x >= np.minimum(self.stride, self.size[0] - strip * self.stride)).any():
+            raise InputError("a code word stands beyond the columns of its strip")
+        falls = np.flatnonzero(self.ids[1:] < self.ids[:-1]) + 1
+        if not np.isin(falls, self.line_starts).all():
+            raise InputError("the words of a line are not sorted by their ids")
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+    @property
+    def strips(self) -> int:
+        """Number of strips."""
+        return -(-self.size[0] // self.stride)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of what an engine is sent, without the materials."""
+        finer = 0 if self.finer is None else self.finer.nbytes
+        return self.words.nbytes + self.ids.nbytes + self.line_starts.nbytes + finer
+
+    def depths(self, keys: NDArray[np.integer]) -> NDArray[np.float32]:
+        """Depths, scan units, any shape, of values of Z, or of finer ones where there are."""
+        t = np.asarray(keys, np.float64) / (DEPTHS - 1 if self.finer is None else FINE_DEPTHS)
+        if not self.perspective:
+            return (self.near + t * (self.far - self.near)).astype(np.float32)
+        inverse = 1 / self.near + t * (1 / self.far - 1 / self.near)
+        return (1 / np.maximum(inverse, np.finfo(np.float32).tiny)).astype(np.float32)
+
+    def depth_error(self) -> float:
+        """Most that a depth is off by rounding it to Z, scan units: half a step where steps are largest."""
+        span = self.far - self.near
+        return (span * self.far / self.near if self.perspective else span) / (DEPTHS - 1) / 2
+
+
+def check_picture_size(size: tuple[int, int]) -> None:
+    """Raise InputError where a picture of (width, height) pixels cannot be made of code words."""
+    width, height = size
+    if not (1 <= width <= _LONGEST_EDGE and 1 <= height <= _LONGEST_EDGE and width * height <= _MOST_PIXELS):
+        raise InputError(
+            f"a picture of code words of {width} x {height} pixels",
+            hint=f"At most {_LONGEST_EDGE:,} along an edge, and {_MOST_PIXELS:,} in all",
+        )
+
+
+def strip_width(width: int) -> int:
+    """Columns of the strips of a picture: as few strips as may be, of about one width."""
+    return -(-width // -(-width // COLUMNS))
+
+
+def write_stream(stream: WordStream, path: Path | str) -> None:
+    """Write a `.cw` file. Raises InputError."""
+    flags = _PERSPECTIVE * stream.perspective | _FINER * (stream.finer is not None)
+    header = _HEADER.pack(
+        _MAGIC, _VERSION, flags, *stream.size, stream.strips, len(stream.materials), len(stream),
+        stream.near, stream.far, bytes(stream.background),
+    )  # fmt: skip
+    materials = stream.materials
+    arrays = [
+        (np.arange(stream.strips) * stream.stride).astype("<u4"),
+        np.diff(stream.line_starts).astype("<u4"),
+        stream.words.astype("<u8"),
+        stream.ids.astype("<u4"),
+        *([] if stream.finer is None else [stream.finer.astype("<i4")]),
+        *(table.astype("<u2") for table in (materials.ambient, materials.diffuse, materials.specular)),
+    ]
+    data = header + b"".join(array.tobytes() for array in arrays)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(data + _CHECKSUM.pack(zlib.crc32(data)))
+
+
+def read_stream(path: Path | str) -> WordStream:
+    """Read a `.cw` file. Raises InputError for one that cannot be read, or is damaged."""
+    try:
+        with open_plain(path) as file:
+            header = file.read(_HEADER.size)
+            needed, held = _file_size(header), os.fstat(file.fileno()).st_size
+            if held != needed:
+                what = "is cut short" if held < needed else "has more in it than it tells of"
+                raise InputError(what, hint="Save it again")
+            data = header + file.read()
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    except InputError as error:
+        raise InputError(error.what, path, error.hint) from error
+    try:
+        (checksum,) = _CHECKSUM.unpack_from(data, needed - _CHECKSUM.size)
+        if zlib.crc32(memoryview(data)[: -_CHECKSUM.size]) != checksum:
+            raise InputError("is damaged: its checksum is another one", hint="Save it again")
+        return _stream_of(data)
+    except InputError as error:
+        raise InputError(error.what, path, error.hint) from error
+
+
+def _file_size(header: bytes) -> int:
+    """Bytes of the file that begins so. Raises InputError where it is no file of code words."""
+    if not header.startswith(_MAGIC) or len(header) < _HEADER.size:
+        raise InputError("is no file of code words", hint=f"'scan4d render -o NAME{SUFFIX}' writes them")
+    _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack(header)
+    if version != _VERSION:
+        raise InputError(f"is of version {version}", hint=f"This program reads version {_VERSION}")
+    if flags & ~(_PERSPECTIVE | _FINER):
+        raise InputError(f"has flags that are not known: {flags}")
+    check_picture_size((width, height))
+    if not -(-width // COLUMNS) <= strips <= width:
+        raise InputError(f"has {strips} strips for {width} columns, of {COLUMNS} at most each")
+    each = 12 + 12 * bool(flags & _FINER)
+    return _HEADER.size + 4 * strips * (1 + height) + each * words + 18 * materials + _CHECKSUM.size
+
+
+def _stream_of(data: bytes) -> WordStream:
+    _, _, flags, width, height, strips, materials, words, near, far, background = _HEADER.unpack_from(data)
+    at = _HEADER.size
+
+    def take(kind: str, *shape: int) -> NDArray:
+        nonlocal at
+        array = np.frombuffer(data, kind, math.prod(shape), at).reshape(shape)
+        at += array.nbytes
+        return array.astype(array.dtype.newbyteorder("="), copy=False)
+
+    starts = take("<u4", strips).astype(np.int64)
+    stride = int(starts[1]) if strips > 1 else width
+    if (starts != np.arange(strips) * stride).any() or not starts[-1] < width <= strips * stride:
+        raise InputError("has strips that do not lie side by side in one width")
+    counts = take("<u4", strips * height)
+    return WordStream(
+        size=(width, height),
+        stride=stride,
+        line_starts=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]),
+        words=take("<u8", words),
+        ids=take("<u4", words),
+        finer=take("<i4", words, 3) if flags & _FINER else None,
+        near=near,
+        far=far,
+        materials=Materials(*(take("<u2", materials, 3) for _ in range(3))),
+        background=tuple(background),
+        perspective=bool(flags & _PERSPECTIVE),
+    )

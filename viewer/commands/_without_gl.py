@@ -1,0 +1,174 @@
+"""Pictures without OpenGL: `scan4d render --no-gl`, from code words, and files of these drawn again."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..camera import Camera
+from ..codewords.engine import NO_WORD, WINDOW, CodePicture, draw_words
+from ..codewords.settings import Params, words_of
+from ..codewords.stream import SUFFIX, WordStream, read_stream, write_stream
+from ..errors import InputError
+from ..frame import Request, view_of
+from ..look import Look, drawable, value_source
+from ..output.export import FILM_SUFFIX, check_output, film, numbered, write_arrays, write_png
+from ..params import parse
+from ..scan.estimate import estimate
+from ..scan.inputs import scan_inputs
+from ..scan.open import DEMO
+from ..scan.pose import Pose
+from . import _drawing as drawing
+from ._console import progress, say, tell, warn
+from ._outputs import claim
+from ._scans import chosen_poses, frame_title, open_timeline, read_poses, told_upright
+
+BACKEND = "codeword"
+_SUFFIXES = (".png", ".npz", FILM_SUFFIX, SUFFIX)
+_SIZE = (1920, 1280)
+# Arguments of `scan4d render` that are for OpenGL's pictures alone, and those that a stream has settled.
+_NEED_GL = ("marks", "stats", "repeat", "replay", "anonymous", "quality")
+_SETTLED = ("size", "set", "look", "camera", "orbit", "turntable", "pose", "time", "poses", "all")
+
+
+def is_asked(args: Namespace) -> bool:
+    """Whether the arguments ask for a picture without OpenGL: by name, or as they read or write code
+    words."""
+    reads = args.scan is not None and args.scan.lower().endswith(SUFFIX)
+    return args.no_gl or reads or args.out.suffix.lower() == SUFFIX
+
+
+def run(args: Namespace) -> int:
+    """Draw what is asked for, on the CPU. Raises InputError."""
+    if args.backend not in (None, BACKEND):
+        hint = f"Use --backend {BACKEND}, or leave it out"
+        raise InputError(f"'{args.backend}' needs OpenGL", "--no-gl", hint)
+    _refuse(args, _NEED_GL, "is for pictures that OpenGL draws")
+    if args.progress:
+        say(device="CPU")
+    if args.scan is not None and args.scan.lower().endswith(SUFFIX):
+        _replay(args, Path(args.scan))
+    else:
+        _draw(args)
+    tell(args.out)
+    return 0
+
+
+def _refuse(args: Namespace, names: tuple[str, ...], what: str) -> None:
+    """Raise InputError where one of these arguments is given."""
+    for name in names:
+        if getattr(args, name) not in (None, False, []):
+            raise InputError(what, f"--{name}", "Leave it out")
+
+
+def _replay(args: Namespace, path: Path) -> None:
+    """Draw a file of code words."""
+    _refuse(args, _SETTLED, f"cannot be chosen: the code words of {path.name} are of one picture")
+    check_output(args.out, tuple(suffix for suffix in _SUFFIXES if suffix != SUFFIX), several=False)
+    claim([numbered(args.out, 0)], [path], args.force)
+    stream = read_stream(path)
+    with _written(args.out, stream.size, args.fps or 1.0) as put, progress(1, args.progress) as tick:
+        put(0, stream, None)
+        tick()
+
+
+def _draw(args: Namespace) -> None:
+    """Encode poses of a scan, and draw them or write their code words."""
+    look, params = parse(Look, dict(args.look), "look"), _params(args)
+    camera = Camera.load(args.camera) if args.camera else None
+    with open_timeline(args, args.scan or DEMO) as timeline:
+        indices, size = chosen_poses(args, timeline) or [0], args.size or _SIZE
+        shots = drawing.shots(indices, args.turntable)
+        check_output(args.out, _SUFFIXES, several=len(shots) > 1)
+        upright = told_upright(args, timeline, indices)
+        if "up" not in dict(args.look):
+            look = replace(look, up=upright.up)
+        inputs = [*scan_inputs(timeline), *([args.camera] if camera else [])]
+        claim(drawing.outputs(args.out, [shot.number for shot in shots]), inputs, args.force)
+        look = drawing.ranged(look, timeline, indices)
+        fps = drawing.film_rate(timeline, indices, args.fps)
+        camera_of = None if camera is None else lambda shot: camera
+        with _written(args.out, size, fps, params.window) as put, progress(len(shots), args.progress) as tick:
+            for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
+                camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
+                known = _with_estimates(pose, params)
+                own = _own_look(look, known, frame_title(timeline, pose.index), several=len(indices) > 1)
+                for shot in shots:
+                    if shot.pose == pose.index:
+                        view = view_of(Request(pose, camera_of(shot)), size)
+                        put(shot.number, words_of(known, view, own, params), pose)
+                        tick()
+
+
+def _params(args: Namespace) -> Params:
+    params = parse(Params, dict(args.set), f"parameter of '{BACKEND}'")
+    params.steps  # noqa: B018  # wrong ones are told before anything is read
+    return params
+
+
+def _own_look(look: Look, pose: Pose, title: str, several: bool) -> Look:
+    """The look with colours of its own choice where one of several poses lacks the number that it colours
+    by, and by depth where nothing else would tell a shape. Raises InputError where the only pose lacks it."""
+    own = drawable(look, pose.overview.scalars)
+    if own is not look and not several:
+        value_source(look, pose.overview.scalars)  # raises, and lists the known ones
+    if own is not look:
+        warn(f"{title} has no '{look.color_by}', and is drawn in other colours")
+    shapeless = pose.cloud.normals is None and pose.cloud.colors is None
+    return replace(own, color_by="depth") if shapeless and own.color_by == "auto" else own
+
+
+def _with_estimates(pose: Pose, params: Params) -> Pose:
+    """The pose with the normals, and where asked for the radii, that it lacks."""
+    wanted = ["normals", "radii"] if params.radius == "own" else ["normals"]
+    missing = [name for name in wanted if getattr(pose.cloud, name) is None]
+    if not (missing and len(pose.cloud)):
+        return pose
+    try:
+        found: dict[str, Any] = estimate(pose, missing)
+        return pose.with_cloud(replace(pose.cloud, **found))
+    except ImportError:  # the library that finds neighbours is linked to EGL
+        effects = {"normals": "discs face the eye", "radii": "they are of one size"}
+        told = " and ".join(effects[name] for name in missing)
+        warn(f"no {' and '.join(missing)} can be estimated here: {told}")
+        return pose
+
+
+@contextmanager
+def _written(
+    out: Path, size: tuple[int, int], fps: float, window: int = WINDOW
+) -> Iterator[Callable[[int, WordStream, Pose | None], None]]:
+    """A function that puts a stream, with its number and the pose that it is of, where the path says."""
+    suffix = out.suffix.lower()
+    if suffix == FILM_SUFFIX:
+        with film(out, size, fps) as add:
+            yield lambda number, stream, pose: add(draw_words(stream, window).image)
+        return
+
+    def put(number: int, stream: WordStream, pose: Pose | None) -> None:
+        path = numbered(out, number)
+        if suffix == SUFFIX:
+            write_stream(stream, path)
+            return
+        picture = draw_words(stream, window)
+        if suffix == ".npz":
+            write_arrays(_arrays(picture, pose), path)
+        else:
+            write_png(picture.image, path)
+
+    yield put
+
+
+def _arrays(picture: CodePicture, pose: Pose | None) -> dict[str, np.ndarray]:
+    """Channels of a picture: colour as it is shown, depth, and ids in the file where the pose is known."""
+    rows = picture.ids()
+    ids = rows
+    if pose is not None and pose.cloud.ids is not None:
+        ids = np.append(pose.cloud.ids, np.uint32(NO_WORD))[np.minimum(rows, len(pose.cloud))]
+    return {"picture": picture.image, "depth": picture.depths(), "id": ids}

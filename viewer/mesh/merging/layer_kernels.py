@@ -1,0 +1,61 @@
+"""The inner loop of finding where one view's triangles lie behind places in another's picture, compiled by
+numba; see `surfaces`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scan.octree.compiled import compiled
+
+_EDGE = 1e-6  # of a triangle: how far outside of it a place still counts, so that none falls between two
+
+
+@compiled
+def nearest_layer(
+    places: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    order: NDArray[np.intp],
+    first: NDArray[np.intp],
+    width: int,
+    height: int,
+    corners: NDArray[np.float64],
+    faces: NDArray[np.uint32],
+    is_parallel: bool,
+    offset: NDArray[np.float64],
+    found: NDArray[np.int64],
+    share: NDArray[np.float32],
+) -> None:
+    """Find for each place of a picture the triangle over it whose depth differs least from its own.
+
+    places: (Q, 2), column and row, of depths (Q,); order: (Q,), by pixel; first: (width * height + 1,), where
+    each pixel begins in it. corners: (V, 3), column, row, and depth in a parallel projection, else one over
+    it, of which faces (F, 3) are made. Gets offset (Q,), the triangle's depth less the place's, with inf
+    before; found (Q,), the row of the triangle; share (Q, 2), the weights of its second and third corner.
+    """
+    for face in range(len(faces)):
+        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+        ax, ay = corners[a, 0], corners[a, 1]
+        bx, by = corners[b, 0] - ax, corners[b, 1] - ay
+        cx, cy = corners[c, 0] - ax, corners[c, 1] - ay
+        area = bx * cy - cx * by
+        if not abs(area) > 0.0:
+            continue
+        left = int(min(max(ax + min(0.0, bx, cx), 0.0), width - 1.0))
+        right = int(min(max(ax + max(0.0, bx, cx), 0.0), width - 1.0))
+        top = int(min(max(ay + min(0.0, by, cy), 0.0), height - 1.0))
+        bottom = int(min(max(ay + max(0.0, by, cy), 0.0), height - 1.0))
+        for row in range(top, bottom + 1):
+            for n in range(first[row * width + left], first[row * width + right + 1]):
+                at = order[n]
+                x, y = places[at, 0] - ax, places[at, 1] - ay
+                second = (x * cy - cx * y) / area
+                third = (bx * y - x * by) / area
+                if second < -_EDGE or third < -_EDGE or second + third > 1.0 + _EDGE:
+                    continue
+                start = corners[a, 2]
+                value = start + second * (corners[b, 2] - start) + third * (corners[c, 2] - start)
+                change = (value if is_parallel else 1.0 / value) - depth[at]
+                if abs(change) < abs(offset[at]):
+                    offset[at], found[at] = change, face
+                    share[at, 0], share[at, 1] = second, third
