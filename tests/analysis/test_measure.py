@@ -15,18 +15,11 @@ import pytest
 from numpy.typing import NDArray
 from scenes import looking_down_z, plane
 
-from viewer.analysis.measure import (
-    COLUMNS,
-    End,
-    Measurement,
-    distance_in_words,
-    reading_of,
-    save_table,
-    table,
-    to_text,
-)
+from viewer.analysis.measure import COLUMNS, Measurement, distance_in_words, reading_of, table
 from viewer.analysis.pick import Neighbor, Picked, pick
+from viewer.analysis.spot import Spot
 from viewer.camera import Camera
+from viewer.csv_text import save_rows, to_text
 from viewer.errors import InputError
 from viewer.gpu.surface import NOTHING, Surface
 from viewer.scan.points import PointCloud
@@ -41,17 +34,17 @@ def looking_from(eye: NDArray[np.float64], **fields: object) -> Camera:
     return Camera(**{**looking_down_z(**fields).to_json(), "eye": eye, "target": eye - np.array([0, 0, 1])})
 
 
-def clicked(surface: Surface, camera: Camera, point: NDArray[np.float64]) -> End:
+def clicked(surface: Surface, camera: Camera, point: NDArray[np.float64]) -> Spot:
     """The end that a click on the pixel of a point sets."""
     offsets = (point - surface.pose.cloud.origin)[None]
     x, y = surface.view.project(offsets)[0][0]
     picked = pick(surface, int(x), int(y))
     assert picked is not None
-    return End.of(picked, Pose(0, 0.0, "", surface.pose.cloud))
+    return Spot.of(picked, Pose(0, 0.0, "", surface.pose.cloud))
 
 
-def end(position: tuple[float, float, float], spacing: float | None = 0.1, **fields: object) -> End:
-    return End(**{"frame": 0, "time": 0.0, "position": position, "snapped": "point", "id": 0,
+def end(position: tuple[float, float, float], spacing: float | None = 0.1, **fields: object) -> Spot:
+    return Spot(**{"frame": 0, "time": 0.0, "position": position, "snapped": "point", "id": 0,
                   "spacing": spacing, "level": 0} | fields)  # fmt: skip
 
 
@@ -84,7 +77,7 @@ def test_an_end_has_the_spacing_around_its_point_and_the_frame_of_its_pose(draw:
     surface = draw(plane(100, depth=4.0), looking_down_z(), SIZE, "surfels")
     picked = pick(surface, 30, 20)
     assert picked is not None
-    made = End.of(picked, Pose(7, 0.28, "", surface.pose.cloud))
+    made = Spot.of(picked, Pose(7, 0.28, "", surface.pose.cloud))
     assert (made.frame, made.time, made.id) == (7, 0.28, picked.id)
     assert made.spacing == pytest.approx(0.05, rel=0.2)
 
@@ -96,8 +89,8 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     picked, pose = pick(surface, x, y), Pose(0, 0.0, "", cloud)
     assert picked is not None
     with pytest.raises(InputError, match="hole is filled"):
-        End.of(picked, pose)
-    made = End.of(picked, pose, filled=True)
+        Spot.of(picked, pose)
+    made = Spot.of(picked, pose, filled=True)
     assert (made.snapped, made.id, made.level) == ("surface", None, 2)
     assert made.position == tuple(picked.position)
     nearest = np.linalg.norm(cloud.positions - picked.position, axis=1).min()
@@ -108,7 +101,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
 
 def test_on_a_measured_surface_without_a_point_the_spacing_counts() -> None:
     cloud = plane(40, depth=4.0)
-    made = End.of(Picked(np.array([0.01, 0.01, -4.0]), level=0), Pose(0, 0.0, "", cloud))
+    made = Spot.of(Picked(np.array([0.01, 0.01, -4.0]), level=0), Pose(0, 0.0, "", cloud))
     assert made.snapped == "surface"
     assert made.spacing == pytest.approx(0.05, rel=0.2)
 
@@ -259,7 +252,7 @@ def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
     surface = Measurement(end((0.1, 1 / 3, 2), None, snapped="surface", id=None, level=2), made.second)
     readings = [(1, reading_of(made, moved(2), True)), (2, reading_of(surface, moved(2), True))]
     file = tmp_path / "distances.csv"
-    save_table(file, table(readings, 'the "left", ear', "mm"))
+    save_rows(file, table(readings, 'the "left", ear', "mm"))
     assert file.read_bytes().count(b"\r\n") == 3
     with open(file, newline="", encoding="utf-8") as stream:
         first, second = csv.DictReader(stream)
@@ -301,5 +294,5 @@ def test_a_table_tells_lengths_in_the_unit_that_it_names() -> None:
 
 def test_a_csv_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
-        save_table(tmp_path / "no folder" / "a.csv", [["a"]])
+        save_rows(tmp_path / "no folder" / "a.csv", [["a"]])
     assert list(tmp_path.iterdir()) == []

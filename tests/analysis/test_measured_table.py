@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewer.analysis.measure import COLUMNS, End, Measurement, reading_of, save_table, table
+from viewer.analysis.measure import COLUMNS, Measurement, reading_of, table
 from viewer.analysis.measured_table import is_measurement_table, read_measurements
 from viewer.analysis.pick import Neighbor
+from viewer.analysis.spot import Spot
+from viewer.csv_text import save_rows
 from viewer.errors import InputError
 from viewer.geometry import vector
 from viewer.rigid import Rigid
@@ -31,7 +33,7 @@ def pose(index: int) -> Pose:
     return Pose(index, 0.5 * index, f"{index}", PointCloud.from_arrays(points))
 
 
-def end(row: int, frame: int = 0) -> End:
+def end(row: int, frame: int = 0) -> Spot:
     """An end beside a point, as clicks set them: it follows the points around."""
     points = pose(frame).cloud.world()
     position = points[row] + np.array([0.01, 0.02, -0.01])
@@ -39,7 +41,7 @@ def end(row: int, frame: int = 0) -> End:
     neighbors = tuple(Neighbor(int(n), vector(points[n] - position)) for n in nearest)
     spread = np.diag([1e-4, 4e-4, 1e-4])
     covariance = tuple(spread[np.triu_indices(3)].tolist())
-    return End(frame, 0.5 * frame, vector(position), "surface", row, 0.1, 0, covariance, neighbors)
+    return Spot(frame, 0.5 * frame, vector(position), "surface", row, 0.1, 0, covariance, neighbors)
 
 
 MADE = (Measurement(end(3), end(50)), Measurement(end(7, 1), end(90, 1)))
@@ -50,7 +52,7 @@ def saved(path: Path) -> Path:
     rows = []
     for number, made in enumerate(MADE, 1):
         rows += [(number, reading_of(made, pose(frame), True)) for frame in (made.first.frame, 2)]
-    save_table(path, table(rows, SCAN, "mm"))
+    save_rows(path, table(rows, SCAN, "mm"))
     return path
 
 

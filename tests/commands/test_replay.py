@@ -17,7 +17,8 @@ from hostile_values import variants
 from scenes import sphere
 from written import bits, film, picture
 
-from viewer.analysis.measure import End, Measurement
+from viewer.analysis.measure import Measurement
+from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.recording import Entry, Recording, fingerprint, matrix_of
@@ -116,7 +117,7 @@ def test_measurements_are_drawn_again_follow_their_points_and_stand_in_anonymous
         for share in (0.2, 0.8):
             wanted = low + (high - low) * np.array([share, 0.45, 0.8])
             row = int(np.linalg.norm(places - wanted, axis=1).argmin())
-            ends.append(End(0, 0.0, vector(places[row]), "surface", row, 3.0, 0))
+            ends.append(Spot(0, 0.0, vector(places[row]), "surface", row, 3.0, 0))
         camera = Camera.orbit(first.bounds, 0, 0, aspect=1.5)
     measured = entry(
         scan="demo", camera=camera, size=(384, 256), marks=Marks(measurements=True),

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from viewer.analysis.measure import End, Measurement
+from viewer.analysis.measure import Measurement
+from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
@@ -23,7 +24,7 @@ Change = Callable[[Document, np.random.Generator], Document]
 
 
 def measurement(number: float) -> Measurement:
-    ends = (End(0, 0.0, (number, 0, side), "point", 3, 0.1, 0) for side in (0, 1))
+    ends = (Spot(0, 0.0, (number, 0, side), "point", 3, 0.1, 0) for side in (0, 1))
     return Measurement(*ends)
 
 

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 from hostile_values import variants
 
-from viewer.analysis.measure import End, Measurement
+from viewer.analysis.measure import Measurement
+from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document import saved_session
@@ -33,7 +34,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 CAMERA = Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5)
-ENDS = End(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), End(2, 0.08, (1, 2, 3), "surface", None, None, 2)
+ENDS = Spot(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), Spot(2, 0.08, (1, 2, 3), "surface", None, None, 2)
 FULL = Document(
     camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},

@@ -18,7 +18,8 @@ import OpenEXR
 from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
-from viewer.analysis.measure import End, Measurement
+from viewer.analysis.measure import Measurement
+from viewer.analysis.spot import Spot
 from viewer.app import keys, settings
 from viewer.app.commands import Commands
 from viewer.backends import backend, backends
@@ -163,7 +164,7 @@ def _write_choices(folder: Path) -> None:
     left = {"index": 3, "camera": camera.to_json(), "unit": "mm", "bookmarks": plain(marks)}
     chosen = settings.Settings(look=Look(light="head"), recent=("demo",)).to_json()
     (folder / "settings.json").write_text(json.dumps(chosen | {"places": {"demo": left}}))
-    end = End(0, 0.0, (1.0, 2.0, 3.0), "point", 3, 0.1, 0)
+    end = Spot(0, 0.0, (1.0, 2.0, 3.0), "point", 3, 0.1, 0)
     document = Document(camera, (1.0, 2.0, 3.0), Look(light="head"), "points", unit="mm", bookmarks=marks)
     document = document.with_params("points", backend("points").params()).with_part(
         Measurements((Measurement(end, replace(end, id=None, snapped="surface")),))

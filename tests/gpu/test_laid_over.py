@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scenes import DRAWS_POINTS, NOTHING, sphere, sphere_mesh
 
-from viewer.analysis.measure import End, Measurement, reading_of
+from viewer.analysis.measure import Measurement, reading_of
 from viewer.analysis.pick import is_seen, pick
+from viewer.analysis.spot import Spot
 from viewer.backends import backend as find_backend
 from viewer.backends import backends
 from viewer.bench.judge import Judge
@@ -245,7 +246,7 @@ def test_measurements_go_with_the_pose(renderer: Renderer) -> None:
     there = moved(CLOUD, TURNED)
     surface = drawn(renderer, POSE, camera_of(there), Layers(place=TURNED), "surfels")
     places = [pick(surface, x, y) for y, x in np.argwhere(surface.row != NOTHING)[[100, 3000]].tolist()]
-    ends = [End.of(place, POSE, place=TURNED) for place in places if place is not None]
+    ends = [Spot.of(place, POSE, place=TURNED) for place in places if place is not None]
     for end, place in zip(ends, places, strict=True):
         assert place is not None
         np.testing.assert_array_equal(end.position, place.position)

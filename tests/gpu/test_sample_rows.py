@@ -13,8 +13,9 @@ from range_scenes import shape_view, sphere_view
 from scenes import NOTHING
 from test_laid_over import turned
 
-from viewer.analysis.measure import End, Measurement, reading_of
+from viewer.analysis.measure import Measurement, reading_of
 from viewer.analysis.pick import Picked, before_gap, is_seen, pick
+from viewer.analysis.spot import Spot
 from viewer.backends import Backend
 from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_request
@@ -188,11 +189,11 @@ def test_picks_and_measurements_are_those_of_the_points(renderer: Renderer, scen
         assert pick(samples, x, y, spacing=False).id == one.id
         assert is_seen(samples, one.position, 0.5)
         assert before_gap(samples, x, y) == before_gap(points, x, y)
-        end = End.of(one, pose, place=TURNED)
-        assert end == replace(End.of(other, points.pose.pose, place=TURNED), spacing=end.spacing)
+        end = Spot.of(one, pose, place=TURNED)
+        assert end == replace(Spot.of(other, points.pose.pose, place=TURNED), spacing=end.spacing)
     place = Picked(TURNED.points(pose.bounds.center), level=2)
     filled, expected = (
-        End.of(place, of, filled=True, place=TURNED).spacing for of in (pose, points.pose.pose)
+        Spot.of(place, of, filled=True, place=TURNED).spacing for of in (pose, points.pose.pose)
     )
     assert filled == pytest.approx(expected, rel=1e-6)
     assert reading_of(Measurement(end, end), pose, False).fixed

@@ -22,8 +22,9 @@ from ..files import open_plain, read_text
 from ..geometry import vector
 from ..scan.pose import Pose
 from ..scan.units import conversion
-from .measure import COLUMNS, End, Measurement
+from .measure import COLUMNS, Measurement
 from .pick import FOLLOWED, SURE, Neighbor
+from .spot import Spot
 
 _MOST_BYTES = 16 * 2**20  # of a table
 _HINT = "Use a table that 'Save CSV...' has written, unchanged"
@@ -88,7 +89,7 @@ def _measurement(row: Mapping[str, str], where: str, unit: str, count: int) -> M
     return Measurement(_end(row, "1", where, factor, count), _end(row, "2", where, factor, count))
 
 
-def _end(row: Mapping[str, str], number: str, where: str, factor: float, count: int) -> End:
+def _end(row: Mapping[str, str], number: str, where: str, factor: float, count: int) -> Spot:
     """An end without the points that it follows. factor: of its lengths to the scan's."""
 
     def read(name: str) -> float:
@@ -114,7 +115,7 @@ def _end(row: Mapping[str, str], number: str, where: str, factor: float, count: 
     snapped: Literal["point", "surface"] = "point" if row[f"snapped_{number}"] == "point" else "surface"
     sure = length("uncertainty")
     variance = 0.0 if sure is None else (sure / SURE) ** 2
-    return End(
+    return Spot(
         frame=whole("frame", 1, count) - 1,
         time=read("time"),
         position=vector(np.array([read(axis) for axis in "xyz"]) * factor),
@@ -126,7 +127,7 @@ def _end(row: Mapping[str, str], number: str, where: str, factor: float, count: 
     )
 
 
-def _with_points(end: End, pose: Pose) -> End:
+def _with_points(end: Spot, pose: Pose) -> Spot:
     """The end with the points of its frame that are nearest to it, its own first, where it follows one."""
     row = None if end.id is None else pose.cloud.row_of(end.id)
     if end.snapped == "point" or end.id is None or row is None:

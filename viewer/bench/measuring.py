@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.measure import End, Measurement
+from ..analysis.measure import Measurement
 from ..analysis.pick import before_gap, pick
+from ..analysis.spot import Spot
 from ..backends import backend
 from ..camera import Camera
 from ..errors import InputError
@@ -166,11 +167,11 @@ def measured_in(
     return Distances(np.array(off), np.array(uncertainty), float(np.median(pitches)))
 
 
-def _end(surface: Surface, pose: Pose, x: int, y: int) -> End:
+def _end(surface: Surface, pose: Pose, x: int, y: int) -> Spot:
     """The end that a click sets."""
     picked = pick(surface, x, y, shown=before_gap(surface, x, y))
     assert picked is not None
-    return End.of(picked, pose, filled=True)
+    return Spot.of(picked, pose, filled=True)
 
 
 # --- as a table -----------------------------------------------------------------------

@@ -13,7 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.measure import End, Measurement
+from ..analysis.measure import Measurement
+from ..analysis.spot import Spot
 from ..camera import Camera
 from ..frame import Request
 from ..geometry import up_vector, vector
@@ -62,7 +63,7 @@ def anonymous_measurements(
     """Measurements over an anonymous picture of a pose, which is as the scan has it. start: as for
     `anonymous_request`."""
 
-    def moved(end: End) -> End:
+    def moved(end: Spot) -> Spot:
         place, time = np.subtract(end.position, middle_of(pose)), round(end.time - start, _DECIMALS)
         return replace(end, position=vector(place), time=time)
 

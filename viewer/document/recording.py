@@ -31,7 +31,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from .. import __version__
-from ..analysis.measure import Measurement, distance_in_words, end_slack, reading_of
+from ..analysis.measure import Measurement, distance_in_words, reading_of
+from ..analysis.spot import spot_slack
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError, shortened
@@ -204,7 +205,7 @@ def measured_lines(
         there = reading_of(measurement, pose, one_topology, place).measurement
         words = distance_in_words(there.distance, there.uncertainty, scale.unit, scale.factor)
         first, second = there.ends
-        slack = end_slack(first, pose.bounds.radius), end_slack(second, pose.bounds.radius)
+        slack = spot_slack(first, pose.bounds.radius), spot_slack(second, pose.bounds.radius)
         lines.append(MeasuredLine((first.position, second.position), slack, f"{number}:  {words}"))
     return tuple(lines)
 

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import pytest
 from imgui_bundle import ImVec2
 
-from viewer.analysis.measure import End, Measurement, Reading
+from viewer.analysis.measure import Measurement, Reading
+from viewer.analysis.spot import Spot
 from viewer.app.desk import Desk
 from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
@@ -19,8 +20,8 @@ from viewer.camera import Camera
 PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 
 
-def end(id: int | None) -> End:
-    return End(0, 0.0, (0, 0, 0), "surface" if id is None else "point", id, None, 0)
+def end(id: int | None) -> Spot:
+    return Spot(0, 0.0, (0, 0, 0), "surface" if id is None else "point", id, None, 0)
 
 
 @pytest.mark.parametrize(

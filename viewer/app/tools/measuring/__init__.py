@@ -11,19 +11,11 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ....analysis.measure import (
-    End,
-    Measurement,
-    Reading,
-    end_slack,
-    reading_of,
-    readings_in_frames,
-    save_table,
-    table,
-    to_text,
-)
+from ....analysis.measure import Measurement, Reading, reading_of, readings_in_frames, table
 from ....analysis.measured_table import is_measurement_table, read_measurements
 from ....analysis.pick import is_seen
+from ....analysis.spot import Spot, spot_slack
+from ....csv_text import save_rows, to_text
 from ....document.measurements import Measurements
 from ....errors import InputError
 from ....files import free_file, working_folder
@@ -56,8 +48,8 @@ class Tool:
         self.saving = SaveDialog("Save measurements", about, ".csv", self._save)
         about = "A table that Save CSV has written of this scan"
         self.reading = ReadDialog("Read measurements", about, ".csv", self._read)
-        self.begun: End | None = None
-        self._seen: tuple[object, dict[End, bool]] = None, {}
+        self.begun: Spot | None = None
+        self._seen: tuple[object, dict[Spot, bool]] = None, {}
         self._told: list[str] = []
         self._learned: Timeline | None = None  # the last that was asked whether points can be followed
         self._followed = ""  # the scan that was found to have one topology, last
@@ -113,7 +105,7 @@ class Tool:
         """Set an end at what was clicked; raises InputError where it cannot be."""
         if click.picked is None:
             raise InputError("There is nothing to measure here.")
-        end = End.of(click.picked, click.pose, filled=self.filled, place=click.motion)
+        end = Spot.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
             self.desk.note("That was seen through a gap: the end is at the point before it.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
@@ -136,7 +128,7 @@ class Tool:
         self.watch(readings)
         overlay.draw(self, readings, canvas, view)
 
-    def set_end(self, end: End) -> None:
+    def set_end(self, end: Spot) -> None:
         """Begin a measurement, or complete the one that was begun.
 
         An end at the very place and frame of the first, as a second click of a double click sets it, changes
@@ -177,7 +169,7 @@ class Tool:
             self._told = told
             log.debug("measurements: %s", "; ".join(told) or "none")
 
-    def is_seen(self, end: End) -> bool:
+    def is_seen(self, end: Spot) -> bool:
         """Whether an end is in the picture and not behind what that shows; found once a picture."""
         surface, shown = self.desk.viewport.surface, self.desk.viewport.request
         if surface is None or shown is None or not self.desk.viewport.is_there:
@@ -186,7 +178,7 @@ class Tool:
             self._seen = shown, {}
         known = self._seen[1]
         if end not in known:
-            slack = end_slack(end, self.desk.viewport.bounds(shown.pose).radius)
+            slack = spot_slack(end, self.desk.viewport.bounds(shown.pose).radius)
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
 
@@ -206,14 +198,14 @@ class Tool:
         refuse_input(file, timeline)
         is_still = pose is None or self.desk.motion(pose).is_identity
         if not (timeline.one_topology and len(timeline) > 1 and is_still):
-            save_table(file, self._table())
+            save_rows(file, self._table())
             self.desk.note(f"Saved {file}")
             return
         made, scale = self.made.all, self.desk.scale
 
         def save_all_frames() -> None:
             rows = readings_in_frames(made, len(timeline), timeline.visit, one_topology=True)
-            save_table(file, table(rows, timeline.name, scale.unit, scale.factor))
+            save_rows(file, table(rows, timeline.name, scale.unit, scale.factor))
 
         told = f"Saved {file}, in all {len(timeline)} frames"
         self.desk.run(f"Saving {file.name}", save_all_frames, lambda _: self.desk.note(told))
@@ -265,7 +257,7 @@ def _places(measurement: Measurement) -> tuple[object, ...]:
     return tuple((end.frame, *(round(x, digits) for x in end.position)) for end in measurement.ends)
 
 
-def _place_words(end: End) -> tuple[str, str]:
+def _place_words(end: Spot) -> tuple[str, str]:
     return ", ".join(map(repr, end.position)), "surface" if end.id is None else f"at point {end.id}"
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
-from ....analysis.measure import End, Reading
+from ....analysis.measure import Reading
+from ....analysis.spot import Spot
 from ....output.marks import LINE_COLOR
 from ...scene.canvas import Canvas, Label, ViewPlace
 from .words import distance_words
@@ -53,7 +54,7 @@ def _draw_one(
     return Label(lines, seen, alpha < 1)
 
 
-def _draw_end(end: End, place: ImVec2, alpha: float, canvas: Canvas) -> None:
+def _draw_end(end: Spot, place: ImVec2, alpha: float, canvas: Canvas) -> None:
     """A disc where points are followed, a ring on the surface alone."""
     draw_place = canvas.ring if end.id is None else canvas.point
     draw_place(place, _COLOR, alpha)

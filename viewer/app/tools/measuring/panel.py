@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ....analysis.measure import End, Reading
+from ....analysis.measure import Reading
+from ....analysis.spot import Spot
 from ....scan.times import frame_in_words
 from ....scan.units import Scale
 from ... import widgets
@@ -63,7 +64,7 @@ def _details(reading: Reading, scale: Scale) -> str:
     return "\n".join([*ends, "± covers the true distance in 95 % of cases: points around, pixels, following"])
 
 
-def _end_words(end: End, scale: Scale) -> str:
+def _end_words(end: Spot, scale: Scale) -> str:
     what = "surface" if end.id is None else f"at point {end.id}"
     place = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
     spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"

@@ -1,0 +1,69 @@
+"""Landmarks: named places of a subject, and where a user has set them in which frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from ..measures import Measure
+from ..spot import Spot
+
+State = Literal["to place", "placed", "skipped"]
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """A named place of a subject.
+
+    keys: where a user has set it, one a frame at most, by frame. skipped: whether it is not to be set.
+    missing: frames in which a user has said that it is not there, increasing. partner: the name of the one
+    that is its mirror image, "" for none. about: how a person finds it.
+    """
+
+    name: str
+    keys: tuple[Spot, ...] = ()
+    skipped: bool = False
+    missing: tuple[int, ...] = ()
+    partner: str = ""
+    about: str = ""
+
+    @property
+    def state(self) -> State:
+        """Whether it is set in any frame, or shall be."""
+        if self.keys:
+            return "placed"
+        return "skipped" if self.skipped else "to place"
+
+    def key_at(self, frame: int) -> Spot | None:
+        """The spot at which it was set in a frame; None where it was not."""
+        return next((key for key in self.keys if key.frame == frame), None)
+
+    def with_key(self, spot: Spot) -> Landmark:
+        """The landmark set at a spot, in place of what was set in that frame; it is there then."""
+        others = (key for key in self.keys if key.frame != spot.frame)
+        keys = tuple(sorted((*others, spot), key=lambda key: key.frame))
+        missing = tuple(frame for frame in self.missing if frame != spot.frame)
+        return replace(self, keys=keys, missing=missing, skipped=False)
+
+    def without_key(self, frame: int) -> Landmark:
+        """The landmark not set in a frame."""
+        return replace(self, keys=tuple(key for key in self.keys if key.frame != frame))
+
+    def with_missing(self, frame: int) -> Landmark:
+        """The landmark not there in a frame."""
+        missing = tuple(sorted({*self.missing, frame}))
+        return replace(self.without_key(frame), missing=missing)
+
+
+@dataclass(frozen=True)
+class Template:
+    """Landmarks to be placed, in their order, and measures of them.
+
+    name: that files and commands know it by. title: that users read. source: of the definitions.
+    """
+
+    name: str
+    title: str
+    landmarks: tuple[Landmark, ...]
+    measures: tuple[Measure, ...] = ()
+    source: str = ""

@@ -1,0 +1,42 @@
+"""Measures of landmarks and surfaces, and their values over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Quantity = Literal["length", "angle", "area", "volume"]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure of a kind, of these landmarks by name, in their order.
+
+    options: choices of the kind, by name, as words.
+    """
+
+    name: str
+    kind: str
+    landmarks: tuple[str, ...] = ()
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """The values of a measure over time.
+
+    times: (T,) seconds. values: (T,) scan units, their square or cube, or degrees, by quantity; NaN where not
+    known. sigmas: (T,) standard deviations of the values; NaN where not known. known: (T,) uint8, the least
+    of what is `Known` of its landmarks.
+    """
+
+    name: str
+    quantity: Quantity
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+    known: NDArray[np.uint8]

@@ -1,0 +1,179 @@
+"""Places on a surface that were picked: how sure they are, and how they follow their points through time.
+
+A spot is the place that was picked, not the nearest point. Its uncertainty is a covariance: of what the
+points around leave open of the surface, of the pixel's size, and of what following the points adds. Where a
+scan has one topology (`Timeline.one_topology`), a spot follows its points as a rigid body does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry import Vector, vector
+from ..rigid import STILL, Rigid
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from ..scan.spacing import nearest_row, spacing_at
+from .pick import Neighbor, Picked, largest_deviation
+
+_SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is before what it hides
+_SAME = 1e-14  # share of coordinates that rounding changes
+_TURNING = 4  # points that tell how a place turns and how well they do
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place of the surface that was picked in a frame, such as an end of a measurement.
+
+    frame: the pose's index. time: the pose's, seconds. position: float64, scan units. snapped: "point" where
+    it is the very place of the point, as ends were once; else on the surface. id: of the point that is seen
+    there, or of the nearest one, None where none is. spacing: distance between the points around it, scan
+    units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how the
+    place that was meant may lie off the position, squared scan units; None: unknown. neighbors: points around
+    it that it follows, and where they were when it was set. at_outline: as of a `Picked`.
+    """
+
+    frame: int
+    time: float
+    position: Vector
+    snapped: Literal["point", "surface"]
+    id: int | None
+    spacing: float | None
+    level: int
+    covariance: tuple[float, float, float, float, float, float] | None = None
+    neighbors: tuple[Neighbor, ...] = ()
+    at_outline: bool = False
+
+    @classmethod
+    def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> Spot:
+        """The spot at a place that was picked, with its spacing, in the picture of a pose that is moved to a
+        place.
+
+        filled: whether a place may be taken that no point shows. Where the points around do not tell of a
+        surface, it is as uncertain as they are apart, or as the nearest is far. Raises InputError for a
+        filled place where it may not be taken.
+        """
+        if not (picked.measured or filled):
+            hint = "Click where points are, or allow filled places"
+            raise InputError("nothing was measured here, the hole is filled", hint=hint)
+        spacing, neighbors = picked.spacing, picked.neighbors
+        if picked.point is None:
+            unmoved = place.inverse.points(picked.position)
+            spacing = _spacing_near(pose.around(unmoved), unmoved)
+        elif not neighbors:
+            assert picked.id is not None
+            neighbors = (Neighbor(picked.id, vector(picked.point - picked.position)),)
+        point, around = picked.id, [neighbor.id for neighbor in neighbors]
+        if point is not None and point not in around:  # the place is on another surface, or beside the point
+            point = around[0]
+        covariance = picked.covariance
+        if covariance is None and spacing is not None:
+            beside = 0.0 if picked.point is None else float(np.linalg.norm(picked.point - picked.position))
+            covariance = max(spacing, beside) ** 2 * np.eye(3)
+        return cls(
+            frame=pose.index,
+            time=float(pose.time),
+            position=picked.place,
+            snapped="surface",
+            id=point,
+            spacing=spacing,
+            level=picked.level,
+            covariance=None if covariance is None else _six(covariance),
+            neighbors=neighbors,
+            at_outline=picked.at_outline,
+        )
+
+    @property
+    def spread(self) -> NDArray[np.float64] | None:
+        """The covariance as a matrix, (3, 3)."""
+        if self.covariance is None:
+            return None
+        xx, xy, xz, yy, yz, zz = self.covariance
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    @property
+    def uncertainty(self) -> float | None:
+        """How far off the position the place that was meant is at most, along any one line, with 95 %; scan
+        units. None where it is unknown."""
+        return None if (spread := self.spread) is None else largest_deviation(spread)
+
+
+def followed(spot: Spot, pose: Pose, motion: Rigid = STILL) -> Spot | None:
+    """A spot where its points are in a pose of the same topology, which is moved by a motion; None where the
+    point that it was set at is missing.
+
+    To the covariance comes what following leaves open."""
+    if spot.id is None:
+        return None
+    neighbors = spot.neighbors or (Neighbor(spot.id, (0.0, 0.0, 0.0)),)
+    rows = [pose.cloud.row_of(neighbor.id) for neighbor in neighbors]
+    if pose.cloud.row_of(spot.id) is None or all(row is None for row in rows):
+        return None
+    there = [(row, neighbor) for row, neighbor in zip(rows, neighbors, strict=True) if row is not None]
+    now = motion.points(pose.cloud.world(np.array([row for row, _ in there])))
+    was = np.array(spot.position) + np.array([neighbor.offset for _, neighbor in there])
+    if np.abs(now - was).max() <= _SAME * np.abs(now).max():
+        return replace(spot, frame=pose.index, time=float(pose.time))
+    position, turned, error = _carried(np.array(spot.position), was, now)
+    spread = spot.spread
+    if spread is not None:
+        spread = turned @ spread @ turned.T + error**2 * np.eye(3)
+    return replace(
+        spot,
+        frame=pose.index,
+        time=float(pose.time),
+        position=vector(position),
+        covariance=None if spread is None else _six(spread),
+        neighbors=spot.neighbors
+        and tuple(
+            Neighbor(neighbor.id, vector(point - position))
+            for (_, neighbor), point in zip(there, now, strict=True)
+        ),
+    )
+
+
+def _carried(
+    position: NDArray[np.float64], was: NDArray[np.float64], now: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """A place that points (n, 3) carry with them as a rigid body would: where it is, how it is turned (3, 3),
+    and the standard deviation of each of its coordinates, by how far the points are off such a motion.
+
+    Fewer than four do not tell a turn and how good it is: the nearest alone is followed, at the same offset,
+    which may have turned any way.
+    """
+    if len(was) < _TURNING:
+        offset = position - was[0]
+        return now[0] + offset, np.eye(3), float(np.linalg.norm(offset)) / math.sqrt(3)
+    before, after = was.mean(axis=0), now.mean(axis=0)
+    left, _, right = np.linalg.svd((now - after).T @ (was - before))  # Kabsch 1976
+    turned = left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
+    off = (now - after) - (was - before) @ turned.T
+    free = 3 * len(was) - 6  # of the coordinates, six make the motion
+    return after + turned @ (position - before), turned, math.sqrt(float((off**2).sum()) / free)
+
+
+def spot_slack(spot: Spot, radius: float) -> float:
+    """How far before a spot the surface may be that is its own, scan units, for `is_seen`.
+
+    radius: of the scan, scan units.
+    """
+    spacings, share = _SLACK
+    return spacings * (spot.spacing or 0) + share * radius + (spot.uncertainty or 0)
+
+
+def _six(spread: NDArray[np.float64]) -> tuple[float, float, float, float, float, float]:
+    xx, xy, xz, yy, yz, zz = spread[np.triu_indices(3)].tolist()
+    return xx, xy, xz, yy, yz, zz
+
+
+def _spacing_near(cloud: PointCloud, position: np.ndarray) -> float | None:
+    """The spacing at the point nearest to a place, or the distance to that point where it is more."""
+    row, gap = nearest_row(cloud, position)
+    spacing = spacing_at(cloud, row)
+    return None if spacing is None else max(spacing, gap)
