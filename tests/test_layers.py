@@ -17,8 +17,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 # A part of the package may import its own layer and those before it.
 LAYERS = (
     {
-        "errors", "files", "folders", "geometry", "bounds", "params", "resources", "rigid", "srgb", "camera",
-        "look", "view", "task", "helper", "native", "signals", "unfinished",
+        "errors", "csv_text", "files", "folders", "geometry", "bounds", "params", "resources", "rigid",
+        "srgb", "camera", "look", "view", "task", "helper", "native", "signals", "unfinished",
     },
     {"scan"},
     {"mesh", "codewords"},
