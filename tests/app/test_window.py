@@ -318,21 +318,21 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
     """The points' size: a slider from 0 to 32."""
     size = "point_size"
     app.choose(PANEL, "##backend", "###points")
-    app.act(PANEL, ("item_input_value", f"{size}/##value", 0))
+    app.act(PANEL, ("item_input_value", f"renderer/{size}/##value", 0))
     app.settle()
     before = Screenshot(app)
-    app.act(PANEL, ("item_input_value", f"{size}/##value", 32))
+    app.act(PANEL, ("item_input_value", f"renderer/{size}/##value", 32))
     app.settle()
     after = assert_true_picture(app)
     assert before.description["params"]["point_size"] == 0
     assert after.description["params"]["point_size"] == 32
-    app.act(PANEL, ("item_drag_with_delta", f"{size}/##value", (-300, 0)))
+    app.act(PANEL, ("item_drag_with_delta", f"renderer/{size}/##value", (-300, 0)))
     app.settle()
     assert difference(Screenshot(app).pixels, before.pixels) == 0
     app.act(
         PANEL,
-        ("item_input_value", f"{size}/##value", 32),
-        ("item_click", f"{size}/{icons.ICON_FA_ARROW_ROTATE_LEFT}"),
+        ("item_input_value", f"renderer/{size}/##value", 32),
+        ("item_click", f"renderer/{size}/{icons.ICON_FA_ARROW_ROTATE_LEFT}"),
     )
     app.settle()
     assert assert_true_picture(app).description["params"]["point_size"] == 1, "the default"
@@ -340,10 +340,10 @@ def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> N
 
 @pytest.mark.slow
 def test_acting_on_a_widget_or_a_window_that_is_not_there_fails(app: RunningApp) -> None:
-    for window, widget in ((PANEL, "k/##nothing"), ("nothing", "k/##value")):
+    for window, widget in ((PANEL, "renderer/k/##nothing"), ("nothing", "renderer/k/##value")):
         with pytest.raises(AssertionError, match=r"Unable to locate|doesn't seem to exist"):
             app.act(window, ("item_click", widget))
-    app.act(PANEL, ("item_click", "k/##value"))
+    app.act(PANEL, ("item_click", "renderer/k/##value"))
 
 
 @pytest.mark.slow

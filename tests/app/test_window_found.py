@@ -36,7 +36,7 @@ def app(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ru
 def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(backends(), "finding", finding.BACKEND)
     app.choose(PANEL, "##backend", "###finding")
-    app.act(PANEL, ("item_input_value", "point_size/##value", 6))
+    app.act(PANEL, ("item_input_value", "renderer/point_size/##value", 6))
     app.choose(PANEL, "color_by/##value", "###gap")
     app.choose(PANEL, "light/##value", "###flat")
     app.choose(PANEL, "quality/##value", "###fast")  # colours of the map, unmixed

@@ -113,7 +113,7 @@ def params(state: State) -> dict[str, object]:
 def draw_pyramids(app: RunningApp, primitive: str) -> None:
     """Have pyramidal projection draw, which is the default, of points or polygons."""
     assert app.settle().backend == "pyramidal"
-    app.choose(PANEL, "primitive/##value", f"###{primitive}")
+    app.choose(PANEL, "renderer/primitive/##value", f"###{primitive}")
     app.settle()
 
 

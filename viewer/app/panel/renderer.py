@@ -24,4 +24,6 @@ def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
     if chosen != name:
         rendering.choose(chosen)
     name, params = session.document.chosen(pose)
+    imgui.push_id("renderer")  # the look has parameters of the same names
     rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))
+    imgui.pop_id()
