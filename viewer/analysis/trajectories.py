@@ -1,0 +1,93 @@
+"""Ways of landmarks through time, in the scan's coordinates or held still by others that are anchors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..rigid import Rigid
+from .curves import Smoothing, smoothed
+from .track import Track
+
+_FLAT = 1e-6  # of the longest spread of anchors: in less across they lie on one line, round which all turns
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The way of a landmark. times: (T,) seconds. positions: (T, 3) scan units, NaN in gaps. speeds: (T,) the
+    length of the smoothed curve's velocity, scan units a second, NaN where not known; of noise alone it is
+    not 0. sigmas: (T,) of the speeds."""
+
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    speeds: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+
+
+def trajectory_of(
+    track: Track, smoothing: Smoothing, still: Sequence[Rigid | None] | None = None
+) -> Trajectory:
+    """The way of a landmark. still: a motion for each frame that it is seen after, see `stabilising`; where
+    there is none, it has a gap."""
+    positions, covariances = track.positions, track.covariances
+    if still is not None:
+        nowhere = np.full((4, 4), np.nan)
+        motions = np.stack([nowhere if motion is None else motion.matrix for motion in still])
+        turns = motions[:, :3, :3]
+        positions = np.einsum("tij,tj->ti", turns, positions) + motions[:, :3, 3]
+        covariances = turns @ covariances @ turns.transpose(0, 2, 1)
+    velocities, spread = smoothed(track.times, positions, covariances, smoothing, 1)
+    speeds = np.sqrt((velocities**2).sum(axis=1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = velocities / speeds[:, None]
+    variances = np.einsum("ti,tij,tj->t", along, spread, along)
+    return Trajectory(track.times, positions, speeds, np.sqrt(np.maximum(variances, 0)))
+
+
+def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Rigid | None, ...]:
+    """Find the motion of each frame that brings the anchors best to where they are in a reference frame.
+
+    Best in least squares over the anchors that both frames know (Kabsch 1976, "A solution for the best
+    rotation to relate two sets of vectors"; Umeyama 1991 for the sign). The reference is the first frame that
+    knows most of them. None where fewer than three are known, or those lie on one line. Raises InputError
+    where less than three landmarks are named, where one has no track, and where no frame knows three.
+    """
+    unknown = [name for name in anchors if name not in tracks]
+    if unknown:
+        raise InputError(f"the anchor '{unknown[0]}' is not placed", hint="Place it first, or leave it out")
+    if len(set(anchors)) < 3:
+        hint = "Choose landmarks that do not move against each other, such as the corners of the eyes"
+        raise InputError("a scan is held still by three anchors at least", hint=hint)
+    places = np.stack([tracks[name].positions for name in dict.fromkeys(anchors)], axis=1)  # (T, A, 3)
+    known = np.logical_and.reduce(np.isfinite(places), axis=2)
+    reference = int(np.argmax(known.sum(axis=1)))
+    motions = tuple(
+        _kabsch(places[frame][both], places[reference][both])
+        for frame, both in enumerate(known & known[reference])
+    )
+    if motions[reference] is None:
+        raise InputError(
+            "no frame knows three anchors that are not on one line", hint="Place them, or choose others"
+        )
+    return motions
+
+
+def _kabsch(moved: NDArray[np.float64], still: NDArray[np.float64]) -> Rigid | None:
+    """The rotation and translation that bring (A, 3) points best to others; None where that is not one."""
+    if len(moved) < 3:
+        return None
+    middles = moved.mean(axis=0), still.mean(axis=0)
+    one, other = moved - middles[0], still - middles[1]
+    spread = [np.linalg.svd(points, compute_uv=False) for points in (one, other)]
+    if any(widths[1] <= _FLAT * widths[0] for widths in spread):
+        return None
+    left, _, right = np.linalg.svd(one.T @ other)
+    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    matrix = np.eye(4)
+    matrix[:3, :3] = right.T @ mirror @ left.T
+    matrix[:3, 3] = middles[1] - matrix[:3, :3] @ middles[0]
+    return Rigid(matrix)
