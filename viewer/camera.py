@@ -169,13 +169,16 @@ class Camera:
     def place_in_picture(self, point: Vector) -> tuple[float, float] | None:
         """The place of a point in the picture, in its heights: to the right of and above its centre; None
         behind the eye."""
-        right, up, back = self.rotation() @ np.subtract(point, self.eye)
-        if back >= 0:
-            return None
-        height = self.view_height
+        right, up = self.places_in_picture(np.array([point], np.float64))[0].tolist()
+        return None if math.isnan(right) else (right, up)
+
+    def places_in_picture(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The places of points (N, 3) as `place_in_picture` gives them, (N, 2); NaN behind the eye."""
+        right, up, back = self.rotation() @ (points - self.eye).T
+        height = np.where(back < 0, self.view_height, np.nan)
         if self.projection == "perspective":
-            height *= -back / self.distance
-        return float(right / height), float(up / height)
+            height = height * -back / self.distance
+        return np.stack([right / height, up / height], axis=1)
 
     def clip_range(self) -> tuple[float, float]:
         """(near, far) along the view axis, scan units: what is outside is not drawn.

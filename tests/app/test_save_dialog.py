@@ -19,6 +19,8 @@ def test_the_file_is_what_the_user_means(tmp_path: Path, monkeypatch: pytest.Mon
     assert named_file("a.b", ".csv") == tmp_path / "a.b.csv"
     assert named_file("A.Scan4D.json", ".scan4d.json") == tmp_path / "A.Scan4D.json"
     assert named_file("a.json", ".scan4d.json") == tmp_path / "a.json.scan4d.json"
+    assert named_file("a.TPS", ".csv", ".tps") == tmp_path / "a.TPS"
+    assert named_file("a", ".csv", ".tps") == tmp_path / "a.csv"
     for wrong in ("", str(tmp_path), "~"):
         with pytest.raises(InputError, match="is a folder"):
             named_file(wrong, ".csv")

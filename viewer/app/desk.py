@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..analysis.pick import Picked
 from ..document.document import Document
 from ..document.part import Part
+from ..geometry import Vector
 from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -40,6 +42,15 @@ class Click:
     through_gap: bool = False
     motion: Rigid = STILL
     pixel: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True)
+class FrameSpan:
+    """Frames that are marked on the timeline. color: 0xRRGGBB. words: that are told of them there."""
+
+    frames: range
+    color: int
+    words: str
 
 
 @dataclass(frozen=True)
@@ -106,6 +117,16 @@ class Desk:
     def viewport(self) -> Viewport:
         """The view of the scan: its picture, and what a pixel of it shows."""
         return self._toolbox.viewport
+
+    def seek(self, index: int) -> None:
+        """Go to a frame."""
+        self._toolbox.playback.seek(index, time.monotonic())
+        self.redraw()
+
+    def seen_at(self, position: Vector, step: tuple[int, int] = (0, 0)) -> Click | None:
+        """Find the click that one at a place would be, moved by so many pixels to the right and up;
+        None where the place is not in the view. position: scan units, where the scan is moved to."""
+        return self._toolbox.seen_at(position, step)
 
     def motion(self, pose: Pose) -> Rigid:
         """The motion of a pose from the scan's coordinates to where it is shown, by what all tools lay."""

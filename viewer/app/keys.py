@@ -34,6 +34,7 @@ _KEYS = {
     **{f"F{n}": getattr(imgui.Key, f"f{n}") for n in range(1, 13)},
 }
 _SHIFT = int(imgui.Key.mod_shift)
+_ARROWS = {"Right": (1, 0), "Left": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 # What leads the keyboard through widgets, and works them.
 _WIDGETS_OWN = {
     int(_KEYS[name]) for name in (
@@ -96,13 +97,24 @@ class Keys:
         if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
             return
         is_in_widgets = app.keyboard.part != VIEW or app.help.focused is not None
+        of_tool = set() if is_in_widgets else _arrows_of_tool(app)
         for command, pressed in self._chords:
-            if is_in_widgets and pressed & ~_SHIFT in _WIDGETS_OWN:
+            if pressed in of_tool or (is_in_widgets and pressed & ~_SHIFT in _WIDGETS_OWN):
                 continue
             flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
             with app.failures.told(command.title):
                 if imgui.shortcut(pressed, flags) and command.can(app):
                     command.act(app)
+
+
+def _arrows_of_tool(app: App) -> set[int]:
+    """The arrow keys that were pressed since the last frame and that a tool has taken, as chords."""
+    flags = imgui.InputFlags_.route_global | imgui.InputFlags_.repeat
+    return {
+        pressed
+        for name, way in _ARROWS.items()
+        if imgui.shortcut(pressed := int(_KEYS[name]), flags) and app.tools.arrow(*way)
+    }
 
 
 def load_keys(path: Path, commands: Commands) -> tuple[Keys, list[str]]:

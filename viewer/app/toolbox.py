@@ -8,17 +8,21 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from imgui_bundle import ImVec2
+
 from ..analysis.pick import before_gap, pick
 from ..document.part import Part
 from ..document.schema import usable
 from ..errors import InputError
+from ..geometry import Vector
 from ..rigid import STILL, Rigid
 from ..scan.layers import Layers
 from ..scan.pose import Pose
 from ..task import Cancelled, Task
 from . import failures, tools
 from .commands import Command, Commands, Entry, Item, Listing, Menu
-from .desk import Click, Desk
+from .desk import Click, Desk, FrameSpan
 from .failures import Failures
 from .laid import Numbers, NumbersOf, PlaceOf
 from .notices import Problem
@@ -54,6 +58,7 @@ class Toolbox:
     """All tools of `tools.tool_names`.
 
     clicking: the name of the tool that clicks in the view go to; None where they only move the view.
+    is_dragging: whether the drag in the view is that tool's.
     session, playback, viewport, note, redraw: what their desks offer them.
     """
 
@@ -73,6 +78,7 @@ class Toolbox:
         self.note, self.redraw, self._failures = note, redraw, failures
         self._remembered = remembered
         self.clicking: str | None = None
+        self.is_dragging = False
         self._is_declined = False  # the last click, by the tool that had it
         self._slots = {name: Slot(Desk(self, name)) for name in tools.tool_names()}
         for slot in self._slots.values():
@@ -194,7 +200,7 @@ class Toolbox:
 
     def draw_over(self, view: ViewPlace) -> None:
         """Have the tools draw over the picture."""
-        canvas = Canvas(view)
+        canvas = Canvas(view, self.viewport.image)
         for slot in self._slots.values():
             self._call(slot, "overlay", canvas, view)
 
@@ -220,15 +226,61 @@ class Toolbox:
 
     def click(self, pixel: tuple[int, int]) -> None:
         """Give the tool that has the clicks what a pixel of the view shows."""
+        self.viewport.finish()
+        click = self._click_at(pixel)
+        if self._first is not None and click is not None:
+            self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
+
+    def press(self, mouse: ImVec2) -> None:
+        """Ask the tool that has the clicks whether a drag that begins there is its own."""
+        self.is_dragging = self._first is not None and bool(self._call(self._first, "on_press", mouse))
+
+    def drag(self, pixel: tuple[int, int], *, ends: bool) -> None:
+        """Give the tool whose drag it is what a pixel of the view shows. ends: whether the button is let go
+        of there."""
+        slot, self.is_dragging = self._first, not ends
+        if ends:
+            self.viewport.finish()
+        click = self._click_at(pixel, in_full=ends)
+        if slot is not None and click is not None:
+            self._ask(slot, lambda tool: tool.on_drag(click, ends), self.note)
+
+    def arrow(self, right: int, up: int) -> bool:
+        """Whether an arrow key was for the tool that has the clicks, which takes it."""
+        slot = self._first
+        if slot is None or not slot.has("on_arrow"):
+            return False
+        return bool(self._ask(slot, lambda tool: tool.on_arrow(right, up), self.note))
+
+    def seen_at(self, position: Vector, step: tuple[int, int]) -> Click | None:
+        """Find the click that one beside a place would be, so many pixels to the right and up, in full;
+        None without a picture, and where the place is not in it."""
+        self.viewport.finish()
+        surface = self.viewport.surface
+        if surface is None:
+            return None
+        unmoved = surface.layers.place.inverse.points(np.array([position])) - surface.view.origin
+        if not surface.view.contains(unmoved)[0]:
+            return None
+        across, down = np.floor(surface.view.project(unmoved)[0][0]).astype(int).tolist()
+        return self._click_at((across + step[0], down - step[1]))
+
+    def _click_at(self, pixel: tuple[int, int], *, in_full: bool = True) -> Click | None:
+        """The click at a pixel of the picture that is there; None without one. in_full: with the spacing,
+        in a picture as large as the view."""
         viewport = self.viewport
-        viewport.finish()
         surface, request = viewport.surface, viewport.request
-        if self._first is None or surface is None or request is None or not viewport.is_there:
-            return
-        meant = before_gap(surface, *pixel)
-        picked = pick(surface, *pixel, shown=meant)
-        click = Click(picked, request.pose, meant != pixel, request.layers.place, meant)
-        self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
+        if surface is None or request is None or not viewport.is_there:
+            return None
+        at = pixel if in_full else viewport.pixel_of_picture(pixel)
+        meant = before_gap(surface, *at)
+        picked = pick(surface, *at, shown=meant, spacing=in_full)
+        return Click(picked, request.pose, meant != at, request.layers.place, meant)
+
+    @property
+    def spans(self) -> list[FrameSpan]:
+        """Marks of all tools on the timeline."""
+        return [span for slot in self._slots.values() for span in self._call(slot, "spans") or ()]
 
     def take_file(self, path: Path) -> bool:
         """Whether a file that the user opens or drops is a tool's, which takes it."""

@@ -34,6 +34,11 @@ class Presenter:
         ctx.enable_only(moderngl.NOTHING)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
 
+    @property
+    def image(self) -> int | None:
+        """The name of the texture that holds the last picture, its upper row first; None before."""
+        return None if self._texture is None else self._texture.glo
+
     def _texture_of(self, size: tuple[int, int]) -> moderngl.Texture:
         if self._texture is None or self._texture.size != size:
             if self._texture is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from imgui_bundle import ImVec2
 
@@ -92,3 +93,6 @@ def test_places_of_the_scan_are_where_the_picture_shows_them() -> None:
     assert above.x > 250
     assert above.y < 150
     assert PLACE.on_screen((0, 0, 5)) is None, "behind the eye"
+    all_places = PLACE.all_on_screen(np.array([[0, 0, 0], [0.1, 0.2, 0], [0, 0, 5], [np.nan, 0, 0]]))
+    assert all_places[:2] == pytest.approx(np.array([[middle.x, middle.y], [above.x, above.y]]), abs=1e-4)
+    assert np.isnan(all_places[2:]).all()

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _SPEED_WIDTH = 4.6  # in heights of the font
 _SHORTEST_TRACK = 8.0
 _BAR = (0.12, 0.4)  # of the track's height, where the frames are
+_SPANS = (0.0, 0.12)  # the same of what tools mark
 _TICKS = 0.5  # where their numbers begin
 _HANDLE = 0.2  # half the width of what sets an end
 _GRAB = 1.5  # of that, how near the mouse has to be
@@ -132,6 +133,7 @@ def _draw_track(app: App, width: float) -> None:
     if width < 2 * inset.x + 1:
         return
     imgui.invisible_button("track", ImVec2(width, height))
+    spans = app.tools.spans
     track = _Track(playback.whole.edges, imgui.get_item_rect_min() + inset, ImVec2(width, height) - inset * 2)
     timeline, frame = playback.timeline, playback.whole.frame_at(track.time(imgui.get_mouse_pos().x))
     if imgui.is_item_active() or imgui.is_item_deactivated():
@@ -144,26 +146,28 @@ def _draw_track(app: App, width: float) -> None:
             playback.seek(frame, time.monotonic())
     if len(timeline) > 1:
         if imgui.is_item_hovered():
-            _draw_frame(app, frame)
+            _draw_frame(app, frame, [span.words for span in spans if frame in span.frames])
         track.seconds(float(timeline.times[0]), playback.span)
     track.bar(0, len(playback.timeline), palette.frame[0])
     for run in playback.timeline.cached():
         track.bar(run.start, run.stop, palette.cached)
     for index in playback.timeline.broken:
         track.bar(index, index + 1, palette.broken)
+    for span in spans:
+        track.bar(span.frames.start, span.frames.stop, span.color, _SPANS)
     if len(playback.timeline) > 1:
         track.ends(playback.span, palette.accent)
         track.head(playback.session.index, palette.text if playback.problem is None else palette.broken)
 
 
-def _draw_frame(app: App, frame: int) -> None:
-    """Tell of a frame beside the mouse: a small picture, its time and its name."""
+def _draw_frame(app: App, frame: int, marks: Sequence[str]) -> None:
+    """Tell of a frame beside the mouse: a small picture, its time and its name, and what it is marked for."""
     timeline, camera = app.playback.timeline, app.document.camera
     if imgui.begin_tooltip():
         if camera is not None:
             app.thumbnails.draw(timeline, frame, camera, app.viewport.aspect)
         words = [frame_in_words(frame), timeline.label(frame)]
-        imgui.text("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words))))
+        imgui.text("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words), *marks)))
         imgui.end_tooltip()
 
 
@@ -182,10 +186,10 @@ class _Track:
         """The time at a place."""
         return (x - self.corner.x) / self.size.x * float(self.edges[-1])
 
-    def bar(self, start: int, stop: int, color: int) -> None:
-        """Mark a run of frames, at least two pixels wide."""
+    def bar(self, start: int, stop: int, color: int, shares: tuple[float, float] = _BAR) -> None:
+        """Mark a run of frames, at least two pixels wide. shares: of the height, where it is."""
         left, right = self.x(self.edges[start]), self.x(self.edges[stop])
-        top, bottom = (self.corner.y + share * self.size.y for share in _BAR)
+        top, bottom = (self.corner.y + share * self.size.y for share in shares)
         corners = ImVec2(left, top), ImVec2(max(right, left + 2), bottom)
         self.draw_list.add_rect_filled(*corners, theme.packed(color))
 

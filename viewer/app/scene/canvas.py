@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from imgui_bundle import ImVec2, imgui
+from numpy.typing import NDArray
 
 from ...camera import Camera
 from ...geometry import Vector
 from .. import theme
 from .labels import Box, Line, free_place, usual_place
 
+_CROSS = 0xFFFFFF
 _OUTLINE = 0x000000  # so that what is light is seen on any surface
 _POINT, _THICK = 0.28, 0.11  # radius, thickness; in heights of the font
 _GAP = 0.5  # between a line and its label
 _HEAD = 2.6  # of the view's head, where the prompt is
+_LOUPE, _LOUPE_AWAY = 4.5, 1.2  # half its side, and how far from its middle it is; the latter in sides
+_MAGNIFIED = 6.0  # screen pixels for one of the picture, in a loupe
 
 
 class ViewPlace:
@@ -36,6 +41,13 @@ class ViewPlace:
         if place is None:
             return None
         return self.corner + self.size * 0.5 + ImVec2(place[0] * self.size.y, -place[1] * self.size.y)
+
+    def all_on_screen(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places of the scan on the screen, (N, 2); NaN behind the eye, and where a position is. positions:
+        (N, 3), scan units."""
+        middle = self.corner + self.size * 0.5
+        places = self.camera.places_in_picture(positions) * (self.size.y, -self.size.y)
+        return places + np.array([middle.x, middle.y])
 
 
 class Label:
@@ -71,8 +83,9 @@ class Canvas:
     One canvas serves all tools in a frame, so that labels keep off the points and labels of them all.
     """
 
-    def __init__(self, view: ViewPlace) -> None:
-        self._view = view
+    def __init__(self, view: ViewPlace, image: int | None = None) -> None:
+        """image: the texture of the picture; None where there is none."""
+        self._view, self._image = view, image
         self._taken: list[Box] = []
         self._em = imgui.get_font_size()
 
@@ -95,6 +108,26 @@ class Canvas:
         draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
         draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
         self._take(place)
+
+    def loupe(self, place: ImVec2) -> None:
+        """The picture about a place on the screen, magnified in a square beside it, with a cross in its
+        middle; nothing where there is no picture."""
+        if self._image is None:
+            return
+        view, half = self._view, _LOUPE * self._em
+        away = 2 * half * _LOUPE_AWAY
+        across = away if place.x + away + half < view.box.high.x else -away
+        up = -away if place.y - away - half > view.box.low.y else away
+        middle = place + ImVec2(across, up)
+        low, high = middle - ImVec2(half, half), middle + ImVec2(half, half)
+        at, reach = (place - view.corner) / view.size, ImVec2(half, half) / _MAGNIFIED / view.size
+        draw_list = imgui.get_window_draw_list()
+        draw_list.add_image(imgui.ImTextureRef(self._image), low, high, at - reach, at + reach)
+        draw_list.add_rect(low, high, imgui.get_color_u32(imgui.Col_.border), thickness=_THICK * self._em)
+        for arm in (ImVec2(half, 0), ImVec2(0, half)):
+            for thick, color in ((3.0, theme.packed(_OUTLINE, 0.5)), (1.0, theme.packed(_CROSS))):
+                for side in (1, -1):
+                    draw_list.add_line(middle + arm * (0.15 * side), middle + arm * side, color, thick)
 
     def _take(self, place: ImVec2) -> None:
         side = 2 * _POINT * self._em + 2

@@ -82,7 +82,10 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
     io, camera, gesture = imgui.get_io(), app.document.camera, app.steering.gesture
     assert camera is not None
     if imgui.is_item_activated():
-        app.steering.gesture = _gesture(io)
+        app.tools.is_dragging = False
+        if imgui.is_mouse_clicked(0) and not io.key_shift:
+            app.tools.press(imgui.get_mouse_pos())
+        app.steering.gesture = None if app.tools.is_dragging else _gesture(io)
         app.steering.turntable.stop()
     elif gesture == "orbit" and app.tools.clicking and _is_click():
         pass  # so that a click does not turn the view
@@ -97,7 +100,9 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
 def _serve_tools(app: App, size: ImVec2) -> None:
     """Let tools have their clicks, and draw over the picture."""
     is_hovered = imgui.is_item_hovered()
-    if app.tools.clicking and is_hovered:
+    if app.tools.is_dragging and not _is_click():
+        app.tools.drag(_pixel(app), ends=imgui.is_item_deactivated())
+    elif app.tools.clicking and is_hovered:
         imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
         is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
         is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click

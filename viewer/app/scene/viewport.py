@@ -260,14 +260,22 @@ class Viewport:
         if self.surface is None or not self.is_there:
             return None
         if self._picked is None or self._picked[0] != pixel:
-            # A pixel is as good as its middle where the picture has fewer than the view.
-            across, down = (
-                math.floor((at + 0.5) * n / m)
-                for at, n, m in zip(pixel, self.surface.size, self.size, strict=True)
-            )
-            meant = before_gap(self.surface, across, down)
-            self._picked = pixel, pick(self.surface, across, down, shown=meant, spacing=False)
+            at = self.pixel_of_picture(pixel)
+            meant = before_gap(self.surface, *at)
+            self._picked = pixel, pick(self.surface, *at, shown=meant, spacing=False)
         return self._picked[1]
+
+    def pixel_of_picture(self, pixel: tuple[int, int]) -> tuple[int, int]:
+        """The pixel of the picture that shows the middle of one of the view, of which a preview has fewer."""
+        if self.surface is None:
+            return pixel
+        (x, y), (width, height), (wide, high) = pixel, self.surface.size, self.size
+        return math.floor((x + 0.5) * width / wide), math.floor((y + 0.5) * height / high)
+
+    @property
+    def image(self) -> int | None:
+        """The OpenGL texture that the picture was shown from last, its first row at 0; None before."""
+        return self._presenter.image if self.is_visible else None
 
     def pick_in_full(self) -> Picked | None:
         """The last `pick` once more, in the picture in full; None where that was before another picture."""

@@ -22,6 +22,13 @@ The Tool has any of
     prompt()                what to say at the top of the view while it has the clicks
     on_click(click)         a click in the view while it has the clicks (`desk.take_clicks`); False: it is not
                             taken, and a double click turns the view about what is there, as without a tool
+    on_press(mouse)         the left button goes down in the view while it has the clicks, at a place on the
+                            screen; True: a drag from there is its own, and does not move the view
+    on_drag(click, ends)    a drag of its own has come to what `click` tells, without its spacing; ends: the
+                            button is let go of there, and it is told in full. Without a move it is a click
+    on_arrow(right, up)     an arrow key was pressed while it has the clicks, each -1, 0 or 1; True: it is
+                            taken, and goes to no other frame
+    spans()                 the `FrameSpan`s to mark on the timeline
     on_file(path)           a file was opened or dropped; True: it is this tool's, and no scan
     on_escape()             Escape was pressed; True: that has ended something
     is_under_way()          whether something has begun that is in no document yet: undo takes that back first
