@@ -174,11 +174,15 @@ class Camera:
 
     def places_in_picture(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """The places of points (N, 3) as `place_in_picture` gives them, (N, 2); NaN behind the eye."""
-        right, up, back = self.rotation() @ (points - self.eye).T
+        right, up, _ = self.rotation() @ (points - self.eye).T
+        return np.stack([right, up], axis=1) / self.heights_at(points)[:, None]
+
+    def heights_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scan units from the bottom to the top of the picture at the depths of points (N, 3), (N,); NaN
+        behind the eye."""
+        back = (points - self.eye) @ self.rotation()[2]
         height = np.where(back < 0, self.view_height, np.nan)
-        if self.projection == "perspective":
-            height = height * -back / self.distance
-        return np.stack([right / height, up / height], axis=1)
+        return height * -back / self.distance if self.projection == "perspective" else height
 
     def clip_range(self) -> tuple[float, float]:
         """(near, far) along the view axis, scan units: what is outside is not drawn.

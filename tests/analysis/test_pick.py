@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scenes import looking_down_z, plane, sphere, sphere_hits
 
-from viewer.analysis.pick import before_gap, is_seen, pick
+from viewer.analysis.pick import are_seen, before_gap, is_seen, pick
 from viewer.camera import Camera
 from viewer.gpu.surface import EMPTY, NOTHING, Surface
 from viewer.scan.points import PointCloud
@@ -231,3 +231,8 @@ def test_a_place_is_seen_unless_something_is_before_it(draw: Draw, projection: s
     assert is_seen(surface, (1.3, 0, -4.0), 0.0), "beside the plane, where nothing is"
     assert not is_seen(surface, (1.9, 0, -4.0), 0.0), "outside the picture"
     assert not is_seen(surface, (0, 0, 2.0), 10.0), "behind the eye"
+    places = np.random.default_rng(0).uniform((-2, -2, -6), (2, 2, 2), (200, 3))
+    slacks = np.tile((0.01, 1.1), 100)
+    seen = [is_seen(surface, place, slack) for place, slack in zip(places, slacks, strict=True)]
+    assert are_seen(surface, places, slacks).tolist() == seen
+    assert not are_seen(surface, np.array([[np.nan, 0, -4]]), np.ones(1)).any(), "nowhere"

@@ -11,7 +11,7 @@ from scenes import DRAWS_POINTS, NOTHING, sphere, sphere_mesh
 
 from viewer.analysis.measure import Measurement, reading_of
 from viewer.analysis.pick import is_seen, pick
-from viewer.analysis.spot import Spot
+from viewer.analysis.spot import Spot, moved_spot
 from viewer.backends import backend as find_backend
 from viewer.backends import backends
 from viewer.bench.judge import Judge
@@ -255,6 +255,10 @@ def test_measurements_go_with_the_pose(renderer: Renderer) -> None:
         assert end.spacing < 0.1
     back = reading_of(Measurement(*ends), POSE, True).measurement
     again = reading_of(Measurement(*ends), POSE, True, TURNED).measurement
+    for end, unmoved_end in zip(ends, back.ends, strict=True):
+        there_again = moved_spot(moved_spot(end, TURNED.inverse), TURNED)
+        np.testing.assert_allclose(there_again.position, end.position, atol=1e-6)
+        assert moved_spot(end, TURNED.inverse).uncertainty == pytest.approx(unmoved_end.uncertainty, rel=1e-3)
     unmoved = TURNED.inverse.points(np.array([end.position for end in ends]))
     np.testing.assert_allclose([end.position for end in back.ends], unmoved, atol=1e-6)
     np.testing.assert_allclose([end.position for end in again.ends], [end.position for end in ends])

@@ -254,6 +254,22 @@ def _lie_all_round(down: NDArray[np.intp], across: NDArray[np.intp]) -> bool:
     return len(angles) > 0 and bool(np.diff(angles, append=angles[0] + 2 * np.pi).max() < _WIDEST)
 
 
+def are_seen(
+    surface: Surface, positions: NDArray[np.float64], slacks: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether each of many places is seen, (N,), as `is_seen` tells of one, at one reading of all pixels.
+
+    positions: (N, 3), NaN for what is not seen. slacks: (N,).
+    """
+    unmoved = surface.layers.place.inverse.points(positions) - surface.view.origin
+    seen = surface.view.contains(unmoved)
+    pixels, depths = surface.view.project(unmoved[seen])
+    across, down = pixels.astype(np.intp).T
+    before = (surface.depth - surface.view.base)[down, across]
+    seen[seen] = before >= depths - slacks[seen]
+    return seen
+
+
 def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:
     """Whether a place lies in the picture with nothing before it.
 

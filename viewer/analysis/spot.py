@@ -158,6 +158,21 @@ def _carried(
     return after + turned @ (position - before), turned, math.sqrt(float((off**2).sum()) / free)
 
 
+def moved_spot(spot: Spot, motion: Rigid) -> Spot:
+    """A spot of a pose that is moved by a motion."""
+    if motion.is_identity:
+        return spot
+    spread = spot.spread
+    return replace(
+        spot,
+        position=vector(motion.points(np.array(spot.position))),
+        covariance=None if spread is None else _six(motion.rotation @ spread @ motion.rotation.T),
+        neighbors=tuple(
+            Neighbor(one.id, vector(motion.rotation @ np.array(one.offset))) for one in spot.neighbors
+        ),
+    )
+
+
 def spot_slack(spot: Spot, radius: float) -> float:
     """How far before a spot the surface may be that is its own, scan units, for `is_seen`.
 

@@ -17,6 +17,7 @@ from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.units import Scale
 from ..task import Task, in_background
+from .followed import Followed
 from .laid import NumbersOf, PlaceOf
 from .scene.viewport import Viewport
 
@@ -142,6 +143,11 @@ class Desk:
         something, lay it anew. All is taken away when another scan is opened, and none of it is kept.
         """
         self._toolbox.lay(self.name, numbers, place)
+
+    @property
+    def followed(self) -> Followed:
+        """Landmarks of the open scan through time, and the measures of them, as far as they are known."""
+        return self._toolbox.followed
 
     # --- the document -----------------------------------------------------------------
 

@@ -24,6 +24,7 @@ from . import failures, tools
 from .commands import Command, Commands, Entry, Item, Listing, Menu
 from .desk import Click, Desk, FrameSpan
 from .failures import Failures
+from .followed import Followed
 from .laid import Numbers, NumbersOf, PlaceOf
 from .notices import Problem
 from .playing.playback import Playback
@@ -59,7 +60,7 @@ class Toolbox:
 
     clicking: the name of the tool that clicks in the view go to; None where they only move the view.
     is_dragging: whether the drag in the view is that tool's.
-    session, playback, viewport, note, redraw: what their desks offer them.
+    session, playback, viewport, followed, note, redraw: what their desks offer them.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class Toolbox:
         self.session, self.playback, self.viewport = session, playback, viewport
         self.note, self.redraw, self._failures = note, redraw, failures
         self._remembered = remembered
+        self.followed = Followed()
         self.clicking: str | None = None
         self.is_dragging = False
         self._is_declined = False  # the last click, by the tool that had it

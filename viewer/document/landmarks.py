@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
-from ..analysis.landmarks import Landmark
+from ..analysis.landmarks import Landmark, Template
 from ..analysis.measures import Measure
 from ..geometry import Vector
 from .part import Part
@@ -30,3 +31,65 @@ class Landmarks(Part, name="landmarks"):
     template: str = ""
     measures: tuple[Measure, ...] = ()
     notes: tuple[Note, ...] = ()
+
+    def named(self, name: str) -> Landmark | None:
+        """The landmark of a name; None where there is none."""
+        return next((landmark for landmark in self.all if landmark.name == name), None)
+
+    def with_landmark(self, landmark: Landmark) -> Landmarks:
+        """The landmarks with this one in the place of the one of its name, or at the end."""
+        if self.named(landmark.name) is None:
+            return replace(self, all=(*self.all, landmark))
+        return replace(self, all=tuple(landmark if one.name == landmark.name else one for one in self.all))
+
+    def without_landmark(self, name: str) -> Landmarks:
+        """The landmarks without the one of a name, and without the measures of it."""
+        return replace(
+            self,
+            all=tuple(one for one in self.all if one.name != name),
+            measures=tuple(measure for measure in self.measures if name not in measure.landmarks),
+        )
+
+    def renamed(self, old: str, new: str) -> Landmarks:
+        """The landmarks with another name for one, also where others and measures speak of it."""
+
+        def now(name: str) -> str:
+            return new if name == old else name
+
+        return replace(
+            self,
+            all=tuple(replace(one, name=now(one.name), partner=now(one.partner)) for one in self.all),
+            measures=tuple(replace(one, landmarks=tuple(map(now, one.landmarks))) for one in self.measures),
+        )
+
+    def begun_with(self, template: Template) -> Landmarks:
+        """The landmarks in the order of a template, as far as they are set; others that are set come after
+        them. Its measures come to those that are there."""
+        known = {landmark.name: landmark for landmark in self.all}
+        listed = {landmark.name for landmark in template.landmarks}
+        placed = tuple(
+            replace(landmark, keys=known[landmark.name].keys, missing=known[landmark.name].missing)
+            if landmark.name in known
+            else landmark
+            for landmark in template.landmarks
+        )
+        others = tuple(one for one in self.all if one.name not in listed and one.keys)
+        measured = {measure.name for measure in self.measures}
+        measures = tuple(measure for measure in template.measures if measure.name not in measured)
+        return replace(
+            self, all=(*placed, *others), template=template.name, measures=(*self.measures, *measures)
+        )
+
+    def next_to_place(self, frame: int, after: str = "") -> Landmark | None:
+        """The first landmark after one that is still to be placed and not missing in a frame, round the end;
+        None where there is none."""
+        names = [landmark.name for landmark in self.all]
+        start = names.index(after) + 1 if after in names else 0
+        in_turn = (*self.all[start:], *self.all[:start])
+        waiting = (one for one in in_turn if one.state == "to place" and frame not in one.missing)
+        return next(waiting, None)
+
+    def free_name(self) -> str:
+        """A name for one more: "Landmark 4", a number above those that are there."""
+        numbers = (re.fullmatch("Landmark ([0-9]{1,6})", landmark.name) for landmark in self.all)
+        return f"Landmark {max((int(number[1]) for number in numbers if number), default=0) + 1}"

@@ -49,6 +49,10 @@ class ViewPlace:
         places = self.camera.places_in_picture(positions) * (self.size.y, -self.size.y)
         return places + np.array([middle.x, middle.y])
 
+    def lengths_on_screen(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How long a scan unit is on the screen at places (N, 3), (N,); NaN behind the eye."""
+        return self.size.y / self.camera.heights_at(positions)
+
 
 class Label:
     """Lines of text on a plate. line: beside which, on the screen. faint: whether it is dimmed."""

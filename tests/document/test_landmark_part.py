@@ -1,0 +1,58 @@
+"""The landmarks of a document: the order of placing, and what a change of one means for others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.analysis.landmarks import Landmark, Template
+from viewer.analysis.measures import Measure
+from viewer.analysis.spot import Spot
+from viewer.document.landmarks import Landmarks
+
+WIDTH = Measure("width", "distance", ("left", "right"))
+PAIR = Template(
+    "pair", "A pair", (Landmark("left", partner="right"), Landmark("right", partner="left")), (WIDTH,)
+)
+
+
+def spot(frame: int) -> Spot:
+    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), "surface", None, None, 0)
+
+
+def test_landmarks_are_placed_in_turn_but_those_that_are_not_there() -> None:
+    names = ("a", "b", "c", "d")
+    part = Landmarks(tuple(Landmark(name) for name in names))
+    part = part.with_landmark(Landmark("b", keys=(spot(0),))).with_landmark(Landmark("c", skipped=True))
+
+    def following(frame: int, after: str = "") -> str | None:
+        found = part.next_to_place(frame, after)
+        return found and found.name
+
+    assert (following(0), following(0, "a"), following(0, "d")) == ("a", "d", "a")
+    part = part.with_landmark(Landmark("d", missing=(0,)))
+    assert (following(0, "a"), following(1, "a")) == ("a", "d")
+    part = part.with_landmark(Landmark("a", keys=(spot(1),)))
+    assert following(0) is None
+
+
+def test_a_template_keeps_what_was_set() -> None:
+    part = Landmarks(
+        (Landmark("other", keys=(spot(0),)), Landmark("right", keys=(spot(2),)), Landmark("idle"))
+    )
+    begun = part.begun_with(PAIR)
+    assert [one.name for one in begun.all] == ["left", "right", "other"]
+    assert begun.all[1] == replace(PAIR.landmarks[1], keys=(spot(2),))
+    assert (begun.template, begun.measures) == ("pair", (WIDTH,))
+    assert begun.begun_with(PAIR) == begun, "nothing is there twice"
+
+
+def test_a_name_goes_wherever_it_is_spoken_of() -> None:
+    part = Landmarks().begun_with(PAIR).renamed("left", "links")
+    assert [(one.name, one.partner) for one in part.all] == [("links", "right"), ("right", "links")]
+    assert part.measures[0].landmarks == ("links", "right")
+    assert part.without_landmark("right").measures == ()
+
+
+def test_a_free_name_is_none_of_those_that_are_there() -> None:
+    assert Landmarks().free_name() == "Landmark 1"
+    assert Landmarks((Landmark("Landmark 7"), Landmark("nose"))).free_name() == "Landmark 8"

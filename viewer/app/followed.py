@@ -1,0 +1,38 @@
+"""What is known of landmarks through time: one tool has it found, all tools may read it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from ..analysis.measures import Series
+from ..analysis.track import Track
+
+
+class Followed:
+    """The tracks of the open scan's landmarks, and its measures over time.
+
+    tracks: by landmark, of those that are placed, in their order; frames nobody has looked at yet are
+    pending. Positions are those of the scan, whatever tools move it to. series: by measure; those that were
+    computed. Either is another object where something has changed, and only then. is_busy: whether more is
+    being found.
+    """
+
+    def __init__(self) -> None:
+        self.tracks: Mapping[str, Track] = MappingProxyType({})
+        self.series: Mapping[str, Series] = MappingProxyType({})
+        self.is_busy = False
+
+    def take_tracks(self, tracks: Mapping[str, Track]) -> bool:
+        """Take in the tracks that are there now; whether one is another object than before."""
+        if list(tracks.items()) == list(self.tracks.items()):  # a track equals itself alone
+            return False
+        self.tracks = MappingProxyType(dict(tracks))
+        return True
+
+    def take_series(self, series: Mapping[str, Series]) -> bool:
+        """Take in the series that are there now; whether one is another object than before."""
+        if list(series.items()) == list(self.series.items()):
+            return False
+        self.series = MappingProxyType(dict(series))
+        return True
