@@ -13,7 +13,7 @@ from ..document.part import Part
 from ..document.saved_session import SavedSession
 from ..files import absolute
 from ..geometry import UP
-from ..scan.open import DEMO
+from ..scan.open import is_demo
 from .laid import Laid
 from .playing.player import Pace
 
@@ -22,7 +22,7 @@ _MOST_LEFT = 50  # scans whose changes can still be undone
 
 def known_as(scan: str) -> str:
     """The name that a scan is remembered by: its path from the root, wherever Scan4D was started."""
-    return scan if scan == DEMO else absolute(scan)
+    return scan if is_demo(scan) else absolute(scan)
 
 
 class Session:

@@ -24,7 +24,7 @@ from ..frame import Request
 from ..output.export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
 from ..output.marks import Legend, marks_of
 from ..scan.inputs import scan_inputs
-from ..scan.open import DEMO, open_scan
+from ..scan.open import is_demo, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS, frame_in_words
 from . import _drawing as drawing
@@ -203,7 +203,7 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
             if os.path.exists(place):
                 raise
             missing = error
-    if scan == DEMO or os.path.isabs(scan):
+    if is_demo(scan) or os.path.isabs(scan):
         raise missing
     hint = f"Looked in '{path.parent}' and in the working directory; put it there, or correct 'scan'"
     raise InputError(f"its scan '{scan}' is not there", path, hint) from missing

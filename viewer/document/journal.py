@@ -19,7 +19,7 @@ from typing import Any
 from .. import __version__
 from ..errors import InputError, explained
 from ..files import free_file, read_text
-from ..scan.open import DEMO
+from ..scan.open import is_demo
 from .recording import FORMAT, Recording
 from .schema import DAMAGED
 
@@ -156,7 +156,7 @@ def _from_root(recording: Recording, folder: Path) -> Recording:
     """The recording for another folder: its scans are named from the root."""
 
     def named(scan: str | None) -> str | None:
-        return scan if scan in (None, DEMO) else os.path.join(folder, scan or "")
+        return scan if scan is None or is_demo(scan) else os.path.join(folder, scan or "")
 
     return replace(
         recording, entries=tuple(replace(entry, scan=named(entry.scan)) for entry in recording.entries)

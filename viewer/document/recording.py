@@ -43,7 +43,7 @@ from ..output.export import read_description
 from ..output.marks import Legend, Marks, MeasuredLine
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
-from ..scan.open import DEMO, searches_folders
+from ..scan.open import is_demo, searches_folders
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.units import Scale
@@ -351,7 +351,7 @@ def is_recording(path: Path) -> bool:
 
 def places_of(scan: str, recording: Path) -> list[str]:
     """Places of a scan that a recording names: beside the recording, then as it is named."""
-    return [DEMO] if scan == DEMO else list(dict.fromkeys([str(recording.parent / scan), scan]))
+    return [scan] if is_demo(scan) else list(dict.fromkeys([str(recording.parent / scan), scan]))
 
 
 def places_to_open(scan: str, recording: Path) -> list[str]:

@@ -24,7 +24,7 @@ from .. import __version__
 from ..errors import InputError, explained
 from ..files import absolute, open_plain, whole_file
 from ..folders import user_folder
-from ..scan.open import DEMO
+from ..scan.open import is_demo
 from .document import Document
 from .schema import (
     DAMAGED,
@@ -121,7 +121,7 @@ def is_session(path: Path) -> bool:
 
 def _named_from(folder: Path, scan: str) -> str:
     """A scan's path from a folder, with slashes; from the root where it is on another drive."""
-    if scan == DEMO:
+    if is_demo(scan):
         return scan
     try:
         return Path(os.path.relpath(absolute(scan), absolute(folder))).as_posix()

@@ -16,7 +16,7 @@ from typing import Literal
 from ..errors import InputError
 from ..files import absolute
 from . import formats
-from .open import DEMO, entries, find_source, folder_frames, matches
+from .open import entries, find_source, folder_frames, is_demo, matches
 from .range_folders import find_range_frames
 from .sources import FileSequence
 from .times import TIMES_FILE, frame_numbers, natural_key
@@ -46,7 +46,7 @@ class Listed:
 def is_there(scan: str) -> bool:
     """Whether a scan can be opened, as far as its name tells; of a pattern its folder must be there."""
     is_pattern = "%" in scan or glob.has_magic(scan)
-    return scan == DEMO or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
+    return is_demo(scan) or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
 
 
 def list_folder(folder: Path | str) -> list[Listed]:
@@ -96,7 +96,7 @@ def scans_beside(scan: str) -> list[str]:
     The scan alone where its folder cannot be listed.
     """
     path = Path(absolute(scan))
-    if scan == DEMO or str(path) == path.anchor:
+    if is_demo(scan) or str(path) == path.anchor:
         return [scan]
     kinds = ("file", "folder") if os.path.exists(path) else ("sequence",)
     found: dict[str, str] = {}

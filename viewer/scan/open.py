@@ -31,10 +31,16 @@ _PRINTF = re.compile("%(0?[0-9]{0,2})d")
 _NAMES_TO_COMPARE = 5000
 
 
+def is_demo(scan: str | None) -> bool:
+    """Whether a name of a scan is that of the demo, or of a variant of it."""
+    return scan is not None and (scan == DEMO or scan.startswith(f"{DEMO}:"))
+
+
 def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float | None = None) -> Timeline:
     """Open a scan; no frame is read before it is asked for.
 
-    path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo".
+    path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo",
+    of which "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed.
     unit: the name of its unit of length, for example "mm"; None: what the scan tells, else "units".
     fps: frame numbers a second, where no times.csv tells the times. Without it the times
     stored in the file count, and without those 25 a second.
@@ -86,10 +92,10 @@ def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
 def find_source(path: str | os.PathLike[str]) -> FrameSource:
     """Find where the frames of the scan named `path` come from. Raises InputError."""
     path = os.fspath(path)
-    if path == DEMO:
+    if is_demo(path):
         from .demo import DemoSource
 
-        return DemoSource()
+        return DemoSource(path)
     if os.path.basename(path) == pods.FILE and os.path.isfile(path):
         path = os.path.dirname(path) or os.curdir
     if os.path.isdir(path):

@@ -15,7 +15,7 @@ from ...document.recording import is_recording
 from ...document.saved_session import is_session
 from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed, list_folder
-from ...scan.open import DEMO
+from ...scan.open import DEMO, is_demo
 from ...task import Task, in_background
 from .. import theme, widgets
 from ..session import Session, known_as
@@ -95,8 +95,8 @@ class Browser:
             self._go(folder)
             return
         scan = self._session.scan
-        here = self._folder if scan == DEMO else Path(known_as(scan)).parent
-        self._go(here, "" if scan == DEMO else known_as(scan))
+        here = self._folder if is_demo(scan) else Path(known_as(scan)).parent
+        self._go(here, "" if is_demo(scan) else known_as(scan))
 
     @property
     def waits(self) -> bool:
@@ -294,8 +294,8 @@ class Browser:
             ]:
                 self._go(place.folder)
             widgets.tooltip(printable(str(place.folder)))
-        is_demo = self._session.scan == DEMO
-        if imgui.selectable(f"{icons.ICON_FA_CUBE}  Demo scan###Demo scan", is_demo)[0]:
+        is_open = self._session.scan == DEMO
+        if imgui.selectable(f"{icons.ICON_FA_CUBE}  Demo scan###Demo scan", is_open)[0]:
             self._open_known(DEMO)
         imgui.spacing()
         scans = self._scans

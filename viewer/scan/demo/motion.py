@@ -1,7 +1,8 @@
-"""How the demo subject moves: rotations that fade in space, on a schedule that repeats.
+"""How the demo subject moves: rotations that fade in space, then the head as a whole, on a schedule that repeats.
 
-The head at rest is an implicit surface; a pose is that surface bent by four twists, one after the
-other. A twist can be undone exactly, so the moved head is an implicit surface as well.
+The head at rest is an implicit surface; a pose is that surface bent by twists, one after the other, and then
+turned. Both can be undone exactly, so the moved head is an implicit surface as well. `variants` has the
+schedules besides the usual one.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import head
 from .dual import coordinates
-from .shapes import Scalar, bell, length, ramp
+from .shapes import Scalar, Triple, bell, length, ramp
 
 PERIOD = 2.56  # seconds
 _FAINT = 1e-8  # radians or weights that move a point by less than float32 can tell
 _BATCH = 1 << 13  # points moved at a time, so that intermediate results stay in the cache
 _BISECTIONS = 52  # halvings that bring an angle down to the precision of float64
+_NECK = np.array((0.0, -110.0, -30.0))  # mm, about which the head turns
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,15 @@ class Twist:
     It works on one side of the face, x >= 0; the other side is its mirror image.
     """
 
-    center: tuple[float, float, float]
-    axis: tuple[float, float, float]
+    center: Triple
+    axis: Triple
     weight: Callable[[Scalar, Scalar, Scalar], Scalar]
 
-    def apply(self, points: NDArray, normals: NDArray, amount: float) -> tuple[NDArray, NDArray, NDArray]:
-        """Moved points (3, N), unit normals (3, N), and the growth of the surface's area (N,)."""
+    def apply(self, points: NDArray, normals: NDArray, amount: Scalar) -> tuple[NDArray, NDArray, NDArray]:
+        """Moved points (3, N), unit normals (3, N), and the growth of the surface's area (N,).
+
+        amount: radians, for all points or (N,).
+        """
         weight = self.weight(*coordinates(points))
         arm = points - _column(self.center, points)
         tangent = _cross(self.axis, arm)
@@ -51,7 +56,7 @@ class Twist:
         moved = _rotate(self.axis, arm, angle) + _column(self.center, points)
         return moved, _rotate(self.axis, bent / stretch, angle), stretch
 
-    def undo(self, points: NDArray, amount: float) -> NDArray:
+    def undo(self, points: NDArray, amount: Scalar) -> NDArray:
         """Points from which moved points (3, N) came, (3, N), by bisection along their circles."""
         center = _column(self.center, points)
         arm = points - center
@@ -97,7 +102,7 @@ def _mouth_corner(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
     return 1.1 * square / (square + 100.0) * place * ramp(z, 0.0, 40.0)
 
 
-def _unit(*direction: float) -> tuple[float, float, float]:
+def _unit(*direction: float) -> Triple:
     x, y, z = (float(v) for v in np.asarray(direction) / np.linalg.norm(direction))
     return x, y, z
 
@@ -108,76 +113,156 @@ JAW = Twist((0.0, -35.0, -15.0), (1.0, 0.0, 0.0), _jaw)
 MOUTH_CORNER = Twist((0.0, -60.0, 18.0), _unit(-0.55, 0.78, 0.22), _mouth_corner)
 
 
-def amounts(time: float) -> list[tuple[Twist, float]]:
-    """The twists at work at a time in seconds, in the order they are applied, with angles in radians."""
-    angles = (
-        (EYELID, 0.72 * _peak(time, 0.56, 30.0)),
-        (BROW, 0.085 * _peak(time, 0.30, 3.0) - 0.02 * _peak(time, 0.76, 4.0)),
-        (JAW, 0.27 * _peak(time, 0.31, 4.0) + 0.05 * _peak(time, 0.75, 4.0)),
-        (MOUTH_CORNER, 0.17 * _peak(time, 0.75, 3.0) - 0.05 * _peak(time, 0.31, 4.0)),
+@dataclass(frozen=True)
+class Peak:
+    """A smooth peak, once a period (von Mises). height: radians; center: in periods; sharpness: one over its
+    variance, where a period is 2 pi long."""
+
+    height: float
+    center: float
+    sharpness: float
+
+    def at(self, time: float) -> float:
+        """Its value at a time in seconds."""
+        angle = 2.0 * np.pi * (time / PERIOD - self.center)
+        return self.height * float(np.exp(self.sharpness * (np.cos(angle) - 1.0)))
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A twist as it comes and goes. share: how much of it the left and the right side of the face have; only
+    where the twist leaves the middle alone may they differ."""
+
+    twist: Twist
+    peaks: tuple[Peak, ...]
+    share: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn of the whole head about an axis through the neck, as it comes and goes. axis: its unit direction."""
+
+    axis: Triple
+    peaks: tuple[Peak, ...]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A schedule: the bends in the order they are applied, and then the turns."""
+
+    bends: tuple[Bend, ...]
+    turns: tuple[Turn, ...] = ()
+
+    def amounts(self, time: float) -> list[tuple[Twist, tuple[float, float]]]:
+        """The twists at work at a time in seconds, with the angles of the left and the right side, radians."""
+        angles = [(bend, _sum(bend.peaks, time)) for bend in self.bends]
+        return [
+            (bend.twist, (angle * bend.share[0], angle * bend.share[1]))
+            for bend, angle in angles
+            if abs(angle) > _FAINT
+        ]
+
+    def turned(self, time: float) -> NDArray[np.float64]:
+        """The rotation of the head about the neck at a time in seconds, (3, 3)."""
+        rotation = np.eye(3)
+        for turn in self.turns:
+            rotation = _rotate(turn.axis, rotation, np.array(_sum(turn.peaks, time)))
+        return rotation
+
+
+TALK = Motion(
+    (
+        Bend(EYELID, (Peak(0.72, 0.56, 30.0),)),
+        Bend(BROW, (Peak(0.085, 0.30, 3.0), Peak(-0.02, 0.76, 4.0))),
+        Bend(JAW, (Peak(0.27, 0.31, 4.0), Peak(0.05, 0.75, 4.0))),
+        Bend(MOUTH_CORNER, (Peak(0.17, 0.75, 3.0), Peak(-0.05, 0.31, 4.0))),
     )
-    return [(twist, angle) for twist, angle in angles if abs(angle) > _FAINT]
+)
 
 
-def _peak(time: float, center: float, sharpness: float) -> float:
-    """A smooth peak of height 1, once a period; center: in periods (von Mises)."""
-    return float(np.exp(sharpness * (np.cos(2.0 * np.pi * (time / PERIOD - center)) - 1.0)))
+def _sum(peaks: tuple[Peak, ...], time: float) -> float:
+    return sum(peak.at(time) for peak in peaks)
 
 
-def move(points: NDArray, normals: NDArray, time: float) -> tuple[NDArray, NDArray, NDArray]:
+def move(
+    points: NDArray, normals: NDArray, time: float, motion: Motion = TALK
+) -> tuple[NDArray, NDArray, NDArray]:
     """Points and normals of the skin at rest, moved to a time in seconds.
 
     points, normals: (3, N) float32 or float64. Gives both in the same shape and type, normals of
     unit length, and the growth of the surface's area at each point, (N,). Fastest where points
     that are near each other follow each other: batches that nothing moves are passed over.
     """
-    twists = amounts(time)
+    twists = motion.amounts(time)
     moved, turned, growth = np.empty_like(points), np.empty_like(normals), np.empty_like(points[0])
     for start in range(0, points.shape[1], _BATCH):
         batch = slice(start, start + _BATCH)
         moved[:, batch], turned[:, batch], growth[batch] = _twisted(
             points[:, batch], normals[:, batch], twists
         )
-    return moved, turned, growth
+    return *turn(moved, turned, time, motion), growth
+
+
+def turn(points: NDArray, normals: NDArray, time: float, motion: Motion) -> tuple[NDArray, NDArray]:
+    """Points and normals, (3, N), turned as the head is at a time in seconds: all that the eyeballs do."""
+    if not motion.turns:
+        return points, normals
+    rotation, neck = motion.turned(time).astype(points.dtype), _NECK.astype(points.dtype)[:, None]
+    return rotation @ (points - neck) + neck, rotation @ normals
 
 
 def _twisted(
-    points: NDArray, normals: NDArray, twists: list[tuple[Twist, float]]
+    points: NDArray, normals: NDArray, twists: list[tuple[Twist, tuple[float, float]]]
 ) -> tuple[NDArray, NDArray, NDArray]:
     mirror = _mirror(points)
     points, normals, growth = points * mirror, normals * mirror, np.ones_like(points[0])
-    for twist, amount in twists:
+    for twist, amounts in twists:
         if (twist.weight(*points) > _FAINT).any():
-            points, normals, stretch = twist.apply(points, normals, amount)
+            points, normals, stretch = twist.apply(points, normals, _of_side(amounts, mirror))
             growth *= stretch
     return points * mirror, normals * mirror, growth
 
 
-def rest_of(points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+def rest_of(points: NDArray[np.float64], time: float, motion: Motion = TALK) -> NDArray[np.float64]:
     """Places at rest of the skin at points (3, N) of a moment, (3, N): the inverse of `move`."""
+    points = _turned_back(points, time, motion)
     mirror = _mirror(points)
     points = points * mirror
-    for twist, amount in reversed(amounts(time)):
-        points = twist.undo(points, amount)
+    for twist, amounts in reversed(motion.amounts(time)):
+        points = twist.undo(points, _of_side(amounts, mirror))
     return points * mirror
 
 
-def surface_value(points: ArrayLike, time: float) -> NDArray[np.float64]:
+def surface_value(points: ArrayLike, time: float, motion: Motion = TALK) -> NDArray[np.float64]:
     """The exact subject at a time: negative inside, 0 on the surface, about mm near it.
 
     points: (N, 3), mm. Gives (N,) float64. See `surface_normal`.
     """
     p = np.asarray(points, np.float64).T
-    return np.minimum(head.skin(*rest_of(p, time)), head.eyes(*p))
+    return np.minimum(head.skin(*rest_of(p, time, motion)), head.eyes(*_turned_back(p, time, motion)))
 
 
-def surface_normal(points: ArrayLike, time: float) -> NDArray[np.float64]:
+def surface_normal(points: ArrayLike, time: float, motion: Motion = TALK) -> NDArray[np.float64]:
     """The exact unit normals (N, 3) of the subject at points (N, 3) of its surface at a time."""
     p = np.asarray(points, np.float64).T
-    rest = rest_of(p, time)
-    skin, eyes = head.skin(*coordinates(rest)), head.eyes(*coordinates(p))
-    _, normals, _ = move(rest, normalized(skin.gradient), time)
-    return np.where(skin.value < eyes.value, normals, normalized(eyes.gradient)).T
+    rest, back = rest_of(p, time, motion), _turned_back(p, time, motion)
+    skin, eyes = head.skin(*coordinates(rest)), head.eyes(*coordinates(back))
+    _, of_skin, _ = move(rest, normalized(skin.gradient), time, motion)
+    _, of_eyes = turn(back, normalized(eyes.gradient), time, motion)
+    return np.where(skin.value < eyes.value, of_skin, of_eyes).T
+
+
+def _turned_back(points: NDArray[np.float64], time: float, motion: Motion) -> NDArray[np.float64]:
+    """Where points (3, N) of a moment were before the head turned."""
+    if not motion.turns:
+        return points
+    return motion.turned(time).T @ (points - _NECK[:, None]) + _NECK[:, None]
+
+
+def _of_side(amounts: tuple[float, float], mirror: NDArray) -> Scalar:
+    """What the left and the right side have, for all points or, where they differ, (N,) by their side."""
+    left, right = amounts
+    return left if left == right else np.where(mirror[0] > 0, left, right).astype(mirror.dtype)
 
 
 def normalized(vectors: NDArray) -> NDArray:
@@ -196,16 +281,16 @@ def _dot(a: NDArray, b: NDArray) -> NDArray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(axis: tuple[float, float, float], v: NDArray) -> NDArray:
+def _cross(axis: Triple, v: NDArray) -> NDArray:
     k = axis
     return np.stack([k[1] * v[2] - k[2] * v[1], k[2] * v[0] - k[0] * v[2], k[0] * v[1] - k[1] * v[0]])
 
 
-def _rotate(axis: tuple[float, float, float], v: NDArray, angle: NDArray) -> NDArray:
+def _rotate(axis: Triple, v: NDArray, angle: NDArray) -> NDArray:
     """Vectors (3, N) turned about a unit axis by angles (N,) (Rodrigues)."""
     along = (axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2]) * (1.0 - np.cos(angle))
     return v * np.cos(angle) + _cross(axis, v) * np.sin(angle) + _column(axis, v) * along
 
 
-def _column(values: tuple[float, float, float], like: NDArray) -> NDArray:
+def _column(values: Triple, like: NDArray) -> NDArray:
     return np.array(values, like.dtype)[:, None]

@@ -1,4 +1,4 @@
-"""The demo scan as a source of frames: a head that speaks, raises its brows, blinks and smiles."""
+"""The demo scan as a source of frames: a head that speaks, raises its brows, blinks and smiles, or a variant."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from ..faces import Faces
 from ..points import PointCloud
 from ..times import frame_in_words
 from .asset import rest_points
-from .motion import PERIOD, move
+from .motion import PERIOD, move, turn
+from .variants import demo_motion
 
 _MOST_GROWTH = 4.0  # of area; beyond it, at the corners of the mouth, larger radii would stick out
 
@@ -22,12 +23,16 @@ class DemoSource:
 
     Point i is the same point of the subject in every pose. Each cloud has normals, colours,
     radii (the local spacing) and the scalar `displacement`, mm from the pose at rest.
+    name: "demo", or a variant as `demo_motion` has it; raises InputError where there is none.
     """
 
-    name = "demo"
     unit = "mm"
     files: tuple[Path, ...] = ()
     fps = 25.0
+
+    def __init__(self, name: str = "demo") -> None:
+        self.name = name
+        self.motion = demo_motion(name)
 
     def __len__(self) -> int:
         return round(PERIOD * self.fps)
@@ -42,11 +47,14 @@ class DemoSource:
 
     def load(self, index: int) -> PointCloud:
         """Compute one pose; the first call reads the points at rest."""
-        rest = rest_points()
-        skin = slice(0, rest.skin)
+        rest, time = rest_points(), index / self.fps
+        skin, eyes = slice(0, rest.skin), slice(rest.skin, None)
         positions, normals, radii = rest.positions.copy(), rest.normals.copy(), rest.radii.copy()
         positions[:, skin], normals[:, skin], growth = move(
-            rest.positions[:, skin], rest.normals[:, skin], index / self.fps
+            rest.positions[:, skin], rest.normals[:, skin], time, self.motion
+        )
+        positions[:, eyes], normals[:, eyes] = turn(
+            rest.positions[:, eyes], rest.normals[:, eyes], time, self.motion
         )
         radii[skin] *= np.sqrt(np.clip(growth, 1.0, _MOST_GROWTH))
         cloud = PointCloud.from_arrays(
