@@ -18,6 +18,8 @@ from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh, face_normals, read_mesh
+from viewer.scan.demo import DemoSource
+from viewer.scan.demo.motion import surface_value
 from viewer.scan.formats import exr, read, read_faces, read_points
 from viewer.scan.range_view import RangeView, merge
 from viewer.simulate.scanner import Faults, around, capture, rig
@@ -412,7 +414,7 @@ def test_what_cannot_be_scanned_or_written(simulate: Simulate, tetrahedron: Path
     assert simulate(tetrahedron, "-o", points, "--size", "16x12") == (0, "")
     for scan, target, message in (
         (points, out, "--faces"),
-        ("demo", out, "no mesh"),
+        ("demo:smiel", out, "variant"),
         (tmp_path / "none.ply", out, "no such file"),
         (tetrahedron, tmp_path / "a.png", "cannot write '.png'"),
         (tetrahedron, tmp_path / "none" / "a.exr", "no folder"),
@@ -423,6 +425,27 @@ def test_what_cannot_be_scanned_or_written(simulate: Simulate, tetrahedron: Path
     code, error = simulate(points, "-o", out, "--faces", tetrahedron)
     assert code == 0  # enough vertices for these faces
     assert len(read_faces(tetrahedron)) == 4
+
+
+@pytest.mark.slow
+def test_the_demo_and_its_variants_are_scanned_as_their_exact_surface(
+    simulate: Simulate, tmp_path: Path
+) -> None:
+    """What pods measure of a frame lies on the surface of that variant at that time."""
+    out = tmp_path / "sway%02d.exr"
+    flags = ("--size", "96x96", "--noise", 0.1)
+    assert simulate("demo:sway:1", "--poses", "3:21:17", "-o", out, *flags) == (0, "")
+    source = DemoSource("demo:sway:1")
+    for index in (3, 20):
+        views = read(tmp_path / f"sway{index:02d}.exr")
+        assert isinstance(views, tuple)
+        assert len(views) == 2
+        off = {
+            time: np.abs(surface_value(merge(views).world(), float(source.times()[time]), source.motion))
+            for time in (3, 20)
+        }
+        assert np.median(off[index]) < 0.2  # mm, of which the noise is at a slant
+        assert np.median(off[23 - index]) > 1
 
 
 def test_times_of_other_files_are_not_overwritten(

@@ -17,6 +17,7 @@ from ..geometry import UP
 from ..mesh.triangles import Mesh
 from ..output.export import check_output
 from ..scan import formats
+from ..scan.demo import DemoSource
 from ..scan.faces import Faces
 from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
@@ -43,7 +44,7 @@ _HINT = "Name the mesh that has them with --faces"
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d simulate`."""
     parser.add_argument(
-        "scan", metavar="MESH|SEQUENCE", help="a file with faces (PLY, OBJ, NPZ), a folder, a pattern"
+        "scan", metavar="MESH|SEQUENCE", help="a file with faces (PLY, OBJ, NPZ), a folder, a pattern, demo"
     )
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
@@ -109,17 +110,16 @@ def run(args: Namespace) -> int:
         check_output(args.out, formats.writable_suffixes(views=True), several=len(indices) > 1)
         inputs = [*scan_inputs(timeline), *([args.faces] if args.faces else [])]
         claim(frame_outputs(args.out, indices, timeline), inputs, args.force)
-        faces_of = _faces_reader(timeline, args.faces)
-        faces_of(indices[0])  # told before all frames are looked at
+        mesh_of = _mesh_maker(timeline, args.faces, indices[0])
         aspect = args.size[0] / args.size[1]
         bounds = framing(timeline, indices)
         pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up or UP)
         with frame_files(args.out) as file_of, progress(len(indices)) as tick:
             for pose in read_poses(timeline, indices):
-                mesh = _mesh(pose, faces_of(pose.index))
                 views = capture(
-                    mesh, pods, args.size, faults, seed=args.seed, frame=pose.index, unit=timeline.unit
-                )
+                    mesh_of(pose), pods, args.size, faults,
+                    seed=args.seed, frame=pose.index, unit=timeline.unit,
+                )  # fmt: skip
                 formats.write(file_of(pose), merge(views, normals=True), views)
                 tick()
     tell(args.out)
@@ -146,8 +146,16 @@ def _for_each(flag: str, values: Sequence[Any], pods: int) -> Sequence[Any]:
     return values if len(values) == pods else [values[0]] * pods
 
 
-def _faces_reader(timeline: Timeline, shared: Path | None) -> Callable[[int], Faces]:
-    """A function from the index of a frame to its faces. shared: the file that has those of all."""
+def _mesh_maker(timeline: Timeline, shared: Path | None, first: int) -> Callable[[Pose], Mesh]:
+    """A function from a pose to the mesh to scan: its points with its faces, or the demo's own surface.
+
+    shared: the file that has the faces of all poses. first: the pose whose faces are asked for at once, so
+    that one without is told before all are looked at.
+    """
+    if isinstance(source := timeline.source, DemoSource) and shared is None:
+        from ..bench.truth.head_mesh import head_mesh
+
+        return lambda pose: head_mesh(float(source.times()[pose.index]), source.motion)
     of_all = None if shared is None else formats.read_faces(shared)
 
     def faces_of(index: int) -> Faces:
@@ -156,7 +164,8 @@ def _faces_reader(timeline: Timeline, shared: Path | None) -> Callable[[int], Fa
             raise InputError("is no mesh: it has no faces", shared or timeline.label(index), _HINT)
         return faces
 
-    return faces_of
+    faces_of(first)
+    return lambda pose: _mesh(pose, faces_of(pose.index))
 
 
 def _mesh(pose: Pose, faces: Faces) -> Mesh:

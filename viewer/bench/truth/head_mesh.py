@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...mesh.triangles import Mesh
 from ...scan.demo import colors, head
-from ...scan.demo.motion import move
+from ...scan.demo.motion import TALK, HeadMotion, move, turn
 from ...scan.demo.sampling import Solid, projected
 from ...scan.faces import Triangles
 from ...scan.points import PointCloud
@@ -48,15 +48,18 @@ class _Rest:
     skin: int
 
 
-def head_mesh(time: float) -> Mesh:
-    """The demo scan's subject at a time in seconds, mm; the faces are the same at all times.
+def head_mesh(time: float, motion: HeadMotion = TALK) -> Mesh:
+    """The demo scan's subject at a time in seconds, mm; its faces are the same always.
 
     Its vertices are exact, with exact normals. The first call makes the mesh at rest.
     """
     rest = _rest()
     positions, normals = rest.positions.copy(), rest.normals.copy()
-    skin = slice(0, rest.skin)
-    positions[:, skin], normals[:, skin], _ = move(rest.positions[:, skin], rest.normals[:, skin], time)
+    skin, eyes = slice(0, rest.skin), slice(rest.skin, None)
+    positions[:, skin], normals[:, skin], _ = move(
+        rest.positions[:, skin], rest.normals[:, skin], time, motion
+    )
+    positions[:, eyes], normals[:, eyes] = turn(rest.positions[:, eyes], rest.normals[:, eyes], time, motion)
     points = PointCloud.from_arrays(positions.T, normals=normals.T, colors=rest.colors, origin=np.zeros(3))
     return Mesh(points, rest.faces)
 

@@ -1,4 +1,4 @@
-"""How the demo subject moves: rotations that fade in space, then the head as a whole, on a schedule that repeats.
+"""How the demo subject moves: rotations that fade in space, and the head turns, on a schedule that repeats.
 
 The head at rest is an implicit surface; a pose is that surface bent by twists, one after the other, and then
 turned. Both can be undone exactly, so the moved head is an implicit surface as well. `variants` has the
@@ -140,21 +140,21 @@ class Bend:
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn of the whole head about an axis through the neck, as it comes and goes. axis: its unit direction."""
+    """A turn of the whole head about an axis through the neck. axis: its unit direction."""
 
     axis: Triple
     peaks: tuple[Peak, ...]
 
 
 @dataclass(frozen=True)
-class Motion:
+class HeadMotion:
     """A schedule: the bends in the order they are applied, and then the turns."""
 
     bends: tuple[Bend, ...]
     turns: tuple[Turn, ...] = ()
 
     def amounts(self, time: float) -> list[tuple[Twist, tuple[float, float]]]:
-        """The twists at work at a time in seconds, with the angles of the left and the right side, radians."""
+        """The twists at work at a time in seconds, with the angles of left and right side, radians."""
         angles = [(bend, _sum(bend.peaks, time)) for bend in self.bends]
         return [
             (bend.twist, (angle * bend.share[0], angle * bend.share[1]))
@@ -170,7 +170,7 @@ class Motion:
         return rotation
 
 
-TALK = Motion(
+TALK = HeadMotion(
     (
         Bend(EYELID, (Peak(0.72, 0.56, 30.0),)),
         Bend(BROW, (Peak(0.085, 0.30, 3.0), Peak(-0.02, 0.76, 4.0))),
@@ -185,7 +185,7 @@ def _sum(peaks: tuple[Peak, ...], time: float) -> float:
 
 
 def move(
-    points: NDArray, normals: NDArray, time: float, motion: Motion = TALK
+    points: NDArray, normals: NDArray, time: float, motion: HeadMotion = TALK
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Points and normals of the skin at rest, moved to a time in seconds.
 
@@ -203,7 +203,7 @@ def move(
     return *turn(moved, turned, time, motion), growth
 
 
-def turn(points: NDArray, normals: NDArray, time: float, motion: Motion) -> tuple[NDArray, NDArray]:
+def turn(points: NDArray, normals: NDArray, time: float, motion: HeadMotion) -> tuple[NDArray, NDArray]:
     """Points and normals, (3, N), turned as the head is at a time in seconds: all that the eyeballs do."""
     if not motion.turns:
         return points, normals
@@ -223,7 +223,7 @@ def _twisted(
     return points * mirror, normals * mirror, growth
 
 
-def rest_of(points: NDArray[np.float64], time: float, motion: Motion = TALK) -> NDArray[np.float64]:
+def rest_of(points: NDArray[np.float64], time: float, motion: HeadMotion = TALK) -> NDArray[np.float64]:
     """Places at rest of the skin at points (3, N) of a moment, (3, N): the inverse of `move`."""
     points = _turned_back(points, time, motion)
     mirror = _mirror(points)
@@ -233,7 +233,7 @@ def rest_of(points: NDArray[np.float64], time: float, motion: Motion = TALK) -> 
     return points * mirror
 
 
-def surface_value(points: ArrayLike, time: float, motion: Motion = TALK) -> NDArray[np.float64]:
+def surface_value(points: ArrayLike, time: float, motion: HeadMotion = TALK) -> NDArray[np.float64]:
     """The exact subject at a time: negative inside, 0 on the surface, about mm near it.
 
     points: (N, 3), mm. Gives (N,) float64. See `surface_normal`.
@@ -242,7 +242,7 @@ def surface_value(points: ArrayLike, time: float, motion: Motion = TALK) -> NDAr
     return np.minimum(head.skin(*rest_of(p, time, motion)), head.eyes(*_turned_back(p, time, motion)))
 
 
-def surface_normal(points: ArrayLike, time: float, motion: Motion = TALK) -> NDArray[np.float64]:
+def surface_normal(points: ArrayLike, time: float, motion: HeadMotion = TALK) -> NDArray[np.float64]:
     """The exact unit normals (N, 3) of the subject at points (N, 3) of its surface at a time."""
     p = np.asarray(points, np.float64).T
     rest, back = rest_of(p, time, motion), _turned_back(p, time, motion)
@@ -252,7 +252,7 @@ def surface_normal(points: ArrayLike, time: float, motion: Motion = TALK) -> NDA
     return np.where(skin.value < eyes.value, of_skin, of_eyes).T
 
 
-def _turned_back(points: NDArray[np.float64], time: float, motion: Motion) -> NDArray[np.float64]:
+def _turned_back(points: NDArray[np.float64], time: float, motion: HeadMotion) -> NDArray[np.float64]:
     """Where points (3, N) of a moment were before the head turned."""
     if not motion.turns:
         return points

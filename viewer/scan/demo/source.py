@@ -1,4 +1,4 @@
-"""The demo scan as a source of frames: a head that speaks, raises its brows, blinks and smiles, or a variant."""
+"""The demo scan as a source of frames: a head that speaks, blinks and smiles, or moves as a variant does."""
 
 from __future__ import annotations
 

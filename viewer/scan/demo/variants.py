@@ -7,19 +7,19 @@ from collections.abc import Callable
 import numpy as np
 
 from ...errors import InputError, unknown_name
-from .motion import BROW, EYELID, JAW, MOUTH_CORNER, TALK, Bend, Motion, Peak, Turn
+from .motion import BROW, EYELID, JAW, MOUTH_CORNER, TALK, Bend, HeadMotion, Peak, Turn
 
 _MOST_TURNED = np.radians(15.0)
 _NOD, _SHAKE, _TILT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _BOTH_WAYS = (0.25, 0.75)  # of a period: when a swing is farthest
 
 
-def _smile(rng: np.random.Generator) -> Motion:
+def _smile(rng: np.random.Generator) -> HeadMotion:
     """A smile of one side, which the other hardly shares; the lips part a little."""
     shares = [1.0, rng.uniform(0.0, 0.15)]
     rng.shuffle(shares)
     peak = Peak(rng.uniform(0.14, 0.18), rng.uniform(0.4, 0.6), rng.uniform(2.0, 4.0))
-    return Motion(
+    return HeadMotion(
         (
             Bend(BROW, (Peak(rng.uniform(0.0, 0.03), peak.center, peak.sharpness),)),
             Bend(JAW, (Peak(rng.uniform(0.0, 0.03), peak.center, peak.sharpness),)),
@@ -28,10 +28,10 @@ def _smile(rng: np.random.Generator) -> Motion:
     )
 
 
-def _sway(rng: np.random.Generator) -> Motion:
+def _sway(rng: np.random.Generator) -> HeadMotion:
     """A head that turns to either side and nods by 15 degrees, and tilts a little, as it talks."""
     phase = rng.uniform(0.0, 1.0)
-    return Motion(
+    return HeadMotion(
         TALK.bends,
         (
             _swing(_NOD, _MOST_TURNED, phase + rng.uniform(0.1, 0.4)),
@@ -41,7 +41,7 @@ def _sway(rng: np.random.Generator) -> Motion:
     )
 
 
-def _cough(rng: np.random.Generator) -> Motion:
+def _cough(rng: np.random.Generator) -> HeadMotion:
     """Coughs in quick succession: the jaw drops in a tenth of a second, the head jerks, the eyes shut."""
     start, apart = rng.uniform(0.2, 0.3), rng.uniform(0.15, 0.2)
     centers = [start + apart * number for number in range(3)]
@@ -53,7 +53,7 @@ def _cough(rng: np.random.Generator) -> Motion:
             for center, height in zip(centers, heights, strict=True)
         )
 
-    return Motion(
+    return HeadMotion(
         (
             Bend(EYELID, (Peak(0.6, centers[1], 12.0),)),
             Bend(JAW, bursts(0.15)),
@@ -69,16 +69,16 @@ def _swing(axis: tuple[float, float, float], most: float, phase: float) -> Turn:
     return Turn(axis, (Peak(most, there + phase, 3.0), Peak(-most, back + phase, 3.0)))
 
 
-VARIANTS: dict[str, Callable[[np.random.Generator], Motion]] = {
+VARIANTS: dict[str, Callable[[np.random.Generator], HeadMotion]] = {
     "smile": _smile,
     "sway": _sway,
     "cough": _cough,
 }
 
 
-def demo_motion(scan: str) -> Motion:
-    """The motion of the demo by its name: "demo", "demo:VARIANT" or "demo:VARIANT:SEED", with the seed 0 unless
-    told. Raises InputError for a variant that there is not, and a seed that is no whole number from 0."""
+def demo_motion(scan: str) -> HeadMotion:
+    """The motion of the demo by its name: "demo", "demo:VARIANT" or "demo:VARIANT:SEED", of seed 0
+    unless told. Raises InputError for a variant that there is not, and a seed that is no whole number."""
     _, named, which = scan.partition(":")
     if not named:
         return TALK

@@ -1,0 +1,1 @@
+"""How well landmarks are tracked: scans of known motion, no two frames with the same points."""
