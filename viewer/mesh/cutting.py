@@ -1,0 +1,265 @@
+"""Patches cut along closed lines that run over them, and by planes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .geodesic import Line
+from .manifold import Rows, joined
+from .patch import Patch, nearest_weights
+from .smoothing import Points
+
+_SAME = 1e-7  # weights below which a place in a face is on its edge, and shares of an edge that are none
+_ROUNDED = 1e-9  # of weights: the least of a place that is off a chord is some `_SAME`
+_HALF_EDGES = ((0, 1), (1, 2), (2, 0))
+
+Weights = NDArray[np.float64]  # (3,) of the corners of a face
+Chord = tuple[Weights, Weights]
+Polygon = list[Weights]
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A piece of a patch. vertices: (V, 3). faces: (F, 3) int64. sources: (F,) the patch's face that each
+    is a part of."""
+
+    vertices: Points
+    faces: Rows
+    sources: Rows
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """The corners of the faces, (3, F, 3)."""
+        return self.vertices[self.faces.T]
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """The area of each face, (F,), squared scan units."""
+        a, b, c = self.corners
+        return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+
+def pieces_along(patch: Patch, lines: Sequence[Line]) -> list[Piece]:
+    """The pieces that lines cut out of a patch, those that the lines run along alone.
+
+    lines: each (P, 3), from one vertex of the patch to another, a place at each edge that it crosses, as
+    `Geodesics.path` has them; together they are closed.
+    """
+    chords, blocked = _chords(patch, lines)
+    of_face, polygons = _divided(patch, chords)
+    one, other = _links(patch, chords, blocked, of_face, polygons)
+    whole = np.setdiff1d(np.arange(len(patch.faces)), list(chords))
+    names = np.concatenate([whole, np.arange(len(patch.faces), len(patch.faces) + len(polygons))])
+    _, part = joined(one, other, len(patch.faces) + len(polygons))
+    beside = np.unique([part[len(patch.faces) + n] for n in range(len(polygons))])
+    edges = [face for edge in blocked for face in _faces_at(patch, edge)]
+    beside = np.union1d(beside, [part[face] for face in edges if face not in chords]).astype(int)
+    return [_piece(patch, names[part[names] == number], polygons) for number in beside]
+
+
+def _faces_at(patch: Patch, edge: tuple[int, int]) -> list[int]:
+    return np.flatnonzero(np.isin(patch.faces, edge).sum(axis=1) == 2).tolist()
+
+
+def _chords(
+    patch: Patch, lines: Sequence[Line]
+) -> tuple[dict[int, list[Chord]], dict[tuple[int, int], list[tuple[float, float]]]]:
+    """Face -> the lines' pieces that cross it, as weights of its corners; and edge -> what of it lines run
+    along, from and to shares of it."""
+    chords: dict[int, list[Chord]] = defaultdict(list)
+    along: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
+    around = _faces_around(patch)
+    for line in lines:
+        place = {int(np.argmin(np.linalg.norm(patch.vertices - line[0], axis=1)))}
+        for start, end in pairwise(line):
+            if (start == end).all():
+                continue
+            near = list(set.intersection(*(around[corner] for corner in place)))
+            tried = np.array([(start + end) / 2, end])
+            corners = patch.corners[:, near]
+            weights = [nearest_weights(corners - position) for position in tried]
+            off = sum(
+                np.linalg.norm(np.einsum("fc,cfi->fi", found, corners) - position, axis=1)
+                for found, position in zip(weights, tried, strict=True)
+            )
+            best = int(np.argmin(off))
+            face, ends = near[best], []
+            for found in (nearest_weights(corners[:, [best]] - start)[0], weights[1][best]):
+                found = np.where(found < _SAME, 0.0, found)
+                ends.append(found / found.sum())
+            place = {int(corner) for corner in patch.faces[face][ends[1] > 0]}
+            empty = np.flatnonzero((ends[0] == 0) & (ends[1] == 0))
+            if len(empty):
+                low, high = sorted(int(corner) for corner in np.delete(patch.faces[face], empty[0]))
+                share = sorted(float(found[patch.faces[face] == high][0]) for found in ends)
+                along[low, high].append((share[0], share[1]))
+            else:
+                chords[face].append((ends[0], ends[1]))
+    return chords, along
+
+
+def _faces_around(patch: Patch) -> list[set[int]]:
+    """The faces at each vertex."""
+    around: list[set[int]] = [set() for _ in patch.vertices]
+    for face, corners in enumerate(patch.faces.tolist()):
+        for corner in corners:
+            around[corner].add(face)
+    return around
+
+
+def _side(chord: Chord, place: Weights) -> float:
+    """How far a place of the same face is off a chord, by weights; the sign tells on which side."""
+    volume = float(np.linalg.det(np.stack([chord[0], chord[1], place])))
+    return volume / float(np.linalg.norm(chord[1] - chord[0]))
+
+
+def _divided(
+    patch: Patch, chords: dict[int, list[Chord]]
+) -> tuple[dict[int, dict[tuple[bool, ...], int]], list[tuple[int, Polygon]]]:
+    """Faces that are crossed as convex polygons: face -> sides of its chords -> number; and the polygons with
+    their faces."""
+    of_face: dict[int, dict[tuple[bool, ...], int]] = {}
+    polygons: list[tuple[int, Polygon]] = []
+    for face, across in chords.items():
+        parts: list[Polygon] = [list(np.eye(3))]
+        for chord in across:
+            parts = [half for part in parts for half in _halves(part, chord) if len(half) > 2]
+        of_face[face] = {}
+        for part in parts:
+            middle = np.mean(part, axis=0)
+            of_face[face][tuple(_side(chord, middle) > 0 for chord in across)] = len(polygons)
+            polygons.append((face, part))
+    return of_face, polygons
+
+
+def _halves(polygon: Polygon, chord: Chord) -> tuple[Polygon, Polygon]:
+    """A convex polygon on both sides of a chord's line."""
+    sides = [_side(chord, corner) for corner in polygon]
+    sides = [0.0 if abs(side) < _ROUNDED else side for side in sides]
+    halves: tuple[Polygon, Polygon] = ([], [])
+    for number, (corner, side) in enumerate(zip(polygon, sides, strict=True)):
+        after, further = polygon[(number + 1) % len(polygon)], sides[(number + 1) % len(polygon)]
+        for half, sign in zip(halves, (1, -1), strict=True):
+            if sign * side >= 0:
+                half.append(corner)
+            if side * further < 0:
+                half.append((side * after - further * corner) / (side - further))
+    kept = [
+        half if any(s * side > 0 for side in sides) else [] for half, s in zip(halves, (1, -1), strict=True)
+    ]
+    return kept[0], kept[1]
+
+
+def _links(
+    patch: Patch,
+    chords: dict[int, list[Chord]],
+    blocked: dict[tuple[int, int], list[tuple[float, float]]],
+    of_face: dict[int, dict[tuple[bool, ...], int]],
+    polygons: list[tuple[int, Polygon]],
+) -> tuple[Rows, Rows]:
+    """Pairs of what lies beside each other with no line between: faces by number, polygons after them."""
+    before, after = patch.pairs
+    corner = patch.faces.ravel()
+    ends = np.sort(np.stack([corner[before], corner[after]], axis=1), axis=1)
+    crossed = np.zeros(len(patch.faces), bool)
+    crossed[list(chords)] = True
+    edges = set(blocked)
+    odd = crossed[before // 3] | crossed[after // 3]
+    odd |= np.array([tuple(pair) in edges for pair in ends.tolist()], bool)
+    one, other = (before // 3)[~odd].tolist(), (after // 3)[~odd].tolist()
+    for half, opposite, (low, high) in zip(
+        before[odd].tolist(), after[odd].tolist(), ends[odd].tolist(), strict=True
+    ):
+        faces = half // 3, opposite // 3
+        shares = {0.0, 1.0}
+        for face in faces:
+            for place in (end for chord in chords.get(face, ()) for end in chord):
+                there = dict(zip(patch.faces[face].tolist(), place.tolist(), strict=True))
+                if there[low] + there[high] > 1 - _SAME:
+                    shares.add(there[high])
+        for start, end in pairwise(sorted(shares)):
+            middle = (start + end) / 2
+            if end - start < 2 * _SAME or any(a <= middle <= b for a, b in blocked.get((low, high), ())):
+                continue
+            for face, links in zip(faces, (one, other), strict=True):
+                place = np.where(patch.faces[face] == low, 1 - middle, 0.0)
+                place += np.where(patch.faces[face] == high, middle, 0.0)
+                links.append(_which(patch, face, place, chords, of_face, polygons))
+    return np.array(one, np.int64), np.array(other, np.int64)
+
+
+def _which(
+    patch: Patch,
+    face: int,
+    place: Weights,
+    chords: dict[int, list[Chord]],
+    of_face: dict[int, dict[tuple[bool, ...], int]],
+    polygons: list[tuple[int, Polygon]],
+) -> int:
+    """The number of the face, or of the polygon of it that holds a place on its edge."""
+    if face not in chords:
+        return face
+    sides = tuple(_side(chord, place) > 0 for chord in chords[face])
+    found = of_face[face].get(sides)
+    if found is None:  # of rounding: the polygon whose corners lie nearest
+        found = min(
+            of_face[face].values(),
+            key=lambda number: float(np.linalg.norm(np.mean(polygons[number][1], axis=0) - place)),
+        )
+    return len(patch.faces) + found
+
+
+def _piece(patch: Patch, names: Rows, polygons: list[tuple[int, Polygon]]) -> Piece:
+    """Faces and polygons by number, these as fans."""
+    count = len(patch.faces)
+    whole = names[names < count]
+    vertices, faces, sources = [patch.vertices], [patch.faces[whole]], [whole]
+    number = len(patch.vertices)
+    for name in names[names >= count].tolist():
+        face, polygon = polygons[name - count]
+        vertices.append(np.array(polygon) @ patch.vertices[patch.faces[face]])
+        fan = np.arange(1, len(polygon) - 1)
+        faces.append(number + np.stack([np.zeros_like(fan), fan, fan + 1], axis=1))
+        sources.append(np.full(len(fan), face))
+        number += len(polygon)
+    return Piece(np.concatenate(vertices), np.concatenate(faces), np.concatenate(sources))
+
+
+def plane_section(patch: Patch, point: NDArray[np.float64], normal: NDArray[np.float64]) -> list[Line]:
+    """The lines in which a plane cuts a patch, each (P, 3); closed ones end where they begin.
+
+    point, normal: (3,), of the plane. A vertex in it counts as before it.
+    """
+    heights = (patch.vertices - point) @ normal
+    above = heights >= 0
+    cut = above[patch.faces]
+    crossed = np.flatnonzero(cut.any(axis=1) & ~cut.all(axis=1))
+    if not len(crossed):
+        return []
+    ends = np.stack([patch.faces[crossed][:, list(pair)] for pair in _HALF_EDGES], axis=1)
+    is_cut = above[ends[..., 0]] != above[ends[..., 1]]
+    pairs = np.sort(ends[is_cut], axis=1)
+    edges, which = np.unique(pairs, axis=0, return_inverse=True)
+    low, high = heights[edges[:, 0]], heights[edges[:, 1]]
+    share = (low / (low - high))[:, None]
+    places = (1 - share) * patch.vertices[edges[:, 0]] + share * patch.vertices[edges[:, 1]]
+    beside: dict[int, list[int]] = defaultdict(list)
+    for one, other in which.reshape(-1, 2).tolist():
+        beside[one].append(other)
+        beside[other].append(one)
+    lines = []
+    for first in sorted(beside, key=lambda place: (len(beside[place]), place)):  # ends before what is closed
+        walk = [first]
+        while beside[walk[-1]]:
+            after = beside[walk[-1]].pop(0)
+            beside[after].remove(walk[-1])
+            walk.append(after)
+        if len(walk) > 1:
+            lines.append(places[walk])
+    return lines
