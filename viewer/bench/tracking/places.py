@@ -66,7 +66,7 @@ def skin_normals(rest: ArrayLike) -> NDArray[np.float64]:
 
 
 def path_of(rest: ArrayLike, times: ArrayLike, motion: HeadMotion) -> NDArray[np.float64]:
-    """Where places (N, 3) of the skin at rest are at times (T,) in seconds: (T, N, 3), exactly."""
+    """Positions of places (N, 3) of the skin at rest at times (T,) in seconds: (T, N, 3), exactly."""
     places = np.asarray(rest, np.float64).T
     normals = np.zeros_like(places)
     normals[2] = 1

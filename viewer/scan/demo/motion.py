@@ -123,7 +123,7 @@ class Peak:
     sharpness: float
 
     def at(self, time: float) -> float:
-        """Its value at a time in seconds."""
+        """Give its value at a time in seconds."""
         angle = 2.0 * np.pi * (time / PERIOD - self.center)
         return self.height * float(np.exp(self.sharpness * (np.cos(angle) - 1.0)))
 
@@ -253,14 +253,14 @@ def surface_normal(points: ArrayLike, time: float, motion: HeadMotion = TALK) ->
 
 
 def _turned_back(points: NDArray[np.float64], time: float, motion: HeadMotion) -> NDArray[np.float64]:
-    """Where points (3, N) of a moment were before the head turned."""
+    """Points (3, N) of a moment, where they were before the head turned."""
     if not motion.turns:
         return points
     return motion.turned(time).T @ (points - _NECK[:, None]) + _NECK[:, None]
 
 
 def _of_side(amounts: tuple[float, float], mirror: NDArray) -> Scalar:
-    """What the left and the right side have, for all points or, where they differ, (N,) by their side."""
+    """Amounts that left and right side have, for all points or, where they differ, (N,) by their side."""
     left, right = amounts
     return left if left == right else np.where(mirror[0] > 0, left, right).astype(mirror.dtype)
 
