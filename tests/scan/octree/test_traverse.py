@@ -190,7 +190,7 @@ def test_a_budget_gives_coarser_cuts_that_lack_nothing(
     steps = 0
     complete = False
     while not complete:
-        held = holders(cloud, tree, traversal.cut(cloud.origin))
+        held = holders(cloud, tree, traversal.cut(cloud.origin, means=True))
         assert held.max() <= 1
         assert (held[seen] == 1).all()
         assert not (held[~before] > 0).any()

@@ -187,7 +187,7 @@ class Traversal:
         from . import cut_kernels
 
         parts = [*self._done, (self._level, self._nodes.part(self._at))]
-        if not self.complete:
+        if self._followed:
             parts.append((self._level + 1, self._children.part(0, self._followed)))
         parts.sort(key=lambda part: -part[0])
         lengths = [len(nodes) for _, nodes in parts]
