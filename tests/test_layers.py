@@ -39,7 +39,7 @@ COMPILED = ("_kernels", "compiled")  # how the names of modules end that are com
 SLOW = WINDOW | {
     "PIL", "OpenEXR",
     "av", "cmap", "jinja2", "lzf", "matplotlib", "open3d", "plyfile", "scipy", "skimage", "tqdm",
-    "DracoPy", "numba", "cattrs", "laspy", "potpourri3d",
+    "DracoPy", "numba", "cattrs", "laspy", "potpourri3d", "c3d",
 }  # fmt: skip
 
 

@@ -1,0 +1,164 @@
+"""Damaged files of landmarks: each is one message with the place, or what can be used of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from landmark_sets import moving
+
+from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
+from viewer.analysis.landmarks.landmark_set import LandmarkSet
+from viewer.errors import InputError
+
+NAMES = ("m.mrk.json", "m.tps", "m.morphologika", "m.csv", "m.wide.csv", "m.c3d")
+POINT = '{"markups": [{"type": "Fiducial", "controlPoints": [%s]}]}'
+LONG = "kind,frame,time,name,x,y,z,state\n"
+BAD = {
+    ("m.mrk.json", "{"): "is not JSON",
+    ("m.mrk.json", "[" * 100_000): "nested too deeply",
+    ("m.mrk.json", "[]"): "has no list of markups",
+    ("m.mrk.json", '{"markups": []}'): "holds no landmarks",
+    ("m.mrk.json", '{"markups": 3}'): "has no list of markups",
+    ("m.mrk.json", '{"markups": [3]}'): "markup 1: is no object",
+    ("m.mrk.json", '{"@schema": "x/annotations-v2.json", "markups": []}'): "is of the schema",
+    ("m.mrk.json", POINT % '{"position": [1, 2]}'): "markup 1, control point 1: its position is",
+    ("m.mrk.json", POINT % '{"position": [1, 2, "3"]}'): "not three numbers",
+    ("m.mrk.json", POINT % '{"position": [1, 2, true]}'): "not three numbers",
+    ("m.mrk.json", POINT % '{"positionStatus": "lost"}'): "positionStatus is 'lost'",
+    ("m.mrk.json", POINT % "7"): "is no object",
+    ("m.mrk.json", '{"markups": [{"coordinateSystem": "IJK"}]}'): "coordinateSystem is",
+    ("m.fcsv", "# CoordinateSystem = 7\n"): "line 1: the coordinate system is '7'",
+    ("m.fcsv", "# nothing\n"): "holds no landmarks",
+    ("m.fcsv", "id,1,2\n"): "line 1: has 3 values",
+    ("m.fcsv", "id,1,two,3\n"): "line 1: 'two' is no number",
+    ("m.tps", "LM3=1000000000\n1 2 3\n"): "is no number of things",
+    ("m.tps", "LM3=100000000\n1 2 3\n"): "announces 100000000 places, and 1 lines follow",
+    ("m.tps", "LM3=-1\n"): "no number of things",
+    ("m.tps", "LM3=2\n1 2 3\nID=0\n"): "line 1: announces 2 places, and 1 are there",
+    ("m.tps", "LM3=1\n1 2\n"): "line 2: has 2 coordinates",
+    ("m.tps", "LM3=1\n1 2 3\n4 5 6\n"): "line 3: is neither",
+    ("m.tps", "LM3=1\n1 2 3\nSCALE=0\n"): "the scale is '0'",
+    ("m.tps", "LM3=1\n1 2 3\nLM3=2\n1 2 3\n4 5 6\n"): "specimen 1 has 1 landmarks",
+    ("m.tps", "ID=3\n"): "holds no specimen",
+    ("m.txt", "hello\n"): "stands before any section",
+    ("m.txt", "[individuals]\n1\n[landmarks]\n3\n[dimensions]\n3\n[rawpoints]\n1 2 3\n"): "holds 1 places",
+    ("m.txt", "[individuals]\n9\n[individuals]\n9\n"): "is there twice",
+    ("m.txt", "[individuals]\n1\n[landmarks]\n1\n[dimensions]\n4\n"): "has 4 dimensions",
+    ("m.txt", "[individuals]\n1\n"): r"no number below \[landmarks\]",
+    ("m.pts", "Version 1.0\n5\nS000 1 2 3\n"): "line 2: promises 5 landmarks, and 1 are there",
+    ("m.lm", "nose\nchin\n1 2 3\n"): "line 1: 'nose' has no coordinates",
+    ("m.lm", "nose\n"): "'nose' has no coordinates",
+    ("m.lm", "# nothing\n"): "holds no landmarks",
+    ("m.csv", "a,b\n1,2\n"): "line 1: names neither",
+    ("m.csv", "name,x,y,z\n"): "holds no landmarks",
+    ("m.csv", "name,x,y,z\na,1,2\n"): "line 2: has 3 values, and 4 columns",
+    ("m.csv", 'name,x,y,z\n"a,1,2,3\n'): "is no row of a table",
+    ("m.csv", "name,x,y,z\na,1,2,3\na,1,2,3\n"): "line 3: 'a' is there twice",
+    ("m.csv", "name,x,y,z\na,1,2,0x10\n"): "'0x10' is no number",
+    ("m.csv", "name;x;y;z\na;1,5;2;3\n"): "Decimals follow a point",
+    ("m.csv", f"{LONG}landmark,0,0,a,1,2,3,placed\n"): "they count from 1",
+    ("m.csv", f"{LONG}landmark,1.5,0,a,1,2,3,placed\n"): "the frame is '1.5'",
+    ("m.csv", f"{LONG}landmark,1,0,a,1,2,3,lost\n"): "the state is 'lost'",
+    ("m.csv", "name,x,y,z,unit\na,1,2,3,mm\nb,1,2,3,feet\n"): "lengths are in 'feet'",
+    ("m.csv", "frame,a_x,a_y,a_z\n2,1,2,3\n1,1,2,3\n"): "its frame is 1, after 2",
+    ("m.csv", "name,x,y,z\na,1e308,1e308,1e308\n"): "beyond",
+    ("m.c3d", "C3D" * 400): "is no C3D file",
+    ("m.c3d", "\x02P"): "is no C3D file",
+    ("m.c3d", "\x02P" * 600): "cannot be read as C3D",
+    ("m.stl", "solid"): "unknown file suffix '.stl'",
+    ("m.tps", ""): "is empty",
+    ("m.tps", "LM3=1\n1 2 3\0\n"): "is no text",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("file", "words"), BAD.items(), ids=lambda value: str(value)[:50])
+def test_bad_files_are_one_message(file: tuple[str, str], words: str, tmp_path: Path) -> None:
+    path = tmp_path / file[0]
+    path.write_bytes(file[1].encode())
+    with pytest.raises(InputError, match=words) as caught:
+        read_landmarks(path)
+    assert str(caught.value).startswith(str(path))
+    assert len(str(caught.value)) < 700
+
+
+def test_a_sparse_table_is_no_large_one(tmp_path: Path) -> None:
+    rows = "".join(f"landmark,{n},0,name {n},1,2,3,placed\n" for n in range(1, 3000))
+    (tmp_path / "m.csv").write_text(LONG + rows)
+    with pytest.raises(InputError, match="2,999 landmarks in 2,999 frames"):
+        read_landmarks(tmp_path / "m.csv")
+
+
+def test_missing_files_and_folders(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_landmarks(tmp_path / "m.csv")
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(InputError):
+        read_landmarks(tmp_path / "folder.csv")
+
+
+def test_names_that_cannot_stay(tmp_path: Path) -> None:
+    names = ["twice", "twice", "", "line\nbreak", "x" * 300, " kept "]
+    points = [{"label": name, "position": [1, 2, 3]} for name in names]
+    data = {"markups": [{"type": "Fiducial", "controlPoints": points}]}
+    (tmp_path / "m.mrk.json").write_text(json.dumps(data))
+    found = read_landmarks(tmp_path / "m.mrk.json")
+    assert found.names == ("twice", "twice (2)", "3", "line break", "x" * 200, "kept")
+    assert len(found.told) == 3
+
+
+def test_old_encodings_are_read(tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_bytes("name,x,y,z\nNäse,1,2,3\n".encode("latin-1"))
+    assert read_landmarks(tmp_path / "m.csv").names == ("Näse",)
+    (tmp_path / "m.csv").write_bytes("name,x,y,z\nNäse,1,2,3\n".encode("utf-8-sig"))
+    assert read_landmarks(tmp_path / "m.csv").names == ("Näse",)
+
+
+def whole(folder: Path) -> dict[str, bytes]:
+    wanted = moving(3)
+    for name in NAMES:
+        write_landmarks(folder / name, wanted.at(0) if name.endswith("json") else wanted)
+    return {name: (folder / name).read_bytes() for name in NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_cut_and_changed_files_do_no_harm(name: str, tmp_path: Path) -> None:
+    data, rng = whole(tmp_path)[name], Random(5)
+    outcomes = {"read": 0, "refused": 0}
+    for number in range(150):
+        damaged = bytearray(data[: rng.randrange(len(data))] if number % 3 == 0 else data)
+        for _ in range(number % 3 * rng.choice((1, 8))):
+            damaged[rng.randrange(min(len(damaged), 1500))] = rng.choice(
+                (rng.randrange(256), 0x2C, 0x39, 0xFF)
+            )
+        (tmp_path / name).write_bytes(damaged)
+        try:
+            found = read_landmarks(tmp_path / name)
+        except InputError:
+            outcomes["refused"] += 1
+        else:
+            outcomes["read"] += 1
+            assert np.isfinite(found.positions[found.is_defined]).all()
+            assert len(set(found.names)) == len(found.names)
+    assert min(outcomes.values()) > 5, outcomes
+
+
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), min_size=0, max_size=30)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(names=st.lists(TEXTS, min_size=1, max_size=5), numbers=st.data())
+def test_any_name_and_number_comes_back(names: list[str], numbers: st.DataObject, tmp_path: Path) -> None:
+    value = st.floats(-1e12, 1e12)
+    values = numbers.draw(st.lists(value, min_size=3 * len(names), max_size=3 * len(names)))
+    wanted = LandmarkSet.of(names, np.array(values).reshape(1, -1, 3), frames=[0], unit="mm")
+    for name in NAMES[:-1]:
+        write_landmarks(tmp_path / name, wanted)
+        found = read_landmarks(tmp_path / name)
+        assert found.names == wanted.names
+        np.testing.assert_array_equal(found.positions, wanted.positions)

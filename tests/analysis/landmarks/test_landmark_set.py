@@ -1,0 +1,79 @@
+"""Sets of landmarks: their frames, and whether they are of this scan."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from landmark_sets import assert_same, moving
+
+from viewer.analysis.landmarks.landmark_set import LandmarkSet, told_apart
+from viewer.analysis.track import Known, Track
+from viewer.bounds import Bounds
+
+
+def test_a_set_of_tracks_is_tracks_again() -> None:
+    rng = np.random.default_rng(1)
+    times = np.arange(5) / 10
+    tracks = {name: Track.pending(times) for name in ("a", "b")}
+    for track in tracks.values():
+        track.known[:] = [Known.PLACED, Known.TRACKED, Known.GAP, Known.PENDING, Known.TRACKED]
+        there = track.known >= Known.TRACKED
+        track.positions[there] = rng.normal(size=(3, 3))
+        track.covariances[there] = np.eye(3) * rng.random((3, 1, 1))
+    found = LandmarkSet.of_tracks(tracks, "mm", {"b": "the second"})
+    assert found.about == ("", "the second")
+    again = found.tracks(times)
+    for name, track in tracks.items():
+        np.testing.assert_array_equal(again[name].positions, track.positions)
+        np.testing.assert_array_equal(again[name].known, track.known)
+        np.testing.assert_allclose(again[name].sigmas, track.sigmas)
+
+
+def test_tracks_of_a_scan_of_other_frames() -> None:
+    some = LandmarkSet.of(["a"], np.ones((3, 1, 3)), frames=[1, 4, 9])
+    track = some.tracks(np.arange(6.0))["a"]
+    assert track.known.tolist() == [0, 3, 0, 0, 3, 0]
+    assert np.isfinite(track.positions[[1, 4]]).all()
+
+
+def test_a_set_has_each_frame_between_its_first_and_its_last() -> None:
+    some = LandmarkSet.of(["a"], np.ones((2, 1, 3)), frames=[2, 5], times=np.array([0.2, 0.5]))
+    even = some.even_rows()
+    np.testing.assert_array_equal(even.frames, [2, 3, 4, 5])
+    np.testing.assert_allclose(even.times, [0.2, 0.3, 0.4, 0.5])
+    assert even.known[:, 0].tolist() == [3, 1, 1, 3]
+    assert_same(moving().even_rows(), moving())
+
+
+BOX = Bounds(np.array([-90.0, 20, 500]), np.array([90.0, 240, 650]))
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (1.0, None),
+        (0.001, "1000 times as large"),
+        (1000.0, "0.001 times as large"),
+        (np.array([-1, -1, 1]), "x and y turned"),
+        (-7.0, "of another scan"),
+    ],
+)
+def test_landmarks_of_another_scan_are_told(factor: float, words: str | None) -> None:
+    rng = np.random.default_rng(2)
+    points = BOX.low + rng.random((1, 9, 3)) * (BOX.high - BOX.low)
+    told = told_apart(LandmarkSet.of([f"{n}" for n in range(9)], points * factor, unit="mm"), BOX)
+    if words is None:
+        assert told is None
+    else:
+        assert told is not None
+        assert words in told
+
+
+def test_one_place_that_is_off_is_told() -> None:
+    points = np.full((1, 9, 3), 100.0) + np.array([0, 0, 450])
+    points[0, 3] += 400
+    points[0, 5] = np.nan
+    told = told_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, unit="mm"), BOX)
+    assert told is not None
+    assert told.startswith("1 of 8 places lie off the scan")
+    assert told_apart(LandmarkSet.of(["a"], np.full((1, 1, 3), np.nan)), BOX) is None

@@ -1,0 +1,99 @@
+"""Templates of landmarks: those that are shipped, and files of users."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from viewer.analysis.landmarks.mirroring import partners_of
+from viewer.analysis.landmarks.templates import read_template, save_template, templates
+from viewer.errors import InputError
+
+
+def test_those_that_are_shipped() -> None:
+    assert set(templates()) == {"body", "eyes", "face-21", "lips"}
+    assert len(templates()["face-21"].landmarks) == 21
+    for template in templates().values():
+        names = [landmark.name for landmark in template.landmarks]
+        assert all(landmark.about and landmark.state == "to place" for landmark in template.landmarks)
+        assert template.title
+        assert template.source
+        partners = {landmark.name: landmark.partner for landmark in template.landmarks if landmark.partner}
+        assert partners == partners_of(names)
+        for landmark in template.landmarks:
+            assert ("right" in landmark.about) == landmark.name.endswith("R")
+            assert ("left" in landmark.about) == landmark.name.endswith("L")
+        assert {measure.kind for measure in template.measures} <= {"distance", "angle"}
+        for measure in template.measures:
+            assert len(measure.landmarks) == (2 if measure.kind == "distance" else 3)
+            assert len(set(measure.landmarks)) == len(measure.landmarks)
+    measured = {measure.name: measure.landmarks for measure in templates()["face-21"].measures}
+    assert measured["mouth width"] == ("chR", "chL")
+    assert measured["mouth opening"] == ("ls", "li")
+
+
+def test_a_template_is_read_as_it_was_written(tmp_path: Path) -> None:
+    for template in templates().values():
+        save_template(tmp_path / "mine.json", template)
+        assert read_template(tmp_path / "mine.json") == template
+
+
+def own(**changes: Any) -> dict[str, Any]:
+    data = {
+        "format": 1,
+        "name": "mine",
+        "landmarks": [{"name": "aL", "partner": "aR"}, {"name": "aR", "partner": "aL"}, {"name": "鼻"}],
+        "measures": [{"name": "w", "kind": "distance", "landmarks": ["aL", "aR"], "options": {"a": "b"}}],
+    }
+    return data | changes
+
+
+def test_a_template_of_a_user(tmp_path: Path) -> None:
+    (tmp_path / "mine.json").write_text(json.dumps(own()), encoding="utf-8")
+    found = read_template(tmp_path / "mine.json")
+    assert (found.name, found.title, found.source) == ("mine", "mine", "")
+    assert [landmark.partner for landmark in found.landmarks] == ["aR", "aL", ""]
+    assert found.measures[0].options == {"a": "b"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"format": 2}, "has the format 2, and 1 is read"),
+        ({"landmarks": []}, "has no landmarks"),
+        ({"landmarks": 3}, "'landmarks' is no list"),
+        ({"landmarks": [3]}, r"landmarks\[0\]: is no object"),
+        ({"landmarks": [{"name": ""}]}, r"landmarks\[0\]: has no 'name'"),
+        ({"landmarks": [{"name": "a\nb"}]}, "no text of one line"),
+        ({"landmarks": [{"name": "a" * 300}]}, "longer than 200"),
+        ({"landmarks": [{"name": "a"}, {"name": "a"}]}, "the landmark 'a' is there twice"),
+        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "whose partner it is not"),
+        ({"landmarks": [{"name": "a", "colour": "b"}]}, "unknown field 'colour'"),
+        (
+            {"measures": [{"name": "w", "kind": "distance", "landmarks": ["x"]}]},
+            r"measures\[0\]: no landmark",
+        ),
+        ({"measures": [{"name": "w"}]}, r"measures\[0\]: has no 'kind'"),
+        ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "options are no words"),
+        ({"more": 1}, "unknown field 'more'"),
+        ({"name": " mine"}, "blanks around"),
+    ],
+)
+def test_a_template_that_is_wrong(changes: dict[str, Any], words: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(own(**changes)))
+    with pytest.raises(InputError, match=words) as caught:
+        read_template(path)
+    assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"\xff\xfe", b"[" * 100_000, b"3"])
+def test_a_template_that_is_damaged(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "mine.json").write_bytes(data)
+    with pytest.raises(InputError, match=r"mine\.json"):
+        read_template(tmp_path / "mine.json")
+    with pytest.raises(InputError, match="no such file"):
+        read_template(tmp_path / "other.json")

@@ -1,0 +1,212 @@
+"""Tables of landmarks: what the long one and the wide one share, and the reading of either."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Sequence
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from ....errors import InputError, shortened
+from ....scan.units import conversion, usable_unit
+from ...track import Known
+from ..landmark_set import LandmarkSet, check_cells
+from ._text import at_line, count_of, number_of, read_all
+
+LONG_COLUMNS = ("kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit")
+STATES = {Known.PENDING: "", Known.GAP: "gap", Known.TRACKED: "tracked", Known.PLACED: "placed"}
+_KNOWN = {word: known for known, word in STATES.items()}
+_NAMES = ("name", "label", "landmark", "id")
+_AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE)
+_FRAMES, _TIMES = ("frame", "frames"), ("time", "seconds", "t")
+_HINT = "Give each row as many values as there are names in the first line"
+
+
+def has_columns(head: str) -> bool:
+    """Whether the first line of a text names the columns of landmarks."""
+    names = [name.strip().lower() for name in _cells(head.split("\n", 1)[0])]
+    named = set(names) & {*_NAMES, "kind"}
+    return bool({"x", "y", "z"} <= set(names) and named) or len(_wide_columns(names)) > 0
+
+
+def _cells(line: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=_separator(line)), [])
+    except csv.Error:
+        return []
+
+
+def _separator(line: str) -> str:
+    return max(",;\t", key=line.count)
+
+
+def read_table(path: Path) -> LandmarkSet:
+    """The landmarks of either table. Raises InputError."""
+    text = read_all(path)
+    rows = _rows(text, _separator(text.split("\n", 1)[0]))
+    _, head = next(rows, (0, []))
+    names = [name.strip().lower() for name in head]
+    if {"x", "y", "z"} <= set(names):
+        return _long(rows, names)
+    if columns := _wide_columns(head):
+        return _wide(rows, names, columns)
+    raise at_line(
+        "names neither x, y and z nor NAME_x, NAME_y and NAME_z", 1, "The first line names the columns"
+    )
+
+
+def _rows(text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+    """The rows that are not blank, each after the number of its last line."""
+    reader = csv.reader(StringIO(text, newline=""), delimiter=separator, strict=True)
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise at_line(f"is no row of a table: {error}", reader.line_num) from error
+
+
+def _first(names: Sequence[str], wanted: Sequence[str]) -> int | None:
+    return next((names.index(name) for name in wanted if name in names), None)
+
+
+class _Units:
+    """The one unit of a table, to which the lengths of all rows are brought."""
+
+    def __init__(self) -> None:
+        self.unit: str | None = None
+
+    def factor(self, word: str, line: int) -> float:
+        """Factor of the lengths of a row. Raises InputError for units that do not go together."""
+        word = word.strip()
+        if not word or word == self.unit:
+            return 1.0
+        if self.unit is None:
+            if usable_unit(word) is None:
+                raise at_line(f"'{shortened(word)}' is no unit of length", line)
+            self.unit = word
+        factor = conversion(word, self.unit)
+        if factor is None:
+            raise at_line(f"lengths are in '{shortened(word)}', those above in '{self.unit}'", line)
+        return factor
+
+
+def _frame(word: str, line: int) -> int:
+    """The index of a frame that counts from 1."""
+    word = word.strip()
+    frame = count_of(word[:-2] if word.endswith(".0") else word, line, "the frame")
+    if frame < 1:
+        raise at_line("has a frame 0, and they count from 1", line)
+    return frame - 1
+
+
+def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> LandmarkSet:
+    name_at, kind_at = _first(columns, _NAMES), _first(columns, ("kind",))
+    frame_at, time_at = _first(columns, _FRAMES), _first(columns, _TIMES)
+    state_at, sigma_at, unit_at = (_first(columns, (name,)) for name in ("state", "sigma", "unit"))
+    axes = [columns.index(axis) for axis in "xyz"]
+    units = _Units()
+    found: dict[tuple[int, str], tuple[list[float], int, float]] = {}
+    times: dict[int, float] = {}
+    names: dict[str, None] = {}
+    for line, row in rows:
+        if len(row) != len(columns):
+            raise at_line(f"has {len(row)} values, and {len(columns)} columns have a name", line, _HINT)
+        if kind_at is not None and row[kind_at].strip().lower() != "landmark":
+            continue
+        frame = 0 if frame_at is None else _frame(row[frame_at], line)
+        name = str(len(names) + 1) if name_at is None else row[name_at].strip()
+        if (frame, name) in found:
+            raise at_line(f"'{shortened(name)}' is there twice in one frame", line, "Give each its own name")
+        factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
+        place = [number_of(row[axis], line) * factor for axis in axes]
+        found[frame, name] = (
+            place,
+            _state(row[state_at] if state_at is not None else None, place, line),
+            math.nan if sigma_at is None else number_of(row[sigma_at], line) * factor,
+        )
+        names[name] = None
+        if time_at is not None:
+            times.setdefault(frame, number_of(row[time_at], line))
+    frames = sorted({frame for frame, _ in found})
+    if not frames:
+        raise InputError("holds no landmarks")
+    check_cells(len(frames), len(names))
+    at = {frame: number for number, frame in enumerate(frames)}, {name: n for n, name in enumerate(names)}
+    shape = len(frames), len(names)
+    positions, sigmas = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
+    known = np.full(shape, Known.PENDING, np.uint8)
+    for (frame, name), (place, state, sigma) in found.items():
+        cell = at[0][frame], at[1][name]
+        positions[cell], known[cell], sigmas[cell] = place, state, sigma
+    return LandmarkSet.of(
+        list(names),
+        positions,
+        known=known,
+        sigmas=sigmas,
+        times=np.array([times.get(frame, math.nan) for frame in frames]),
+        frames=None if frame_at is None else frames,
+        unit=units.unit,
+    )
+
+
+def _state(word: str | None, place: Sequence[float], line: int) -> int:
+    """State that a row tells; a place without a word was set."""
+    if word is None:
+        return Known.PLACED if all(map(math.isfinite, place)) else Known.PENDING
+    if (word := word.strip().lower()) not in _KNOWN:
+        known = ", ".join(filter(None, _KNOWN))
+        raise at_line(f"the state is '{shortened(word)}'", line, f"Known: {known}")
+    return _KNOWN[word]
+
+
+def _wide_columns(names: Sequence[str]) -> dict[str, list[int]]:
+    """Landmark -> its columns of x, y and z, for those that have all three."""
+    found: dict[str, dict[str, int]] = {}
+    for number, name in enumerate(names):
+        if match := _AXIS.fullmatch(name.strip()):
+            found.setdefault(match[1], {}).setdefault(match[2].lower(), number)
+    return {name: [axes[axis] for axis in "xyz"] for name, axes in found.items() if len(axes) == 3}
+
+
+def _wide(
+    rows: Iterator[tuple[int, list[str]]], columns: Sequence[str], landmarks: dict[str, list[int]]
+) -> LandmarkSet:
+    frame_at, time_at, unit_at = (_first(columns, words) for words in (_FRAMES, _TIMES, ("unit",)))
+    units = _Units()
+    frames: list[int] = []
+    times: list[float] = []
+    positions: list[list[list[float]]] = []
+    for line, row in rows:
+        if len(row) != len(columns):
+            raise at_line(f"has {len(row)} values, and {len(columns)} columns have a name", line, _HINT)
+        frames.append(len(frames) if frame_at is None else _frame(row[frame_at], line))
+        if len(frames) > 1 and frames[-1] <= frames[-2]:
+            raise at_line(f"its frame is {frames[-1] + 1}, after {frames[-2] + 1}", line, "Sort the frames")
+        check_cells(len(frames), len(landmarks))
+        times.append(math.nan if time_at is None else number_of(row[time_at], line))
+        factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
+        positions.append(
+            [[number_of(row[axis], line) * factor for axis in axes] for axes in landmarks.values()]
+        )
+    if not positions:
+        raise InputError("holds no landmarks")
+    places = np.array(positions)
+    known = np.where(np.isfinite(places).all(axis=2), Known.PLACED, Known.GAP)
+    return LandmarkSet.of(
+        list(landmarks),
+        places,
+        known=known,
+        times=np.array(times),
+        frames=None if frame_at is None else frames,
+        unit=units.unit,
+    )
+
+
+def cell(value: float) -> float | None:
+    """A number as tables have it, empty where it is not known."""
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,129 @@
+"""Landmarks in text: lines with their numbers, coordinates, and what a format has no field for."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ....errors import InputError, shortened
+from ....files import open_plain, parsed_json
+from ....scan.units import usable_unit
+from ...track import Known
+from ..landmark_set import LandmarkSet
+
+MOST_BYTES = 64 * 2**20  # of a file of landmarks
+MISSING = "NA"  # in place of a coordinate, as geomorph reads it
+_ABSENT = {"na", "nan", "-nan", "none", "null", ""}
+_REAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
+_OWN = "scan4d "
+
+
+def read_all(path: Path) -> str:
+    """The text of a file in UTF-8, or where it is none in Latin-1. Raises InputError for what is no text."""
+    with open_plain(path) as stream:
+        data = stream.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise InputError(f"is longer than the {MOST_BYTES:,} bytes that are read of landmarks")
+    if b"\0" in data:
+        raise InputError("is no text")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def numbered_lines(path: Path) -> list[tuple[int, str]]:
+    """The lines of a file that are not blank, without blanks around, each after its number from 1."""
+    lines = read_all(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return [(number, text.strip()) for number, text in enumerate(lines, 1) if text.strip()]
+
+
+def at_line(what: str, line: int, hint: str | None = None) -> InputError:
+    """The error for something in a line; the front puts the name of the file before it."""
+    return InputError(what, f"line {line}", hint)
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a coordinate, or stands for one that is missing."""
+    return word.lower() in _ABSENT or _REAL.fullmatch(word) is not None
+
+
+def number_of(word: str, line: int) -> float:
+    """The number of a word; NaN where it says that there is none. Raises InputError."""
+    word = word.strip()
+    if word.lower() in _ABSENT:
+        return math.nan
+    if _REAL.fullmatch(word) is None:
+        hint = "Decimals follow a point" if re.fullmatch(r"-?\d+,\d+", word) else None
+        raise at_line(f"'{shortened(word)}' is no number", line, hint)
+    value = float(word.replace("d", "e").replace("D", "e"))
+    return value if math.isfinite(value) else math.nan
+
+
+def count_of(word: str, line: int, what: str) -> int:
+    """A whole number that counts something, below 10^9. Raises InputError."""
+    if not re.fullmatch(r"\+?\d{1,9}", word.strip(), re.ASCII):
+        raise at_line(f"{what} is '{shortened(word.strip())}', which is no number of things", line)
+    return int(word)
+
+
+def three_numbers(words: Sequence[str], line: int) -> list[float]:
+    """The three coordinates of a line. Raises InputError where it has not so many."""
+    if len(words) < 3:
+        raise at_line(f"has {len(words)} coordinates, not three: '{shortened(' '.join(words))}'", line)
+    return [number_of(word, line) for word in words[:3]]
+
+
+def digits_of(value: float) -> str:
+    """A number with all its digits, or the word for none."""
+    return repr(float(value)) if math.isfinite(value) else MISSING
+
+
+def own_text(values: Mapping[str, Any]) -> str:
+    """A comment of one line with what a format has no field for."""
+    return _OWN + json.dumps({key: value for key, value in values.items() if value is not None})
+
+
+def own_values(comment: str) -> dict[str, Any]:
+    """Values of such a comment where it was written here; none of others."""
+    if not comment.startswith(_OWN):
+        return {}
+    try:
+        found = parsed_json(comment.removeprefix(_OWN))
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def own_names(values: Mapping[str, Any], count: int) -> list[str] | None:
+    """The names that a comment tells, where they are as many as there are landmarks."""
+    names = values.get("names")
+    if isinstance(names, list) and len(names) == count and all(isinstance(name, str) for name in names):
+        return names
+    return None
+
+
+def own_number(values: Mapping[str, Any], key: str) -> float:
+    """A finite number that a comment tells, NaN for none."""
+    value = values.get(key)
+    fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+    return float(value) if fits else math.nan  # type: ignore[arg-type]
+
+
+def own_unit(values: Mapping[str, Any]) -> str | None:
+    """The unit that a comment tells."""
+    unit = values.get("unit")
+    return usable_unit(unit) if isinstance(unit, str) else None
+
+
+def without_states(landmarks: LandmarkSet, title: str) -> str | None:
+    """The remark of a format that has no states, where the landmarks have some."""
+    if (landmarks.known == Known.TRACKED).any() or np.isfinite(landmarks.sigmas).any():
+        return f"{title} has no states and no uncertainty: what was tracked reads as placed"
+    return None

@@ -1,0 +1,209 @@
+"""C3D, the format of motion capture: landmarks through time, as points (https://www.c3d.org).
+
+Numbers are float32, the frame rate is one for all; a residual of -1 marks a point that is not there. Names
+are the labels of points, up to 255 in each of POINT:LABELS, LABELS2 and so on. The package c3d reads and
+writes the parameters and frames.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....errors import InputError
+from ....files import open_plain
+from ....scan.units import usable_unit
+from ...track import Known
+from ..landmark_set import LandmarkSet, check_cells
+from ._text import without_states
+
+if TYPE_CHECKING:
+    from c3d import Reader
+
+TITLE = "C3D"
+SUFFIXES = (".c3d",)
+
+_BLOCK = 512  # bytes
+_MAGIC = 80
+_MOST_BYTES = 1 << 30
+_PER_PARAMETER = 255  # names, as a dimension is a byte
+_LONGEST = 120  # bytes of a text, so that 255 of them are less than the 32767 that a parameter may have
+_TEXTS = 30_000  # bytes of all names, and of all descriptions: the package has 127 blocks for parameters
+_MOST_POINTS = 2500  # whose names then have twelve bytes each
+_RATE = 30.0  # frames a second, where no times are known
+_EVEN = 1e-3  # frames, by which times may be off even ones
+_ROUNDED = 1e-5  # of the extent, by which float32 may be off
+
+
+def read(path: Path) -> LandmarkSet:
+    """All points in all frames. Raises InputError."""
+    from c3d import Reader
+
+    with open_plain(path) as stream:
+        data = stream.read(_MOST_BYTES + 1)
+    if len(data) > _MOST_BYTES:
+        raise InputError(f"is longer than the {_MOST_BYTES:,} bytes that are read of landmarks")
+    if len(data) < 2 * _BLOCK or data[1] != _MAGIC:
+        raise InputError("is no C3D file, or is cut short")
+    with warnings.catch_warnings(action="ignore"):
+        try:
+            reader = Reader(BytesIO(data))
+            return _frames(reader, len(data))
+        except AssertionError as error:  # of the library, where header and parameters differ
+            raise InputError(f"its header is at odds with its parameters: {error}") from error
+
+
+def _frames(reader: Reader, size: int) -> LandmarkSet:
+    count, frames = int(reader.point_used), int(reader.frame_count)
+    if not count:
+        raise InputError("holds no points")
+    words = 4 if reader.point_scale < 0 else 2
+    held = size - (int(reader.header.data_block) - 1) * _BLOCK
+    analog = int(reader.analog_used) * int(reader.analog_per_frame)
+    if frames < 1 or frames * (4 * count + analog) * words > held:
+        raise InputError(f"promises {frames:,} frames of {count:,} points, and is shorter")
+    check_cells(frames, count)
+    values = np.stack([points for _, points, _ in reader.read_frames(analog_transform=False)])
+    there = values[..., 3] >= 0
+    positions = np.where(there[..., np.newaxis], values[..., :3], np.nan)
+    known = np.where(there, Known.PLACED, Known.GAP)
+    first, rate = int(reader.first_frame), float(reader.point_rate)
+    numbers = np.arange(frames) + max(first, 1) - 1
+    labels = _texts(reader, "LABELS", count)
+    return LandmarkSet.of(
+        labels or [str(number) for number in range(1, count + 1)],
+        positions,
+        known=known,
+        times=numbers / rate if rate > 0 and np.isfinite(rate) else None,
+        frames=numbers,
+        unit=_unit(reader),
+        about=_texts(reader, "DESCRIPTIONS", count),
+        told=[] if labels else ["Its points have no names, and got numbers"],
+    )
+
+
+def _texts(reader: Reader, name: str, count: int) -> list[str]:
+    """The texts of POINT:NAME, NAME2 and so on, one a point; none where these parameters are not there."""
+    found: list[str] = []
+    for number in range(1, -(-count // _PER_PARAMETER) + 1):
+        parameter = reader.get(f"POINT:{name}" + (str(number) if number > 1 else ""))
+        if parameter is None or len(parameter.dimensions) != 2:
+            break
+        width, rows = parameter.dimensions
+        if len(parameter.bytes) != width * rows:
+            break
+        pieces = [parameter.bytes[width * row : width * (row + 1)] for row in range(rows)]
+        found += [_decoded(piece) for piece in pieces]
+    found = found[:count]
+    return [*found, *[""] * (count - len(found))] if found else []
+
+
+def _decoded(text: bytes) -> str:
+    text = text.rstrip(b" \0")
+    try:
+        return text.decode("utf-8")
+    except UnicodeDecodeError:
+        return text.decode("latin-1")
+
+
+def _unit(reader: Reader) -> str | None:
+    parameter = reader.get("POINT:UNITS")
+    return None if parameter is None else usable_unit(_decoded(bytes(parameter.bytes)).strip())
+
+
+def write(path: Path, landmarks: LandmarkSet) -> str | None:
+    """All frames from the first to the last; what is not defined has the residual -1."""
+    from c3d import Writer
+
+    landmarks = landmarks.even_rows()
+    count = len(landmarks.names)
+    if count > _MOST_POINTS:
+        raise InputError(f"C3D holds {_MOST_POINTS} points at most", hint="Use .csv")
+    rate, is_even = _rate(landmarks)
+    longest = min(_LONGEST, _TEXTS // count)
+    labels = _labels(landmarks.names, longest)
+    writer = Writer(point_rate=rate, point_scale=-1.0)
+    writer.set_start_frame(int(landmarks.frames[0]) + 1)
+    unit = (landmarks.unit or "").encode()
+    writer.point_group.add("UNITS", "Unit of lengths", -1, "", unit, len(unit))
+    _add_texts(writer, "LABELS", "Names of the points", labels)
+    _add_texts(
+        writer, "DESCRIPTIONS", "How they are found", [_cut(text, longest) for text in landmarks.about]
+    )
+    writer.add_frames(list(_points(landmarks)))
+    with open(path, "wb") as stream, warnings.catch_warnings(action="ignore"):
+        writer.write(stream)
+    return _remark(landmarks, labels, longest, is_even)
+
+
+def _points(landmarks: LandmarkSet) -> Iterator[tuple[Any, Any]]:
+    there = landmarks.is_defined
+    for row in range(len(landmarks)):
+        points = np.zeros((len(landmarks.names), 5), np.float32)
+        points[:, :3] = np.where(there[row][:, np.newaxis], landmarks.positions[row], 0)
+        points[:, 3] = np.where(there[row], 0, -1)
+        yield points, np.zeros((0, 0), np.float32)
+
+
+def _rate(landmarks: LandmarkSet) -> tuple[float, bool]:
+    """Frames a second, and whether the times are what these tell: the index of a frame, divided by them."""
+    times = landmarks.times
+    if not np.isfinite(times).all():
+        return _RATE, not np.isfinite(times).any()
+    steps = np.diff(times)
+    if len(steps):
+        rate = 1 / float(np.median(steps)) if np.median(steps) > 0 else _RATE
+    else:
+        rate = float(landmarks.frames[0] / times[0]) if times[0] > 0 and landmarks.frames[0] else _RATE
+    rate = float(np.float32(rate))
+    return rate, bool(
+        (np.abs(times * rate - landmarks.frames) < _EVEN * np.maximum(landmarks.frames, 1)).all()
+    )
+
+
+def _labels(names: Sequence[str], longest: int) -> list[bytes]:
+    """Labels that differ, of so many bytes at most."""
+    labels: dict[bytes, None] = {}
+    for number, name in enumerate(names, 1):
+        label = _cut(name, longest)
+        if label in labels:
+            ending = f" #{number}".encode()
+            label = _cut(name, longest - len(ending)) + ending
+        labels[label] = None
+    return list(labels)
+
+
+def _cut(text: str, most: int) -> bytes:
+    """The beginning of a text that so many bytes of UTF-8 hold."""
+    return text.encode()[:most].decode(errors="ignore").encode()
+
+
+def _add_texts(writer: Any, name: str, about: str, texts: Sequence[bytes]) -> None:
+    for start in range(0, len(texts), _PER_PARAMETER):
+        part = texts[start : start + _PER_PARAMETER]
+        width = max(1, *map(len, part))
+        number = start // _PER_PARAMETER + 1
+        key = name if number == 1 else f"{name}{number}"
+        data = b"".join(text.ljust(width) for text in part)
+        writer.point_group.add(key, about, -1, "", data, width, len(part))
+
+
+def _remark(landmarks: LandmarkSet, labels: Sequence[bytes], longest: int, is_even: bool) -> str | None:
+    """Losses of the file, in words."""
+    lost = []
+    if any(label.decode() != name for label, name in zip(labels, landmarks.names, strict=True)):
+        lost.append(f"names longer than {longest} bytes are cut")
+    if not is_even:
+        lost.append("times are even, from 0")
+    points = landmarks.positions[landmarks.is_defined]
+    if len(points):
+        off = np.abs(points.astype(np.float32) - points).max()
+        if off > _ROUNDED * max(float(np.ptp(points, axis=0).max()), 1e-300):
+            lost.append(f"coordinates are rounded, by up to {off:.2g}")
+    told = [f"In C3D {'; '.join(lost)}"] if lost else []
+    return ". ".join(filter(None, [*told, without_states(landmarks, TITLE)])) or None

@@ -1,0 +1,90 @@
+"""Landmarks of files placed on a scan: each with the points around it, which it then follows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry import vector
+from ...scan.pose import Pose
+from ...scan.spacing import nearest_row, spacing_at
+from ...task import checkpoint
+from ..pick import FOLLOWED, Neighbor
+from ..spot import Spot
+from ..track import Known
+from . import Landmark
+from .landmark_set import LandmarkSet
+from .mirroring import partners_of
+
+_ON_SURFACE = 3.0  # spacings: farther from the nearest point, a place follows none
+
+
+def landmarks_of(
+    found: LandmarkSet, pose_of: Callable[[int], Pose], count: int, frame: int, known: Iterable[Landmark] = ()
+) -> tuple[Landmark, ...]:
+    """The landmarks of a file as keys of a scan; those that have no position are to be placed.
+
+    What the file has as tracked is tracked anew, where anything of the landmark was placed. Lengths have to
+    be in the scan's unit. pose_of: gives one by its index. count: of the scan's frames; others are left out.
+    frame: the one that a file of one moment without a frame is of. known: landmarks whose partners and
+    descriptions stay where the file has none. Raises InputError for a frame that cannot be read.
+    """
+    frames = found.frames if found.is_framed or len(found) > 1 else np.array([frame])
+    placed = found.known == Known.PLACED
+    keyed = placed | (found.is_defined & ~placed.any(axis=0))
+    keys: list[list[Spot]] = [[] for _ in found.names]
+    for row, index in enumerate(frames.tolist()):
+        if not (0 <= index < count and keyed[row].any()):
+            continue
+        checkpoint(row / len(frames))
+        pose = pose_of(index)
+        for number in np.flatnonzero(keyed[row]):
+            keys[number].append(spot_at(found.positions[row, number], pose, float(found.sigmas[row, number])))
+    before = {landmark.name: landmark for landmark in known}
+    partners = partners_of(found.names)
+    landmarks = []
+    for name, spots, about in zip(found.names, keys, found.about, strict=True):
+        old = before.get(name, Landmark(name, partner=partners.get(name, "")))
+        landmarks.append(Landmark(name, tuple(spots), partner=old.partner, about=about or old.about))
+    return tuple(landmarks)
+
+
+def spot_at(position: NDArray[np.float64], pose: Pose, sigma: float = math.nan) -> Spot:
+    """A place, (3,), on the surface of a pose, with the points that it follows; none where none is near.
+
+    sigma: standard deviation of its coordinates; where it is not known, the place is as uncertain as the
+    points around are apart, or as the nearest is far.
+    """
+    cloud = pose.around(position)
+    row, gap = nearest_row(cloud, position)
+    spacing = spacing_at(cloud, row)
+    if not math.isfinite(sigma):
+        sigma = max(spacing or 0.0, gap)
+    neighbors: tuple[Neighbor, ...] = ()
+    id = None
+    if spacing is not None and gap <= _ON_SURFACE * spacing:
+        offsets = cloud.world() - position
+        away = np.einsum("ij,ij->i", offsets, offsets)
+        few = min(FOLLOWED, len(away))
+        nearest = np.argpartition(away, few - 1)[:few]
+        nearest = nearest[np.lexsort((nearest, away[nearest]))]
+        ids = nearest if cloud.ids is None else cloud.ids[nearest]
+        neighbors = tuple(
+            Neighbor(int(one), vector(offset)) for one, offset in zip(ids, offsets[nearest], strict=True)
+        )
+        id = neighbors[0].id
+    variance = sigma**2
+    return Spot(
+        frame=pose.index,
+        time=float(pose.time),
+        position=vector(position),
+        snapped="surface",
+        id=id,
+        spacing=spacing,
+        level=0,
+        covariance=(variance, 0.0, 0.0, variance, 0.0, variance),
+        neighbors=neighbors,
+    )

@@ -1,0 +1,148 @@
+"""Templates: which landmarks are placed in which order, and what is measured of them.
+
+A template is a JSON file: `format` (1), `name`, `title`, `source`, `landmarks` (each a `name`, and where
+there are any its `partner` in the mirror and `about`, how it is found) and `measures` (each a `name`, its
+`kind`, its `landmarks` and `options`). Those in assets/templates/ come with Scan4D.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError, explained, shortened
+from ...files import parsed_json, read_text, whole_file
+from ...resources import resource_path
+from ..measures import Measure
+from . import Landmark, Template
+from .landmark_set import LONGEST_LANDMARK_NAME
+
+_FORMAT = 1
+_MOST_BYTES = 4 * 2**20
+_MOST = 10_000  # landmarks, and measures
+_LONGEST = 4000  # characters of a text
+_HINT = "docs/formats.md tells what a template is"
+_FIELDS = ("format", "name", "title", "source", "landmarks", "measures")
+
+
+@cache
+def templates() -> Mapping[str, Template]:
+    """Shipped templates, by name."""
+    found = [read_template(path) for path in sorted(resource_path("assets", "templates").glob("*.json"))]
+    return {template.name: template for template in found}
+
+
+def read_template(path: Path | str) -> Template:
+    """The template of a file. Raises InputError, which tells the place of what is wrong."""
+    path = Path(path)
+    try:
+        data = parsed_json(read_text(path, _MOST_BYTES))
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    except ValueError as error:  # of the text's encoding as well
+        raise InputError(f"is not JSON ({error})", path, _HINT) from error
+    try:
+        return _template(data)
+    except InputError as error:
+        raise InputError(error.what, ", ".join(map(str, filter(None, (path, error.where)))), _HINT) from None
+
+
+def _template(data: Any) -> Template:
+    fields = _fields(data, _FIELDS, "")
+    if fields.get("format") != _FORMAT:
+        raise InputError(f"has the format {shortened(fields.get('format'))}, and {_FORMAT} is read")
+    landmarks = tuple(
+        _landmark(value, f"landmarks[{number}]") for number, value in enumerate(_list(fields, "landmarks"))
+    )
+    if not landmarks:
+        raise InputError("has no landmarks")
+    _check_names([landmark.name for landmark in landmarks], "landmark")
+    partners = {landmark.name: landmark.partner for landmark in landmarks if landmark.partner}
+    for name, partner in partners.items():
+        if partners.get(partner) != name:
+            raise InputError(f"'{name}' has the partner '{partner}', whose partner it is not", "landmarks")
+    names = {landmark.name for landmark in landmarks}
+    measures = tuple(
+        _measure(value, names, f"measures[{number}]")
+        for number, value in enumerate(_list(fields, "measures"))
+    )
+    _check_names([measure.name for measure in measures], "measure")
+    name = _text(fields, "name", "", needed=True)
+    return Template(
+        name, _text(fields, "title", "") or name, landmarks, measures, _text(fields, "source", "")
+    )
+
+
+def _landmark(data: Any, where: str) -> Landmark:
+    fields = _fields(data, ("name", "partner", "about"), where)
+    name = _text(fields, "name", where, needed=True)
+    if len(name) > LONGEST_LANDMARK_NAME:
+        raise InputError(f"its name is longer than {LONGEST_LANDMARK_NAME} characters", where)
+    return Landmark(name, partner=_text(fields, "partner", where), about=_text(fields, "about", where))
+
+
+def _measure(data: Any, names: set[str], where: str) -> Measure:
+    fields = _fields(data, ("name", "kind", "landmarks", "options"), where)
+    used = _list(fields, "landmarks", where)
+    for name in used:
+        if not isinstance(name, str) or name not in names:
+            raise InputError(f"no landmark is called {shortened(name)!r}", where)
+    options = fields.get("options", {})
+    if not isinstance(options, dict) or not all(isinstance(value, str) for value in options.values()):
+        raise InputError("its options are no words by name", where)
+    name, kind = (_text(fields, key, where, needed=True) for key in ("name", "kind"))
+    return Measure(name, kind, tuple(used), options)
+
+
+def _fields(data: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        raise InputError("is no object", where or None)
+    for name in data:
+        if name not in known:
+            raise InputError(f"has an unknown field '{shortened(name)}'", where or None)
+    return data
+
+
+def _list(fields: Mapping[str, Any], key: str, where: str = "") -> list[Any]:
+    values = fields.get(key, [])
+    if not isinstance(values, list) or len(values) > _MOST:
+        raise InputError(f"'{key}' is no list of at most {_MOST}", where or None)
+    return values
+
+
+def _text(fields: Mapping[str, Any], key: str, where: str, *, needed: bool = False) -> str:
+    value = fields.get(key, "")
+    if not isinstance(value, str) or not (value.isprintable() and len(value) <= _LONGEST):
+        raise InputError(f"'{key}' is no text of one line but {shortened(value)}", where or None)
+    if (needed and value.strip() != value) or (needed and not value):
+        raise InputError(f"has no '{key}', or one with blanks around", where or None)
+    return value
+
+
+def _check_names(names: list[str], what: str) -> None:
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"the {what} '{shortened(twice)}' is there twice")
+
+
+def save_template(path: Path | str, template: Template) -> None:
+    """Write a template as `read_template` reads it, without where landmarks are set. Raises InputError."""
+    landmarks = [
+        {"name": one.name} | {key: text for key in ("partner", "about") if (text := getattr(one, key))}
+        for one in template.landmarks
+    ]
+    measures = [
+        {"name": one.name, "kind": one.kind, "landmarks": list(one.landmarks)}
+        | ({"options": dict(one.options)} if one.options else {})
+        for one in template.measures
+    ]
+    data = {
+        "format": _FORMAT, "name": template.name, "title": template.title, "source": template.source,
+        "landmarks": landmarks, "measures": measures,
+    }  # fmt: skip
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
