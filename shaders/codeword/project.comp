@@ -1,4 +1,4 @@
-// Elements of code words: points as a view shows them, in steps of the table (viewer/codewords/encode_kernels.py, `project`
+// Elements of code words: points as a view shows them, in steps of the table (viewer/codewords/project_kernels.py, `project`
 // and `_quantise`, in float32). MATERIALS: points have one of their own.
 #include "common/item.glsl"
 #include "surfels/splat.glsl"

@@ -1,4 +1,4 @@
-// Words of elements (viewer/codewords/encode_kernels.py, `emit`): whole numbers, but for the rows of discs too large for
+// Words of elements (viewer/codewords/emit_kernels.py, `emit`): whole numbers, but for the rows of discs too large for
 // 32 bits. PASS 0 counts those of each line, PASS 1 writes them, in any order within a line. An element's words are divided
 // among `slices` invocations, since drivers may bound how often loops turn. BEYOND: some are larger than the table's.
 #include "common/item.glsl"

@@ -65,7 +65,7 @@ class Light:
 class Projected:
     """Elements that a picture may show, M of them, projected and in steps.
 
-    rows: (M,) uint32, which ones. shapes: (M, 7) int32, and planes: (M, 10) float64, see `encode_kernels`.
+    rows: (M,) uint32, which ones. shapes: (M, 7) int32, and planes: (M, 10) float64, see `project_kernels`.
     near, far: depths from the view's base that the least and the largest Z stand for, scan units.
     """
 
@@ -114,7 +114,8 @@ def project_elements(
     cull_back: bool = False,
 ) -> Projected:
     """The elements that a view may show, in steps; arguments as those of `encode_elements`."""
-    from .encode_kernels import PLANE_COLUMNS, SHAPE_COLUMNS, project
+    from .outline_kernels import PLANE_COLUMNS
+    from .project_kernels import SHAPE_COLUMNS, project
 
     count = len(elements.positions)
     rows, spread = np.empty(count, np.uint32), np.empty(2)
@@ -152,7 +153,7 @@ def emit_words(
     the corner and a pixel right and down, of exact outlines; None: they are those of the table. Raises
     InputError where there are too many words.
     """
-    from .encode_kernels import emit
+    from .emit_kernels import emit
 
     width, height = size
     stride, exact, table = strip_width(width), finer is not None, shape_table(steps)

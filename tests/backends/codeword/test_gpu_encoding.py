@@ -15,17 +15,17 @@ from viewer.backends.codeword.engine import WordBuffers
 from viewer.bench.scenes.samples import on_torus
 from viewer.camera import PROJECTIONS, Camera
 from viewer.codewords.encode import Projected, emit_words, project_elements
-from viewer.codewords.encode_kernels import (
+from viewer.codewords.engine import draw_words
+from viewer.codewords.outline_kernels import PLANE_COLUMNS
+from viewer.codewords.project_kernels import (
     DIFFUSE,
     NORMAL_I,
-    PLANE_COLUMNS,
     SHAPE_COLUMNS,
     SIZE,
     SPECULAR,
     X,
     Y,
 )
-from viewer.codewords.engine import draw_words
 from viewer.codewords.settings import elements_of, point_materials, word_lights, words_of
 from viewer.codewords.stream import strip_width
 from viewer.codewords.words import decode_words

@@ -1,8 +1,8 @@
 """Encoding on the GPU: points of a view become code words of the table, line by line.
 
-The steps of viewer/codewords/encode_kernels.py, in float32 up to whole numbers: what lies between two of them
-may be rounded to the other one. What follows of these is to the bit. Words of a line are in no order: at a
-pixel there is one of each point at most, so that points' rows tell them apart.
+The steps of project_kernels.py and emit_kernels.py in viewer/codewords/, in float32 up to whole numbers: what
+lies between two of them may be rounded to the other one. What follows of these is to the bit. Words of a line
+are in no order: at a pixel there is one of each point at most, so that points' rows tell them apart.
 """
 
 from __future__ import annotations
