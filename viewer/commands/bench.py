@@ -11,7 +11,7 @@ import os
 from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from itertools import chain, count, product
@@ -19,80 +19,22 @@ from pathlib import Path
 
 from ..backends import backend, backends
 from ..bench import numerics
-from ..bench.defaults import SCENES as DEFAULT_SCENES
-from ..bench.defaults import default_groups
 from ..bench.forecast import forecast
-from ..bench.measuring import NAME as MEASURING
-from ..bench.measuring import SCENES as MEASURED_SCENES
-from ..bench.measuring import measure_distances, write_measuring
-from ..bench.papers.farooq_2013 import pyramids
-from ..bench.papers.farooq_2013.farooq import NAME as FAROOQ
-from ..bench.papers.farooq_2013.farooq import write_farooq
-from ..bench.papers.farooq_2013.laplacian import NAME as LAPLACIAN
-from ..bench.papers.farooq_2013.laplacian import write_laplacian
-from ..bench.papers.farooq_2013.large_views import measure_large_views
-from ..bench.papers.farooq_2013.playing import measure_playing
-from ..bench.papers.farooq_2013.splines import PICTURE as SEAM_PICTURE
-from ..bench.papers.farooq_2013.splines import SCENES as SEAM_SCENES
-from ..bench.papers.farooq_2013.splines import measure_alone, measure_bands, measure_seams, measure_sizes
-from ..bench.papers.machado_2014.accuracy import SCENES as VISIBILITY_SCENES
-from ..bench.papers.machado_2014.accuracy import measure_visibility
-from ..bench.papers.machado_2014.growth import measure_growth
-from ..bench.papers.machado_2014.hpr import NAME as HPR
-from ..bench.papers.machado_2014.hpr import write_hpr
-from ..bench.papers.machado_2014.pictures import ERROR_PICTURE, GROWTH_PICTURE, SECTOR_PICTURE
-from ..bench.papers.machado_2014.speed import measure_speeds
-from ..bench.papers.marsik_2010.codeword import NAME as CODEWORD
-from ..bench.papers.marsik_2010.codeword import write_codeword
-from ..bench.papers.marsik_2010.words import SCENES as WORD_SCENES
-from ..bench.papers.marsik_2010.words import SIZES as WORD_SIZES
-from ..bench.papers.marsik_2010.words import measure_pixels, measure_tables, measure_times
-from ..bench.papers.preiner_2012 import auto_splats
-from ..bench.papers.preiner_2012.fits import measure_fits
-from ..bench.papers.preiner_2012.preiner import NAME as PREINER
-from ..bench.papers.preiner_2012.preiner import write_preiner
-from ..bench.papers.preiner_2012.searches import measure_searches
-from ..bench.papers.slomp_2014 import octree_sizes, octrees
-from ..bench.papers.slomp_2014 import surfels as slomp
-from ..bench.papers.slomp_2014.octree_tables import NAME as OCTREE_TABLES
-from ..bench.papers.slomp_2014.octree_tables import write_octree_tables
-from ..bench.papers.slomp_2014.table_two import NAME as TABLE_TWO
-from ..bench.papers.slomp_2014.table_two import write_table_two
 from ..bench.plan import Group, plan
-from ..bench.report.defaults_page import NAME as DEFAULTS
-from ..bench.report.defaults_page import write_defaults
 from ..bench.report.page import PAGE, write_report
 from ..bench.report.pictures import picture_path
 from ..bench.report.results import (
-    ALONE,
-    BAND_TIMES,
-    DISTANCES,
-    FITS,
-    GROWTH,
-    LARGE_VIEWS,
     NOTES,
     NUMERICS,
-    OCTREE_SIZES,
-    OCTREES,
-    PICTURE_SIZES,
-    PLAYING,
     RESULTS,
-    SEAMS,
-    SEARCHES,
-    SPEEDS,
-    VISIBILITY,
-    WORD_PIXELS,
-    WORD_TABLES,
-    WORD_TIMES,
     Row,
     compare,
     read_rows,
     write_row,
 )
-from ..bench.report.scene_table import NAME as SCENE_TABLE
-from ..bench.report.scene_table import write_scene_table
 from ..bench.run import Bench, BenchSettings
 from ..bench.scenes import catalog
+from ..bench.suites import PAGE_SUITES
 from ..errors import InputError, explained
 from ..files import whole_file
 from ..signals import held_interrupts
@@ -101,120 +43,7 @@ from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
 
-
-@dataclass(frozen=True)
-class _PageSuite:
-    """A suite that has a page of its own.
-
-    groups: what is drawn, of some scenes. write_page: makes the page of a folder. page: its name. scenes:
-    which, unless others are named; None: it has its own. others: what else is measured, by the files of its
-    rows, given the bench, and the scenes where it has any. pictures: what these write beside, by name. usual:
-    settings unless told otherwise. quick: scenes and views of the quick form, where it has one of its own.
-    """
-
-    groups: Callable[[BenchSettings, Sequence[str]], list[Group]]
-    write_page: Callable[[Path], Path]
-    page: str
-    scenes: Sequence[str] | None = None
-    others: Mapping[str, Callable[..., Iterator[Row]]] = field(default_factory=dict)
-    pictures: Sequence[str] = ()
-    usual: BenchSettings = field(default_factory=BenchSettings)
-    quick: tuple[Sequence[str], int] | None = None
-
-
-def _octree_scans(bench: Bench) -> Iterator[Row]:
-    """Octrees built and cut, of the scans that are there."""
-    missing = catalog.scene_names(bench.settings.data)
-    scans = [scan for scan in slomp.scans() if not missing[scan.scene]]
-    return octrees.build_and_cut(bench, scans)
-
-
-def _octree_sizes(bench: Bench) -> Iterator[Row]:
-    return map(asdict, octree_sizes.measure(bench.settings.data))
-
-
-_WITH_PAGES = {
-    "summary": _PageSuite(
-        lambda _, scenes: plan(scenes, list(backends()), counts=(), noises=(), swept_scenes=0),
-        write_scene_table,
-        SCENE_TABLE,
-        ("bunny", "bunny-bare", "bunny-ramp-bare", "dragon-scans", "bunny-scans", "truedepth-head", "demo"),
-        usual=BenchSettings(size=(960, 640), frames=0),
-    ),
-    "defaults": _PageSuite(
-        default_groups,
-        write_defaults,
-        DEFAULTS,
-        DEFAULT_SCENES,
-        usual=BenchSettings(size=(384, 256), views=4, frames=0),
-    ),
-    "measuring": _PageSuite(
-        lambda *_: [],
-        write_measuring,
-        MEASURING,
-        MEASURED_SCENES,
-        others={DISTANCES: measure_distances},
-        usual=BenchSettings(size=(400, 300), views=8, frames=0),
-    ),
-    "hpr": _PageSuite(
-        lambda *_: [],
-        write_hpr,
-        HPR,
-        VISIBILITY_SCENES,
-        others={VISIBILITY: measure_visibility, GROWTH: measure_growth, SPEEDS: measure_speeds},
-        pictures=(ERROR_PICTURE, SECTOR_PICTURE, GROWTH_PICTURE),
-        usual=BenchSettings(size=(400, 300), views=2, frames=0),
-        quick=(VISIBILITY_SCENES[:1], 1),
-    ),
-    "laplacian": _PageSuite(
-        lambda *_: [],
-        write_laplacian,
-        LAPLACIAN,
-        SEAM_SCENES,
-        others={
-            SEAMS: measure_seams,
-            ALONE: measure_alone,
-            PICTURE_SIZES: measure_sizes,
-            BAND_TIMES: measure_bands,
-        },
-        pictures=(SEAM_PICTURE,),
-        usual=BenchSettings(size=(640, 480), views=3, frames=0),
-        quick=(SEAM_SCENES[:1], 1),
-    ),
-    "codeword": _PageSuite(
-        lambda *_: [],
-        write_codeword,
-        CODEWORD,
-        WORD_SCENES,
-        others={WORD_TIMES: measure_times, WORD_PIXELS: measure_pixels, WORD_TABLES: measure_tables},
-        usual=BenchSettings(size=WORD_SIZES[0], views=1, repeat=9, frames=0),
-        quick=(WORD_SCENES[:1], 1),
-    ),
-    "slomp": _PageSuite(lambda *_: slomp.groups(), write_table_two, TABLE_TWO),
-    "octrees": _PageSuite(
-        lambda *_: octrees.groups(),
-        write_octree_tables,
-        OCTREE_TABLES,
-        others={OCTREES: _octree_scans, OCTREE_SIZES: _octree_sizes},
-        usual=BenchSettings(frames=0),  # how voxels flicker, the scenes tell
-    ),
-    "farooq": _PageSuite(
-        lambda *_: pyramids.groups(),
-        write_farooq,
-        FAROOQ,
-        others={LARGE_VIEWS: measure_large_views, PLAYING: measure_playing},
-        usual=BenchSettings(size=(640, 480), views=8, frames=0),
-    ),
-    "preiner": _PageSuite(
-        lambda *_: auto_splats.groups(),
-        write_preiner,
-        PREINER,
-        others={SEARCHES: measure_searches, FITS: measure_fits},
-        usual=BenchSettings(size=auto_splats.SIZE, views=4, frames=3),
-    ),
-}
-_SUITES = ("scenes", "numerics", *_WITH_PAGES)
-_WITHOUT_RESULTS = (MEASURING, HPR, LAPLACIAN, CODEWORD)  # suites that draw no pictures of scenes
+_SUITES = ("scenes", "numerics", *PAGE_SUITES)
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 # Enough to see whether a change helps, in two minutes on two cores.
@@ -286,7 +115,7 @@ def run(args: Namespace) -> int:
         return 0
     if args.compare and args.suite == "numerics":
         raise InputError("--compare is for the scenes", "--suite numerics")
-    suite = _WITH_PAGES.get(args.suite)
+    suite = PAGE_SUITES.get(args.suite)
     if suite is not None and (args.backend or (args.scene and suite.scenes is None)):
         own, hint = ("scenes and renderer", "--scene and ") if suite.scenes is None else ("renderers", "")
         raise InputError(f"has its own {own}", f"--suite {args.suite}", f"Leave out {hint}--backend")
@@ -331,17 +160,18 @@ def run(args: Namespace) -> int:
 
 def _report(args: Namespace) -> None:
     """Make the pages of the rows in the folder, and say what is there."""
-    if args.suite not in _WITHOUT_RESULTS:
+    suite = PAGE_SUITES.get(args.suite)
+    if suite is None or suite.groups is not None:
         tell(write_report(args.out))
-    if args.suite in _WITH_PAGES:
-        tell(_WITH_PAGES[args.suite].write_page(args.out))
+    if suite is not None:
+        tell(suite.write_page(args.out))
 
 
 def _others(args: Namespace) -> Mapping[str, Callable[[Bench], Iterator[Row]]]:
     """Other measurements of a suite than pictures of scenes, by the files of their rows."""
-    if args.suite not in _WITH_PAGES:
+    if args.suite not in PAGE_SUITES:
         return {}
-    suite = _WITH_PAGES[args.suite]
+    suite = PAGE_SUITES[args.suite]
     if suite.scenes is None:
         return suite.others
     scenes = args.scene or (suite.quick[0] if args.quick and suite.quick else suite.scenes)
@@ -351,8 +181,8 @@ def _others(args: Namespace) -> Mapping[str, Callable[[Bench], Iterator[Row]]]:
 def _report_files(args: Namespace) -> list[Path]:
     """The files that `_report` writes, and the plots that it replaces by its own."""
     names = [PAGE]
-    if args.suite in _WITH_PAGES:
-        name = _WITH_PAGES[args.suite].page
+    if args.suite in PAGE_SUITES:
+        name = PAGE_SUITES[args.suite].page
         names += [f"{name}.md", f"{name}.json"]
     return [*(args.out / name for name in names), *sorted((args.out / "plots").glob("*.png"))]
 
@@ -365,8 +195,8 @@ def _claim(args: Namespace, settings: BenchSettings, groups: Sequence[Group], nu
     drawn = dict.fromkeys(contender.backend for group in judged for contender in group.contenders)
     outputs = [*(args.out / name for name in names), *_report_files(args)]
     outputs += [picture_path(args.out, scene, name) for scene, name in product(scenes, drawn)]
-    if args.suite in _WITH_PAGES:
-        outputs += [args.out / name for name in _WITH_PAGES[args.suite].pictures]
+    if args.suite in PAGE_SUITES:
+        outputs += [args.out / name for name in PAGE_SUITES[args.suite].pictures]
     compared = [args.compare, args.compare / RESULTS] if args.compare else []
     claim(outputs, [*compared, *map(Path, args.scene or ())], args.force)
 
@@ -441,9 +271,9 @@ def _settings(args: Namespace) -> BenchSettings:
             f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
-    usual = _WITH_PAGES[args.suite].usual if args.suite in _WITH_PAGES else BenchSettings()
+    usual = PAGE_SUITES[args.suite].usual if args.suite in PAGE_SUITES else BenchSettings()
     if args.quick:
-        quick = _WITH_PAGES[args.suite].quick if args.suite in _WITH_PAGES else None
+        quick = PAGE_SUITES[args.suite].quick if args.suite in PAGE_SUITES else None
         usual = replace(
             _QUICK, frames=min(_QUICK.frames, usual.frames), views=quick[1] if quick else _QUICK.views
         )
@@ -455,10 +285,10 @@ def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> t
     if args.suite == "numerics":
         return [], []
     missing = {name: reason for name, reason in catalog.scene_names(settings.data).items() if reason}
-    if args.suite in _WITH_PAGES:
-        suite = _WITH_PAGES[args.suite]
+    if args.suite in PAGE_SUITES:
+        suite = PAGE_SUITES[args.suite]
         scenes = args.scene or [name for name in suite.scenes or () if name not in missing]
-        groups = suite.groups(settings, scenes)
+        groups = suite.groups(settings, scenes) if suite.groups else []
         lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
         lacking |= {name: missing[name] for name in suite.scenes or () if name in missing and not args.scene}
         return [group for group in groups if group.scene not in lacking], _left_out(lacking)
