@@ -12,17 +12,9 @@ from scenes import DRAWS_POINTS, of_variant, variants
 
 from viewer.backends import Backend, Limit, backends
 from viewer.backends import backend as find_backend
-from viewer.bench.numerics import (
-    EXACT,
-    Difference,
-    RgbdImage,
-    Row,
-    difference,
-    distinct_limits,
-    picture,
-    rows,
-    ways_of,
-)
+from viewer.bench.numerics import EXACT, distinct_limits, rows, ways_of
+from viewer.bench.shots import RgbdImage, picture
+from viewer.bench.stability import Difference, Row, difference
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu.amplify import FEEDS

@@ -42,6 +42,7 @@ from .report.results import SPREADS, Row, spread
 from .scenes import catalog
 from .scenes.subjects import Moment, Subject
 from .scenes.viewpoints import pod_viewpoints, viewpoints
+from .stability import Difference
 
 LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the scan
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
@@ -199,7 +200,7 @@ class Bench:
                 found, held = outcome.found, outcome.held
                 limit = outcome.limit.reason if outcome.limit and outcome.allowed else ""
             except InputError as error:
-                found, held, limit = numerics.Difference(nan, nan, nan), False, str(error)
+                found, held, limit = Difference(nan, nan, nan), False, str(error)
             yield {
                 "row": row.name,
                 "backend": name,
