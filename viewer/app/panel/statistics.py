@@ -12,7 +12,7 @@ from .. import widgets
 from ..scene import counting
 
 if TYPE_CHECKING:
-    from ...gpu.surface import Stats
+    from ...gpu.stats import Stats
     from ...gpu.timers import Timers
     from ..scene.viewport import Viewport
 

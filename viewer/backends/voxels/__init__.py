@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ...gpu.amplify import Points
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Stats, Surface
+from ...gpu.stats import Stats
+from ...gpu.surface import Surface
 from ...params import param
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
