@@ -45,6 +45,7 @@ FULL = Settings(
     export_marks=Marks(scale_bar=True),
     recent=("/scans/b", "demo"),
     panel=PanelChoices(30.0, {"Statistics": True}),
+    drawer=22.5,
     glide=False,
     slow_devices=("llvmpipe",),
     welcomed=True,

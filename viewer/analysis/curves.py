@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 _Array = NDArray[np.float64]
 
 _EDGE = 1e-9  # relative: a point at the very edge of the window is in it, whatever rounding says
+_ALIKE = 1e-9  # relative: peaks that rounding alone tells apart
 _AT_FRAME = 1e-6  # of the time from one frame to the next
 _SAME = 1e-12  # relative to values: an amplitude that rounding makes
 
@@ -59,17 +61,19 @@ def smoothed(
     found, spread = np.full(values.shape, np.nan), np.full(variances.shape, np.nan)
     known = np.isfinite(values.reshape(len(values), -1))
     for start, stop in runs(np.logical_and.reduce(known, axis=1)):
-        rows, weights = _fit(times[start:stop], smoothing, order)
+        rows, weights = _fit(np.ascontiguousarray(times[start:stop]).tobytes(), smoothing, order)
         found[start:stop] = np.einsum("tw,tw...->t...", weights, values[start:stop][rows])
         spread[start:stop] = np.einsum("tw,tw...->t...", weights**2, variances[start:stop][rows])
     return found, spread
 
 
-def _fit(times: _Array, smoothing: Smoothing, order: int) -> tuple[NDArray[np.intp], _Array]:
+@lru_cache(maxsize=16)  # curves of a scan share their times
+def _fit(run: bytes, smoothing: Smoothing, order: int) -> tuple[NDArray[np.intp], _Array]:
     """Find for each time of a run the points in its window, (T, W), and weights that give the derivative of
-    the polynomial through them, (T, W), NaN where there are too few."""
+    the polynomial through them, (T, W), NaN where there are too few. run: the times, (T,) float64."""
     if order > smoothing.degree:
         raise ValueError(f"a polynomial of degree {smoothing.degree} has no derivative of order {order}")
+    times = np.frombuffer(run)
     half, count = smoothing.seconds / 2, len(times)
     reach = half * (1 + _EDGE) + _EDGE * _step(times)
     if times[-1] - times[0] > 2 * half:
@@ -154,7 +158,8 @@ def movement_of(
     )
     rest = float(values[at_rest].mean())
     rest_variance = float(variances[at_rest].sum()) / int(at_rest.sum()) ** 2
-    top = known[np.argmax(np.abs(curve[known] - rest))]
+    away = np.abs(curve[known] - rest)
+    top = known[np.argmax(away >= (1 - _ALIKE) * away.max())]  # the first of several
     peak, height = _vertex(times, curve, int(top))
     amplitude = height - rest
     if abs(amplitude) <= _SAME * max(abs(height), abs(rest)):
@@ -266,9 +271,14 @@ def repeats_of(
         raise ValueError("there is no event to align by")
     apart = float(np.diff(np.sort(events)).min()) / 2 if len(events) > 1 else float(times[-1] - times[0])
     before, after, step = before or apart, after or apart, _step(times)
-    steps = range(-math.floor(before / step), math.floor(after / step) + 1)
+    steps = range(-_steps_in(before / step), _steps_in(after / step) + 1)
     offsets = np.array(steps, np.float64) * step
     return Repeats(offsets, events, np.array([_between(times, values, event + offsets) for event in events]))
+
+
+def _steps_in(steps: float) -> int:
+    """How many whole steps there are, whatever rounding says."""
+    return math.floor(steps + _AT_FRAME)
 
 
 def _between(times: _Array, values: _Array, wanted: _Array) -> _Array:

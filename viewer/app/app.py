@@ -30,6 +30,7 @@ from ..scan.timeline import Timeline
 from ..task import Task, in_background
 from . import keys, settings, theme
 from .commands import Commands
+from .drawer import Drawer
 from .failures import Failures
 from .files.browser import Browser
 from .files.changes import Changes
@@ -84,8 +85,8 @@ class App:
     keeping: keeps what is to come back at the next start.
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
     and films at other sizes.
-    panel: at the right. welcome: the card of the first start. commands: all that can be done. keys: which do
-    what. keyboard: which part of the window has it.
+    panel: at the right. drawer: under the timeline. welcome: the card of the first start. commands: all that
+    can be done. keys: which do what. keyboard: which part of the window has it.
     tools: what is in their folder. help: its open pages.
     theme: of the panels. notices: what the user was told. failures: what went wrong in the window itself.
     tasks: work that goes on beside it. counting: of the points that are shown.
@@ -158,6 +159,7 @@ class App:
         self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
         self.panel = Panel(remembered.panel)
+        self.drawer = Drawer(remembered.drawer, self.tools)
         self.welcome: Welcome = Welcome(self.session, remembered.welcomed)
         self.capture: Capture = Capture(
             self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
@@ -306,8 +308,8 @@ class App:
             marks=self.marks.shown, marks_in_files=self.marks.in_files, cube=self.steering.cube.is_shown,
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
-            panel=self.panel.chosen, glide=self.glide.is_wanted, welcomed=self.welcome.is_over,
-            slow_devices=self._slow_devices,
+            panel=self.panel.chosen, drawer=self.drawer.height, glide=self.glide.is_wanted,
+            welcomed=self.welcome.is_over, slow_devices=self._slow_devices,
         )  # fmt: skip
 
     # --- for the loop -----------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""How the window is divided: menus and toolbar, the 3D view, a panel at its right, the timeline below."""
+"""How the window is divided: menus, toolbar, the 3D view, a panel at its right, timeline and drawer below."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from .keyboard import NO_KEYS
 from .output import export_dialog
 from .playing import timeline_bar
 from .scene import view
+from .ui import Ui
 
 if TYPE_CHECKING:
     from .app import App
 
 Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
-_GRIP = 0.4  # width of what resizes the panel, in heights of the font
+_GRIP = 0.4  # width of what resizes the panel and the drawer, in heights of the font
 _BAR_HEIGHT = 4.8
+_DRAWER_SHARE = 0.5  # of the window, at most
 # No background: the window is filled with the panels' colour before.
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -66,25 +68,35 @@ def _draw_parts(app: App) -> tuple[Place, float]:
     em = imgui.get_font_size()
     # Whole numbers, so that the picture's edges fall on pixels.
     width = max(1, int(whole.x - min(app.panel.width * em, 0.5 * whole.x)))
-    bottom = int(whole.y - min(_BAR_HEIGHT * em, 0.5 * whole.y))
+    grip = int(_GRIP * em)
+    below = (
+        whole.y - min(grip + app.drawer.height * em, _DRAWER_SHARE * whole.y)
+        if app.drawer.is_open
+        else whole.y
+    )
+    bottom = int(below - min(_BAR_HEIGHT * em, 0.5 * whole.y))
     height = max(1, bottom - top)
     view_and_head = _draw_view(app, top, width, height)
     with app.failures.told("The panel"):
-        grip = int(_GRIP * em)
-        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-        imgui.push_style_var(imgui.StyleVar_.window_min_size, ImVec2(1, 1))
-        _place("grip", width, top, grip, height)
-        imgui.pop_style_var(2)
+        _place_grip("grip", width, top, grip, height)
         app.panel.draw_grip(height)
         imgui.end()
         _place("panel", width + grip, top, whole.x - width - grip, height)
         app.panel.draw(app)
         imgui.end()
     with app.failures.told("The timeline"):
-        _place("timeline", 0, bottom, whole.x, whole.y - bottom, app.keyboard.flags("timeline"))
+        _place("timeline", 0, bottom, whole.x, below - bottom, app.keyboard.flags("timeline"))
         app.keyboard.take("timeline")
         timeline_bar.draw(app)
         imgui.end()
+    if below < whole.y:
+        with app.failures.told("What is under the timeline"):
+            _place_grip("grip below", 0, below, whole.x, grip)
+            app.drawer.draw_grip(whole.x)
+            imgui.end()
+            _place("drawer", 0, below + grip, whole.x, whole.y - below - grip)
+            app.drawer.draw(app.keyboard, Ui(app.keys))
+            imgui.end()
     return view_and_head
 
 
@@ -112,6 +124,14 @@ def _draw_head(app: App, width: float) -> int:
     imgui.end()
     imgui.pop_style_var()
     return int(below + height)
+
+
+def _place_grip(name: str, left: float, top: float, width: float, height: float) -> None:
+    """Begin an ImGui window that is nothing but a grip."""
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    imgui.push_style_var(imgui.StyleVar_.window_min_size, ImVec2(1, 1))
+    _place(name, left, top, width, height)
+    imgui.pop_style_var(2)
 
 
 def _place(name: str, left: float, top: float, width: float, height: float, keys: int = NO_KEYS) -> None:

@@ -34,7 +34,7 @@ from ..files import parsed_json, read_text, whole_file
 from ..look import COLOR_BY, Look
 from ..output.marks import Marks
 from ..params import describe
-from . import theme
+from . import drawer, theme
 from .files.scans import MOST_RECENT
 from .output.export_plan import Choices
 from .panel import PanelChoices
@@ -83,9 +83,9 @@ class Settings:
     orientation cube is shown. turn_seconds: of the turntable. export, export_marks: of the export dialog.
     recent: the scans opened last, newest first. places: what earlier versions kept here of each scan, whose
     documents have files of their own now.
-    panel: its width, and which of its sections are open. glide: whether views glide. slow_devices: those of
-    which the user was told that they draw in software. welcomed: whether the card of the first start was
-    seen.
+    panel: its width, and which of its sections are open. drawer: its height. glide: whether views glide.
+    slow_devices: those of which the user was told that they draw in software. welcomed: whether the card of
+    the first start was seen.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
     """
 
@@ -105,6 +105,7 @@ class Settings:
     recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
     places: Mapping[str, SavedSession] = field(default_factory=dict)
     panel: PanelChoices = field(default_factory=PanelChoices)
+    drawer: drawer.DrawerHeight = drawer.USUAL
     glide: bool = True
     welcomed: bool = False
     slow_devices: tuple[str, ...] = ()

@@ -200,6 +200,12 @@ class Toolbox:
                 is_revealed, slot.desk.is_revealed = slot.desk.is_revealed, False
                 yield f"{slot.title}###{name}", is_revealed, partial(self._declare, slot, "panel")
 
+    def drawn_below(self) -> Iterator[tuple[str, Callable[[Ui], object]]]:
+        """Find what tools show under the timeline now: the tool's name, and what declares it."""
+        for name, slot in self._slots.items():
+            if slot.has("below") and self._call(slot, "is_below"):
+                yield name, partial(self._declare, slot, "below")
+
     def draw_over(self, view: ViewPlace) -> None:
         """Have the tools draw over the picture."""
         canvas = Canvas(view, self.viewport.image)

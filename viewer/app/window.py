@@ -16,7 +16,7 @@ from functools import partial
 from typing import Any
 
 import glfw
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 from moderngl_window.context.glfw.window import Window as GlfwWindow
 
 from ..errors import NoOpenGLError
@@ -171,6 +171,7 @@ class Window(GlfwWindow):
 
     def _start_imgui(self) -> None:
         imgui.create_context()
+        implot.create_context()
         imgui.get_io().set_ini_filename("")
         imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard.value
         imgui.backends.glfw_init_for_opengl(_address(self._window), False)
@@ -292,6 +293,7 @@ class Window(GlfwWindow):
         """Close the window and let go of its context."""
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
+        implot.destroy_context()
         imgui.destroy_context()
         super().destroy()
 

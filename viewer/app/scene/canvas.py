@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -16,6 +16,7 @@ from .labels import Box, Line, free_place, usual_place
 _CROSS = 0xFFFFFF
 _OUTLINE = 0x000000  # so that what is light is seen on any surface
 _POINT, _THICK = 0.28, 0.11  # radius, thickness; in heights of the font
+_DOT, _DOT_ROOM = 0.16, 0.4  # radius of dots, and how far apart they are at least
 _GAP = 0.5  # between a line and its label
 _HEAD = 2.6  # of the view's head, where the prompt is
 _LOUPE, _LOUPE_AWAY = 4.5, 1.2  # half its side, and how far from its middle it is; the latter in sides
@@ -52,6 +53,18 @@ class ViewPlace:
     def lengths_on_screen(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
         """How long a scan unit is on the screen at places (N, 3), (N,); NaN behind the eye."""
         return self.size.y / self.camera.heights_at(positions)
+
+
+def _like_runs(joined: NDArray[np.bool_], styles: Sequence[object]) -> Iterator[tuple[int, int]]:
+    """The runs of joined places whose lines are of one style: the first and the last place of each."""
+    start = 0
+    for at, is_joined in enumerate(joined.tolist()):
+        if at > start and (not is_joined or styles[at] != styles[start]):
+            yield start, at
+        if not is_joined or at == start or styles[at] != styles[start]:
+            start = at + (not is_joined)
+    if len(joined) > start:
+        yield start, len(joined)
 
 
 class Label:
@@ -112,6 +125,28 @@ class Canvas:
         draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
         draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
         self._take(place)
+
+    def path(self, places: NDArray[np.float64], colors: Sequence[int], alphas: NDArray[np.float64]) -> None:
+        """A line through places on the screen, (N, 2), with a dot at each where there is room; NaN: a gap.
+
+        colors, alphas: N each; of the dots, and of the line from each place on. It costs little where they
+        are the same for many places in a row.
+        """
+        there = np.logical_and.reduce(np.isfinite(places), axis=1)
+        joined, points = there[:-1] & there[1:], places.tolist()
+        inks = [theme.packed(*ink) for ink in zip(colors, alphas.tolist(), strict=True)]
+        draw_list, thick = imgui.get_window_draw_list(), _THICK * self._em
+        for start, stop in _like_runs(joined, alphas.tolist()):
+            color = theme.packed(_OUTLINE, 0.6 * float(alphas[start]))
+            draw_list.add_polyline(points[start : stop + 1], color, thick + 2, 0)
+        for start, stop in _like_runs(joined, inks):
+            draw_list.add_polyline(points[start : stop + 1], inks[start], thick, 0)
+        steps = np.hypot(*np.diff(places, axis=0)[joined].T)
+        if len(steps) and np.median(steps) < _DOT_ROOM * self._em:
+            there[:-1] &= ~joined  # those that no line joins to the next
+            there[1:] &= ~joined
+        for at in np.flatnonzero(there):
+            draw_list.add_circle_filled(points[at], _DOT * self._em, inks[at])
 
     def loupe(self, place: ImVec2) -> None:
         """The picture about a place on the screen, magnified in a square beside it, with a cross in its

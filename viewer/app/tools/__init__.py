@@ -18,6 +18,7 @@ The Tool has any of
 
     panel(ui)               declares its section of the panel
     overlay(canvas, view)   draws over the picture
+    below(ui)               declares what it shows under the timeline, while `is_below()` is true
     dialog()                declares windows of its own, over everything
     prompt()                what to say at the top of the view while it has the clicks
     on_click(click)         a click in the view while it has the clicks (`desk.take_clicks`); False: it is not

@@ -1,0 +1,56 @@
+"""The drawer under the timeline: what tools show over time, beside each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from imgui_bundle import ImVec2, imgui
+
+from ..document.schema import Kind
+
+if TYPE_CHECKING:
+    from .keyboard import Keyboard
+    from .toolbox import Toolbox
+    from .ui import Ui
+
+LOWEST, HIGHEST, USUAL = 7.0, 60.0, 15.0  # in heights of the font
+DrawerHeight = Annotated[float, Kind("a height of the drawer", lambda height: LOWEST <= height <= HIGHEST)]
+
+
+class Drawer:
+    """The drawer: how high it is, in heights of the font. It is there while a tool has something in it."""
+
+    def __init__(self, height: float, tools: Toolbox) -> None:
+        self.height = height
+        self._tools = tools
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a tool has something to show in it."""
+        return any(True for _ in self._tools.drawn_below())
+
+    def draw_grip(self, width: float) -> None:
+        """Declare what resizes it, in a window of its own at its upper edge: a drag does, a double click
+        brings the usual height back."""
+        imgui.invisible_button("##grip", ImVec2(max(width, 1), max(imgui.get_content_region_avail().y, 1)))
+        if imgui.is_item_hovered() or imgui.is_item_active():
+            imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ns)
+        if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+            self.height = USUAL
+        elif imgui.is_item_active():
+            dragged = imgui.get_io().mouse_delta.y / imgui.get_font_size()
+            self.height = min(max(self.height - dragged, LOWEST), HIGHEST)
+
+    def draw(self, keyboard: Keyboard, ui: Ui) -> None:
+        """Declare what tools show in it, in the current ImGui window."""
+        flags = keyboard.flags("drawer")
+        sections = list(self._tools.drawn_below())
+        size = ImVec2(ui.button_size(len(sections)).x, 0)
+        for number, (name, declare) in enumerate(sections):
+            if number:
+                imgui.same_line()
+            imgui.begin_child(name, size, window_flags=flags)
+            if not number:
+                keyboard.take("drawer")
+            declare(ui)
+            imgui.end_child()

@@ -1,0 +1,218 @@
+"""Measures over time, plotted under the timeline, and the ways of landmarks over the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+from numpy.typing import NDArray
+
+from ....analysis.measures import Measure
+from ....csv_text import to_text
+from ....document.landmarks import Landmarks
+from ....errors import InputError
+from ....files import free_file, working_folder
+from ....output.plots import PLOT_SUFFIXES, CurvePlot
+from ....scan.inputs import refuse_input
+from ...commands import Command, Menu
+from ...desk import Desk
+from ...save_dialog import SaveDialog
+from ...scene.canvas import Canvas, ViewPlace
+from ...ui import Ui
+from . import panel, plot
+from .choices import CurveChoices, Settings
+from .shown import Curve, Kept, Shown
+from .ways import Ways
+from .words import number_rows, numbers_in_words
+
+TITLE = "Curves"
+
+
+class Tool:
+    """The tool that plots measures over time, and draws the ways of landmarks.
+
+    shown: what is plotted. ways: what is drawn over the picture. pointed: the curve that the mouse points at
+    in the table, by name.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.shown = Shown()
+        self.ways = Ways(desk)
+        self.pointed: str | None = None
+        self.saving = SaveDialog(
+            "Save curves", "What is plotted: a table (.csv) or a picture (.png, .svg)",
+            PLOT_SUFFIXES[0], self._save, PLOT_SUFFIXES[1:],
+        )  # fmt: skip
+        self._words = Kept()
+        self._fitted: object = None  # what the axes were fitted to last
+
+    @property
+    def settings(self) -> Settings:
+        """The choices whatever the scan."""
+        settings: Settings = self.desk.settings
+        return settings
+
+    @settings.setter
+    def settings(self, settings: Settings) -> None:
+        self.desk.settings = settings
+
+    @property
+    def choices(self) -> CurveChoices:
+        """The choices about the open scan."""
+        return self.desk.document.part(CurveChoices)
+
+    def choose(self, step: str, **changes: Any) -> None:
+        """Change choices about the open scan. step: what Undo calls it."""
+        self.desk.change(step, replace(self.choices, **changes))
+
+    @property
+    def landmarks(self) -> Landmarks:
+        """The landmarks of the open scan, and the measures of them."""
+        return self.desk.document.part(Landmarks)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """(T,) seconds, of the scan's frames."""
+        return self.desk.timeline.times
+
+    # --- the drawer -------------------------------------------------------------------
+
+    def toggle(self) -> None:
+        """Show the curves, or put them away."""
+        self.settings = replace(self.settings, is_open=not self.settings.is_open)
+        self.desk.redraw()
+
+    def is_below(self) -> bool:
+        """Whether curves are shown under the timeline."""
+        return self.settings.is_open
+
+    def below(self, ui: Ui) -> None:
+        """Declare the curves under the timeline."""
+        plot.draw(self, ui)
+
+    def fit(self) -> None:
+        """Have the axes show all of the curves."""
+        self._fitted = None
+
+    def takes_fit(self, shown: CurvePlot) -> bool:
+        """Whether the axes are to be fitted, once: to other curves, or to ones that are still being found."""
+        kind = self.desk.scan, self.settings.mode, self.settings.order, *(line.label for line in shown.drawn)
+        now = (shown, kind) if self.desk.followed.is_busy else (None, kind)
+        is_due = self._fitted is None or self._fitted != now
+        self._fitted = now
+        return is_due
+
+    def words_of(self, curve: Curve) -> tuple[str, ...]:
+        """The numbers of a curve, in words."""
+        return self._words.of(curve.name, (curve,), lambda: numbers_in_words(curve))
+
+    # --- measures ---------------------------------------------------------------------
+
+    def add(self, measure: Measure) -> None:
+        """Measure something, and show its curve. Raises InputError where one has that name already."""
+        if any(one.name == measure.name for one in self.landmarks.measures):
+            raise InputError(f"There is a measure '{measure.name}' already.")
+        measures = (*self.landmarks.measures, measure)
+        self.desk.change("Add measure", replace(self.landmarks, measures=measures))
+        self.settings = replace(self.settings, is_open=True)
+
+    def delete(self, name: str) -> None:
+        """Take away a measure."""
+        measures = tuple(one for one in self.landmarks.measures if one.name != name)
+        self.desk.change("Delete measure", replace(self.landmarks, measures=measures))
+
+    def measure_distance(self) -> None:
+        """Measure the distance of the two landmarks that stand last among those that are placed."""
+        placed = [landmark.name for landmark in self.landmarks.all if landmark.state == "placed"]
+        if len(placed) < 2:
+            raise InputError("A distance takes two landmarks: place them first.")
+        self.add(Measure(" to ".join(placed[-2:]), "distance", tuple(placed[-2:])))
+
+    # --- in the window ----------------------------------------------------------------
+
+    def panel(self, ui: Ui) -> None:
+        """Declare the section of the panel."""
+        panel.draw(self, ui)
+
+    def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
+        """Draw the ways of landmarks."""
+        self.ways.draw(self.settings, self.choices, canvas, view)
+
+    def advance(self, budget: float) -> bool:
+        """Have the scan held still by its anchors where that is chosen; whether that has changed."""
+        return self.ways.hold(self.settings, self.choices)
+
+    def toggle_ways(self) -> None:
+        """Draw the ways of the landmarks that are ticked, or not."""
+        self.settings = replace(self.settings, trajectories=not self.settings.trajectories)
+
+    def dialog(self) -> None:
+        """Declare the dialog that names a file, while it is open."""
+        self.saving.draw()
+
+    # --- out of the window ------------------------------------------------------------
+
+    def copy(self) -> None:
+        """Put what is plotted into the clipboard, as a table for spreadsheets."""
+        if self.shown.plot is not None:
+            imgui.set_clipboard_text(to_text(self.shown.plot.rows(), "\t"))
+            self.desk.note(f"Copied {len(self.shown.plot.lines)} curves as a table.")
+
+    def copy_numbers(self) -> None:
+        """Put amplitude, onset, peak and duration of each curve into the clipboard, as a table."""
+        imgui.set_clipboard_text(to_text(number_rows(self.shown.curves), "\t"))
+        self.desk.note(f"Copied the numbers of {len(self.shown.curves)} curves as a table.")
+
+    def ask_to_save(self) -> None:
+        """Open the dialog that saves, with a name that is free."""
+        self.saving.ask(free_file(working_folder(), PLOT_SUFFIXES[0]))
+
+    def _save(self, file: Path) -> None:
+        shown = self.shown.plot
+        if shown is None:
+            raise InputError("There are no curves to save.")
+        refuse_input(file, self.desk.timeline)
+        self.desk.run(
+            f"Saving {file.name}", lambda: shown.save(file), lambda _: self.desk.note(f"Saved {file}")
+        )
+
+
+def _with_plot(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:
+    """A command that does something with what is plotted."""
+    return Command(name, title, act, can=lambda tool: tool.is_below() and tool.shown.plot is not None)
+
+
+COMMANDS = {
+    "Tools": (
+        Command(
+            "curves", "Curves", Tool.toggle, "V",
+            is_on=Tool.is_below, short="Curves", icon=icons.ICON_FA_CHART_LINE,
+        ),
+        Menu("Curves", (
+            (
+                Command(
+                    "measure_distance", "Distance of the two placed last", Tool.measure_distance, "D"
+                ),
+                Command(
+                    "trajectories", "Ways of landmarks", Tool.toggle_ways, "W",
+                    is_on=lambda tool: tool.settings.trajectories,
+                ),
+            ),
+            (
+                _with_plot("copy_curves", "Copy as table", Tool.copy),
+                _with_plot("copy_numbers", "Copy numbers", Tool.copy_numbers),
+                _with_plot("save_curves", "Save...", Tool.ask_to_save),
+            ),
+        )),
+    )
+}  # fmt: skip
+MOUSE = (
+    ("Drag the line in a plot of curves, or click", "Go to that frame"),
+    ("Wheel, drag, right drag, double click in a plot of curves", "Zoom, move, zoom to a box, show all"),
+)

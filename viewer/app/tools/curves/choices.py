@@ -1,0 +1,71 @@
+"""What the user chooses about curves: some of it is the scan's, the rest comes back whatever the scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ....analysis.curves import Smoothing
+from ....document.part import Part
+from ....params import param
+
+TIME, AGAINST, REPEATS = "time", "against", "repeats"
+VALUE, SPEED, ACCELERATION = "value", "speed", "acceleration"
+SCAN, ANCHORS = "scan", "anchors"
+ORDERS = (VALUE, SPEED, ACCELERATION)  # in the order of derivatives
+MODE_WORDS = {TIME: "Over time", AGAINST: "Against another", REPEATS: "Repeats"}
+ORDER_WORDS = {VALUE: "Values", SPEED: "Speed", ACCELERATION: "Acceleration"}
+
+
+@dataclass(frozen=True)
+class CurveChoices(Part, name="curves"):
+    """Choices about the curves of a scan.
+
+    hidden: measures that are not plotted. abscissa: the measure that others are plotted against, "" for the
+    first that is plotted. aligned: the one whose peaks repeats are aligned by, likewise. traced: landmarks
+    whose trajectories are drawn. anchors: those that hold the scan still.
+    """
+
+    hidden: tuple[str, ...] = ()
+    abscissa: str = ""
+    aligned: str = ""
+    traced: tuple[str, ...] = ()
+    anchors: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Choices that come back at the next start, whatever the scan."""
+
+    is_open: bool = param(False, "Curves under the timeline")
+    mode: str = param(TIME, "What is plotted over what", choices=tuple(MODE_WORDS), words=MODE_WORDS)
+    order: str = param(VALUE, "Values, or how fast they change", choices=ORDERS, words=ORDER_WORDS)
+    bands: bool = param(True, "Two standard deviations to either side of a curve", title="±")
+    seconds: float = param(
+        0.3, "Width of the window in which curves are smoothed for speed, acceleration and numbers",
+        low=0.02, high=5.0, unit="s", title="smoothing",
+    )  # fmt: skip
+    least: float = param(
+        0.5, "How much of a curve's range a peak stands out by to count as a repeat", low=0.05, high=1.0,
+        title="least repeat",
+    )  # fmt: skip
+    trajectories: bool = param(True, "Draw the ways of the landmarks that are ticked", basic=True)
+    coordinates: str = param(
+        SCAN, "Ways as the scan has them, or with the motion of the anchors taken off",
+        choices=(SCAN, ANCHORS), words={SCAN: "Of the scan", ANCHORS: "Held still by anchors"}, basic=True,
+    )  # fmt: skip
+    hold: bool = param(
+        False, "Show the scan itself held still by the anchors", title="Hold the scan still", basic=True,
+    )  # fmt: skip
+    by_speed: bool = param(
+        True, "Colour ways by speed; else each landmark has a colour", title="Colour by speed", basic=True,
+    )  # fmt: skip
+
+    @property
+    def smoothing(self) -> Smoothing:
+        """How curves are smoothed."""
+        return Smoothing(self.seconds)
+
+    @property
+    def derivative(self) -> int:
+        """How often curves are differentiated."""
+        return ORDERS.index(self.order)

@@ -1,0 +1,108 @@
+"""Curves in the panel: the measures, how to add one, and whose ways are drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
+
+from ....look import color_table
+from ... import widgets
+from ...ui import Ui
+from .choices import ANCHORS, Settings
+from .ways import SPEED_MAP
+
+if TYPE_CHECKING:
+    from . import Tool
+
+_OF_THE_PLOT = ("is_open", "mode", "order", "bands", "seconds", "least")
+_BAR_STEPS = 16  # of the bar of colours
+
+
+def draw(tool: Tool, ui: Ui) -> None:
+    """Declare the section of the panel."""
+    words = "Hide curves" if tool.is_below() else "Show curves"
+    if imgui.button(f"{words}###curves", ui.button_size(1)):
+        tool.toggle()
+    ui.tooltip("Measures over time, under the timeline", "curves")
+    _draw_measures(tool)
+    _draw_ways(tool)
+
+
+def _draw_measures(tool: Tool) -> None:
+    """The measures, each with what shows it and what deletes it, and a row to add one."""
+    measures, choices = tool.landmarks.measures, tool.choices
+    if not measures:
+        widgets.faint("No measures yet. They come with templates of landmarks, or are added here.")
+    for number, measure in enumerate(measures):
+        imgui.push_id(number)
+        right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
+        changed, is_shown = imgui.checkbox("##shown", measure.name not in choices.hidden)
+        widgets.tooltip("Plot it")
+        if changed:
+            others = tuple(name for name in choices.hidden if name != measure.name)
+            tool.choose("Show curve", hidden=others if is_shown else (*others, measure.name))
+        imgui.same_line()
+        imgui.text(
+            widgets.fitted(measure.name, right - imgui.get_cursor_pos_x() - 1.6 * imgui.get_frame_height())
+        )
+        widgets.tooltip(f"{measure.name}: {measure.kind} of {', '.join(measure.landmarks)}")
+        imgui.same_line(right - 1.3 * imgui.get_frame_height())
+        if widgets.icon_button(icons.ICON_FA_TRASH, "Delete"):
+            tool.delete(measure.name)
+        imgui.pop_id()
+
+
+def _draw_ways(tool: Tool) -> None:
+    """The landmarks, each with whether its way is drawn and whether it holds the scan still."""
+    placed = [landmark.name for landmark in tool.landmarks.all if landmark.state == "placed"]
+    if not placed or not imgui.tree_node("Ways of landmarks"):
+        return
+    choices = tool.choices
+    if imgui.begin_table("ways", 3, imgui.TableFlags_.sizing_fixed_fit.value):
+        imgui.table_setup_column("landmark", imgui.TableColumnFlags_.width_stretch.value)
+        for words, about in (
+            ("", ""),
+            ("way", "Draw its way over the picture"),
+            ("anchor", "It holds the scan still"),
+        ):
+            imgui.table_next_column()
+            imgui.text_disabled(words)
+            if about:
+                widgets.tooltip(about)
+        for number, name in enumerate(placed):
+            imgui.push_id(number)
+            imgui.table_next_column()
+            imgui.align_text_to_frame_padding()
+            imgui.text(name)
+            for column in ("traced", "anchors"):
+                imgui.table_next_column()
+                names = getattr(choices, column)
+                changed, is_on = imgui.checkbox(f"##{column}", name in names)
+                if changed:
+                    others = tuple(one for one in names if one != name)
+                    tool.choose("Choose ways", **{column: (*others, name) if is_on else others})
+            imgui.pop_id()
+        imgui.end_table()
+    tool.settings = widgets.edit(tool.settings, Settings(), hidden=_OF_THE_PLOT)
+    if (tool.settings.hold or tool.settings.coordinates == ANCHORS) and tool.ways.problem:
+        widgets.faint(tool.ways.problem)
+    if tool.settings.by_speed and tool.settings.trajectories and tool.ways.fastest:
+        _draw_colors(tool)
+    imgui.tree_pop()
+
+
+def _draw_colors(tool: Tool) -> None:
+    """The colours of speeds, from rest to the fastest."""
+    em, scale = imgui.get_font_size(), tool.desk.scale
+    low = imgui.get_cursor_screen_pos()
+    step = imgui.get_content_region_avail().x / _BAR_STEPS
+    table = color_table(SPEED_MAP)
+    for number in range(_BAR_STEPS):
+        red, green, blue, _ = (table[round(255 * number / (_BAR_STEPS - 1))] / 255).tolist()
+        corner = low + ImVec2(number * step, 0)
+        ink = imgui.color_convert_float4_to_u32(ImVec4(red, green, blue, 1))
+        imgui.get_window_draw_list().add_rect_filled(corner, corner + ImVec2(step + 1, 0.5 * em), ink)
+    imgui.dummy(ImVec2(0, 0.5 * em))
+    imgui.text_disabled(f"0 to {scale.factor * tool.ways.fastest:.3g} {scale.unit}/s")

@@ -1,0 +1,176 @@
+"""The curves that are plotted, made of measures over time; each is found once, until its measure changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....analysis.curves import (
+    Movement,
+    Repeats,
+    Smoothing,
+    correlation,
+    movement_of,
+    peaks_of,
+    repeats_of,
+    smoothed,
+)
+from ....analysis.measures import Series
+from ....output.plots import PLOT_COLORS, CurvePlot, PlotLine
+from ....scan.units import Scale
+from .choices import AGAINST, REPEATS, CurveChoices, Settings
+
+T = TypeVar("T")
+BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
+_PER = ("", "/s", "/s²")
+_POWERS = {"length": 1, "area": 2, "volume": 3}
+_RAISED = {1: "", 2: "²", 3: "³"}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A measure over time as it is told.
+
+    color: 0xRRGGBB. unit: of the values, such as "mm". times, values, sigmas: (T,). movement: the largest
+    one, None where there is none. fastest: the largest speed to either side, NaN where not known.
+    """
+
+    name: str
+    color: int
+    unit: str
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+    movement: Movement | None
+    fastest: float
+
+
+class Kept:
+    """Results, each kept until it is asked for with other inputs, which are compared by `is`."""
+
+    def __init__(self) -> None:
+        self._kept: dict[object, tuple[tuple[object, ...], Any]] = {}
+
+    def of(self, key: object, inputs: tuple[object, ...], make: Callable[[], T]) -> T:
+        """The result of a key, made anew where the inputs are not those that it was made of."""
+        known = self._kept.get(key)
+        if known is None or any(a is not b for a, b in zip(known[0], inputs, strict=True)):
+            known = self._kept[key] = inputs, make()
+        result: T = known[1]
+        return result
+
+    def forget_others(self, keys: set[object]) -> None:
+        """Keep the results of these keys alone."""
+        self._kept = {key: result for key, result in self._kept.items() if key in keys}
+
+
+class Shown:
+    """The curves that are plotted now. plot: of them, None where there is nothing to plot."""
+
+    def __init__(self) -> None:
+        self.curves: tuple[Curve, ...] = ()
+        self.plot: CurvePlot | None = None
+        self._kept = Kept()
+        self._asked: tuple[object, ...] | None = None
+
+    def take(
+        self, series: Mapping[str, Series], choices: CurveChoices, settings: Settings, scale: Scale
+    ) -> None:
+        """Find what is to be plotted; the same objects as before where nothing in them has changed."""
+        asked = series, choices, settings, scale
+        if asked == self._asked:  # a series equals itself alone
+            return
+        smoothing, keys, curves = settings.smoothing, set[object](), []
+        for number, (name, one) in enumerate(series.items()):
+            color = PLOT_COLORS[number % len(PLOT_COLORS)]
+            key = name, color, smoothing, scale
+            keys.add(key)
+            if name not in choices.hidden and len(one.times):
+                make = partial(curve_of, one, color, scale, smoothing)
+                curves.append(self._kept.of(key, (one,), make))
+        self._kept.forget_others(keys)
+        self._asked, self.curves, self.plot = asked, tuple(curves), plot_of(curves, choices, settings)
+
+
+def unit_of(quantity: str, unit: str) -> str:
+    """The unit of a quantity where lengths have this one."""
+    power = _POWERS.get(quantity)
+    return "°" if power is None else f"{unit}{_RAISED[power]}"
+
+
+def curve_of(series: Series, color: int, scale: Scale, smoothing: Smoothing) -> Curve:
+    """The curve of a measure, in the unit that lengths are told in."""
+    factor = scale.factor ** _POWERS.get(series.quantity, 0)
+    times, values, sigmas = series.times, factor * series.values, factor * series.sigmas
+    wide = smoothing.wide_enough(times)
+    speeds = np.abs(smoothed(times, values, np.zeros(len(values)), wide, 1)[0])
+    fastest = float(np.nanmax(speeds)) if np.isfinite(speeds).any() else float("nan")
+    movement = movement_of(times, values, sigmas, wide)
+    unit = unit_of(series.quantity, scale.unit)
+    return Curve(series.name, color, unit, times, values, sigmas, movement, fastest)
+
+
+def line_of(curve: Curve, settings: Settings) -> PlotLine:
+    """The line of a curve: its values, speed or acceleration."""
+    values, sigmas, order = curve.values, curve.sigmas, settings.derivative
+    if order:
+        smoothing = settings.smoothing.wide_enough(curve.times)
+        values, variances = smoothed(curve.times, values, sigmas**2, smoothing, order)
+        sigmas = np.sqrt(variances)
+    band = BAND_SIGMAS * sigmas if settings.bands else np.full(len(values), np.nan)
+    return PlotLine(curve.name, curve.unit + _PER[order], values, band, curve.color)
+
+
+def plot_of(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) -> CurvePlot | None:
+    """The plot of curves; None where there are too few for it, or no repeats."""
+    if not curves:
+        return None
+    lines = [line_of(curve, settings) for curve in curves]
+    frames = np.arange(len(curves[0].times))
+    if settings.mode == REPEATS:
+        repeats = repeats_in(curves, choices, settings)
+        return None if repeats is None else _plot_of_repeats(curves, lines, repeats)
+    if settings.mode == AGAINST:
+        chosen = curves.index(chosen_of(curves, choices.abscissa))
+        x = lines.pop(chosen)
+        return CurvePlot(x.label, x.unit, x.values, tuple(lines), frames) if lines else None
+    return CurvePlot("time", "s", curves[0].times, tuple(lines), frames)
+
+
+def chosen_of(curves: Sequence[Curve], name: str) -> Curve:
+    """The curve of a name, or the first."""
+    return next((curve for curve in curves if curve.name == name), curves[0])
+
+
+def repeats_in(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) -> Repeats | None:
+    """The repeats of the curve that others are aligned by; None where it has no peak."""
+    curve = chosen_of(curves, choices.aligned)
+    smoothing = settings.smoothing.wide_enough(curve.times)
+    events = peaks_of(curve.times, curve.values, smoothing, settings.least)
+    return repeats_of(curve.times, curve.values, events) if len(events) else None
+
+
+def _plot_of_repeats(curves: Sequence[Curve], lines: Sequence[PlotLine], aligned: Repeats) -> CurvePlot:
+    """Each curve's repeats, thin, and their mean with a band of one standard deviation."""
+    drawn: list[PlotLine] = []
+    before, after = -float(aligned.times[0]), float(aligned.times[-1])
+    for curve, line in zip(curves, lines, strict=True):
+        cut = repeats_of(curve.times, line.values, aligned.events, before, after)
+        none = np.full(len(cut.times), np.nan)
+        drawn += [
+            PlotLine(f"{line.label} {number}", line.unit, one, none, line.color, is_thin=True)
+            for number, one in enumerate(cut.curves, 1)
+        ]
+        drawn.append(PlotLine(f"{line.label}, mean", line.unit, cut.mean, cut.deviation, line.color))
+    return CurvePlot("time from the peak", "s", aligned.times, tuple(drawn))
+
+
+def correlations(curves: Sequence[Curve], choices: CurveChoices) -> dict[str, float]:
+    """How each curve goes with the one that it is plotted against: name -> Pearson's correlation."""
+    chosen = chosen_of(curves, choices.abscissa)
+    return {curve.name: correlation(chosen.values, curve.values) for curve in curves if curve is not chosen}

@@ -1,0 +1,127 @@
+"""The ways of landmarks over the picture, in the scan's coordinates or held still by anchors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....analysis.curves import Smoothing
+from ....analysis.pick import are_seen
+from ....analysis.track import Track
+from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
+from ....errors import InputError
+from ....look import color_table
+from ....output.plots import PLOT_COLORS
+from ....rigid import STILL, Rigid
+from ...desk import Desk
+from ...scene.canvas import Canvas, ViewPlace
+from .choices import ANCHORS, CurveChoices, Settings
+from .shown import Kept
+
+Still = tuple[Rigid | None, ...]
+SPEED_MAP = "viridis"
+_LEVELS = 16  # of speed that are told apart
+_DIM = 0.3  # opacity where a way is behind a surface
+_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that it lies on
+
+
+class Ways:
+    """The ways of the landmarks that are ticked. problem: why they are not held still, "" where nothing is
+    wrong. fastest: the speed that has the last colour, scan units a second."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.problem = ""
+        self.fastest = 0.0
+        self._desk = desk
+        self._kept = Kept()
+        self._laid: object = None
+        self._seen: tuple[object, dict[str, NDArray[np.bool_]]] = None, {}
+
+    def still(self, choices: CurveChoices) -> Still | None:
+        """The motion of each frame that holds the scan still; None where the anchors do not tell one."""
+        tracks = self._desk.followed.tracks
+        anchors = tuple(name for name in choices.anchors if name in tracks)
+        return self._kept.of(
+            ("still", anchors), tuple(tracks[name] for name in anchors), lambda: self._found(tracks, anchors)
+        )
+
+    def _found(self, tracks: Mapping[str, Track], anchors: tuple[str, ...]) -> Still | None:
+        try:
+            self.problem, found = "", stabilising(tracks, anchors)
+        except InputError as error:
+            self.problem, found = str(error), None
+        return found
+
+    def hold(self, settings: Settings, choices: CurveChoices) -> bool:
+        """Have the scan held still where that is chosen; whether that has changed something."""
+        still = self.still(choices) if settings.hold else None
+        wanted = None if still is None else (self._desk.timeline, still)
+        if wanted == self._laid:
+            return False
+        self._laid = wanted
+        self._desk.lay(place=None if still is None else lambda index: still[index] or STILL)
+        return True
+
+    def trajectories(self, settings: Settings, choices: CurveChoices) -> dict[str, Trajectory]:
+        """The ways of the landmarks that are ticked, by name."""
+        tracks, smoothing = self._desk.followed.tracks, settings.smoothing
+        still = self.still(choices) if settings.coordinates == ANCHORS else None
+        found = {}
+        for name in choices.traced:
+            if (track := tracks.get(name)) is not None and len(track.times):
+                found[name] = self._kept.of(
+                    (name, smoothing), (track, still), partial(_way_of, track, smoothing, still)
+                )
+        speeds = [np.nanmax(one.speeds) for one in found.values() if np.isfinite(one.speeds).any()]
+        self.fastest = float(max(speeds, default=0.0))
+        return found
+
+    def draw(self, settings: Settings, choices: CurveChoices, canvas: Canvas, view: ViewPlace) -> None:
+        """Draw them, as they lie about the pose that is shown."""
+        pose, desk = self._desk.pose, self._desk
+        if not settings.trajectories or not choices.traced or pose is None:
+            return
+        motion = desk.motion(pose)
+        if settings.coordinates == ANCHORS and (still := self.still(choices)) is not None:
+            now = still[pose.index] if pose.index < len(still) else None
+            if now is None:  # nobody knows how the anchors lie in this frame
+                return
+            motion = motion.after(now.inverse)
+        found = self.trajectories(settings, choices)
+        shown = desk.viewport.request if desk.viewport.is_there else None
+        key = shown, tuple(found.values())
+        if self._seen[0] != key:
+            self._seen = key, {}
+        for name, one in found.items():
+            places = motion.points(one.positions)
+            if name not in self._seen[1]:
+                self._seen[1][name] = self._are_seen(places)
+            alphas = np.where(self._seen[1][name], 1.0, _DIM)
+            number = list(desk.followed.tracks).index(name)
+            colors = (
+                self._colors(one)
+                if settings.by_speed
+                else [PLOT_COLORS[number % len(PLOT_COLORS)]] * len(places)
+            )
+            canvas.path(view.all_on_screen(places), colors, alphas)
+
+    def _colors(self, one: Trajectory) -> list[int]:
+        """The colours of a way by its speed, 0xRRGGBB; that of rest where the speed is not known."""
+        share = np.nan_to_num(one.speeds) / self.fastest if self.fastest else np.zeros(len(one.speeds))
+        levels = np.round(np.clip(share, 0, 1) * (_LEVELS - 1)) / (_LEVELS - 1)
+        red, green, blue = color_table(SPEED_MAP)[np.round(levels * 255).astype(int), :3].astype(int).T
+        return (red << 16 | green << 8 | blue).tolist()
+
+    def _are_seen(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        viewport, pose = self._desk.viewport, self._desk.pose
+        if viewport.surface is None or pose is None or not viewport.is_there:
+            return np.ones(len(places), bool)
+        slack = _SLACK * viewport.bounds(pose).radius
+        return are_seen(viewport.surface, places, np.full(len(places), slack))
+
+
+def _way_of(track: Track, smoothing: Smoothing, still: Still | None) -> Trajectory:
+    return trajectory_of(track, smoothing.wide_enough(track.times), still)

@@ -1,0 +1,64 @@
+"""What is said of curves: values with how sure they are, and the numbers of a movement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .shown import BAND_SIGMAS, Curve
+
+UNKNOWN = "-"
+NUMBERS_HELP = {
+    "Amplitude": "From rest, the mean of the first frames, to the peak; ± covers 95 %",
+    "Onset": "When the curve leaves rest by 10 % of the amplitude",
+    "Peak": "When the curve is farthest from rest",
+    "Duration": "From onset until it is back within 10 % of the amplitude from rest",
+    "Fastest": "The largest speed to either side",
+}
+_ROWS = ("measure", "unit", "rest", "amplitude", "amplitude ±", "onset [s]", "onset ± [s]", "peak [s]",
+         "end [s]", "end ± [s]", "duration [s]", "duration ± [s]", "fastest per s")  # fmt: skip
+
+
+def with_spread(value: float, sigma: float, unit: str = "") -> str:
+    """A value and twice its standard deviation, in as many digits as that tells; a dash where not known."""
+    if math.isnan(value):
+        return UNKNOWN
+    spread = BAND_SIGMAS * sigma
+    if not spread > 0:
+        return f"{value:.4g} {unit}".rstrip()
+    decimals = max(0, 1 - math.floor(math.log10(spread)))
+    return f"{value:.{decimals}f} ± {spread:.{decimals}f} {unit}".rstrip()
+
+
+def numbers_in_words(curve: Curve) -> tuple[str, ...]:
+    """The numbers of a curve's movement, in the order of NUMBERS_HELP."""
+    movement = curve.movement
+    fastest = UNKNOWN if math.isnan(curve.fastest) else f"{curve.fastest:.3g} {curve.unit}/s"
+    if movement is None:
+        return *(UNKNOWN,) * (len(NUMBERS_HELP) - 1), fastest
+    times = (
+        (movement.onset, movement.onset_sigma),
+        (movement.peak, 0.0),
+        (movement.duration, movement.duration_sigma),
+    )
+    amplitude = with_spread(movement.amplitude, movement.amplitude_sigma, curve.unit)
+    return amplitude, *(_seconds(*time) for time in times), fastest
+
+
+def _seconds(time: float, sigma: float) -> str:
+    return UNKNOWN if math.isnan(time) else f"{time:.2f} s" + (f" ± {2 * sigma:.2f}" if sigma > 0 else "")
+
+
+def number_rows(curves: Sequence[Curve]) -> list[list[object]]:
+    """A table of the numbers of the movements: a row for each curve."""
+    rows: list[list[object]] = [list(_ROWS)]
+    for curve in curves:
+        one = curve.movement
+        two = BAND_SIGMAS
+        told = [math.nan] * 10 if one is None else [
+            one.rest, one.amplitude, two * one.amplitude_sigma, one.onset, two * one.onset_sigma, one.peak,
+            one.end, two * one.end_sigma, one.duration, two * one.duration_sigma,
+        ]  # fmt: skip
+        numbers = ["" if math.isnan(number) else f"{number:.6g}" for number in (*told, curve.fastest)]
+        rows.append([curve.name, curve.unit, *numbers])
+    return rows

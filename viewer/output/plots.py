@@ -1,0 +1,153 @@
+"""Curves as they are plotted, whether in the window or in a file: PNG, SVG, or a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..csv_text import save_rows
+from ..errors import InputError
+from ..files import whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Seen on light and on dark, and told apart with colour-blindness: of Okabe and Ito (2008), and lighter ones.
+PLOT_COLORS = (
+    0x3D9BE0, 0xE69F00, 0x1FA783, 0xD55E00, 0xCC79A7, 0x8C7AE6, 0xB59F00, 0x56B4E9, 0xE06C75, 0x7F8C9A,
+)  # fmt: skip
+PLOT_SUFFIXES = (".csv", ".png", ".svg")
+BAND_ALPHA = 0.3
+_STYLE: Any = {
+    "svg.fonttype": "none", "svg.hashsalt": "scan4d", "axes.spines.top": False, "axes.grid": True,
+    "grid.alpha": 0.3, "text.parse_math": False,
+}  # fmt: skip
+_INCHES, _DPI = (8.0, 4.5), 200
+_MOST_UNITS = 3
+_APART = 55.0  # points between axes at the right
+_DIGITS = 9  # of a number in a table
+
+
+@dataclass(frozen=True, eq=False)
+class PlotLine:
+    """A line of a plot. label: its name. unit: of its values, which says whose axis it goes by. values: (N,),
+    NaN where not known. band: (N,) how far to either side it is filled, NaN for not at all. color: 0xRRGGBB.
+    is_thin: whether it is one of many that stand behind another."""
+
+    label: str
+    unit: str
+    values: NDArray[np.float64]
+    band: NDArray[np.float64]
+    color: int
+    is_thin: bool = False
+
+    @cached_property
+    def lone(self) -> NDArray[np.intp]:
+        """The values that stand by themselves between gaps, where no line can show them."""
+        there = np.concatenate([[False], np.isfinite(self.values), [False]])
+        return np.flatnonzero(there[1:-1] & ~there[:-2] & ~there[2:])
+
+    @cached_property
+    def edges(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """The lower and the upper edge of the band, (N,) each; None where it is filled nowhere."""
+        low, high = self.values - self.band, self.values + self.band
+        return (low, high) if np.isfinite(low).any() else None
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePlot:
+    """Lines over one abscissa. x_label: its name. x_unit: its unit. x: (N,). lines: all (N,). frames: (N,)
+    from 0, where each x is of a frame, which the table then tells; None where they are not."""
+
+    x_label: str
+    x_unit: str
+    x: NDArray[np.float64]
+    lines: tuple[PlotLine, ...]
+    frames: NDArray[np.intp] | None = None
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The units of the axes: of the lines, in their order, as many as axes are drawn."""
+        return tuple(dict.fromkeys(line.unit for line in self.lines))[:_MOST_UNITS]
+
+    @property
+    def drawn(self) -> tuple[PlotLine, ...]:
+        """The lines for whose unit there is an axis."""
+        return tuple(line for line in self.lines if line.unit in self.units)
+
+    def rows(self) -> list[list[object]]:
+        """A table: a row for each x, a column for each line and for its band where it has one. Cells are
+        empty where a value is not known; frames are told from 1."""
+        head: list[object] = [] if self.frames is None else ["frame"]
+        head.append(f"{self.x_label} [{self.x_unit}]")
+        columns: list[Sequence[object]] = [] if self.frames is None else [(self.frames + 1).tolist()]
+        columns.append(_cells(self.x))
+        for line in self.lines:
+            head.append(f"{line.label} [{line.unit}]")
+            columns.append(_cells(line.values))
+            if line.edges is not None:
+                head.append(f"{line.label} ± [{line.unit}]")
+                columns.append(_cells(line.band))
+        return [head, *(list(row) for row in zip(*columns, strict=True))]
+
+    def save(self, path: Path) -> None:
+        """Write a table, PNG or SVG by the file's suffix, in one step.
+
+        Raises InputError where it cannot be written, or a picture is wanted and matplotlib is not there.
+        """
+        if path.suffix.lower() == ".csv":
+            save_rows(path, self.rows())
+        else:
+            self._save_picture(path)
+
+    def _save_picture(self, path: Path) -> None:
+        if find_spec("matplotlib") is None:
+            raise InputError(
+                "pictures of plots need matplotlib", path, "Install it: pip install 'scan4d[plots]'"
+            )
+        import matplotlib
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        with matplotlib.rc_context(_STYLE), whole_file(path) as temporary:
+            figure = Figure(_INCHES, layout="constrained")
+            FigureCanvasAgg(figure)
+            self._draw(figure)
+            suffix = path.suffix.lower().removeprefix(".")
+            figure.savefig(
+                temporary, format=suffix, dpi=_DPI, metadata={"Date": None} if suffix == "svg" else None
+            )
+
+    def _draw(self, figure: Figure) -> None:
+        """The lines on axes, of which those of the second and third unit stand at the right."""
+        axes = figure.subplots()
+        of_unit = {unit: axes if not number else axes.twinx() for number, unit in enumerate(self.units)}
+        for number, (unit, own) in enumerate(of_unit.items()):
+            own.set_ylabel(unit)
+            if number:
+                own.spines["right"].set_visible(True)
+                own.spines["right"].set_position(("outward", _APART * (number - 1)))
+                own.grid(visible=False)
+        axes.set_xlabel(f"{self.x_label} [{self.x_unit}]")
+        handles = []
+        for line in self.drawn:
+            own, color = of_unit[line.unit], f"#{line.color:06x}"
+            if line.edges is not None:
+                own.fill_between(self.x, *line.edges, color=color, alpha=BAND_ALPHA, linewidth=0)
+            style: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.5} if line.is_thin else {"linewidth": 1.6}
+            handles += own.plot(self.x, line.values, color=color, label=line.label, **style)
+            own.plot(self.x[line.lone], line.values[line.lone], ".", color=color)
+        named = [handle for handle, line in zip(handles, self.drawn, strict=True) if not line.is_thin]
+        if named:
+            axes.legend(handles=named, frameon=False, fontsize="small", loc="best")
+
+
+def _cells(values: NDArray[np.float64]) -> list[object]:
+    return ["" if np.isnan(value) else float(f"{value:.{_DIGITS}g}") for value in values]
