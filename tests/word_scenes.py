@@ -13,7 +13,7 @@ from viewer.camera import Camera
 from viewer.codewords.encode import Elements
 from viewer.codewords.lighting import Materials
 from viewer.codewords.stream import FINE_DEPTHS, WordStream
-from viewer.codewords.words import FIELDS, encode_words
+from viewer.codewords.words import FIELDS, decode_scans, decode_words, encode_words
 from viewer.view import View
 
 GREY = Materials.of_palette(np.array([[200, 190, 180], [90, 120, 150]], np.uint8), 0.2, 0.7, 0.3)
@@ -52,6 +52,25 @@ def one_element(position: tuple[float, float, float], radius: float, normal: Any
         normals=np.array([normal], np.float32),
         radii=np.array([radius], np.float32),
     )
+
+
+def drawn_pixels(stream: WordStream) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All pixels of all words: (F,) numbers of words, (F,) of pixels, and (F,) finer depths there."""
+    lines = np.repeat(np.arange(len(stream.line_starts) - 1), np.diff(stream.line_starts))
+    strips, tops = np.divmod(lines, stream.size[1])
+    fields = decode_words(stream.words)
+    spans = decode_scans(fields["scans"])
+    below = np.where(fields["mode"][:, None, None] == 0, 7 - spans[:, ::-1, ::-1], [7, 0])
+    spans = np.concatenate([spans, below], axis=1)
+    columns = np.arange(8)
+    word, row, column = np.nonzero((columns >= spans[..., :1]) & (columns <= spans[..., 1:]))
+    x, y = fields["x"][word] + column, tops[word] + row
+    inside = (x < stream.stride) & (x + strips[word] * stream.stride < stream.size[0]) & (y < stream.size[1])
+    word, row, column, x, y = (each[inside] for each in (word, row, column, x, y))
+    assert stream.finer is not None
+    key, right, down = stream.finer[word].T.astype(np.int64)
+    pixel = y * stream.size[0] + x + strips[word] * stream.stride
+    return word, pixel, key + right * column + down * row
 
 
 @st.composite

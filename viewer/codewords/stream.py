@@ -141,6 +141,12 @@ class WordStream:
         inverse = 1 / self.near + t * (1 / self.far - 1 / self.near)
         return (1 / np.maximum(inverse, np.finfo(np.float32).tiny)).astype(np.float32)
 
+    def steps_of(self, depths: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Depths, scan units, any shape, as Z counts them, not rounded."""
+        count = np.reciprocal if self.perspective else np.positive
+        start, end, values = (count(np.asarray(each, np.float64)) for each in (self.near, self.far, depths))
+        return (values - start) / ((end - start) or 1.0) * (DEPTHS - 1)
+
     def depth_error(self) -> float:
         """Most that a depth is off by rounding it to Z, scan units: half a step where steps are largest."""
         span = self.far - self.near

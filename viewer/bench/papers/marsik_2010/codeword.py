@@ -14,7 +14,7 @@ from ...report.results import WORD_PIXELS, WORD_TABLES, WORD_TIMES, Row
 NAME, PAGE = "codeword", "codeword.md"
 _KEPT = {
     "times": ("scene", "n", "size", "busy_ms", "wall_ms"),
-    "pixels": ("scene", "projection", "quality", "ids", "covered", "depth", "normal"),
+    "pixels": ("scene", "projection", "quality", "ids", "nearest", "covered", "depth", "normal"),
     "tables": ("steps", "sizes", "normals", "busy_ms", "nbytes", "bitmap_bytes"),
 }
 
@@ -82,13 +82,14 @@ def _pixels(rows: Sequence[dict[str, Any]]) -> str:
         "projection",
         "quality",
         "other points, %",
+        "nearest to a step of Z, %",
         "other pixels, %",
         "depths, of the radius",
         "normals, degrees",
     ]
     lines = [
-        [f"`{row['scene']}`", row["projection"], row["quality"], f"{row['ids']:.2f}", f"{row['covered']:.2f}",
-         f"{row['depth']:.1g}", f"{row['normal']:.2f}"]
+        [f"`{row['scene']}`", row["projection"], row["quality"], f"{row['ids']:.2f}", f"{row['nearest']:.2f}",
+         f"{row['covered']:.2f}", f"{row['depth']:.1g}", f"{row['normal']:.2f}"]
         for row in rows
     ]  # fmt: skip
     return markdown_table(head, lines, left=("scene", "projection", "quality"))

@@ -18,6 +18,7 @@ from ....backends import backend
 from ....camera import PROJECTIONS, Camera
 from ....codewords import settings as words
 from ....codewords.engine import draw_words
+from ....codewords.stream import WordStream
 from ....codewords.tables import PAPER, Steps, shape_table
 from ....errors import InputError
 from ....frame import Request, render_frame, view_of
@@ -93,10 +94,16 @@ def measure_pixels(
         for projection in PROJECTIONS:
             camera = _camera(pose, size, up, projection)
             discs = _surface(bench, surfels.backend, surfels.params, pose, camera, size)
+            stream = words.words_of(pose, discs.view, LOOK, words.Params())
             for quality in ("table", "exact"):
                 drawn = _surface(bench, BACKEND, {"quality": quality}, pose, camera, size)
-                row = {**_row(bench, name, pose, size), "projection": projection, "quality": quality}
-                yield row | pixel_errors(drawn, discs, pose)
+                yield {
+                    **_row(bench, name, pose, size),
+                    "projection": projection,
+                    "quality": quality,
+                    **pixel_errors(drawn, discs, pose),
+                    "nearest": nearest_to_a_step(drawn, discs, stream),
+                }
                 drawn.release()
             discs.release()
 
@@ -118,6 +125,22 @@ def pixel_errors(drawn: Surface, discs: Surface, pose: Pose) -> dict[str, float]
         "depth": float(f"{off.max(initial=0) / pose.bounds.radius:.2g}"),
         "normal": round(float(np.degrees(np.arccos(np.clip(np.median(cosines), -1, 1)))), 2),
     }
+
+
+def nearest_to_a_step(drawn: Surface, discs: Surface, stream: WordStream) -> float:
+    """Percent of the pixels that both cover whose point is the nearest up to a step of Z: its disc, where the
+    pixel's ray meets the plane, is no more than that before or behind the nearest of all discs. stream: whose
+    Z."""
+    both, view, cloud = (drawn.row != NOTHING) & (discs.row != NOTHING), drawn.view, drawn.pose.cloud
+    pixels, rows = np.argwhere(both)[:, ::-1] + 0.5, drawn.row[both]
+    starts, ends = (view.unproject(pixels, np.full(len(pixels), depth)) for depth in (1.0, 2.0))
+    assert cloud.normals is not None
+    normals = cloud.normals[rows].astype(np.float64)
+    points = cloud.positions[rows] + (cloud.origin - view.origin)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of planes seen edge on, which are not near
+        met = 1 + np.vecdot(points - starts, normals) / np.vecdot(ends - starts, normals)
+        steps = stream.steps_of(met + view.base) - stream.steps_of(discs.depth[both])
+    return round(100 * float((np.abs(steps) <= 1).mean()), 2)
 
 
 def measure_tables(bench: Bench, scenes: Sequence[str] = ()) -> Iterator[Row]:
