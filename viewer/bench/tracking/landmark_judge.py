@@ -1,0 +1,98 @@
+"""Tracked landmarks against the truth: how far off, how well they know it, which gaps are right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+
+from ...analysis.landmarks import Landmark
+from ...analysis.spot import Spot
+from ...analysis.track import Known, Track
+from ...geometry import vector
+from ...scan.spacing import nearest_row
+from ...scan.timeline import Timeline
+from .known import KnownScan
+
+_EXACT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # covariance of a key: it is the truth
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is told of a tracked scan.
+
+    frames, landmarks: how many. spacing: of the points, scan units. median, p95, worst: errors, scan units,
+    in frames that are told as tracked where the truth is in the scan. within: share of these errors that are
+    at most two standard deviations (`Track.sigmas`). hidden: in how many frames landmarks are, all counted
+    together. gaps_hit: the share of them that are gaps, NaN without any. gaps_false: the share of gaps where
+    the truth is in the scan. seconds: of processor time, a frame.
+    """
+
+    name: str
+    frames: int
+    landmarks: int
+    spacing: float
+    median: float
+    p95: float
+    worst: float
+    within: float
+    hidden: int
+    gaps_hit: float
+    gaps_false: float
+    seconds: float
+
+
+def keyed_landmarks(known: KnownScan) -> list[Landmark]:
+    """The landmarks of a scan, each set once, at the truth, in the first frame that has it."""
+    landmarks = []
+    for number, name in enumerate(known.names):
+        frame = int(known.counted[:, number].argmax())
+        place = known.paths[frame, number]
+        row, _ = nearest_row(known.source.load(frame), place)
+        time = float(known.source.times()[frame])
+        spot = Spot(frame, time, vector(place), "surface", row, known.spacing, 0, _EXACT)
+        landmarks.append(Landmark(name).with_key(spot))
+    return landmarks
+
+
+def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float = np.nan) -> Judgement:
+    """Judge the tracks of `keyed_landmarks`, by name. seconds: what tracking took a frame."""
+    states = np.stack([tracks[name].known for name in known.names], axis=1)
+    positions = np.stack([tracks[name].positions for name in known.names], axis=1)
+    sigmas = np.stack([tracks[name].sigmas for name in known.names], axis=1)
+    told = (states == Known.TRACKED) & known.counted
+    errors = np.linalg.norm(positions - known.paths, axis=2)[told]
+    gaps = states == Known.GAP
+    asked = known.counted & (states != Known.PLACED)
+
+    def share(of: np.ndarray) -> float:
+        return float(of.mean()) if of.size else np.nan
+
+    median, p95, worst = np.quantile(errors, [0.5, 0.95, 1.0]) if errors.size else [np.nan] * 3
+    return Judgement(
+        name=known.name,
+        frames=len(states),
+        landmarks=len(known.names),
+        spacing=known.spacing,
+        median=float(median),
+        p95=float(p95),
+        worst=float(worst),
+        within=share(errors <= 2 * sigmas[told]),
+        hidden=int(known.hidden.sum()),
+        gaps_hit=share(gaps[known.hidden]),
+        gaps_false=share(gaps[asked]),
+        seconds=seconds,
+    )
+
+
+def judge_tracking(
+    known: KnownScan, tracker: Callable[[Timeline, Sequence[Landmark]], Mapping[str, Track]]
+) -> Judgement:
+    """Judge a tracker on a scan. tracker: tracks the landmarks of a timeline, such as `track_landmarks`."""
+    landmarks = keyed_landmarks(known)
+    with Timeline(known.source, known.source.times()) as timeline:
+        began = process_time()
+        tracks = tracker(timeline, landmarks)
+        return judge_tracks(known, tracks, (process_time() - began) / len(timeline))
