@@ -86,7 +86,7 @@ class KnownScan:
 def scanned_demo(
     scan: str, noise: float, frames: Sequence[int] | None = None, *, pods: int = 2, seed: int = 0
 ) -> KnownScan:
-    """What `scan4d simulate` measures of the demo or a variant, by its name; its places are `PLACES`.
+    """The demo or a variant, by its name, as `scan4d simulate` scans it; its places are `PLACES`.
 
     noise: standard deviation of depth, mm. frames: those that are scanned; None: all. Steeper than 80 degrees
     nothing is measured. A place is hidden where no pod's ray reaches it and no point is within two spacings;

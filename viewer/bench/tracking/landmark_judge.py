@@ -21,7 +21,7 @@ _EXACT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # covariance of a key: it is the truth
 
 @dataclass(frozen=True)
 class Judgement:
-    """What is told of a tracked scan.
+    """Figures of a tracked scan.
 
     frames, landmarks: how many. spacing: of the points, scan units. median, p95, worst: errors, scan units,
     in frames that are told as tracked where the truth is in the scan. within: share of these errors that are
