@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
+from PIL import Image
 from small_scans import FRAMES, SMALL, finish, front, names, process, stored
 from written import film, picture
 
@@ -93,6 +94,32 @@ def test_films_patterns_turntables_and_arrays(run: Run, scans: Path, tmp_path: P
     assert (arrays["picture"][covered, 3] == 255).all()
     stream = read_stream(tmp_path / "p1.cw")
     assert draw_words(stream).covered.any()
+
+
+def test_a_picture_lies_behind(run: Run, scans: Path, tmp_path: Path) -> None:
+    """Drawn at once, or over a file of code words: what is not covered stays."""
+    behind = np.random.default_rng(1).integers(0, 256, (64, 96, 3), np.uint8)
+    Image.fromarray(behind).save(tmp_path / "behind.png")
+    scan, over = scans / "ball.npz", ("--behind", tmp_path / "behind.png")
+    assert run("render", scan, "--no-gl", "-o", tmp_path / "a.png", *SMALL, *over).code == 0
+    assert run("render", scan, "-o", tmp_path / "a.cw", *SMALL).code == 0
+    assert run("render", tmp_path / "a.cw", "-o", tmp_path / "b.png", *over).code == 0
+    drawn, covered = picture(tmp_path / "a.png"), draw_words(read_stream(tmp_path / "a.cw")).covered
+    assert np.array_equal(drawn, picture(tmp_path / "b.png"))
+    assert 0.1 < covered.mean() < 0.9
+    assert np.array_equal(drawn[~covered][:, :3], behind[~covered])
+    assert (drawn[covered][:, :3] != behind[covered]).any(axis=1).mean() > 0.9
+    for arguments, told in (
+        ((scan, "--no-gl", "-o", "c.png", "--size", "50x40", *over), "has 96 x 64 pixels, where the picture"),
+        ((scan, "-o", "c.cw", *SMALL, *over), "--behind: is not kept in '.cw' files"),
+        ((scan, "-o", "c.png", *SMALL, *over), "--behind: is for pictures without OpenGL"),
+        ((scan, "--no-gl", "-o", "c.png", *SMALL, "--behind", scan), "is no PNG or JPEG or TIFF"),
+        ((scan, "--no-gl", "-o", over[1], *SMALL, "--force", *over), "behind.png"),
+    ):
+        done = run("render", *arguments)
+        assert (done.code, done.out) == (2, ""), arguments
+        assert told in done.err, arguments
+    assert names(tmp_path) == ["a.cw", "a.png", "b.png", "behind.png"]
 
 
 def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_path: Path) -> None:

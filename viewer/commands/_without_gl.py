@@ -6,13 +6,15 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..camera import Camera
-from ..codewords.engine import NO_WORD, WINDOW, CodePicture, draw_words
+from ..codewords.engine import NO_WORD, CodePicture, draw_words
 from ..codewords.settings import Params, words_of
 from ..codewords.stream import SUFFIX, WordStream, read_stream, write_stream
 from ..errors import InputError
@@ -24,6 +26,7 @@ from ..scan.estimate import estimate
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.pose import Pose
+from ..scan.range_folders._pictures import read_color
 from . import _drawing as drawing
 from ._console import progress, say, tell, warn
 from ._outputs import claim
@@ -50,6 +53,8 @@ def run(args: Namespace) -> int:
         hint = f"Use --backend {BACKEND}, or leave it out"
         raise InputError(f"'{args.backend}' needs OpenGL", "--no-gl", hint)
     _refuse(args, _NEED_GL, "is for pictures that OpenGL draws")
+    if args.behind and args.out.suffix.lower() == SUFFIX:
+        raise InputError(f"is not kept in '{SUFFIX}' files", "--behind", "Name it where they are drawn")
     if args.progress:
         say(device="CPU")
     if args.scan is not None and args.scan.lower().endswith(SUFFIX):
@@ -71,9 +76,10 @@ def _replay(args: Namespace, path: Path) -> None:
     """Draw a file of code words."""
     _refuse(args, _SETTLED, f"cannot be chosen: the code words of {path.name} are of one picture")
     check_output(args.out, tuple(suffix for suffix in _SUFFIXES if suffix != SUFFIX), several=False)
-    claim([numbered(args.out, 0)], [path], args.force)
+    claim([numbered(args.out, 0)], [path, *_given(args.behind)], args.force)
     stream = read_stream(path)
-    with _written(args.out, stream.size, args.fps or 1.0) as put, progress(1, args.progress) as tick:
+    draw = partial(draw_words, background=_background(args.behind, stream.size))
+    with _written(args.out, stream.size, args.fps or 1.0, draw) as put, progress(1, args.progress) as tick:
         put(0, stream, None)
         tick()
 
@@ -89,12 +95,13 @@ def _draw(args: Namespace) -> None:
         upright = told_upright(args, timeline, indices)
         if "up" not in dict(args.look):
             look = replace(look, up=upright.up)
-        inputs = [*scan_inputs(timeline), *([args.camera] if camera else [])]
+        inputs = [*scan_inputs(timeline), *_given(args.camera), *_given(args.behind)]
         claim(drawing.outputs(args.out, [shot.number for shot in shots]), inputs, args.force)
         look = drawing.ranged(look, timeline, indices)
         fps = drawing.film_rate(timeline, indices, args.fps)
         camera_of = None if camera is None else lambda shot: camera
-        with _written(args.out, size, fps, params.window) as put, progress(len(shots), args.progress) as tick:
+        draw = partial(draw_words, window=params.window, background=_background(args.behind, size))
+        with _written(args.out, size, fps, draw) as put, progress(len(shots), args.progress) as tick:
             for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
                 camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
                 known = _with_estimates(pose, params)
@@ -104,6 +111,22 @@ def _draw(args: Namespace) -> None:
                         view = view_of(Request(pose, camera_of(shot)), size)
                         put(shot.number, words_of(known, view, own, params), pose)
                         tick()
+
+
+def _given(path: Path | None) -> list[Path]:
+    return [] if path is None else [path]
+
+
+def _background(path: Path | None, size: tuple[int, int]) -> NDArray[np.uint8] | None:
+    """A picture that is drawn over, (H, W, 4). Raises InputError for one of another size."""
+    if path is None:
+        return None
+    colors = read_color(path)
+    height, width = colors.shape[:2]
+    if (width, height) != size:
+        what = f"has {width} x {height} pixels, where the picture has {size[0]} x {size[1]}"
+        raise InputError(what, path, "Scale it, or the picture with --size")
+    return np.dstack([colors, np.full((height, width), 255, np.uint8)])
 
 
 def _params(args: Namespace) -> Params:
@@ -142,13 +165,13 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
 
 @contextmanager
 def _written(
-    out: Path, size: tuple[int, int], fps: float, window: int = WINDOW
+    out: Path, size: tuple[int, int], fps: float, draw: Callable[[WordStream], CodePicture]
 ) -> Iterator[Callable[[int, WordStream, Pose | None], None]]:
     """A function that puts a stream, with its number and the pose that it is of, where the path says."""
     suffix = out.suffix.lower()
     if suffix == FILM_SUFFIX:
         with film(out, size, fps) as add:
-            yield lambda number, stream, pose: add(draw_words(stream, window).image)
+            yield lambda number, stream, pose: add(draw(stream).image)
         return
 
     def put(number: int, stream: WordStream, pose: Pose | None) -> None:
@@ -156,7 +179,7 @@ def _written(
         if suffix == SUFFIX:
             write_stream(stream, path)
             return
-        picture = draw_words(stream, window)
+        picture = draw(stream)
         if suffix == ".npz":
             write_arrays(_arrays(picture, pose), path)
         else:

@@ -84,6 +84,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--no-gl", action="store_true", help="without OpenGL, which needs not be there: --backend codeword"
     )
     picture.add_argument(
+        "--behind", type=Path, metavar="FILE", help="a picture of the same size that --no-gl draws over"
+    )
+    picture.add_argument(
         "--set", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
         help="the backend's parameters; 'scan4d backends' lists them",
     )  # fmt: skip
@@ -123,6 +126,8 @@ def run(args: Namespace) -> int:
     """Draw what is asked for; broken frames among several are left out."""
     if without_gl.is_asked(args):
         return without_gl.run(args)
+    if args.behind:
+        raise InputError("is for pictures without OpenGL", "--behind", "Add --no-gl")
     if args.repeat and not args.stats:
         raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
     if args.stats:
