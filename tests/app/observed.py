@@ -134,6 +134,7 @@ def shown(app: App) -> dict[str, Any]:
         "asks_before_closing": app.exporting.is_leaving,
         "clicking": app.tools.clicking,
         "is_under_way": app.tools.is_under_way,
+        "landmarks": landmarks(app),
         "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),
@@ -167,6 +168,18 @@ def told(measurement: Measurement, app: App) -> dict[str, Any]:
         "distance": reading.measurement.distance,
         "uncertainty": reading.measurement.uncertainty,
         "motion": reading.motion,
+    }
+
+
+def landmarks(app: App) -> dict[str, Any]:
+    """State and place of each landmark in the frame that is shown, by name."""
+    tool = app.tools._slots["landmarks"].tool
+    if tool is None:
+        return {}
+    stands = tool.shown
+    return {
+        landmark.name: (stands.state(number), stands.positions[number].tolist())
+        for number, landmark in enumerate(stands.landmarks)
     }
 
 

@@ -321,7 +321,8 @@ class App:
 
     def settle(self, now: float) -> None:
         """End the step of the history that a drag or typing is, once it is over. now: by the clock."""
-        if self.steering.rests(now) and self.replayer.replaying is None and not imgui.is_any_item_active():
+        goes_on = imgui.is_any_item_active() or self.keys.is_arrow_held
+        if self.steering.rests(now) and self.replayer.replaying is None and not goes_on:
             self.session.history.settle()
 
     def take_opened(self) -> None:

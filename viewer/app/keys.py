@@ -91,6 +91,11 @@ class Keys:
         keys, title = self.of[name], self._commands[name].title
         return f"{title} ({keys})" if keys else title
 
+    @property
+    def is_arrow_held(self) -> bool:
+        """Whether an arrow key is down: what it repeats is one step."""
+        return any(imgui.is_key_down(_KEYS[name]) for name in _ARROWS)
+
     def handle(self, app: App) -> None:
         """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there,
         and to widgets those that lead through them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -21,11 +21,13 @@ _MOST = 200  # files
 class ReadDialog(PathDialog):
     """Names a file, by the field or by the list of those in its folder, the newest first."""
 
-    def __init__(self, title: str, about: str, suffix: str, read: Callable[[Path], None]) -> None:
-        """about: what is read, a line. suffix: of the files in the list. read: takes the file, or raises
-        InputError where it cannot."""
+    def __init__(
+        self, title: str, about: str, suffix: str, read: Callable[[Path], None], others: Sequence[str] = ()
+    ) -> None:
+        """about: what is read, a line. suffix, others: of the files in the list. read: takes the file, or
+        raises InputError where it cannot."""
         super().__init__(title, about)
-        self._suffix, self._read = suffix, read
+        self._suffixes, self._read = (suffix, *others), read
         self._listed = ""  # folder
         self._files: list[str] = []  # their names
         self._listing: Future[list[str]] | None = None
@@ -55,7 +57,8 @@ class ReadDialog(PathDialog):
                 self._path = os.path.join(self._listed, name)
                 self._try(self._read, present_file)
         if not self._files:
-            told = "Reading ..." if self._listing else f"There is no {self._suffix} file in this folder."
+            known = " or ".join(self._suffixes)
+            told = "Reading ..." if self._listing else f"There is no {known} file in this folder."
             imgui.text_disabled(told)
         imgui.end_child()
 
@@ -63,8 +66,8 @@ class ReadDialog(PathDialog):
         """Have the folder of the field listed where it is another; beside the window, which does not wait."""
         folder = os.path.dirname(_typed(self._path))
         if folder != self._listed:
-            self._listed, self._files, suffix = folder, [], self._suffix
-            self._listing = in_background(Task("Listing files"), lambda: newest(folder, suffix))
+            self._listed, self._files, suffixes = folder, [], self._suffixes
+            self._listing = in_background(Task("Listing files"), lambda: newest(folder, *suffixes))
         if self._listing is not None and self._listing.done():
             self._files, self._listing = self._listing.result(), None
 
@@ -82,15 +85,15 @@ def _typed(text: str) -> str:
     return os.path.expanduser(text.strip())
 
 
-def newest(folder: str, suffix: str) -> list[str]:
-    """The names of a folder's files with a suffix, those changed last first; none of one that cannot be
-    read."""
+def newest(folder: str, *suffixes: str) -> list[str]:
+    """The names of a folder's files with one of the suffixes, those changed last first; none of one that
+    cannot be read."""
     try:
         with os.scandir(folder or ".") as entries:
             found = [
                 (entry.stat().st_mtime, entry.name)
                 for entry in entries
-                if entry.name.lower().endswith(suffix) and entry.is_file()
+                if entry.name.lower().endswith(suffixes) and entry.is_file()
             ]
     except OSError:
         return []

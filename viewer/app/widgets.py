@@ -24,6 +24,7 @@ _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _TOOLTIP = 60  # characters of a line
 _NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
 _FACTS = 6.0  # where facts begin, in heights of the font
+_DOT = 0.25  # radius, in heights of the font
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
@@ -251,6 +252,15 @@ def edited(path: str, text: str) -> str:
     heads = (path[:end] for end in range(len(path), -1, -1))
     kept = next(head for head in heads if text.startswith(printable(head)))
     return kept + text[len(printable(kept)) :]
+
+
+def dot(middle: ImVec2, color: int | None) -> None:
+    """A small disc on the screen, of a colour 0xRRGGBB, to show a state; a faint ring without one."""
+    draw_list, radius = imgui.get_window_draw_list(), _DOT * imgui.get_font_size()
+    if color is None:
+        draw_list.add_circle(middle, radius, imgui.get_color_u32(imgui.Col_.text_disabled))
+    else:
+        draw_list.add_circle_filled(middle, radius, theme.packed(color))
 
 
 def fitted(text: str, width: float) -> str:

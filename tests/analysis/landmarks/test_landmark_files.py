@@ -14,6 +14,7 @@ import pytest
 from landmark_sets import NAMES, assert_same, moving
 
 from viewer.analysis.landmarks.files import (
+    holds_one_moment,
     is_landmark_file,
     landmark_formats,
     landmark_suffixes,
@@ -165,6 +166,8 @@ def test_one_moment_is_one_file(tmp_path: Path) -> None:
 def test_a_series_with_a_file_that_is_gone(tmp_path: Path) -> None:
     wanted = moving()
     write_landmarks(tmp_path / "m_%04d.mrk.json", wanted)
+    names = ("m_%04d.mrk.json", "m.mrk.json", "m.c3d", "m.csv")
+    assert [holds_one_moment(name) for name in names] == [False, True, False, False]
     (tmp_path / "m_0003.mrk.json").unlink()
     found = read_landmarks(tmp_path / "m_%04d.mrk.json", "mm")
     np.testing.assert_array_equal(found.frames, [0, 1, 3, 4, 5])

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from viewer.analysis.landmarks.mirroring import partners_of
-from viewer.analysis.landmarks.templates import read_template, save_template, templates
+from viewer.analysis.landmarks.templates import is_template_file, read_template, save_template, templates
 from viewer.errors import InputError
 
 
@@ -97,3 +97,12 @@ def test_a_template_that_is_damaged(data: bytes, tmp_path: Path) -> None:
         read_template(tmp_path / "mine.json")
     with pytest.raises(InputError, match="no such file"):
         read_template(tmp_path / "other.json")
+
+
+def test_a_template_is_told_from_other_files(tmp_path: Path) -> None:
+    texts = {"mine.json": own(), "wrong.json": own(title=3), "other.json": {"landmarks": [], "document": {}}}
+    for name, data in texts.items():
+        (tmp_path / name).write_text(json.dumps(data))
+    (tmp_path / "broken.json").write_text("{")
+    names = [name for name in (*texts, "broken.json", "missing.json") if is_template_file(tmp_path / name)]
+    assert names == ["mine.json", "wrong.json"]

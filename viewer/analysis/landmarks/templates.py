@@ -35,6 +35,17 @@ def templates() -> Mapping[str, Template]:
     return {template.name: template for template in found}
 
 
+def is_template_file(path: Path | str) -> bool:
+    """Whether a file is a template, perhaps one with mistakes, and no other JSON."""
+    if Path(path).suffix.lower() != ".json":
+        return False
+    try:
+        data = parsed_json(read_text(Path(path), _MOST_BYTES))
+    except (OSError, ValueError):
+        return False
+    return isinstance(data, dict) and "landmarks" in data and set(data) <= set(_FIELDS)
+
+
 def read_template(path: Path | str) -> Template:
     """The template of a file. Raises InputError, which tells the place of what is wrong."""
     path = Path(path)

@@ -13,10 +13,11 @@ from ...geometry import Vector
 from .. import theme
 from .labels import Box, Line, free_place, usual_place
 
-_CROSS = 0xFFFFFF
+_CROSS = _INK = 0xFFFFFF
 _OUTLINE = 0x000000  # so that what is light is seen on any surface
 _POINT, _THICK = 0.28, 0.11  # radius, thickness; in heights of the font
 _DOT, _DOT_ROOM = 0.16, 0.4  # radius of dots, and how far apart they are at least
+_MARK = 0.22  # radius of one of many marks
 _GAP = 0.5  # between a line and its label
 _HEAD = 2.6  # of the view's head, where the prompt is
 _LOUPE, _LOUPE_AWAY = 4.5, 1.2  # half its side, and how far from its middle it is; the latter in sides
@@ -81,6 +82,11 @@ class Label:
         """A label of what stands before the colon alone, such as its number."""
         return Label([self.texts[0].partition(":")[0]], self.line, self.faint)
 
+    def draw_at(self, corner: ImVec2) -> ImVec2:
+        """Draw it with its upper left corner there; returns where the next one below it begins."""
+        self.draw(Box(corner, corner + self.size))
+        return corner + ImVec2(0, self.size.y + self._pad.y)
+
     def draw(self, box: Box) -> None:
         """Text in the theme's colours on a plate of the theme, which is read on any picture."""
         draw_list = imgui.get_window_draw_list()
@@ -97,31 +103,32 @@ class Label:
 class Canvas:
     """Draws over the picture, into the current ImGui window. Colours are 0xRRGGBB, alpha is 0..1.
 
-    One canvas serves all tools in a frame, so that labels keep off the points and labels of them all.
+    One canvas serves all tools in a frame, so that labels keep off the points and labels of them all. em: the
+    height of the font.
     """
 
     def __init__(self, view: ViewPlace, image: int | None = None) -> None:
         """image: the texture of the picture; None where there is none."""
         self._view, self._image = view, image
         self._taken: list[Box] = []
-        self._em = imgui.get_font_size()
+        self.em = imgui.get_font_size()
 
     def line(self, start: ImVec2, stop: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A line between two places on the screen."""
-        draw_list, thick = imgui.get_window_draw_list(), _THICK * self._em
+        draw_list, thick = imgui.get_window_draw_list(), _THICK * self.em
         draw_list.add_line(start, stop, theme.packed(_OUTLINE, 0.6 * alpha), thick + 2)
         draw_list.add_line(start, stop, theme.packed(color, alpha), thick)
 
     def point(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A disc at a place on the screen."""
-        draw_list, radius = imgui.get_window_draw_list(), _POINT * self._em
+        draw_list, radius = imgui.get_window_draw_list(), _POINT * self.em
         draw_list.add_circle_filled(place, radius + 1, theme.packed(_OUTLINE, 0.6 * alpha))
         draw_list.add_circle_filled(place, radius, theme.packed(color, alpha))
         self._take(place)
 
     def ring(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A ring round a place on the screen."""
-        draw_list, radius, thick = imgui.get_window_draw_list(), _POINT * self._em, _THICK * self._em
+        draw_list, radius, thick = imgui.get_window_draw_list(), _POINT * self.em, _THICK * self.em
         draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
         draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
         self._take(place)
@@ -135,25 +142,59 @@ class Canvas:
         there = np.logical_and.reduce(np.isfinite(places), axis=1)
         joined, points = there[:-1] & there[1:], places.tolist()
         inks = [theme.packed(*ink) for ink in zip(colors, alphas.tolist(), strict=True)]
-        draw_list, thick = imgui.get_window_draw_list(), _THICK * self._em
+        draw_list, thick = imgui.get_window_draw_list(), _THICK * self.em
         for start, stop in _like_runs(joined, alphas.tolist()):
             color = theme.packed(_OUTLINE, 0.6 * float(alphas[start]))
             draw_list.add_polyline(points[start : stop + 1], color, thick + 2, 0)
         for start, stop in _like_runs(joined, inks):
             draw_list.add_polyline(points[start : stop + 1], inks[start], thick, 0)
         steps = np.hypot(*np.diff(places, axis=0)[joined].T)
-        if len(steps) and np.median(steps) < _DOT_ROOM * self._em:
+        if len(steps) and np.median(steps) < _DOT_ROOM * self.em:
             there[:-1] &= ~joined  # those that no line joins to the next
             there[1:] &= ~joined
         for at in np.flatnonzero(there):
-            draw_list.add_circle_filled(points[at], _DOT * self._em, inks[at])
+            draw_list.add_circle_filled(points[at], _DOT * self.em, inks[at])
+
+    def marks(
+        self,
+        places: NDArray[np.float64],
+        color: int,
+        alphas: NDArray[np.float64],
+        reaches: NDArray[np.float64],
+    ) -> None:
+        """Discs at many places on the screen, (N, 2), of opacity (N,), each in a ring of a radius (N,) where
+        that is wider than the disc. Labels do not keep off them."""
+        draw_list, radius, thick = imgui.get_window_draw_list(), _MARK * self.em, 0.6 * _THICK * self.em
+        colors = {alpha: theme.packed(color, alpha) for alpha in set(alphas.tolist())}
+        outlines = {alpha: theme.packed(_OUTLINE, 0.7 * alpha) for alpha in colors}
+        for (x, y), alpha, reach in zip(places.tolist(), alphas.tolist(), reaches.tolist(), strict=True):
+            place = ImVec2(x, y)
+            draw_list.add_circle_filled(place, radius + 1, outlines[alpha])
+            draw_list.add_circle_filled(place, radius, colors[alpha])
+            if reach > radius:
+                draw_list.add_circle(place, reach, colors[alpha], thickness=thick)
+
+    def names(self, texts: Sequence[str], places: NDArray[np.float64], alphas: NDArray[np.float64]) -> None:
+        """Texts at the right of places on the screen, (N, 2), of opacity (N,): the first ones, and of the
+        others those that cover no text before them."""
+        draw_list, line = imgui.get_window_draw_list(), imgui.get_text_line_height()
+        corners = places + np.array([1.6 * _MARK * self.em, -line / 2])
+        ends = corners + np.array([(imgui.calc_text_size(text).x, line) for text in texts]).reshape(-1, 2)
+        drawn = np.empty((0, 4))
+        for text, low, high, alpha in zip(texts, corners, ends, alphas.tolist(), strict=True):
+            is_off = (drawn[:, :2] >= high).any(axis=1) | (drawn[:, 2:] <= low).any(axis=1)
+            if not is_off.all():
+                continue
+            drawn = np.vstack([drawn, [*low, *high]])
+            for shift, color in ((1.0, _OUTLINE), (0.0, _INK)):
+                draw_list.add_text(ImVec2(*(low + shift).tolist()), theme.packed(color, 0.9 * alpha), text)
 
     def loupe(self, place: ImVec2) -> None:
         """The picture about a place on the screen, magnified in a square beside it, with a cross in its
         middle; nothing where there is no picture."""
         if self._image is None:
             return
-        view, half = self._view, _LOUPE * self._em
+        view, half = self._view, _LOUPE * self.em
         away = 2 * half * _LOUPE_AWAY
         across = away if place.x + away + half < view.box.high.x else -away
         up = -away if place.y - away - half > view.box.low.y else away
@@ -162,23 +203,23 @@ class Canvas:
         at, reach = (place - view.corner) / view.size, ImVec2(half, half) / _MAGNIFIED / view.size
         draw_list = imgui.get_window_draw_list()
         draw_list.add_image(imgui.ImTextureRef(self._image), low, high, at - reach, at + reach)
-        draw_list.add_rect(low, high, imgui.get_color_u32(imgui.Col_.border), thickness=_THICK * self._em)
+        draw_list.add_rect(low, high, imgui.get_color_u32(imgui.Col_.border), thickness=_THICK * self.em)
         for arm in (ImVec2(half, 0), ImVec2(0, half)):
             for thick, color in ((3.0, theme.packed(_OUTLINE, 0.5)), (1.0, theme.packed(_CROSS))):
                 for side in (1, -1):
                     draw_list.add_line(middle + arm * (0.15 * side), middle + arm * side, color, thick)
 
     def _take(self, place: ImVec2) -> None:
-        side = 2 * _POINT * self._em + 2
+        side = 2 * _POINT * self.em + 2
         self._taken.append(Box.around(place, ImVec2(side, side)))
 
     def labels(self, labels: Sequence[Label]) -> None:
         """Labels beside their lines, off each other and all points; in short where there is no room, and then
         in full under the mouse."""
         lines, view = [label.line for label in labels], self._view
-        area = Box(view.box.low + ImVec2(0, _HEAD * self._em), view.box.high)
+        area = Box(view.box.low + ImVec2(0, _HEAD * self.em), view.box.high)
         for label in labels:
-            short, gap = label.in_short(), _GAP * self._em
+            short, gap = label.in_short(), _GAP * self.em
             if (box := free_place(label.size, label.line, gap, area, self._taken, lines)) is not None:
                 label.draw(box)
             else:

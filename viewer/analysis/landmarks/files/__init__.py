@@ -70,6 +70,12 @@ def is_landmark_file(path: Path | str) -> bool:
     return not hasattr(module, "owns") or module.owns(head)
 
 
+def holds_one_moment(path: Path | str) -> bool:
+    """Whether what is written under a name is one moment: by its format, unless the name is of a series."""
+    path = Path(path)
+    return getattr(_module_of(path), "ONE_MOMENT", False) and _NUMBER.search(path.name) is None
+
+
 def read_landmarks(path: Path | str, unit: str | None = None, axes: str = "LPS") -> LandmarkSet:
     """The landmarks of a file, or of a series of files of one moment each ("smile_%04d.mrk.json").
 

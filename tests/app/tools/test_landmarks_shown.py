@@ -1,0 +1,102 @@
+"""What the window says of landmarks in a frame, and which a click sets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from viewer.analysis.landmarks import Landmark
+from viewer.analysis.spot import Spot
+from viewer.analysis.track import Known, Track
+from viewer.app.desk import Desk
+from viewer.app.session import Session
+from viewer.app.tools.landmarks import Tool
+from viewer.app.tools.landmarks.shown import ShownLandmarks
+from viewer.app.tools.landmarks.words import gap_spans, place_words
+from viewer.document.landmarks import Landmarks
+from viewer.scan.units import Scale
+
+TIMES = np.arange(4) / 10
+MM = Scale.of("mm", None)
+
+
+def spot(frame: int) -> Spot:
+    covariance = (0.01, 0.0, 0.0, 0.04, 0.0, 0.01)
+    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), "surface", None, 0.5, 0, covariance)
+
+
+def track(*known: Known, reasons: dict[int, str] | None = None) -> Track:
+    empty = Track.pending(TIMES)
+    there = np.array(known) >= Known.TRACKED
+    positions, covariances = empty.positions.copy(), empty.covariances.copy()
+    positions[there], covariances[there] = (4.0, 5.0, 6.0), np.diag([1.0, 0.25, 0.04])
+    return Track(TIMES, positions, covariances, np.array(known, np.uint8), reasons or {})
+
+
+PLACED = Landmark("placed", keys=(spot(0),), missing=(3,))
+ALL = (PLACED, Landmark("later"), Landmark("left out", skipped=True))
+TRACKS = {
+    "placed": track(Known.PLACED, Known.TRACKED, Known.GAP, Known.GAP, reasons={2: "hidden"}),
+}
+
+
+def test_states_in_each_frame() -> None:
+    shown = [ShownLandmarks.of(ALL, TRACKS, frame) for frame in range(4)]
+    words = ["placed", "tracked", "gap: hidden", "missing in this frame"]
+    assert [one.state(0) for one in shown] == words
+    assert [one.is_there.tolist() for one in shown] == [[known, False, False] for known in (1, 1, 0, 0)]
+    assert (shown[0].state(1), shown[0].state(2)) == ("to place", "skipped")
+    assert ShownLandmarks.of(ALL, {}, 1).state(0) == "not tracked yet"
+    assert not np.isfinite(shown[2].positions).any(), "a gap is nowhere"
+
+
+def test_a_key_counts_before_what_was_tracked_until_it_is_tracked_anew() -> None:
+    moved = replace(PLACED, keys=(spot(0), spot(1)))
+    shown = ShownLandmarks.of((moved,), TRACKS, 1)
+    assert (shown.state(0), shown.positions[0].tolist()) == ("placed", [1.0, 2.0, 3.0])
+
+
+def test_places_are_told_as_well_as_they_are_known() -> None:
+    shown = ShownLandmarks.of(ALL, TRACKS, 0)
+    assert shown.sure[0] == pytest.approx(1.96 * 0.2)
+    assert place_words(shown, 0, MM) == "1.00, 2.00, 3.00 ± 0.39 mm"
+    assert place_words(shown, 0, Scale.of("mm", "cm")) == "0.100, 0.200, 0.300 ± 0.039 cm"
+    assert place_words(shown, 1, MM) == "", "where it is not known"
+
+
+def test_gaps_are_marked_in_runs() -> None:
+    other = Landmark("other", keys=(spot(0),))
+    tracks = {**TRACKS, "other": track(Known.PLACED, Known.TRACKED, Known.TRACKED, Known.GAP)}
+    spans = gap_spans((PLACED, other), tracks)
+    assert [(span.frames, span.words) for span in spans] == [
+        (range(2, 3), "Gap of placed"),
+        (range(3, 4), "Gap of placed, other"),
+    ]
+    assert [span.frames for span in gap_spans((PLACED,), TRACKS)] == [range(2, 4)]
+
+
+def test_clicks_set_what_is_next() -> None:
+    session = Session("scan")
+    playback = SimpleNamespace(pose=None)
+    box = SimpleNamespace(session=session, playback=playback, clicking="landmarks", redraw=lambda: None)
+    tool = Tool(Desk(box, "landmarks"))  # type: ignore[arg-type]
+    session.change("Begin", Landmarks(ALL, template="own"))
+    target = tool.target
+    assert target is not None
+    assert target.name == "later"
+    tool.set_missing()
+    assert tool.target is None, "what is missing here is not placed here"
+    session.history.undo()
+    tool.skip()
+    assert (tool.made.all[1].state, tool.target) == ("skipped", None)
+    session.history.undo()
+    target = tool.target
+    assert target is not None
+    assert target.name == "later", "what is taken back is next again"
+    session.change("Place", tool.made.with_landmark(target.with_key(spot(0))))
+    assert tool.target is None
+    tool.rename("final")
+    assert [one.name for one in tool.made.all] == ["placed", "final", "left out"]

@@ -1,0 +1,439 @@
+"""Landmarks: named places of the subject, placed by a click each and followed through time."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import ImVec2
+from imgui_bundle import icons_fontawesome_6 as icons
+from numpy.typing import NDArray
+
+from ....analysis.landmarks import Landmark, Template
+from ....analysis.landmarks.mirroring import Proposal, proposal_for
+from ....analysis.pick import are_seen
+from ....analysis.spot import Spot, moved_spot, spot_slack
+from ....document.landmarks import Landmarks
+from ....errors import InputError
+from ....geometry import Vector, vector
+from ....params import param
+from ....scan.times import frame_in_words
+from ...commands import Command, Menu
+from ...desk import Click, Desk, FrameSpan
+from ...scene.canvas import Canvas, ViewPlace
+from ...ui import Ui
+from . import overlay, panel
+from .exchange import Exchange
+from .following import Follower
+from .notebook import Notebook
+from .shown import ShownLandmarks
+from .words import gap_spans
+
+TITLE = "Landmarks"
+_GRAB = 0.7  # how near the mouse has to be to take hold of one, in heights of the font
+_OFF = 3.0, 0.03  # deviations, and shares of the scan's radius, that the surface may be off a mirrored place
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Choices that come back at the next start."""
+
+    follow: bool = param(True, "Follow landmarks through all frames as soon as they are placed")
+    names: bool = param(True, "Show names in the view, as far as there is room")
+    loupe: bool = param(True, "Magnify what is under the mouse while placing")
+
+
+class Tool:
+    """The tool that places landmarks. These are in the document.
+
+    selected: the name of the one that was placed or chosen last, "" for none. corrects: whether clicks set
+    that one, though it is placed or skipped. dragged: where the one that is dragged would be, in the
+    coordinates that the scan is shown in; None while none is.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.selected, self.corrects = "", False
+        self.dragged: Vector | None = None
+        self.follower = Follower(desk)
+        self.notebook = Notebook(desk)
+        self.exchange = Exchange(desk, self.begin)
+        self._pressed = ""  # the name of the one that the mouse went down on
+        self._shown: tuple[tuple[object, ...], ShownLandmarks] | None = None
+        self._seen: tuple[tuple[object, ...], NDArray[np.bool_]] | None = None
+        self._proposal: tuple[tuple[object, ...], Proposal | None] | None = None
+        self._spans: tuple[tuple[object, ...], list[FrameSpan]] = (), []
+        self._on_screen = np.empty((0, 2))
+        self._grab = 0.0  # pixels
+
+    # --- what there is ----------------------------------------------------------------
+
+    @property
+    def made(self) -> Landmarks:
+        """The landmarks of the open scan."""
+        return self.desk.document.part(Landmarks)
+
+    @property
+    def frame(self) -> int:
+        """The frame that is shown."""
+        return self.desk.index if self.desk.pose is None else self.desk.pose.index
+
+    @property
+    def shown(self) -> ShownLandmarks:
+        """The landmarks in the frame that is shown."""
+        of = self.made.all, self.desk.followed.tracks, self.frame
+        if self._shown is None or not _same(self._shown[0], of):
+            self._shown = of, ShownLandmarks.of(*of)
+        return self._shown[1]
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(N, 3): where they are in the picture, NaN where that is not known."""
+        pose = self.desk.pose
+        found = self.shown.positions
+        return found if pose is None else self.desk.motion(pose).points(found)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(N,): which are in the picture with nothing before them; found once a picture."""
+        viewport, shown = self.desk.viewport, self.shown
+        surface, request = viewport.surface, viewport.request
+        if surface is None or request is None or not viewport.is_there:
+            return shown.is_there
+        of = shown, request, surface
+        if self._seen is None or not _same(self._seen[0], of):
+            radius = viewport.bounds(request.pose).radius
+            slacks = [spot_slack(one.keys[0], radius) if one.keys else 0.0 for one in shown.landmarks]
+            seen = are_seen(surface, self.positions, np.array(slacks)) if slacks else shown.is_there
+            self._seen = of, seen
+        return self._seen[1]
+
+    @property
+    def target(self) -> Landmark | None:
+        """The landmark that a click sets: the chosen one, else the next that is to be placed."""
+        chosen = self.made.named(self.selected)
+        if chosen is not None:
+            waits = chosen.state == "to place" and self.frame not in chosen.missing
+            if self.corrects or waits:
+                return chosen
+        return self.made.next_to_place(self.frame, self.selected)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether clicks make landmarks of new names."""
+        return not self.made.template
+
+    @property
+    def proposal(self) -> Proposal | None:
+        """Place of the one that a click sets, as the mirror image of its partner, in scan coordinates;
+        None where that is not known, or it has a place in the frame."""
+        target, shown = self.target, self.shown
+        of = target, shown
+        if self._proposal is None or not _same(self._proposal[0], of):
+            template = self.exchange.templates.get(self.made.template)
+            listed = {one.name for one in template.landmarks} if template else set()
+            self._proposal = of, None if target is None else _mirrored(target, shown, listed)
+        return self._proposal[1]
+
+    # --- placing ----------------------------------------------------------------------
+
+    @property
+    def is_active(self) -> bool:
+        """Whether clicks in the view place landmarks."""
+        return self.desk.has_clicks and not self.notebook.is_pinning
+
+    def toggle(self) -> None:
+        """Take up the tool or put it away."""
+        was_active = self.is_active
+        self.abandon()
+        if was_active:
+            self.desk.leave_clicks()
+        else:
+            self.desk.take_clicks()
+            self.desk.reveal()
+
+    def pin_note(self) -> None:
+        """Have the next click pin a note."""
+        self.abandon()
+        self.notebook.is_pinning = True
+        self.desk.take_clicks()
+
+    def on_escape(self) -> bool:
+        """Put the tool away; whether it was taken up."""
+        was_active = self.desk.has_clicks
+        self.abandon()
+        self.desk.leave_clicks()
+        return was_active
+
+    def abandon(self) -> None:
+        """Let go of what was chosen and what is dragged."""
+        self.corrects, self.dragged, self.notebook.is_pinning = False, None, False
+
+    def prompt(self) -> str:
+        """The words that say what a click does."""
+        if self.notebook.is_pinning:
+            return "Note: click the place that it is of.  Esc ends."
+        target, names = self.target, [one.name for one in self.made.all]
+        if target is not None and target.state == "to place":
+            number = names.index(target.name) + 1
+            return f"{target.name} ({number} of {len(names)}): click its place.  Esc ends."
+        if target is not None:
+            return f"{target.name}: click its place in {frame_in_words(self.frame)}.  Esc ends."
+        if self.is_free:
+            return f"{self.made.free_name()}: click its place.  Esc ends."
+        return "All are placed: drag one to correct it, or choose one in the list.  Esc ends."
+
+    def on_click(self, click: Click) -> bool:
+        """Set the next one at what was clicked; raises InputError where it cannot be."""
+        if self.notebook.is_pinning:
+            self.notebook.pin(click)
+            self.desk.leave_clicks()
+            return True
+        target = self.target
+        if target is None and self._pressed:
+            self.selected = self._pressed
+            return True
+        if target is None and not self.is_free:
+            return False
+        self._set(target or Landmark(self.made.free_name()), click, "Place landmark")
+        return True
+
+    def _set(self, landmark: Landmark, click: Click, name: str, merge: object = None) -> None:
+        """Set one at what is seen, and go on to the next. name, merge: of the step of the history."""
+        if click.picked is None:
+            raise InputError("There is nothing to place a landmark on here.")
+        spot = moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
+        if click.through_gap:
+            self.desk.note("That was seen through a gap: the landmark is on the surface before it.")
+        self.corrects = self.corrects and bool(landmark.keys)
+        self.selected = landmark.name
+        self.desk.change(name, self.made.with_landmark(landmark.with_key(spot)), merge=merge)
+
+    def on_press(self, mouse: ImVec2) -> bool:
+        """Take hold of the one under the mouse, where one is."""
+        self._pressed = "" if self.notebook.is_pinning else self.under(mouse)
+        return bool(self._pressed)
+
+    def under(self, mouse: ImVec2) -> str:
+        """The name of the seen landmark that a place on the screen is on; "" where it is on none."""
+        if len(self._on_screen) != len(self.shown.landmarks) or not len(self._on_screen):
+            return ""
+        away = np.hypot(*(self._on_screen - (mouse.x, mouse.y)).T)
+        away[~self.seen | np.isnan(away)] = np.inf
+        nearest = int(away.argmin())
+        return self.shown.landmarks[nearest].name if away[nearest] <= self._grab else ""
+
+    def on_drag(self, click: Click, ends: bool) -> None:
+        """Show the one that is dragged where it would be, and set it where it is let go."""
+        landmark, picked = self.made.named(self._pressed), click.picked
+        self.dragged = None if ends or picked is None else picked.place
+        self.desk.redraw()
+        if ends and landmark is not None:
+            if picked is None:
+                raise InputError(f"There is nothing there: {landmark.name} stays where it was.")
+            self.corrects = False
+            self._set(landmark, click, "Move landmark")
+
+    def on_arrow(self, right: int, up: int) -> bool:
+        """Move the selected one by a pixel, along the surface that is seen; whether one is selected."""
+        number = self.shown.number(self.selected)
+        if number is None or not self.shown.is_there[number]:
+            return False
+        click = self.desk.seen_at(vector(self.positions[number]), (right, up)) if self.seen[number] else None
+        if click is None or click.pose.index != self.shown.frame:
+            raise InputError(f"{self.selected} is not seen from here: turn the view to move it.")
+        if click.picked is not None:
+            landmark = self.shown.landmarks[number]
+            self._set(landmark, click, "Nudge landmark", merge=("nudge", landmark.name, self.frame))
+        return True
+
+    def take_mirrored(self) -> None:
+        """Set the next one where the mirror image of its partner is, on the surface that is seen there."""
+        target, proposal, pose = self.target, self.proposal, self.desk.pose
+        if target is None or proposal is None or pose is None:
+            raise InputError("Nothing is mirrored here: its partner and a few others have to be placed.")
+        place = self.desk.motion(pose).points(proposal.position)
+        click = self.desk.seen_at(vector(place))
+        deviations, share = _OFF
+        most = deviations * np.nan_to_num(proposal.sigma) + share * self.desk.viewport.bounds(pose).radius
+        if click is None or click.picked is None or np.linalg.norm(click.picked.position - place) > most:
+            raise InputError(f"The mirrored place of {target.name} is not seen from here: turn the view.")
+        self._set(target, click, "Place landmark")
+
+    # --- the list ---------------------------------------------------------------------
+
+    def choose(self, name: str) -> None:
+        """Select one in the list: clicks set it, and the view goes where it is known."""
+        landmark = self.made.named(name)
+        if landmark is None:
+            return
+        self.selected = name
+        self.corrects = self.is_active and landmark.state != "to place"
+        number = self.shown.number(name)
+        if number is not None and self.shown.is_there[number]:
+            self._look_at(number)
+        elif landmark.keys:
+            nearest = min(landmark.keys, key=lambda key: abs(key.frame - self.frame))
+            self.desk.seek(nearest.frame)
+
+    def _look_at(self, number: int) -> None:
+        """Bring one into the middle of the view, where it is not seen."""
+        camera, place = self.desk.document.camera, vector(self.positions[number])
+        if camera is not None and not self.seen[number]:
+            self.desk.change("Look at landmark", camera=camera.centered(place), pivot=place)
+
+    def begin(self, template: Template | None) -> None:
+        """Have the landmarks of a template placed, or such of new names; and take up the tool."""
+        made = replace(self.made, template="") if template is None else self.made.begun_with(template)
+        self.desk.change("Choose template", made)
+        self.selected = ""
+        if not self.is_active:
+            self.toggle()
+
+    def change_selected(self, name: str, landmark: Landmark) -> None:
+        """Change the selected one. name: of the step of the history."""
+        self.corrects = False
+        self.desk.change(name, self.made.with_landmark(landmark))
+
+    def skip(self) -> None:
+        """Leave out the next one, or place it after all."""
+        if target := self.target:
+            self.selected = target.name
+            self.change_selected("Skip landmark", replace(target, skipped=not target.skipped))
+
+    def set_missing(self) -> None:
+        """Say that the one which a click sets, or the selected one, is not there in this frame."""
+        landmark = self.target or self.made.named(self.selected)
+        if landmark is not None:
+            self.selected = landmark.name
+            self.change_selected("Landmark missing", landmark.with_missing(self.frame))
+
+    def rename(self, name: str) -> None:
+        """Give the selected one another name. Raises InputError for one that is taken."""
+        name = name.strip()
+        if not name or name == self.selected:
+            return
+        if self.made.named(name) is not None:
+            raise InputError(f"There is a landmark '{name}' already.")
+        self.desk.change("Rename landmark", self.made.renamed(self.selected, name))
+        self.selected = name
+
+    def delete(self) -> None:
+        """Delete the selected one."""
+        if self.made.named(self.selected) is not None:
+            self.desk.change("Delete landmark", self.made.without_landmark(self.selected))
+            self.selected, self.corrects = "", False
+
+    def take_key_away(self) -> None:
+        """Take back that the selected one was set in this frame."""
+        if landmark := self.made.named(self.selected):
+            self.change_selected("Take landmark back", landmark.without_key(self.frame))
+
+    def has_key(self) -> bool:
+        """Whether the selected one was set in this frame."""
+        landmark = self.made.named(self.selected)
+        return landmark is not None and landmark.key_at(self.frame) is not None
+
+    # --- in the window ----------------------------------------------------------------
+
+    def panel(self, ui: Ui) -> None:
+        """Declare the section of the panel."""
+        panel.draw(self, ui)
+
+    def dialog(self) -> None:
+        """Declare the dialogs that name a file, while one is open."""
+        self.exchange.draw()
+
+    def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
+        """Draw landmarks and notes over the picture."""
+        self._grab = _GRAB * canvas.em
+        self._on_screen = view.all_on_screen(self.positions)
+        overlay.draw(self, self._on_screen, canvas, view)
+        self.notebook.draw_over(self.shown.frame, canvas, view)
+
+    def spans(self) -> list[FrameSpan]:
+        """The gaps, for the timeline."""
+        of = self.made.all, self.desk.followed.tracks
+        if not _same(self._spans[0], of):
+            self._spans = of, gap_spans(*of)
+        return self._spans[1]
+
+    def on_file(self, path: Path) -> bool:
+        """Read a file of landmarks; whether it is one."""
+        return self.exchange.take(path)
+
+    def advance(self, budget: float) -> bool:
+        """Have landmarks followed; whether something new was found."""
+        self.follower.advance(self.desk.settings.follow)
+        return False
+
+
+def _same(before: tuple[object, ...], now: tuple[object, ...]) -> bool:
+    """Whether each is the very object, or equal number, that it was before."""
+    return len(before) == len(now) and all(
+        one is other or (isinstance(one, int) and one == other)
+        for one, other in zip(before, now, strict=True)
+    )
+
+
+def _mirrored(target: Landmark, shown: ShownLandmarks, listed: Collection[str]) -> Proposal | None:
+    """The mirrored place of one that has none in the frame. listed: by the template, so that those without a
+    partner are of the midline; of others nobody knows."""
+    number = shown.number(target.name)
+    if not target.partner or (number is not None and shown.is_there[number]):
+        return None
+    partners = {one.name: one.partner for one in shown.landmarks if one.partner}
+    there = [(one.name, n) for n, one in enumerate(shown.landmarks) if shown.is_there[n]]
+    positions = {name: shown.positions[n] for name, n in there if name in partners or name in listed}
+    return proposal_for(target.name, positions, partners)
+
+
+def _while_active(name: str, title: str, act: object, key: str) -> Command[Tool]:
+    """A command on the landmark that is selected or placed next."""
+    return Command(name, title, act, key, can=lambda tool: tool.is_active)  # type: ignore[arg-type]
+
+
+COMMANDS = {
+    "Tools": (
+        Command(
+            "landmarks", "Place landmarks", Tool.toggle, "K",
+            is_on=lambda tool: tool.is_active, can=lambda tool: tool.desk.document.camera is not None,
+            short="Landmarks", icon=icons.ICON_FA_LOCATION_DOT,
+        ),
+        Menu("Landmarks", (
+            (
+                _while_active("skip_landmark", "Skip, or place after all", Tool.skip, "X"),
+                _while_active("missing_landmark", "Missing in this frame", Tool.set_missing, "Shift+X"),
+                _while_active("mirrored_landmark", "Take the mirrored place", Tool.take_mirrored, "A"),
+                Command(
+                    "delete_landmark", "Delete", Tool.delete, "Delete", can=lambda tool: bool(tool.selected)
+                ),
+                Command(
+                    "landmark_key", "Take back in this frame", Tool.take_key_away, "Shift+Delete",
+                    can=Tool.has_key,
+                ),
+            ),
+            (
+                Command("note_at_place", "Pin a note", Tool.pin_note, "J"),
+                Command(
+                    "note_at_frame", "Note on this frame",
+                    lambda tool: tool.notebook.add_to_frame(tool.frame), "Shift+J",
+                ),
+            ),
+            (
+                Command("read_landmarks", "Read...", lambda tool: tool.exchange.ask_to_read()),
+                Command(
+                    "save_landmarks", "Save...", lambda tool: tool.exchange.ask_to_save(),
+                    can=lambda tool: any(one.keys for one in tool.made.all),
+                ),
+            ),
+        )),
+    )
+}  # fmt: skip
+MOUSE = (
+    ("Click while placing", "Place the next landmark"),
+    ("Drag a landmark while placing", "Correct it in this frame"),
+    ("Arrows while placing", "Move the selected landmark by a pixel"),
+)

@@ -1,0 +1,141 @@
+"""Files of landmarks and templates: read and saved by dialogs, or dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ....analysis.landmarks import Landmark, Template
+from ....analysis.landmarks.files import (
+    holds_one_moment,
+    is_landmark_file,
+    landmark_suffixes,
+    read_landmarks,
+    write_landmarks,
+)
+from ....analysis.landmarks.landmark_set import LandmarkSet, told_apart
+from ....analysis.landmarks.placed import landmarks_of
+from ....analysis.landmarks.templates import is_template_file, read_template, templates
+from ....analysis.track import Track
+from ....bounds import Bounds
+from ....document.landmarks import Landmarks
+from ....errors import InputError
+from ....files import free_file, working_folder
+from ....scan.inputs import refuse_input
+from ....scan.timeline import Timeline
+from ....scan.times import frame_in_words
+from ...desk import Desk
+from ...read_dialog import ReadDialog
+from ...save_dialog import SaveDialog
+
+_USUAL = ".mrk.json"
+_SAMPLED = 8  # frames whose bounds stand for those of all
+
+
+class Exchange:
+    """Reads and saves landmarks of the open scan. templates: by name; those that were read too."""
+
+    def __init__(self, desk: Desk, begin: Callable[[Template], None]) -> None:
+        """begin: has the landmarks of a template placed."""
+        self._desk, self._begin = desk, begin
+        self.templates: dict[str, Template] = dict(templates())
+        written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
+        about = f"The ending tells the format: {_USUAL}, {', '.join(written)}"
+        self._saving = SaveDialog("Save landmarks", about, _USUAL, self._save, written)
+        about = "A file of landmarks, or a template of your own"
+        self._reading = ReadDialog("Read landmarks", about, ".json", self._read, landmark_suffixes())
+        self._doubted: Path | None = None  # file whose landmarks seem to be of another scan
+
+    def draw(self) -> None:
+        """Declare the dialogs that name a file, while one is open."""
+        self._saving.draw()
+        self._reading.draw()
+
+    def ask_to_save(self) -> None:
+        """Open the dialog that saves, with a name that is free."""
+        self._saving.ask(free_file(working_folder(), _USUAL))
+
+    def ask_to_read(self) -> None:
+        """Open the dialog that reads landmarks or a template."""
+        self._reading.ask(working_folder())
+
+    def take(self, path: Path) -> bool:
+        """Read a file that was opened or dropped; whether it holds landmarks or a template."""
+        if is_landmark_file(path):
+            self._read_landmarks(path)
+        elif is_template_file(path):
+            self._read_template(path)
+        else:
+            return False
+        return True
+
+    def _read(self, file: Path) -> None:
+        if not self.take(file):
+            raise InputError("holds no landmarks", file, f"Known: {', '.join(landmark_suffixes())}")
+
+    def _read_template(self, path: Path) -> None:
+        template = read_template(path)
+        self.templates[template.name] = template
+        self._begin(template)
+
+    def _read_landmarks(self, path: Path) -> None:
+        """Have a file read beside the window. One that seems to be of another scan is taken at the second
+        time."""
+        timeline, desk = self._desk.timeline, self._desk
+        frame = desk.index if desk.pose is None else desk.pose.index
+        unit, known, is_sure = desk.unit, desk.document.part(Landmarks).all, path == self._doubted
+        self._doubted = path
+
+        def read() -> tuple[LandmarkSet, tuple[Landmark, ...]]:
+            found = read_landmarks(path, unit)
+            problem = None if is_sure else told_apart(found, _bounds(found, timeline, frame))
+            if problem is not None:
+                raise InputError(problem, path, "Read it again to take them all the same")
+            return found, landmarks_of(found, timeline.visit, len(timeline), frame, known)
+
+        def take(result: tuple[LandmarkSet, tuple[Landmark, ...]]) -> None:
+            found, landmarks = result
+            self._doubted = None
+            if self._desk.timeline is timeline:
+                self._add(path, found, landmarks)
+
+        desk.run(f"Reading {path.name}", read, take)
+
+    def _add(self, path: Path, found: LandmarkSet, landmarks: tuple[Landmark, ...]) -> None:
+        made = self._desk.document.part(Landmarks)
+        for landmark in landmarks:
+            made = made.with_landmark(landmark)
+        self._desk.change("Read landmarks", made)
+        self._desk.reveal()
+        for text in found.told:
+            self._desk.note(f"{path.name}: {text}.")
+        self._desk.note(f"Read {len(landmarks)} landmarks of {path.name}.")
+
+    def _save(self, file: Path) -> None:
+        timeline, desk = self._desk.timeline, self._desk
+        refuse_input(file, timeline)
+        landmarks, tracks = desk.document.part(Landmarks).all, desk.followed.tracks
+        frame, unit = desk.index if desk.pose is None else desk.pose.index, desk.unit
+        is_one, is_whole = holds_one_moment(file), all(track.is_whole for track in tracks.values())
+
+        def save() -> str | None:
+            pending = Track.pending(timeline.times)
+            all_tracks = {one.name: tracks.get(one.name, pending) for one in landmarks}
+            found = LandmarkSet.of_tracks(all_tracks, unit, {one.name: one.about for one in landmarks})
+            return write_landmarks(file, found.at(frame) if is_one else found)
+
+        def tell(remark: str | None) -> None:
+            frames = frame_in_words(frame) if is_one else f"{len(timeline)} frames"
+            gaps = "" if is_one or is_whole else "; some frames are not followed yet, and are gaps in it"
+            desk.note(f"Saved {file}, {frames}{gaps}." + (f" {remark}" if remark else ""))
+
+        desk.run(f"Saving {file.name}", save, tell)
+
+
+def _bounds(found: LandmarkSet, timeline: Timeline, frame: int) -> Bounds:
+    """The bounds of the frames that landmarks are of, or of some of many."""
+    frames = (
+        [index for index in found.frames.tolist() if 0 <= index < len(timeline)] if found.is_framed else []
+    )
+    frames = (frames or [frame])[:: max(1, len(frames) // _SAMPLED)]
+    return Bounds.around([timeline.visit(index).bounds for index in frames])

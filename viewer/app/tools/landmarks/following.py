@@ -1,0 +1,88 @@
+"""Landmarks tracked beside the window: only what has changed, and first the frame that is looked at."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+
+from ....analysis.landmarks import Landmark
+from ....analysis.track import Track
+from ....document.landmarks import Landmarks
+from ....scan.timeline import Timeline
+from ....task import Task
+from ...desk import Desk
+from .exact import Tracker
+
+_CALM = 0.2  # seconds without a change of the landmarks before they are tracked anew
+
+
+class Follower:
+    """Has the landmarks of the open scan tracked, and tells all tools (`desk.followed`).
+
+    is_stopped: whether the user has cancelled it, until landmarks change or `resume` is called.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self.is_stopped = False
+        self._timeline: Timeline | None = None
+        self._landmarks: Sequence[Landmark] | None = None
+        self._tracker: Tracker | None = None
+        self._task: Task | None = None
+        self._is_done = False
+        self._begins_at = 0.0  # by the clock
+        self._looked_at = -1
+
+    @property
+    def is_running(self) -> bool:
+        """Whether landmarks are being tracked."""
+        return any(work.task is self._task for work in self._desk.works)
+
+    def resume(self) -> None:
+        """Go on after the user has cancelled it."""
+        self.is_stopped, self._begins_at = False, 0.0
+
+    def advance(self, is_wanted: bool) -> bool:
+        """Take in what was found, and have done what is left to do; whether there is something new.
+
+        is_wanted: whether anything is to be tracked now.
+        """
+        timeline, landmarks = self._desk.timeline, self._desk.document.part(Landmarks).all
+        if timeline is not self._timeline or landmarks is not self._landmarks:
+            self._take_up(timeline, landmarks)
+        if self._task is not None and not self.is_running:
+            self.is_stopped |= self._task.cancelled
+            self._is_done, self._task = True, None
+        if self._tracker is not None:
+            self._go_on(self._tracker, is_wanted)
+        found: Mapping[str, Track] = self._tracker.tracks if self._tracker else {}
+        self._desk.followed.is_busy = self.is_running
+        return self._desk.followed.take_tracks(found)
+
+    def _take_up(self, timeline: Timeline, landmarks: Sequence[Landmark]) -> None:
+        """Begin with other landmarks, and keep what still holds of the same scan."""
+        if self._task is not None:
+            self._task.cancel()
+        known = self._tracker if timeline is self._timeline else None
+        self._timeline, self._landmarks = timeline, landmarks
+        self._task, self._tracker, self._is_done, self.is_stopped = None, None, False, False
+        self._begins_at = time.monotonic() + _CALM
+        if any(landmark.keys for landmark in landmarks):
+            self._looked_at = self._desk.index
+            self._tracker = Tracker(timeline, landmarks, first=self._looked_at, known=known)
+
+    def _go_on(self, tracker: Tracker, is_wanted: bool) -> None:
+        if self._desk.index != self._looked_at:
+            self._looked_at = self._desk.index
+            tracker.look_at(self._looked_at)
+        waits = self.is_stopped or self._is_done or time.monotonic() < self._begins_at
+        if is_wanted and self._task is None and not waits:
+            if all(track.is_whole for track in tracker.tracks.values()):
+                self._is_done = True
+                return
+
+            def follow() -> None:
+                for _ in tracker.run():
+                    pass
+
+            self._task = self._desk.run("Following landmarks", follow, lambda _: None)

@@ -1,0 +1,152 @@
+"""Landmarks in the panel: which are to be placed, their list, what is said of the selected one, notes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from imgui_bundle import ImVec2, imgui
+
+from ....analysis.track import Known
+from ....files import printable
+from ... import widgets
+from ...ui import Ui
+from .words import place_words
+
+if TYPE_CHECKING:
+    from . import Tool
+
+_ROWS = 6  # of the list that are shown at once
+_COLORS = {Known.PLACED: 0x8DE36B, Known.TRACKED: 0xF2C14E, Known.GAP: 0xE0A03E, Known.PENDING: 0x969CA6}
+_FREE = "Free names"
+
+
+def draw(tool: Tool, ui: Ui) -> None:
+    """Declare the section of the panel."""
+    _draw_template(tool)
+    words = "Stop placing" if tool.is_active else "Place"
+    if imgui.button(f"{words}###landmarks", ui.button_size(3)):
+        tool.toggle()
+    ui.tooltip("Click each landmark's place in the view, one after the other", "landmarks")
+    imgui.begin_disabled(not tool.is_active)
+    imgui.same_line()
+    if imgui.button("Skip", ui.button_size(2)):
+        tool.skip()
+    ui.tooltip("Leave out the next one, or place it after all", "skip_landmark")
+    imgui.same_line()
+    if imgui.button("Missing", ui.button_size(1)):
+        tool.set_missing()
+    ui.tooltip("It cannot be seen in this frame, and is a gap there", "missing_landmark")
+    imgui.end_disabled()
+    if tool.is_active and tool.proposal is not None and tool.target is not None:
+        if imgui.button("Take the mirrored place", ui.button_size(1)):
+            tool.take_mirrored()
+        ui.tooltip(f"{tool.target.name} as the mirror image of {tool.target.partner}", "mirrored_landmark")
+    if tool.is_active and tool.target is not None and tool.target.about:
+        widgets.faint(tool.target.about)
+    if tool.made.all:
+        _draw_list(tool)
+    else:
+        widgets.faint("No landmarks yet. Choose a template, or press Place and click places on the surface.")
+    if tool.selected:
+        _draw_selected(tool, ui)
+    _draw_following(tool)
+    imgui.separator_text("Notes")
+    if imgui.button("Pin a note", ui.button_size(2)):
+        tool.pin_note()
+    ui.tooltip("Click the place that it is of", "note_at_place")
+    imgui.same_line()
+    if imgui.button("Note on the frame", ui.button_size(1)):
+        tool.notebook.add_to_frame(tool.frame)
+    ui.tooltip("A note on the whole of this frame", "note_at_frame")
+    tool.notebook.draw_list()
+    tool.desk.settings = widgets.edit(tool.desk.settings, type(tool.desk.settings)())
+
+
+def _draw_template(tool: Tool) -> None:
+    known = tool.exchange.templates
+    titles = {"": _FREE, **{name: template.title for name, template in known.items()}}
+    widgets.label("Template", "The landmarks that are to be placed, in their order")
+    chosen = tool.made.template
+    if imgui.begin_combo("##template", titles.get(chosen, chosen)):
+        for name, title in titles.items():
+            if imgui.selectable(f"{title}###template {name}", name == chosen)[0] and name != chosen:
+                tool.begin(known.get(name))
+        imgui.end_combo()
+
+
+def _draw_list(tool: Tool) -> None:
+    """Declare a row of two lines for each: name and state, place and uncertainty; only those in sight are
+    gone through."""
+    shown, height = tool.shown, 2 * imgui.get_text_line_height_with_spacing()
+    size = ImVec2(0, min(len(shown.landmarks), _ROWS) * height + 2 * imgui.get_style().window_padding.y)
+    flags = imgui.ChildFlags_.borders | imgui.ChildFlags_.nav_flattened
+    if imgui.begin_child("landmarks", size, flags):
+        clipper = imgui.ListClipper()
+        clipper.begin(len(shown.landmarks), height)
+        while clipper.step():
+            for number in range(clipper.display_start, clipper.display_end):
+                imgui.push_id(number)
+                _draw_row(tool, number, height)
+                imgui.pop_id()
+    imgui.end_child()
+
+
+def _draw_row(tool: Tool, number: int, height: float) -> None:
+    shown, em, gap = tool.shown, imgui.get_font_size(), imgui.get_style().item_spacing
+    landmark, target = shown.landmarks[number], tool.target if tool.is_active else None
+    corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    is_chosen = landmark.name == (target.name if target else tool.selected)
+    if imgui.selectable("##row", is_chosen, size=ImVec2(width, height - gap.y))[0]:
+        tool.choose(landmark.name)
+    if landmark.about:
+        widgets.tooltip(landmark.about)
+    draw_list, faint = imgui.get_window_draw_list(), imgui.get_color_u32(imgui.Col_.text_disabled)
+    color = _COLORS[Known(int(shown.known[number]))] if landmark.keys else None
+    widgets.dot(corner + ImVec2(0.5 * em, 0.5 * imgui.get_text_line_height()), color)
+    left, state = corner.x + 1.2 * em, shown.state(number)
+    room = corner.x + width - left - gap.x
+    state = widgets.fitted(state, 0.6 * room)
+    right = corner.x + width - imgui.calc_text_size(state).x
+    name = widgets.fitted(printable(landmark.name), right - left - gap.x)
+    draw_list.add_text(ImVec2(left, corner.y), imgui.get_color_u32(imgui.Col_.text), name)
+    draw_list.add_text(ImVec2(right, corner.y), faint, state)
+    words = widgets.fitted(place_words(shown, number, tool.desk.scale), room)
+    below = corner.y + imgui.get_text_line_height_with_spacing()
+    draw_list.add_text(ImVec2(left, below), faint, words)
+
+
+def _draw_selected(tool: Tool, ui: Ui) -> None:
+    """Declare what can be done with the selected one."""
+    landmark = tool.made.named(tool.selected)
+    if landmark is None:
+        return
+    imgui.separator_text("Selected")
+    imgui.set_next_item_width(-1)
+    entered, name = imgui.input_text("##name", landmark.name, imgui.InputTextFlags_.enter_returns_true.value)
+    widgets.tooltip("Its name; Enter changes it")
+    imgui.begin_disabled(not tool.has_key())
+    if imgui.button("Take back here", ui.button_size(2)):
+        tool.take_key_away()
+    ui.tooltip("Undo that it was set in this frame", "landmark_key")
+    imgui.end_disabled()
+    imgui.same_line()
+    if imgui.button("Delete", ui.button_size(1)):
+        tool.delete()
+    ui.tooltip("Delete it, with its measures; undo brings it back", "delete_landmark")
+    if entered:
+        tool.rename(name)
+
+
+def _draw_following(tool: Tool) -> None:
+    """Say how far landmarks are followed through time."""
+    if len(tool.desk.timeline) < 2 or not tool.desk.followed.tracks:
+        return
+    tracks = tool.desk.followed.tracks.values()
+    pending = sum(not track.is_whole for track in tracks)
+    if tool.follower.is_running:
+        widgets.faint(f"Following {pending} of {len(tracks)} landmarks through all frames ...")
+    elif pending and tool.follower.is_stopped:
+        if imgui.button("Go on following"):
+            tool.follower.resume()
+    elif pending:
+        widgets.faint(f"{pending} of {len(tracks)} landmarks are not followed through all frames.")

@@ -1,0 +1,88 @@
+"""Landmarks as they stand in one frame: where they are, how sure that is, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....analysis.landmarks import Landmark
+from ....analysis.pick import SURE
+from ....analysis.track import Known, Track
+
+MISSING = "missing in this frame"
+
+
+@dataclass(frozen=True, eq=False)
+class ShownLandmarks:
+    """The landmarks of a document in one frame.
+
+    positions: (N, 3) scan coordinates, NaN where they are not known. known: (N,) uint8 of `Known`; GAP also
+    where the user says that it is not there. sure: (N,) how far off a place is at most with 95 %, along the
+    line on which that is worst, scan units; NaN where not known. spacings: (N,) at their keys, 0 where not
+    known.
+    """
+
+    frame: int
+    landmarks: Sequence[Landmark]
+    positions: NDArray[np.float64]
+    known: NDArray[np.uint8]
+    sure: NDArray[np.float64]
+    spacings: NDArray[np.float64]
+    reasons: Mapping[int, str]
+
+    @classmethod
+    def of(cls, landmarks: Sequence[Landmark], tracks: Mapping[str, Track], frame: int) -> ShownLandmarks:
+        """The landmarks in a frame: as they were set there, else as they were tracked."""
+        count = len(landmarks)
+        positions, spreads = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
+        known, spacings = np.zeros(count, np.uint8), np.zeros(count)
+        reasons: dict[int, str] = {}
+        for number, landmark in enumerate(landmarks):
+            if not landmark.keys:
+                continue
+            spacings[number] = landmark.keys[0].spacing or 0.0
+            track = tracks.get(landmark.name)
+            if frame in landmark.missing:
+                known[number] = Known.GAP
+            elif (key := landmark.key_at(frame)) is not None:
+                positions[number], known[number] = key.position, Known.PLACED
+                if key.spread is not None:
+                    spreads[number] = key.spread
+            elif track is not None:
+                known[number] = track.known[frame]
+                positions[number], spreads[number] = track.positions[frame], track.covariances[frame]
+                if known[number] == Known.GAP:
+                    reasons[number] = track.reasons.get(frame, "")
+        return cls(frame, landmarks, positions, known, _largest(spreads), spacings, reasons)
+
+    @property
+    def is_there(self) -> NDArray[np.bool_]:
+        """(N,): which have a place in the frame."""
+        return self.known >= Known.TRACKED
+
+    def number(self, name: str) -> int | None:
+        """Find a landmark in the arrays by its name; None where there is none."""
+        return next((n for n, landmark in enumerate(self.landmarks) if landmark.name == name), None)
+
+    def state(self, number: int) -> str:
+        """Tell how one stands, in words."""
+        landmark, known = self.landmarks[number], Known(int(self.known[number]))
+        if self.frame in landmark.missing:
+            return MISSING
+        if not landmark.keys:
+            return landmark.state
+        if known is Known.GAP:
+            reason = self.reasons.get(number, "")
+            return f"gap: {reason}" if reason else "gap"
+        return {Known.PENDING: "not tracked yet", Known.TRACKED: "tracked", Known.PLACED: "placed"}[known]
+
+
+def _largest(spreads: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The deviations that 95 % do not exceed, along the lines on which they are largest, (N,)."""
+    found = np.full(len(spreads), np.nan)
+    there = np.isfinite(spreads).all(axis=(1, 2))
+    found[there] = SURE * np.sqrt(np.maximum(np.linalg.eigvalsh(spreads[there])[:, -1], 0))
+    return found

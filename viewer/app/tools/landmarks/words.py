@@ -1,0 +1,47 @@
+"""What is said of landmarks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from ....analysis.landmarks import Landmark
+from ....analysis.track import Known, Track
+from ....scan.units import Scale
+from ...desk import FrameSpan
+from .shown import ShownLandmarks
+
+_GAP_COLOR = 0xE0A03E
+_DECIMALS = 6  # at most
+_MOST_NAMED = 4  # of the landmarks that are gaps in a frame
+
+
+def place_words(shown: ShownLandmarks, number: int, scale: Scale) -> str:
+    """The position of one and its uncertainty with 95 %; "" where it is not known."""
+    if not shown.is_there[number]:
+        return ""
+    sure, factor = float(shown.sure[number]), scale.factor
+    decimals = min(max(1 - math.floor(math.log10(factor * sure)), 0), _DECIMALS) if sure > 0 else _DECIMALS
+    place = ", ".join(f"{factor * v:.{decimals}f}" for v in shown.positions[number])
+    return f"{place} ± {factor * sure:.2g} {scale.unit}" if sure > 0 else f"{place} {scale.unit}"
+
+
+def gap_spans(landmarks: Iterable[Landmark], tracks: Mapping[str, Track]) -> list[FrameSpan]:
+    """The runs of frames in which the same landmarks are gaps, for the timeline."""
+    by_frame: dict[int, list[str]] = {}
+    for landmark in landmarks:
+        track = tracks.get(landmark.name)
+        if track is not None:
+            for frame in (track.known == Known.GAP).nonzero()[0].tolist():
+                by_frame.setdefault(frame, []).append(landmark.name)
+    spans: list[FrameSpan] = []
+    last: Sequence[str] = ()
+    for frame, names in sorted(by_frame.items()):
+        if spans and spans[-1].frames.stop == frame and names == last:
+            spans[-1] = FrameSpan(range(spans[-1].frames.start, frame + 1), _GAP_COLOR, spans[-1].words)
+        else:
+            more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+            words = f"Gap of {', '.join(names[:_MOST_NAMED])}{more}"
+            spans.append(FrameSpan(range(frame, frame + 1), _GAP_COLOR, words))
+        last = names
+    return spans
