@@ -139,6 +139,36 @@ class View:
         in_picture = ((pixels >= 0) & (pixels < self.size)).all(axis=1)
         return in_picture & (depth >= self.near) & (depth <= self.far)
 
+    def holds(self, positions: NDArray[np.floating]) -> bool:
+        """Whether all points (N, 3), relative to the origin, and so all between them, are in the picture and
+        its depth range."""
+        return bool(self.contains(positions).all())
+
+    def may_show(
+        self, low: NDArray[np.floating], high: NDArray[np.floating], margin: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Tell which boxes, (N, 3) corners relative to the origin, the picture and its depth range may reach
+        into: none that it does is left out; (N,). margin: pixels beyond the picture's edges."""
+        left, top = self.center + margin
+        right, bottom = self.size - self.center + margin
+        # Half-spaces a x + b y + c depth + d >= 0 of view space, whose common part is what is seen.
+        sides = (
+            (self.scale, 0, left),
+            (-self.scale, 0, right),
+            (0, -self.scale, top),
+            (0, self.scale, bottom),
+        )
+        if self.perspective:
+            planes = [(a, b, c, 0.0) for a, b, c in sides]
+        else:
+            planes = [(a, b, 0.0, c) for a, b, c in sides]
+        planes += [(0, 0, 1, -self.near), (0, 0, -1, self.far)]
+        walls = np.array(planes) * (1, 1, -1, 1)  # depth is -z
+        normals, constants = walls[:, :3] @ self.rotation, walls[:, 3] + walls[:, :3] @ self.translation
+        middles, halves = (low + high) / 2, (high - low) / 2
+        nearest = middles @ normals.T + halves @ np.abs(normals).T + constants
+        return nearest.min(axis=1) >= 0
+
     def faces_away(self, positions: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Tell which points (N, 3), relative to the origin, have a normal (N, 3) that points away from the
         eye; those without one do not."""

@@ -76,10 +76,20 @@ class Points:
     colored: bool = False
 
     @classmethod
-    def of(cls, pose: GpuPose, surface: Surface, share: float, use_radii: bool) -> Points:
-        """A share of the points, as `Surface.take_sample` chooses them; 1: all."""
-        rows, count = surface.take_sample(share)
-        return cls(pose, use_radii, count, rows, math.sqrt(len(pose.cloud) / count) if count else 1.0)
+    def of(
+        cls,
+        pose: GpuPose,
+        surface: Surface,
+        share: float,
+        use_radii: bool,
+        margin: float | None = None,
+        reach: float = 0.0,
+    ) -> Points:
+        """A share of the points, as `Surface.take_sample` chooses them; 1: all. margin, reach: as there, of
+        all points; those of a share are larger, and reach as much farther."""
+        enlarged = 1 / math.sqrt(share)
+        rows, count = surface.take_sample(share, margin, enlarged * reach)
+        return cls(pose, use_radii, count, rows, enlarged if surface.stats.share < 1 else 1.0)
 
     @property
     def packed(self) -> bool:

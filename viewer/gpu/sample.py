@@ -74,6 +74,32 @@ def sample_of(gpu: Gpu) -> Sample:
     return gpu.keep(Sample)
 
 
+class RowList:
+    """Rows as texels, one list at a time."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._capacity = 0
+        self._rows: NDArray[np.uint32] | None = None
+        self._texels: gl.BufferTexture | None = None
+
+    def write(self, rows: NDArray[np.uint32]) -> gl.BufferTexture:
+        """The list, made of these rows, (N,)."""
+        if self._texels is None or len(rows) > self._capacity:
+            self._gpu.discard(self._texels)
+            self._capacity = max(int(len(rows) * _GROWTH), 1)  # a buffer of no bytes is not allowed
+            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * self._capacity), gl.R32UI)
+        if rows is not self._rows and len(rows):
+            self._texels.buffer.write(rows)
+        self._rows = rows
+        return self._texels
+
+
+def row_list(gpu: Gpu) -> RowList:
+    """The list of rows in view that all backends on this context share."""
+    return gpu.keep(RowList)
+
+
 def _sampled_rows(count: int, share: float) -> NDArray[np.uint32]:
     starts = range(0, count, _CHUNK)
     chunks = (np.arange(start, min(start + _CHUNK, count), dtype=np.uint32) for start in starts)

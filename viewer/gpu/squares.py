@@ -48,10 +48,11 @@ def draw_squares(
     point_size: edge, pixels; 0: as far as the next point. share: of the points that are drawn. shown: R32UI,
     a texel a row, 0 where a point is left out; None: none is.
     """
-    rows, count = surface.take_sample(share)
     size = point_size or _touching(pose, surface.view)
-    if rows is not None:
-        size = min(round(size * math.sqrt(len(pose.cloud) / count)), LARGEST_SQUARE)
+    rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
+    is_sample = surface.stats.share < 1
+    if is_sample:
+        size = min(round(size / math.sqrt(surface.stats.share)), LARGEST_SQUARE)
     sparse = count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
 
     def bind(_: Program) -> None:
@@ -67,7 +68,7 @@ def draw_squares(
     scatter(pose.gpu, visits, surface.depths, surface.rows, listed)
     if sparse:
         surface.stats.skipped["compact"] = "few points: they list the pixels themselves"
-    return rows is not None
+    return is_sample
 
 
 def _touching(pose: GpuPose, view: View) -> int:

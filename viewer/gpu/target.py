@@ -19,11 +19,12 @@ from ..view import View
 from . import gl
 from .bindings import Storage, Texture, UniformBlock
 from .blocks import BlockBuffer
+from .chunks import Chunks
 from .compact import IndexList, list_covered
 from .constants import NO_DEPTH, NOTHING
 from .context import Gpu, Resource, Workspace
 from .pose import GpuPose
-from .sample import sample_of
+from .sample import is_sampled, row_list, sample_of
 from .stats import Stats
 from .view import ViewBlock
 
@@ -166,10 +167,25 @@ class RenderTarget:
             self._covered_known = True
         return self.covered
 
-    def take_sample(self, share: float) -> tuple[gl.BufferTexture | None, int]:
+    def take_sample(
+        self, share: float, margin: float | None = None, reach: float = 0.0
+    ) -> tuple[gl.BufferTexture | None, int]:
         """The rows to draw in place of all, for a backend that is asked for a share of the points:
-        (their list, ascending; None where it is all of them, how many there are). Counts the others."""
+        (their list, ascending; None where it is all of them, how many there are). Counts the others.
+
+        margin, reach: how many pixels, and scan units, beyond the picture a point may be that it shows;
+        points in chunks beyond are not listed. None for a backend that looks at points wherever they are.
+        """
         count = len(self._cloud) if self.samples is None else int(self.samples.firsts[-1])
+        near = None
+        if margin is not None and self.samples is None:
+            near = self.pose.keep(Chunks).rows_in(self.view, margin, reach)
+        if near is not None:
+            self.stats.skipped["points"] = f"{count - len(near):,} of {count:,} are in chunks out of view"
+            if share < 1:
+                near = near[is_sampled(near, share)]
+                self.stats.share, self.stats.left_out = share, count - round(count * share)
+            return row_list(self.gpu).write(near), len(near)
         if share >= 1 or count < _FEW:
             return None, count
         rows, drawn = sample_of(self.gpu).take(share, count)

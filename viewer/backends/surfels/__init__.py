@@ -154,7 +154,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     instancing = _instancing(params, surface)
     surface.stats.faces_away = params.cull_back
     _splat(points, surface, params, instancing, uniform_radius)
-    return points.rows is not None or not known
+    return surface.stats.share < 1 or not known
 
 
 def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, float, bool]:
@@ -166,15 +166,24 @@ def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, 
         known = gaps.find(pose, wait=frame.budget_ms is None)
         own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
-            points = Points.of(pose, surface, frame.share, use_radii=True)
+            points = _in_view(pose, frame, surface, gaps.largest, use_radii=True)
             buffers = {**points.buffers, "radii": gaps.texels}
             if own:
                 surface.stats.chosen["radius"] = "as large as gaps, of which the scan's leave some"
             return replace(points, buffers=buffers), gaps.usual, True
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)
-    points = Points.of(pose, surface, frame.share, use_radii=own)
-    return points, 0.0 if suffices else _uniform_radius(pose), known
+    uniform = 0.0 if suffices else _uniform_radius(pose)
+    largest = max(uniform, pose.cloud.longest_reach() if own else 0.0)
+    return _in_view(pose, frame, surface, largest, own), uniform, known
+
+
+def _in_view(pose: GpuPose, frame: FrameView, surface: Surface, largest: float, use_radii: bool) -> Points:
+    """The points whose discs the picture may show. largest: of their radii, scan units."""
+    params: Params = frame.params
+    margin, reach = _splats(params, 0.0).least_radius, params.radius_scale * largest
+    larger = max(params.enlarge, 1.0)
+    return Points.of(pose, surface, frame.share, use_radii, larger * margin, larger * reach)
 
 
 def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:

@@ -1,0 +1,136 @@
+"""Chunks of points: what a picture cannot show is not looked at, and the picture is the same."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewer.backends import backend
+from viewer.bounds import Bounds
+from viewer.camera import Camera
+from viewer.frame import Request, render_frame
+from viewer.gpu import chunks
+from viewer.gpu.chunks import in_coarse_order, in_file_order
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.view import View
+
+COUNT, SIZE = 30_000, (120, 80)
+
+
+def sphere(order: str) -> PointCloud:
+    """A sphere of radius 1 whose points come in bands, as a scanner has them, or by chance."""
+    rng = np.random.default_rng(3)
+    points = rng.standard_normal((COUNT, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    if order == "bands":
+        points = points[np.lexsort((points[:, 0], np.floor(points[:, 1] * 4)))]
+    return PointCloud.from_arrays(
+        points.astype(np.float32), normals=points, colors=points * 0.5 + 0.5, origin=np.array([1e6, 0, -1e6])
+    )
+
+
+def camera_in(cloud: PointCloud, azimuth: float = 0.0) -> Camera:
+    """A camera near the surface that sees a part of it."""
+    outside = Camera.orbit(cloud.bounds(), azimuth, 10, aspect=1.5)
+    eye, target = np.array(outside.eye), np.array(outside.target)
+    near = target + (eye - target) * 0.35
+    return replace(outside, eye=tuple(near), target=tuple(near + np.array([0.3, 0.1, -0.5])))
+
+
+def drawn(renderer: Renderer, request: Request, share: float = 1.0) -> tuple[Any, ...]:
+    surface = Surface(renderer.gpu, SIZE)
+    while render_frame(renderer, request, surface, share=share) and share == 1:
+        pass
+    found = surface.image(), surface.id, surface.depth, surface.stats.skipped.get("points")
+    surface.release()
+    return found
+
+
+@pytest.mark.parametrize("order", ["bands", "chance"])
+@pytest.mark.parametrize(
+    ("name", "params"),
+    [
+        ("points", {}),
+        ("points", {"point_size": 9}),
+        ("surfels", {}),
+        ("surfels", {"passes": "two", "enlarge": 2.0}),
+    ],
+    ids=str,
+)
+def test_pictures_are_the_same_to_the_bit(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, name: str, params: dict[str, Any], order: str
+) -> None:
+    cloud = sphere(order)
+    pose = Pose(0, 0.0, order, cloud)
+    request = Request(pose, camera_in(cloud), name, backend(name).params(params), Look(light="head"))
+    whole = [drawn(renderer, request, share) for share in (1.0, 0.4)]
+    monkeypatch.setattr(chunks, "LEAST", 1)
+    monkeypatch.setattr(chunks, "CHUNK", 256)
+    drawn(renderer, request)
+    end = time.monotonic() + 60
+    while drawn(renderer, request)[-1] is None and time.monotonic() < end:
+        time.sleep(0.05)  # until points are in order
+    parts = [drawn(renderer, request, share) for share in (1.0, 0.4)]
+    for one, other in zip(whole, parts, strict=True):
+        assert one[-1] is None
+        assert "out of view" in other[-1]
+        for before, after in zip(one[:-1], other[:-1], strict=True):
+            assert (before == after).all()
+
+
+def test_a_picture_of_nothing_looks_at_no_point(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "LEAST", 1)
+    cloud = sphere("bands")
+    camera = Camera.orbit(cloud.bounds(), 0, 0, aspect=1.5)
+    away = replace(camera, target=tuple(2 * np.array(camera.eye) - np.array(camera.target)))
+    _, ids, _, told = drawn(renderer, Request(Pose(0, 0.0, "", cloud), away, "points"))
+    assert (ids == 0xFFFFFFFF).all()
+    assert told == f"{COUNT:,} of {COUNT:,} are in chunks out of view"
+
+
+def test_orders_hold_each_point_once_and_boxes_hold_theirs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "CHUNK", 256)
+    cloud = sphere("chance")
+    file, coarse = in_file_order(cloud), in_coarse_order(cloud)
+    assert file.is_scattered
+    assert not coarse.is_scattered
+    assert coarse.rows is not None
+    assert (np.sort(coarse.rows) == np.arange(COUNT)).all()
+    for ordered in (file, coarse):
+        for chunk in range(-(-COUNT // 256)):
+            rows = ordered.rows_of(np.array([chunk]), COUNT)
+            assert (np.diff(rows.astype(int)) > 0).all()
+            points = cloud.positions[rows]
+            assert (points.min(axis=0) == ordered.low[chunk]).all()
+            assert (points.max(axis=0) == ordered.high[chunk]).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["perspective", "orthographic"]))
+def test_no_box_with_a_point_in_view_is_left_out(seed: int, projection: Any) -> None:
+    rng = np.random.default_rng(seed)
+    eye, target = rng.normal(size=(2, 3))
+    camera = Camera(tuple(eye), tuple(target), (0, 1, 0), projection, near=0.05, far=3.0)
+    view = View.of(camera, SIZE, np.zeros(3), Bounds(-np.ones(3), np.ones(3)))
+    points = rng.normal(size=(400, 3))
+    low, high = points - rng.random((400, 3)), points + rng.random((400, 3))
+    assert view.may_show(low, high)[view.contains(points)].all()
+    far = points + 50 * (target - eye) / np.linalg.norm(target - eye)
+    assert not view.may_show(far, far).any()
+
+
+def test_what_holds_the_corners_holds_all_between() -> None:
+    view = View.of(
+        Camera((0, 0, 5), (0, 0, 0), (0, 1, 0)), SIZE, np.zeros(3), Bounds(-np.ones(3), np.ones(3))
+    )
+    assert view.holds(Bounds(-0.5 * np.ones(3), 0.5 * np.ones(3)).corners())
+    assert not view.holds(Bounds(-0.5 * np.ones(3), 9 * np.ones(3)).corners())
