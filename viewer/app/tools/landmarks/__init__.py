@@ -26,7 +26,7 @@ from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import overlay, panel
 from .exchange import Exchange
-from .following import Follower
+from .following import Following
 from .notebook import Notebook
 from .shown import ShownLandmarks
 from .words import gap_spans
@@ -57,7 +57,7 @@ class Tool:
         self.desk = desk
         self.selected, self.corrects = "", False
         self.dragged: Vector | None = None
-        self.follower = Follower(desk)
+        self.follower = Following(desk)
         self.notebook = Notebook(desk)
         self.exchange = Exchange(desk, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on

@@ -13,7 +13,7 @@ from ....scan.timeline import Timeline
 from ....task import checkpoint
 
 
-class Tracker:
+class ExactTracker:
     """Follows landmarks frame by frame. tracks: as far as they are known, by name."""
 
     def __init__(
@@ -22,7 +22,7 @@ class Tracker:
         landmarks: Sequence[Landmark],
         *,
         first: int = 0,
-        known: Tracker | None = None,
+        known: ExactTracker | None = None,
     ) -> None:
         self._timeline, self._next = timeline, first
         self._landmarks = {one.name: one for one in landmarks if one.keys}

@@ -11,12 +11,12 @@ from ....document.landmarks import Landmarks
 from ....scan.timeline import Timeline
 from ....task import Task
 from ...desk import Desk
-from .exact import Tracker
+from .exact import ExactTracker
 
 _CALM = 0.2  # seconds without a change of the landmarks before they are tracked anew
 
 
-class Follower:
+class Following:
     """Has the landmarks of the open scan tracked, and tells all tools (`desk.followed`).
 
     is_stopped: whether the user has cancelled it, until landmarks change or `resume` is called.
@@ -27,7 +27,7 @@ class Follower:
         self.is_stopped = False
         self._timeline: Timeline | None = None
         self._landmarks: Sequence[Landmark] | None = None
-        self._tracker: Tracker | None = None
+        self._tracker: ExactTracker | None = None
         self._task: Task | None = None
         self._is_done = False
         self._begins_at = 0.0  # by the clock
@@ -48,30 +48,32 @@ class Follower:
         is_wanted: whether anything is to be tracked now.
         """
         timeline, landmarks = self._desk.timeline, self._desk.document.part(Landmarks).all
-        if timeline is not self._timeline or landmarks is not self._landmarks:
-            self._take_up(timeline, landmarks)
         if self._task is not None and not self.is_running:
             self.is_stopped |= self._task.cancelled
             self._is_done, self._task = True, None
+        if timeline is not self._timeline or landmarks is not self._landmarks:
+            if self._task is None:
+                self._take_up(timeline, landmarks)
+            else:
+                self._task.cancel()  # what it has found is taken over when it has come to an end
         if self._tracker is not None:
             self._go_on(self._tracker, is_wanted)
-        found: Mapping[str, Track] = self._tracker.tracks if self._tracker else {}
+        is_same = timeline is self._timeline  # else what is there is of the scan before
+        found: Mapping[str, Track] = self._tracker.tracks if self._tracker and is_same else {}
         self._desk.followed.is_busy = self.is_running
         return self._desk.followed.take_tracks(found)
 
     def _take_up(self, timeline: Timeline, landmarks: Sequence[Landmark]) -> None:
         """Begin with other landmarks, and keep what still holds of the same scan."""
-        if self._task is not None:
-            self._task.cancel()
         known = self._tracker if timeline is self._timeline else None
         self._timeline, self._landmarks = timeline, landmarks
-        self._task, self._tracker, self._is_done, self.is_stopped = None, None, False, False
+        self._tracker, self._is_done, self.is_stopped = None, False, False
         self._begins_at = time.monotonic() + _CALM
         if any(landmark.keys for landmark in landmarks):
             self._looked_at = self._desk.index
-            self._tracker = Tracker(timeline, landmarks, first=self._looked_at, known=known)
+            self._tracker = ExactTracker(timeline, landmarks, first=self._looked_at, known=known)
 
-    def _go_on(self, tracker: Tracker, is_wanted: bool) -> None:
+    def _go_on(self, tracker: ExactTracker, is_wanted: bool) -> None:
         if self._desk.index != self._looked_at:
             self._looked_at = self._desk.index
             tracker.look_at(self._looked_at)
