@@ -83,7 +83,8 @@ def test_kinks_tell_of_chords_and_of_zigzags() -> None:
     turn = np.linspace(0, np.pi / 2, 40)
     arc = 100 * np.stack([np.cos(turn), np.sin(turn), np.zeros(40)], axis=1)
     short = 50 * np.pi - length_of(arc)
-    assert short < kinked(arc) < 4 * short
+    assert short < kinked(arc, 4.0) < 8 * short
+    assert kinked(arc, 8.0) == pytest.approx(4 * kinked(arc, 4.0), rel=0.1)
     zigzag = np.stack([np.arange(41.0), np.tile([0, 0.1], 21)[:41], np.zeros(41)], axis=1)
-    assert kinked(zigzag) == pytest.approx(length_of(zigzag) - 40, rel=0.1)
-    assert kinked(arc[:1]) == kinked(arc[:2]) == 0
+    assert kinked(zigzag, 1.0) == pytest.approx(2 * (length_of(zigzag) - 40), rel=0.2)
+    assert kinked(arc[:1], 1.0) == kinked(arc[:2], 9.0) == 0

@@ -3,7 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.mesh.smoothing import LENGTHENED, moved_to_quadrics, rows_apart, smoothing_radius
+from viewer.mesh.patch import Patch
+from viewer.mesh.smoothing import (
+    LENGTHENED,
+    moved_to_quadrics,
+    noise_over_faces,
+    rows_apart,
+    smoothing_radius,
+)
 
 
 def patch_of(count: int, seed: int = 0) -> np.ndarray:
@@ -34,6 +41,21 @@ def test_noise_gets_as_little_as_is_said() -> None:
     height = found[:, 2].reshape(side, side)[10:-10, 10:-10]
     slopes = np.diff(height, axis=1)
     assert 0.5 * LENGTHENED < (slopes**2).mean() / 2 < 2 * LENGTHENED
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.03, 0.3])
+def test_noise_over_faces_is_told_from_what_bends(noise: float) -> None:
+    """A grid that is bent like a saddle and folded once."""
+    y, x = np.mgrid[:50, :50].astype(float)
+    height = (x * x - y * y) / 500 + 0.3 * np.maximum(x - 20, 0)
+    points = np.stack([x, y, height + noise * np.random.default_rng(0).standard_normal(x.shape)], axis=2)
+    number = np.arange(2500).reshape(50, 50)
+    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    faces = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3)
+    normals = Patch(points.reshape(-1, 3), faces, np.arange(2500)).vertex_normals
+    found = noise_over_faces(points.reshape(-1, 3), faces, normals)
+    assert found == pytest.approx(noise, rel=0.15, abs=0.002)
+    assert noise_over_faces(points.reshape(-1, 3), faces[:0], normals) == 0
 
 
 def test_points_that_face_the_other_way_do_not_count() -> None:

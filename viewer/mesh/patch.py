@@ -95,6 +95,14 @@ class Patch:
         return np.cross(b - a, c - a)
 
     @cached_property
+    def vertex_normals(self) -> Points:
+        """Normals of the vertices, the sums of those of the faces around each, (V, 3); not of unit length."""
+        normals = np.zeros_like(self.vertices)
+        for corner in self.faces.T:
+            np.add.at(normals, corner, self.doubled)
+        return normals
+
+    @cached_property
     def pairs(self) -> tuple[Rows, Rows]:
         """Half-edges that share an edge, see `across_edges`."""
         return across_edges(self.faces)

@@ -1,0 +1,105 @@
+"""Measures along the surface: the path through landmarks, and what a plane cuts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mesh.cutting import plane_section
+from ....mesh.geodesic import Line, kinked, length_of
+from ....mesh.patch import Patch
+from ....mesh.smoothing import Points
+from ..planes import PLANES, plane_of
+from ..surface import Found, PoseSurface
+from . import MeasureKind, Options
+
+_STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
+_SLAB = 2.0  # spacings to both sides of a plane
+
+
+def _path(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+    closed = options.get("closed") == "yes"
+    ends = np.concatenate([positions, positions[:1]]) if closed else positions
+    lines, gradient = [], np.zeros_like(ends)
+    for number, (start, end) in enumerate(pairwise(ends)):
+        line = surface.path(start, end)
+        if line is None:
+            return None
+        lines.append(line)
+        gradient[number] -= direction(line)
+        gradient[number + 1] -= direction(line[::-1])
+    if closed:
+        gradient[0] += gradient[-1]
+    return Found(
+        sum(map(length_of, lines)), gradient[: len(positions)], off_smooth(surface, lines), tuple(lines)
+    )
+
+
+def off_smooth(surface: PoseSurface, lines: Sequence[Line]) -> float:
+    """The standard deviation of the length of lines by what lies between the points, see `kinked`."""
+    return sum(kinked(line, surface.spacing) for line in lines)
+
+
+def direction(line: Line) -> NDArray[np.float64]:
+    """The unit vector in which a line begins, (3,); zeros where it has no length."""
+    pieces = np.diff(line, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    first = np.flatnonzero(lengths > 0)[:1]
+    return (pieces[first] / lengths[first, None]).sum(axis=0)
+
+
+def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+    local = positions - surface.origin
+    how = options.get("plane", PLANES[0])
+    center, normal = plane_of(local, how)
+    if not np.isfinite(normal).all():
+        return None
+
+    def beyond(points: Points) -> NDArray[np.float64]:
+        return np.abs((points - center) @ normal) - _SLAB * surface.spacing
+
+    patch = surface.patch(beyond)
+    lines = _contours(patch, center, normal, local[0], options)
+    if not lines:
+        return None
+    gradient = np.zeros_like(positions)
+    step = _STEP * surface.spacing
+    for number in range(len(local)):
+        lengths = []
+        for side in (step, -step):
+            moved = local.copy()
+            moved[number] += side * normal
+            found = _contours(patch, *plane_of(moved, how), local[0], options)
+            lengths.append(sum(map(length_of, found)))
+        gradient[number] = (lengths[0] - lengths[1]) / (2 * step) * normal
+    value, deviation = sum(map(length_of, lines)), off_smooth(surface, lines)
+    return Found(value, gradient, deviation, tuple(line + surface.origin for line in lines))
+
+
+def _contours(
+    patch: Patch,
+    center: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    first: NDArray[np.float64],
+    options: Options,
+) -> list[Line]:
+    """Lines that the plane cuts: all, or the one nearest to the first landmark."""
+    lines = plane_section(patch, center, normal)
+    if options.get("lines") == "all" or not lines:
+        return lines
+    return [min(lines, key=lambda line: float(np.linalg.norm(line - first, axis=1).min()))]
+
+
+KINDS = (
+    MeasureKind(
+        "path", "Path along the surface", "through landmarks in their order, the shortest between them",
+        "length", 2, None, _path, True, {"closed": ("no", "yes")},
+    ),
+    MeasureKind(
+        "section", "Cross-section", "the length of the line in which the plane of landmarks cuts the surface",
+        "length", 3, None, _section, True, {"lines": ("nearest", "all"), "plane": PLANES},
+    ),
+)  # fmt: skip

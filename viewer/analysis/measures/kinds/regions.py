@@ -1,0 +1,173 @@
+"""Measures of a region: what the shortest paths from landmark to landmark go around."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mesh.cutting import Piece, pieces_along
+from ....mesh.geodesic import Line, length_of
+from ....mesh.patch import Patch
+from ..planes import THROUGH, plane_of
+from ..surface import Found, Circuit, PoseSurface
+from . import MeasureKind, Options
+from .along import direction, off_smooth
+
+_STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
+_BENT = 3.0  # of the squared angles at a face's edges, by which it is smaller than what it stands for
+
+
+def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
+    loop = surface.loop(positions)
+    if loop is None:
+        return None
+    gradient = -np.array([direction(line) for line in loop.lines])
+    gradient -= np.roll([direction(line[::-1]) for line in loop.lines], 1, axis=0)
+    return Found(
+        sum(map(length_of, loop.lines)), gradient, off_smooth(surface, loop.lines), _absolute(surface, loop)
+    )
+
+
+def _area(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
+    loop = surface.loop(positions)
+    piece = None if loop is None else region_within(loop)
+    if loop is None or piece is None:
+        return None
+    deviation = float((piece.areas * loop.patch.bends[piece.sources]).sum()) / _BENT
+    return Found(float(piece.areas.sum()), _widening(loop), deviation, _absolute(surface, loop))
+
+
+def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
+    loop = surface.loop(positions)
+    piece = None if loop is None else region_within(loop)
+    if loop is None or piece is None:
+        return None
+    edges = [line[:-1] for line in loop.lines]
+    around = np.concatenate(edges)
+    center, normal = _facing(piece, around)
+    if not np.isfinite(normal).all():
+        return None
+    value = _below(piece, center, normal)
+    normals = _upright(loop.patch, around)  # across which nothing moves: the outline stays on the surface
+    gradient, step = np.zeros_like(positions), _STEP * surface.spacing
+    for number, pulled in enumerate(_pulled(edges)):
+        for axis in range(3):
+            sides = []
+            for side in (step, -step):
+                moved = around + side * pulled[:, None] * (np.eye(3)[axis] - normals[:, [axis]] * normals)
+                sides.append(_below(piece, *_facing(piece, moved)))
+            gradient[number, axis] = (sides[0] - sides[1]) / (2 * step)
+    flat = np.abs(_across(piece, normal))
+    sag = np.sqrt(piece.areas * loop.patch.bends[piece.sources]) / 8
+    noise = surface.noise * surface.spacing * np.sqrt(flat.sum())
+    deviation = float(np.hypot((flat * sag).sum(), noise))
+    return Found(value, gradient, deviation, _absolute(surface, loop))
+
+
+def _absolute(surface: PoseSurface, loop: Circuit) -> tuple[Line, ...]:
+    return tuple(line + surface.origin for line in loop.lines)
+
+
+def region_within(loop: Circuit) -> Piece | None:
+    """The piece of a patch that a loop goes around: of those on its sides, what lies within it as seen across
+    its plane. None where it goes around none."""
+    pieces = pieces_along(loop.patch, loop.lines)
+    around = np.concatenate([line[:-1] for line in loop.lines])
+    center, normal = plane_of(around, THROUGH)
+    if len(pieces) < 2 or not np.isfinite(normal).all():
+        return None
+    axes = np.linalg.svd(normal[None])[2][1:]
+    outline = (around - center) @ axes.T
+    shares = []
+    for piece in pieces:
+        within = is_within((piece.corners.mean(axis=0) - center) @ axes.T, outline)
+        shares.append(float(piece.areas[within].sum() / max(piece.areas.sum(), np.finfo(float).tiny)))
+    most = max(shares)
+    chosen = [piece for piece, share in zip(pieces, shares, strict=True) if share > 0.5 or share == most]
+    counts = np.cumsum([0, *(len(piece.vertices) for piece in chosen)])
+    return Piece(
+        np.concatenate([piece.vertices for piece in chosen]),
+        np.concatenate([piece.faces + before for piece, before in zip(chosen, counts, strict=False)]),
+        np.concatenate([piece.sources for piece in chosen]),
+    )
+
+
+def is_within(places: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether places (N, 2) lie within a closed outline (P, 2): a ray to the right crosses it oddly often."""
+    inside = np.zeros(len(places), bool)
+    x, y = places.T
+    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        rises = (start[1] > y) != (end[1] > y)
+        if rises.any():
+            at = start[0] + (y[rises] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
+            inside[np.flatnonzero(rises)[x[rises] < at]] ^= True
+    return inside
+
+
+def _widening(loop: Circuit) -> NDArray[np.float64]:
+    """How the area within changes as each landmark moves, (K, 3): the paths beside it swing about their other
+    ends, by half their lengths across them."""
+    lengths = np.array([length_of(line) for line in loop.lines])[:, None] / 2
+    leaving = lengths * [direction(line) for line in loop.lines]
+    arriving = lengths * [-direction(line[::-1]) for line in loop.lines]
+    corners = np.concatenate([line[:-1] for line in loop.lines])
+    corners = corners - corners.mean(axis=0)
+    normals = _upright(loop.patch, loop.patch.vertices[list(loop.numbers)])
+    turning = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0) @ normals.sum(axis=0)
+    along = leaving + np.roll(arriving, 1, axis=0)
+    return np.sign(turning) * np.cross(along, normals)
+
+
+def _upright(patch: Patch, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The unit normals of a patch at the vertices nearest to places (N, 3)."""
+    from scipy.spatial import cKDTree
+
+    normals = patch.vertex_normals[cKDTree(patch.vertices).query(places)[1]]
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+
+
+def _pulled(edges: list[Line]) -> list[NDArray[np.float64]]:
+    """How much each landmark takes every place of the outline along: all at itself, none at the next ones."""
+    shares = [np.arange(len(edge)) / len(edge) for edge in edges]
+    count = len(edges)
+    pulled = []
+    for number in range(count):
+        parts = [np.zeros(len(edge)) for edge in edges]
+        parts[number] = 1 - shares[number]
+        parts[number - 1] = parts[number - 1] + shares[number - 1]
+        pulled.append(np.concatenate(parts))
+    return pulled
+
+
+def _facing(piece: Piece, around: Line) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The plane of an outline, on the side to which the piece faces."""
+    center, normal = plane_of(around, THROUGH)
+    return center, normal if _across(piece, normal).sum() >= 0 else -normal
+
+
+def _across(piece: Piece, normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The areas of faces as seen along a normal, (F,), negative from behind."""
+    a, b, c = piece.corners
+    return np.cross(b - a, c - a) @ normal / 2
+
+
+def _below(piece: Piece, center: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
+    """The volume from a plane to a piece, negative where the piece is beneath."""
+    heights = (piece.corners.mean(axis=0) - center) @ normal
+    return float((heights * _across(piece, normal)).sum())
+
+
+KINDS = (
+    MeasureKind(
+        "area", "Area of a region", "within the paths along the surface from landmark to landmark",
+        "area", 3, None, _area, True,
+    ),
+    MeasureKind(
+        "perimeter", "Perimeter of a region", "the paths along the surface from landmark to landmark",
+        "length", 3, None, _perimeter, True,
+    ),
+    MeasureKind(
+        "volume", "Volume over a plane", "between a region and the plane of its outline; negative beneath",
+        "volume", 3, None, _volume, True,
+    ),
+)  # fmt: skip

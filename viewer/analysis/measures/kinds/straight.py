@@ -1,0 +1,94 @@
+"""Measures of landmarks alone: distances, angles, planes, and curves through the air."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..planes import PLANES, plane_of
+from . import MeasureKind, Options
+
+_BETWEEN = 32  # places on a curve from one landmark to the next
+_PLANE = "then those of the plane: three or more that it lies nearest to, or pairs that it lies between"
+
+Positions = NDArray[np.float64]  # (T, K, 3)
+Values = NDArray[np.float64]  # (T,)
+
+
+def _distance(positions: Positions, _: Options) -> Values:
+    return np.linalg.norm(positions[:, 1] - positions[:, 0], axis=1)
+
+
+def _between(one: NDArray[np.float64], other: NDArray[np.float64]) -> Values:
+    """The angles between vectors (T, 3), degrees; NaN where one has no length."""
+    cosine = (one * other).sum(axis=1)
+    sine = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.where((cosine == 0) & (sine == 0), np.nan, np.degrees(np.arctan2(sine, cosine)))
+
+
+def _angle(positions: Positions, _: Options) -> Values:
+    return _between(positions[:, 0] - positions[:, 1], positions[:, 2] - positions[:, 1])
+
+
+def _plane(positions: Positions, options: Options) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return plane_of(positions, options.get("plane", PLANES[0]))
+
+
+def _plane_angle(positions: Positions, options: Options) -> Values:
+    _, normal = _plane(positions[:, 2:], options)
+    to_normal = _between(positions[:, 1] - positions[:, 0], normal)
+    return np.abs(90 - to_normal)
+
+
+def _plane_distance(positions: Positions, options: Options) -> Values:
+    center, normal = _plane(positions[:, 1:], options)
+    return ((positions[:, 0] - center) * normal).sum(axis=1)
+
+
+def _curve(positions: Positions, options: Options) -> Values:
+    if options.get("closed") == "yes":
+        positions = np.concatenate([positions, positions[:, :1]], axis=1)
+        before, after = positions[:, -2], positions[:, 1]
+    else:
+        before, after = 2 * positions[:, 0] - positions[:, 1], 2 * positions[:, -1] - positions[:, -2]
+    if options.get("shape") == "straight":
+        return np.linalg.norm(np.diff(positions, axis=1), axis=2).sum(axis=1)
+    knots = np.concatenate([before[:, None], positions, after[:, None]], axis=1)
+    lengths = np.zeros(len(positions))
+    for number in range(positions.shape[1] - 1):
+        lengths += _catmull_rom(knots[:, number : number + 4])
+    return lengths
+
+
+def _catmull_rom(knots: Positions) -> Values:
+    """Lengths of centripetal Catmull-Rom curves from the second to the third of four places, (T, 4, 3), with
+    the pyramid of Barry and Goldman (1988). Centripetal ones have no loops (Yuksel 2011)."""
+    steps = np.sqrt(np.maximum(np.linalg.norm(np.diff(knots, axis=1), axis=2), np.finfo(float).tiny))
+    times = np.concatenate([np.zeros((len(knots), 1)), np.cumsum(steps, axis=1)], axis=1)[:, :, None, None]
+    share = np.linspace(0, 1, _BETWEEN + 1)[None, :, None]
+    time = times[:, 1] + share * (times[:, 2] - times[:, 1])
+    level = [knots[:, number, None] for number in range(4)]
+    for height in (1, 2, 3):
+        level = [
+            level[n] + (time - times[:, n]) / (times[:, n + height] - times[:, n]) * (level[n + 1] - level[n])
+            for n in range(4 - height)
+        ]
+    return np.linalg.norm(np.diff(level[0], axis=1), axis=2).sum(axis=1)
+
+
+KINDS = (
+    MeasureKind("distance", "Distance", "from the first landmark to the second", "length", 2, 2, _distance),
+    MeasureKind("angle", "Angle", "at the second of three landmarks", "angle", 3, 3, _angle),
+    MeasureKind(
+        "plane_angle", "Angle to a plane", f"of the line through the first two landmarks; {_PLANE}",
+        "angle", 5, None, _plane_angle, choices={"plane": PLANES},
+    ),
+    MeasureKind(
+        "plane_distance", "Distance to a plane", f"of the first landmark, with its sign; {_PLANE}",
+        "length", 4, None, _plane_distance, choices={"plane": PLANES},
+    ),
+    MeasureKind(
+        "curve", "Curve", "through landmarks in their order, not along the surface",
+        "length", 2, None, _curve, choices={"shape": ("smooth", "straight"), "closed": ("no", "yes")},
+    ),
+)  # fmt: skip

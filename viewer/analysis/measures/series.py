@@ -1,0 +1,171 @@
+"""The values of measures in all frames, with their uncertainty; docs/landmarks.md has the formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...mesh.geodesic import Line
+from ...scan.faces import Triangles
+from ...scan.pose import Pose
+from ...scan.timeline import Timeline
+from ...task import checkpoint
+from ..track import Known, Track
+from . import Measure, Series
+from .kinds import MeasureKind, kind_of
+from .surface import PoseSurface
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """A measure with what is known of its landmarks. positions: (T, K, 3). covariances: (T, U, 3, 3), of its
+    landmarks, each once. which: (K,), of these. known: (T,)."""
+
+    measure: Measure
+    kind: MeasureKind
+    positions: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    which: NDArray[np.intp]
+    known: NDArray[np.uint8]
+    values: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+
+
+def series_of(
+    measure: Measure,
+    tracks: Mapping[str, Track],
+    timeline: Timeline | None = None,
+    noise: float = 0.0,
+) -> Series:
+    """The values of a measure in all frames, see `all_series`."""
+    return all_series([measure], tracks, timeline, noise)[measure.name]
+
+
+def all_series(
+    measures: Sequence[Measure],
+    tracks: Mapping[str, Track],
+    timeline: Timeline | None = None,
+    noise: float = 0.0,
+    frames: Sequence[int] | None = None,
+) -> dict[str, Series]:
+    """The values of measures by name in all frames.
+
+    tracks: by the name of the landmark, all of the same frames, at least one. timeline: the scan; each pose
+    is read once for all measures that need its surface, and none where none does. noise: of the scanner,
+    standard deviation of a coordinate of what it measures, scan units. frames: those in which the surface is
+    looked at; None: all. What a frame does not tell, because a landmark is not known there, is not on the
+    surface, or the frame is broken, is a gap. Long work: it can be cancelled. Raises InputError for measures
+    that are none.
+    """
+    asked = [_asked(measure, tracks, noise) for measure in measures]
+    for each in asked:
+        if not each.kind.needs_surface:
+            _fill_points(each)
+    on_surface = [each for each in asked if each.kind.needs_surface]
+    if on_surface and timeline is not None:
+        _fill_surfaces(on_surface, timeline, range(len(timeline)) if frames is None else frames)
+    times = next(iter(tracks.values())).times if tracks else np.zeros(0)
+    return {each.measure.name: _series(each, times) for each in asked}
+
+
+def found_on(measure: Measure, positions: NDArray[np.float64], surface: PoseSurface) -> tuple[Line, ...]:
+    """The lines that a measure of the surface measures, or that are around it, each (P, 3), to be drawn; none
+    for measures of landmarks alone. positions: (K, 3) of its landmarks. Raises InputError as `kind_of`."""
+    kind = kind_of(measure)
+    compute: Callable = kind.compute
+    found = compute(surface, positions, measure.options) if kind.needs_surface else None
+    return () if found is None else found.lines
+
+
+def surface_of(timeline: Timeline, pose: Pose, kept: dict[str, Triangles] | None = None) -> PoseSurface:
+    """The surface of a pose, with the faces that the scan has of it. kept: faces by topology, of other
+    poses."""
+    name = pose.overview.topology
+    if name is None:
+        return PoseSurface(pose)
+    kept = {} if kept is None else kept
+    if name not in kept:
+        kept.clear()  # one at a time: they are as large as a pose
+        kept[name] = timeline.faces(pose.index).triangles()
+    return PoseSurface(pose, kept[name])
+
+
+def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Asked:
+    kind = kind_of(measure)
+    frames = len(next(iter(tracks.values())).times) if tracks else 0
+    names = list(dict.fromkeys(measure.landmarks))
+    missing = Track.pending(np.zeros(frames))
+    own = [tracks.get(name, missing) for name in names]
+    which = np.array([names.index(name) for name in measure.landmarks], np.intp)
+    known = np.min([track.known for track in own], axis=0).astype(np.uint8)
+    covariances = np.stack([track.covariances for track in own], axis=1) + noise**2 * np.eye(3)
+    positions = np.stack([track.positions for track in own], axis=1)[:, which]
+    empty = np.full((2, frames), np.nan)
+    return _Asked(measure, kind, positions, covariances, which, known, *empty)
+
+
+def _series(asked: _Asked, times: NDArray[np.float64]) -> Series:
+    known = asked.known.copy()
+    known[(known >= Known.TRACKED) & ~np.isfinite(asked.values)] = Known.GAP
+    measure, quantity = asked.measure, asked.kind.quantity
+    return Series(measure.name, quantity, times, asked.values, asked.sigmas, known)
+
+
+def _fill_points(asked: _Asked) -> None:
+    rows = np.flatnonzero((asked.known >= Known.TRACKED) & np.isfinite(asked.positions).all(axis=(1, 2)))
+    compute: Callable = asked.kind.compute
+
+    def value(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        with np.errstate(invalid="ignore", divide="ignore"):  # of landmarks in one place
+            return compute(positions, asked.measure.options)
+
+    positions = asked.positions[rows]
+    asked.values[rows] = found = value(positions)
+    variance = np.zeros(len(rows))
+    told = np.asarray(np.isfinite(asked.covariances[rows]).all(axis=(1, 2, 3)))
+    covariances = np.where(told[:, None, None, None], asked.covariances[rows], 0)
+    roots = _roots(covariances)
+    for landmark in range(covariances.shape[1]):
+        moved = (asked.which == landmark)[None, :, None]
+        for axis in range(3):
+            step = moved * roots[:, landmark, None, :, axis]
+            for side in (step, -step):
+                variance += (value(positions + side) - found) ** 2 / 2
+    asked.sigmas[rows] = np.where(told, np.sqrt(variance), np.nan)
+
+
+def _roots(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrices (..., 3, 3) of which each column is a standard deviation long, along the axes."""
+    widths, axes = np.linalg.eigh(covariances)
+    return axes * np.sqrt(np.maximum(widths, 0))[..., None, :]
+
+
+def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence[int]) -> None:
+    needed = [frame for frame in frames if any(each.known[frame] >= Known.TRACKED for each in asked)]
+    faces: dict[str, Triangles] = {}
+    for done, frame in enumerate(needed):
+        checkpoint(done / len(needed))
+        try:
+            surface = surface_of(timeline, timeline.visit(frame), faces)
+        except InputError:  # told by the timeline
+            continue
+        for each in asked:
+            checkpoint()
+            if each.known[frame] >= Known.TRACKED and np.isfinite(each.positions[frame]).all():
+                _fill_surface(each, frame, surface)
+
+
+def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface) -> None:
+    compute: Callable = asked.kind.compute
+    found = compute(surface, asked.positions[frame], asked.measure.options)
+    if found is None:
+        return
+    gradient = np.zeros((asked.covariances.shape[1], 3))
+    np.add.at(gradient, asked.which, found.gradient)
+    variance = np.einsum("ui,uij,uj->", gradient, asked.covariances[frame], gradient)
+    asked.values[frame] = found.value
+    asked.sigmas[frame] = np.sqrt(max(variance, 0) + found.deviation**2)

@@ -1,0 +1,198 @@
+"""The surface of a pose as measures ask for it: a patch around landmarks, smoothed to the scan's noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...backends.hpr.noise import noise_of
+from ...mesh.geodesic import Geodesics, Line, length_of
+from ...mesh.patch import Patch
+from ...mesh.smoothing import Points, moved_to_quadrics, noise_over_faces, smoothing_radius
+from ...scan.estimate import cloud_normals
+from ...scan.faces import Triangles
+from ...scan.pose import Pose
+from ...scan.range_view import merged_normals
+
+Beyond = Callable[[Points], NDArray[np.float64]]  # how far places (N, 3) are outside, negative within, (N,)
+
+_FITTED = 2.0  # spacings in which points tell a normal where there is no noise
+_RIM = 4.0  # spacings that a patch of points reaches farther, as it ends in a ragged rim
+_ASTRAY = 4.0  # spacings, and deviations of noise, that a landmark may lie off the surface
+_LONGER = 1.2  # times the straight line: the path that is looked for first
+_GROWS = 1.6  # by which what is looked at grows where no path is found
+_TRIES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A value found on a surface.
+
+    value: scan units, or their square or cube. gradient: (K, 3), its change as each landmark moves.
+    deviation: standard deviation by what sampling and noise leave open of the surface. lines: those that were
+    measured, or that are around it, each (P, 3), to be drawn.
+    """
+
+    value: float
+    gradient: NDArray[np.float64]
+    deviation: float
+    lines: tuple[Line, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Circuit:
+    """Landmarks on a patch, and paths from each to the next. numbers: (K,) of the vertices."""
+
+    patch: Patch
+    numbers: tuple[int, ...]
+    lines: tuple[Line, ...]
+
+
+class PoseSurface:
+    """The surface of one pose.
+
+    faces: (F, 3) ids of its points; None or none: faces are found where they are needed. Positions are scan
+    units, absolute.
+    """
+
+    def __init__(self, pose: Pose, faces: Triangles | None = None) -> None:
+        self._cloud, self._views, self.spacing = pose.cloud, pose.views, pose.spacing
+        self._faces = None if faces is None or not len(faces) else _rows(faces, self._cloud.ids)
+        self.origin = self._cloud.origin
+        self._loops: dict[bytes, Circuit | None] = {}
+
+    @cached_property
+    def noise(self) -> float:
+        """The standard deviation of the points off their surface, scan units."""
+        if self._faces is None:
+            return noise_of(self._cloud).deviation
+        whole = Patch(self._points, self._faces, np.arange(len(self._points)))
+        return noise_over_faces(self._points, self._faces, whole.vertex_normals)
+
+    @cached_property
+    def radius(self) -> float:
+        """How far points are averaged, scan units; 0: they are taken as they are."""
+        return smoothing_radius(self.noise, self.spacing)
+
+    @cached_property
+    def _points(self) -> Points:
+        """All points, relative to the origin."""
+        return self._cloud.world() - self.origin
+
+    @cached_property
+    def _normals(self) -> NDArray[np.float32] | None:
+        """Normals that tell the sides; None where the scan has none that do."""
+        normals = merged_normals(self._views, self._cloud) if self._views else self._cloud.normals
+        if normals is None or not np.isfinite(normals).all() or not normals.any(axis=1).all():
+            return None
+        return normals
+
+    def patch(self, beyond: Beyond) -> Patch:
+        """The part of the surface that a function says is within; places are relative to the origin."""
+        margin = 0.0 if self._faces is not None else max(self.radius, _FITTED * self.spacing)
+        outside = beyond(self._points)
+        if self._faces is not None:
+            return self._patch_of_faces(outside <= 0)
+        near = np.flatnonzero(outside <= margin + _RIM * self.spacing)
+        if len(near) < 3:
+            return Patch.of(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
+        points = self._points[near]
+        normals = cloud_normals(self._cloud.of_rows(near)) if self._normals is None else self._normals[near]
+        rows = np.flatnonzero(outside[near] <= _RIM * self.spacing)
+        moved, directions = moved_to_quadrics(points, max(self.radius, _FITTED * self.spacing), normals, rows)
+        return Patch.of_points(moved if self.radius else points[rows], directions, self.spacing)
+
+    def _patch_of_faces(self, within: NDArray[np.bool_]) -> Patch:
+        assert self._faces is not None
+        faces = self._faces[within[self._faces].any(axis=1)]
+        patch = Patch.of(self._points, faces)
+        if not self.radius or not len(faces):
+            return patch
+        moved, _ = moved_to_quadrics(patch.vertices, self.radius, patch.vertex_normals)
+        return Patch(moved, patch.faces, patch.sources)
+
+    def path(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> Line | None:
+        """The shortest path over the surface from one place to another, (P, 3); None where they are not on
+        it, or nothing joins them.
+
+        It is looked for where paths of its length could be: within the ellipsoid about both places.
+        """
+        start, end = start - self.origin, end - self.origin
+        reach = _LONGER * float(np.linalg.norm(end - start)) + 2 * _RIM * self.spacing
+
+        def beyond(points: Points) -> NDArray[np.float64]:
+            both = np.linalg.norm(points - start, axis=1) + np.linalg.norm(points - end, axis=1)
+            return (both - reach) / 2
+
+        for _ in range(_TRIES):
+            found = self._joined(self.patch(beyond), [start, end], is_closed=False)
+            length = length_of(found.lines[0]) if found else np.inf
+            if length <= reach:
+                assert found is not None
+                return found.lines[0] + self.origin
+            if beyond(self._points).max() <= 0:
+                break
+            reach = min(length * (1 + 1e-6), _GROWS * reach) if found else _GROWS * reach
+        return None if found is None else found.lines[0] + self.origin
+
+    def loop(self, corners: NDArray[np.float64]) -> Circuit | None:
+        """The paths from each of some places (K, 3) to the next and back to the first, on a patch that has
+        what is within them; None where they are not on the surface, or nothing joins them.
+
+        The patch and its lines are relative to the origin. Found once for each places.
+        """
+        key = corners.tobytes()
+        if key not in self._loops:
+            self._loops[key] = self._loop(corners - self.origin)
+        return self._loops[key]
+
+    def _loop(self, corners: NDArray[np.float64]) -> Circuit | None:
+        middle = corners.mean(axis=0)
+        reach = _GROWS * float(np.linalg.norm(corners - middle, axis=1).max()) + 2 * _RIM * self.spacing
+
+        def beyond(points: Points) -> NDArray[np.float64]:
+            return np.linalg.norm(points - middle, axis=1) - reach
+
+        for _ in range(_TRIES):
+            found = self._joined(self.patch(beyond), list(corners), is_closed=True)
+            if found and max(beyond(line).max() for line in found.lines) < -_RIM * self.spacing:
+                break
+            if beyond(self._points).max() <= 0:
+                break
+            reach *= _GROWS
+        return found
+
+    def _joined(
+        self, patch: Patch, corners: Sequence[NDArray[np.float64]], is_closed: bool
+    ) -> Circuit | None:
+        """The paths over a patch from each place to the next."""
+        if not len(patch.faces):
+            return None
+        numbers = []
+        for corner in corners:
+            place = patch.nearest(corner)
+            if place.away > _ASTRAY * (self.spacing + self.noise):
+                return None
+            patch, number = patch.with_point(place)
+            numbers.append(number)
+        geodesics, lines = Geodesics(patch), []
+        for start, end in zip(numbers, numbers[1:] + (numbers[:1] if is_closed else []), strict=False):
+            line = geodesics.path(start, end)
+            if line is None:
+                return None
+            lines.append(line)
+        return Circuit(patch, tuple(numbers), tuple(lines))
+
+
+def _rows(faces: Triangles, ids: NDArray[np.uint32] | None) -> NDArray[np.int64]:
+    """Faces of ids as faces of rows, without those of points that were dropped."""
+    if ids is None:
+        return faces.astype(np.int64)
+    if not len(ids):
+        return np.zeros((0, 3), np.int64)
+    rows = np.searchsorted(ids, faces).clip(max=len(ids) - 1)
+    return rows[(ids[rows] == faces).all(axis=1)].astype(np.int64)
