@@ -9,7 +9,7 @@ from ....mesh.cutting import Piece, pieces_along
 from ....mesh.geodesic import Line, length_of
 from ....mesh.patch import Patch
 from ..planes import THROUGH, plane_of
-from ..surface import Found, Circuit, PoseSurface
+from ..surface import Circuit, Found, PoseSurface
 from . import MeasureKind, Options
 from .along import direction, off_smooth
 
