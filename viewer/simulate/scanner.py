@@ -6,6 +6,7 @@ has the formulas.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,16 +123,24 @@ def capture(
         raise InputError(
             f"a range image of {size[0]}x{size[1]} is too large", hint=f"Up to {_MOST_PIXELS:,} pixels"
         )
+    pictures = [trace(scene, pod, size) for pod in pods]
+    return measured(pictures, pods, faults, seed=seed, frame=frame, unit=unit)
+
+
+def measured(
+    pictures: Sequence[Reference],
+    pods: Sequence[Camera],
+    faults: Sequence[Faults],
+    *,
+    seed: int = 0,
+    frame: int = 0,
+    unit: str = UNKNOWN_UNIT,
+) -> tuple[RangeView, ...]:
+    """Range views of true pictures, one a pod, as `capture` makes them: to compare faults without
+    casting rays anew."""
     return tuple(
-        _measure(
-            trace(scene, pod, size),
-            pod,
-            fault,
-            np.random.default_rng([seed, frame, number]),
-            f"pod{number}",
-            unit,
-        )
-        for number, (pod, fault) in enumerate(zip(pods, faults, strict=True))
+        _measure(picture, pod, fault, np.random.default_rng([seed, frame, number]), f"pod{number}", unit)
+        for number, (picture, pod, fault) in enumerate(zip(pictures, pods, faults, strict=True))
     )
 
 

@@ -104,7 +104,7 @@ def test_a_tracker_is_judged_by_what_it_gives(known: KnownScan) -> None:
 @pytest.mark.slow
 def test_places_are_hidden_where_no_pod_sees_them() -> None:
     """One pod, from the front: the sides of the head come and go as it turns, its middle stays."""
-    known = scanned_demo("demo:sway:1", 0.0, range(0, 64, 8), pods=1)
+    (known,) = scanned_demo("demo:sway:1", [0.0], range(0, 64, 8), pods=1)
     side, middle = known.names.index("tragion left"), known.names.index("pronasale")
     assert known.counted[:, middle].all()
     assert known.hidden[:, side].any()

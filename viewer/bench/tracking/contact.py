@@ -19,13 +19,13 @@ def near_contact(
 ) -> NDArray[np.bool_]:
     """Tell in which frames places are near fast contact of the surface with itself, (T, N).
 
-    They are where a vertex is within 4 spacings of the place, more than four times as far along the edges of
-    the first mesh, and moves against it by more than a spacing to the frame before or after. meshes: T of the
-    same faces. paths: (T, N, 3) of the places; vertices: (N,), one beside each.
+    They are where a vertex moves against the place by more than a spacing to the frame before or after, is
+    nearer to it than it moves so or than 4 spacings, and more than four times as far along the edges of the
+    first mesh: then it may be taken for the place. meshes: T of the same faces. paths: (T, N, 3) of the
+    places; vertices: (N,), one beside each.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
-    from scipy.spatial import cKDTree
 
     points = np.array([mesh.points.world() for mesh in meshes])
     edges = np.concatenate(
@@ -35,19 +35,18 @@ def near_contact(
     # An edge of two faces is there twice, which would add up.
     edges, first = np.unique(np.sort(edges, axis=1), axis=0, return_index=True)
     graph = coo_matrix((lengths[first], edges.T), shape=(points.shape[1],) * 2).tocsr()
-    reach = _NEAR * spacing
-    along = dijkstra(graph, directed=False, indices=vertices, limit=_ALONG * reach)  # inf beyond
+    along = dijkstra(graph, directed=False, indices=vertices)
     steps = np.diff(points, axis=0)
     own_steps = np.diff(paths, axis=0)
     touching = np.zeros(paths.shape[:2], bool)
-    for frame, places in enumerate(paths):
-        around = cKDTree(points[frame]).query_ball_point(places, reach)
-        for place, near in enumerate(around):
-            others = np.array(near, int)[np.isinf(along[place, near])]
-            moves = [
-                np.linalg.norm(steps[step, others] - own_steps[step, place], axis=1)
-                for step in (frame - 1, frame)
-                if 0 <= step < len(steps)
-            ]
-            touching[frame, place] = bool(len(others)) and np.max(moves) > _FAST * spacing
+    for frame, place in np.ndindex(*touching.shape):
+        moves = [
+            np.linalg.norm(steps[step] - own_steps[step, place], axis=1)
+            for step in (frame - 1, frame)
+            if 0 <= step < len(steps)
+        ]
+        fast = np.max(moves, axis=0) > _FAST * spacing
+        reach = np.maximum(np.max(moves, axis=0), _NEAR * spacing)
+        near = np.linalg.norm(points[frame] - paths[frame, place], axis=1) < reach
+        touching[frame, place] = (fast & near & (along[place] > _ALONG * reach)).any()
     return touching

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...bounds import Bounds
 from ...camera import Camera
-from ...mesh.reference import visible
+from ...mesh.reference import trace, visible
 from ...mesh.triangles import Mesh
 from ...scan.demo import DemoSource
 from ...scan.faces import Faces
@@ -20,7 +20,7 @@ from ...scan.range_view import merge
 from ...scan.sources import FrameSource
 from ...scan.spacing import typical_spacing
 from ...scan.times import DEFAULT_FPS, frame_in_words
-from ...simulate.scanner import Faults, around, capture, rig
+from ...simulate.scanner import Faults, around, measured, rig
 from ...task import checkpoint
 from ..truth.head_mesh import head_mesh
 from .contact import near_contact
@@ -30,6 +30,7 @@ from .resampled import ResampledDemo, ResampledMesh
 SCANNED = (560, 420)  # pixels of a pod: some 95 000 points a frame of two
 _FRAMED = 5  # frames that the pods are placed for
 _STEEPEST = 80.0  # degrees of incidence that a pod measures
+_GRAIN = 0.02  # standard deviation of a pod's colours, of their values
 _AT_SURFACE = 0.1  # mm that a place may lie behind the mesh of the exact surface
 _ABSENT = 2.0  # spacings to the nearest point, from which on a place that no pod sees is hidden
 
@@ -84,13 +85,13 @@ class KnownScan:
 
 
 def scanned_demo(
-    scan: str, noise: float, frames: Sequence[int] | None = None, *, pods: int = 2, seed: int = 0
-) -> KnownScan:
-    """The demo or a variant, by its name, as `scan4d simulate` scans it; its places are `PLACES`.
+    scan: str, noises: Sequence[float], frames: Sequence[int] | None = None, *, pods: int = 2, seed: int = 0
+) -> list[KnownScan]:
+    """The demo or a variant, by its name, as `scan4d simulate` scans it, once for each noise.
 
-    noise: standard deviation of depth, mm. frames: those that are scanned; None: all. Steeper than 80 degrees
-    nothing is measured. A place is hidden where no pod's ray reaches it and no point is within two spacings;
-    those that no frame has are left out.
+    Its places are `PLACES`. noises: standard deviations of depth, mm. frames: those that are scanned; None:
+    all. Steeper than 80 degrees nothing is measured. A place is hidden where no pod's ray reaches it and no
+    point is within two spacings; those that no frame has are left out. Colours have a grain of 2 %.
     """
     demo = DemoSource(scan)
     chosen = list(range(len(demo)) if frames is None else frames)
@@ -100,20 +101,44 @@ def scanned_demo(
         demo.load(chosen[i]).whole_bounds() for i in np.linspace(0, len(chosen) - 1, _FRAMED).astype(int)
     ]
     cameras = rig(Bounds.around(framed), around(pods), aspect=SCANNED[0] / SCANNED[1])
-    faults = [Faults(noise=noise, grazing=_STEEPEST)] * pods
-    clouds, seen = [], np.zeros(paths.shape[:2], bool)
+    faults = [[Faults(noise=noise, grazing=_STEEPEST)] * pods for noise in noises]
+    clouds: list[list[PointCloud]] = [[] for _ in noises]
+    seen = np.zeros(paths.shape[:2], bool)
     for row, (index, time) in enumerate(zip(chosen, times, strict=True)):
         checkpoint(row / len(chosen))
         mesh = head_mesh(float(time), demo.motion)
-        clouds.append(merge(capture(mesh, cameras, SCANNED, faults, seed=seed, frame=index)))
+        pictures = [trace(mesh, camera, SCANNED) for camera in cameras]
+        for kept, those in zip(clouds, faults, strict=True):
+            cloud = merge(measured(pictures, cameras, those, seed=seed, frame=index))
+            kept.append(with_grain(cloud, np.random.default_rng([seed, index, pods])))
         seen[row] = _seen(mesh, paths[row], cameras)
+    return [_had(scan, kept, times, paths, seen) for kept in clouds]
+
+
+def with_grain(cloud: PointCloud, chance: np.random.Generator) -> PointCloud:
+    """A cloud whose colours have the noise of a camera: 2 % of their values, each channel by itself."""
+    assert cloud.colors is not None
+    colors = cloud.colors.copy()
+    noisy = colors[:, :3] * chance.normal(1.0, _GRAIN, (len(colors), 3))
+    colors[:, :3] = np.clip(np.rint(noisy), 0, 255)
+    return replace(cloud, colors=colors)
+
+
+def _had(
+    name: str,
+    clouds: Sequence[PointCloud],
+    times: NDArray[np.float64],
+    paths: NDArray[np.float64],
+    seen: NDArray[np.bool_],
+) -> KnownScan:
+    """A scan of the places that it has in any frame. paths: (T, N, 3) of `PLACES`; seen: (T, N), by a ray."""
     spacing = typical_spacing(clouds[0])
     absent = _farther(clouds, paths, _ABSENT * spacing)
     hidden, counted = ~seen & absent, seen & ~absent
     had = np.flatnonzero(counted.any(axis=0))
     return KnownScan(
-        name=scan,
-        source=KeptFrames(scan, clouds, times),
+        name=name,
+        source=KeptFrames(name, clouds, times),
         names=tuple(PLACES[place] for place in had),
         paths=paths[:, had],
         hidden=hidden[:, had],
