@@ -18,6 +18,9 @@ import OpenEXR
 from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
+from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
+from viewer.analysis.landmarks.landmark_set import LandmarkSet
+from viewer.analysis.landmarks.templates import read_template, save_template, templates
 from viewer.analysis.measure import Measurement
 from viewer.analysis.spot import Spot
 from viewer.app import keys, settings
@@ -58,14 +61,21 @@ _TEXTS = {
     "named.csv": '"x";"y";"z";"GPS Time"\r\n1;2;3;4\r\n5;6;7;8\r\n',
     "tabs.txt": "X\tY\tZ\tR\tG\tB\n1\t2\t3\t4\t5\t6\n",
     "count.pts": "2\n1 2 3 4 5 6 7\n8 9 1 2 3 4 5\n",
+    "landmarks.fcsv": "# CoordinateSystem = 1\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc\n"
+    'a,1,2,3,0,0,0,1,1,1,1,"n, tip",\nb,4,5,6,0,0,0,1,1,1,1,chin,d\n',
+    "landmarks.lm": "Landmarks-1.0\n2\nnose\n1 2 3 1 1\nchin\n4 5 6 1 1\n",
 }
+
+
+_LANDMARKS = ("mrk.json", "tps", "txt", "c3d", "csv", "wide.csv")  # in which they are written
 
 
 def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
     """Kind -> whole files: made here, and small real ones where they are at hand.
 
     Kinds are the suffixes of scans, and the names of other files that the project reads: "camera.json",
-    "recording.json", "recording.png", "session.json", "times.csv", "settings.json", "keys.toml".
+    "recording.json", "recording.png", "session.json", "times.csv", "settings.json", "keys.toml",
+    "template.json", "landmarks.csv" and so on.
     """
     for name, text in _TEXTS.items():
         (folder / name).write_text(text)
@@ -74,6 +84,7 @@ def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
     (folder / "packed.pcd").write_bytes(f"{_PCD}binary_compressed\n".encode() + sizes + packed)
     _write_scans(folder)
     _write_choices(folder)
+    _write_landmarks(folder)
     found: dict[str, list[bytes]] = {}
     for path in sorted(folder.iterdir()):
         found.setdefault(kind_of(path.name), []).append(path.read_bytes())
@@ -175,6 +186,16 @@ def _write_choices(folder: Path) -> None:
     (folder / "keys.toml").write_text(text.replace("\n# ", "\n").split("[keys]")[1].join(["[keys]", ""]))
 
 
+def _write_landmarks(folder: Path) -> None:
+    places = np.random.default_rng(3).normal(size=(3, 4, 3))
+    places[1, 2] = np.nan
+    names = ("n", "chL", "chR", 'a "b", c')
+    landmarks = LandmarkSet.of(names, places, frames=range(3), times=np.arange(3) / 25, unit="mm")
+    for suffix in _LANDMARKS:
+        write_landmarks(folder / f"landmarks.{suffix}", landmarks.at(0) if "json" in suffix else landmarks)
+    save_template(folder / "template.json", templates()["lips"])
+
+
 # --- what is done with a file -------------------------------------------------------------------
 
 
@@ -227,6 +248,13 @@ def _settings(path: Path) -> None:
     settings.save(settings.load(path)[0], path)
 
 
+def _landmarks(path: Path) -> None:
+    found = read_landmarks(path, "mm")
+    assert len(set(found.names)) == len(found.names) > 0
+    assert np.isfinite(found.positions[found.is_defined]).all()
+    write_landmarks(path.with_name("again.csv"), found)
+
+
 def _planted(path: Path) -> None:
     """What goes wrong on purpose, to see that it is found."""
     match path.read_text():
@@ -258,6 +286,8 @@ _CHOICES: dict[str, Callable[[Path], Any]] = {
     "settings.json": _settings,
     "keys.toml": lambda path: keys.load_keys(path, Commands()),
     "planted.txt": _planted,
+    "template.json": read_template,
+    **dict.fromkeys([f"landmarks.{suffix}" for suffix in (*_LANDMARKS, "fcsv", "lm")], _landmarks),
 }
 
 

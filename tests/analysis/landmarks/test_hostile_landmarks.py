@@ -70,7 +70,7 @@ BAD = {
     ("m.csv", "name,x,y,z\na,1e308,1e308,1e308\n"): "beyond",
     ("m.c3d", "C3D" * 400): "is no C3D file",
     ("m.c3d", "\x02P"): "is no C3D file",
-    ("m.c3d", "\x02P" * 600): "cannot be read as C3D",
+    ("m.c3d", "\x02P" * 600): "parameters or frames are damaged",
     ("m.stl", "solid"): "unknown file suffix '.stl'",
     ("m.tps", ""): "is empty",
     ("m.tps", "LM3=1\n1 2 3\0\n"): "is no text",

@@ -181,6 +181,7 @@ def check_cells(frames: int, names: int) -> None:
 def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     """Names of which each is there once and can be shown, and what was changed, in words."""
     usable: dict[str, None] = {}
+    copies: dict[str, int] = {}
     twice, unnamed, changed = [], 0, 0
     for number, given in enumerate(names, 1):
         name = "".join(letter if letter.isprintable() else " " for letter in given).strip()
@@ -188,11 +189,10 @@ def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
         name = name[:LONGEST_LANDMARK_NAME]
         unnamed += not name
         base = name = name or str(number)
-        copy = 1
         while name in usable:
-            copy += 1
-            name = f"{base} ({copy})"
-        if copy > 1 and base == given.strip():
+            copies[base] = copies.get(base, 1) + 1
+            name = f"{base} ({copies[base]})"
+        if name != base and base == given.strip():
             twice.append(base)
         usable[name] = None
     told = []

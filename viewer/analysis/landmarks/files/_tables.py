@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from array import array
 from collections.abc import Iterator, Sequence
 from io import StringIO
 from pathlib import Path
@@ -110,45 +111,45 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
     state_at, sigma_at, unit_at = (_first(columns, (name,)) for name in ("state", "sigma", "unit"))
     axes = [columns.index(axis) for axis in "xyz"]
     units = _Units()
-    found: dict[tuple[int, str], tuple[list[float], int, float]] = {}
     times: dict[int, float] = {}
-    names: dict[str, None] = {}
+    numbers: dict[str, int] = {}
+    cells, numerals = array("q"), array("d")  # frame, number, line and state; x, y, z and sigma of each row
     for line, row in rows:
         if len(row) != len(columns):
             raise at_line(f"has {len(row)} values, and {len(columns)} columns have a name", line, _HINT)
         if kind_at is not None and row[kind_at].strip().lower() != "landmark":
             continue
         frame = 0 if frame_at is None else _frame(row[frame_at], line)
-        name = str(len(names) + 1) if name_at is None else row[name_at].strip()
-        if (frame, name) in found:
-            raise at_line(f"'{shortened(name)}' is there twice in one frame", line, "Give each its own name")
+        name = str(len(numbers) + 1) if name_at is None else row[name_at].strip()
         factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
         place = [number_of(row[axis], line) * factor for axis in axes]
-        found[frame, name] = (
-            place,
-            _state(row[state_at] if state_at is not None else None, place, line),
-            math.nan if sigma_at is None else number_of(row[sigma_at], line) * factor,
-        )
-        names[name] = None
+        state = _state(None if state_at is None else row[state_at], place, line)
+        sigma = math.nan if sigma_at is None else number_of(row[sigma_at], line) * factor
+        cells.extend((frame, numbers.setdefault(name, len(numbers)), line, state))
+        numerals.extend((*place, sigma))
         if time_at is not None:
             times.setdefault(frame, number_of(row[time_at], line))
-    frames = sorted({frame for frame, _ in found})
-    if not frames:
+    if not cells:
         raise InputError("holds no landmarks")
-    check_cells(len(frames), len(names))
-    at = {frame: number for number, frame in enumerate(frames)}, {name: n for n, name in enumerate(names)}
-    shape = len(frames), len(names)
-    positions, sigmas = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
-    known = np.full(shape, Known.PENDING, np.uint8)
-    for (frame, name), (place, state, sigma) in found.items():
-        cell = at[0][frame], at[1][name]
-        positions[cell], known[cell], sigmas[cell] = place, state, sigma
+    frames_of, number_of_row, lines, states = np.array(cells).reshape(-1, 4).T
+    frames, rows_of = np.unique(frames_of, return_inverse=True)
+    check_cells(len(frames), len(numbers))
+    at = rows_of * len(numbers) + number_of_row
+    _, first = np.unique(at, return_index=True)
+    if len(first) < len(at):
+        again = np.setdiff1d(np.arange(len(at)), first)[0]
+        name = list(numbers)[number_of_row[again]]
+        what = f"'{shortened(name)}' is there twice in one frame"
+        raise at_line(what, int(lines[again]), "Give each its own name")
+    values, known = np.full((len(frames) * len(numbers), 4), np.nan), np.zeros(len(frames) * len(numbers))
+    values[at], known[at] = np.array(numerals).reshape(-1, 4), states
+    shape = len(frames), len(numbers)
     return LandmarkSet.of(
-        list(names),
-        positions,
-        known=known,
-        sigmas=sigmas,
-        times=np.array([times.get(frame, math.nan) for frame in frames]),
+        list(numbers),
+        values[:, :3].reshape(*shape, 3),
+        known=known.astype(np.uint8).reshape(shape),
+        sigmas=values[:, 3].reshape(shape),
+        times=np.array([times.get(frame, math.nan) for frame in frames.tolist()]),
         frames=None if frame_at is None else frames,
         unit=units.unit,
     )

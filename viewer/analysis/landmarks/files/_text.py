@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,12 +25,19 @@ _REAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 _OWN = "scan4d "
 
 
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The bytes of a file. Raises InputError where they are more than so many."""
+    with open_plain(path) as stream:
+        held = os.fstat(stream.fileno()).st_size  # Python takes memory for all that it is asked for
+        data = stream.read(min(held, most) + 1)
+    if len(data) > most:
+        raise InputError(f"is longer than the {most:,} bytes that are read of landmarks")
+    return data
+
+
 def read_all(path: Path) -> str:
     """The text of a file in UTF-8, or where it is none in Latin-1. Raises InputError for what is no text."""
-    with open_plain(path) as stream:
-        data = stream.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise InputError(f"is longer than the {MOST_BYTES:,} bytes that are read of landmarks")
+    data = read_bytes(path)
     if b"\0" in data:
         raise InputError("is no text")
     try:
@@ -40,7 +48,8 @@ def read_all(path: Path) -> str:
 
 def numbered_lines(path: Path) -> list[tuple[int, str]]:
     """The lines of a file that are not blank, without blanks around, each after its number from 1."""
-    lines = read_all(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    text = read_all(path)
+    lines = text.replace("\r", "").split("\n") if "\n" in text else text.split("\r")
     return [(number, text.strip()) for number, text in enumerate(lines, 1) if text.strip()]
 
 

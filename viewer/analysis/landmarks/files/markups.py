@@ -88,7 +88,7 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
     count = len(points)
     positions = np.full((count, 3), np.nan)
     known, sigmas = np.full(count, Known.PENDING, np.uint8), np.full(count, np.nan)
-    names, about, told = [], [], []
+    names, about, lost = [], [], []
     for row, point in enumerate(points):
         at = f"{where}, control point {row + 1}"
         if not isinstance(point, dict):
@@ -110,7 +110,10 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
         positions[row] = _position(point.get("position"), at)
         if status == "defined" and not np.isfinite(positions[row]).all():
             known[row] = Known.PENDING
-            told.append(f"'{shortened(names[-1])}' is said to be defined, and has no finite position")
+            lost.append(names[-1])
+    told = []
+    if lost:
+        told = [f"{len(lost)} are said to be defined without a position, such as '{shortened(lost[0])}'"]
     name = _word(markup.get("name"))
     if len(points) == 1 and not names[0]:
         names[0] = name

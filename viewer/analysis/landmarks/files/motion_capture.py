@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,11 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import InputError
-from ....files import open_plain
 from ....scan.units import usable_unit
 from ...track import Known
 from ..landmark_set import LandmarkSet, check_cells
-from ._text import without_states
+from ._text import read_bytes, without_states
 
 if TYPE_CHECKING:
     from c3d import Reader
@@ -44,47 +44,49 @@ def read(path: Path) -> LandmarkSet:
     """All points in all frames. Raises InputError."""
     from c3d import Reader
 
-    with open_plain(path) as stream:
-        data = stream.read(_MOST_BYTES + 1)
-    if len(data) > _MOST_BYTES:
-        raise InputError(f"is longer than the {_MOST_BYTES:,} bytes that are read of landmarks")
+    data = read_bytes(path, _MOST_BYTES)
     if len(data) < 2 * _BLOCK or data[1] != _MAGIC:
         raise InputError("is no C3D file, or is cut short")
-    with warnings.catch_warnings(action="ignore"):
-        try:
-            reader = Reader(BytesIO(data))
-            return _frames(reader, len(data))
-        except AssertionError as error:  # of the library, where header and parameters differ
-            raise InputError(f"its header is at odds with its parameters: {error}") from error
-
-
-def _frames(reader: Reader, size: int) -> LandmarkSet:
-    count, frames = int(reader.point_used), int(reader.frame_count)
+    with _library():
+        reader = Reader(BytesIO(data))
+        count, frames, first = int(reader.point_used), int(reader.frame_count), int(reader.first_frame)
+        rate, words = float(reader.point_rate), 4 if reader.point_scale < 0 else 2
+        analog = int(reader.analog_used) * int(reader.analog_per_frame)
+        held = len(data) - (int(reader.header.data_block) - 1) * _BLOCK
     if not count:
         raise InputError("holds no points")
-    words = 4 if reader.point_scale < 0 else 2
-    held = size - (int(reader.header.data_block) - 1) * _BLOCK
-    analog = int(reader.analog_used) * int(reader.analog_per_frame)
     if frames < 1 or frames * (4 * count + analog) * words > held:
         raise InputError(f"promises {frames:,} frames of {count:,} points, and is shorter")
     check_cells(frames, count)
-    values = np.stack([points for _, points, _ in reader.read_frames(analog_transform=False)])
-    there = values[..., 3] >= 0
-    positions = np.where(there[..., np.newaxis], values[..., :3], np.nan)
-    known = np.where(there, Known.PLACED, Known.GAP)
-    first, rate = int(reader.first_frame), float(reader.point_rate)
+    with _library():
+        values = np.stack([points for _, points, _ in reader.read_frames(analog_transform=False)])
+    there = (values[..., 3] >= 0) & np.isfinite(values[..., :3]).all(axis=2)
     numbers = np.arange(frames) + max(first, 1) - 1
     labels = _texts(reader, "LABELS", count)
     return LandmarkSet.of(
         labels or [str(number) for number in range(1, count + 1)],
-        positions,
-        known=known,
+        np.where(there[..., np.newaxis], values[..., :3], np.nan),
+        known=np.where(there, Known.PLACED, Known.GAP),
         times=numbers / rate if rate > 0 and np.isfinite(rate) else None,
         frames=numbers,
         unit=_unit(reader),
         about=_texts(reader, "DESCRIPTIONS", count),
         told=[] if labels else ["Its points have no names, and got numbers"],
     )
+
+
+@contextmanager
+def _library() -> Iterator[None]:
+    """The package at work on a file: silent, and whatever it stumbles over is the file's fault."""
+    with warnings.catch_warnings(action="ignore"):
+        try:
+            yield
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise InputError(
+                f"its parameters or frames are damaged ({error or type(error).__name__})"
+            ) from error
 
 
 def _texts(reader: Reader, name: str, count: int) -> list[str]:
@@ -112,8 +114,11 @@ def _decoded(text: bytes) -> str:
 
 
 def _unit(reader: Reader) -> str | None:
+    """The unit of the first point, where each has one, or of all."""
     parameter = reader.get("POINT:UNITS")
-    return None if parameter is None else usable_unit(_decoded(bytes(parameter.bytes)).strip())
+    if parameter is None or not parameter.dimensions:
+        return None
+    return usable_unit(_decoded(parameter.bytes[: parameter.dimensions[0]]).strip())
 
 
 def write(path: Path, landmarks: LandmarkSet) -> str | None:

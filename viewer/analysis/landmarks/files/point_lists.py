@@ -58,7 +58,7 @@ def read(path: Path) -> LandmarkSet:
             promised = count_of(count[1], line, "the count"), line
             continue
         words = _words(text)
-        first = next((n for n in range(len(words)) if _is_place(words[n:])), None)
+        first = _place_in(words)
         if waiting is not None and first != 0:
             raise at_line(f"'{shortened(waiting[1])}' has no coordinates", waiting[0])
         if first is None:
@@ -95,6 +95,9 @@ def _are_numbered(rows: list[list[float]]) -> bool:
     return start in (0, 1) and all(row[0] == start + number for number, row in enumerate(rows))
 
 
-def _is_place(words: list[str]) -> bool:
-    """Whether words are coordinates, two or more, with nothing but numbers behind them."""
-    return len(words) >= 2 and all(is_number(word) for word in words)
+def _place_in(words: list[str]) -> int | None:
+    """The first of the numbers, two or more, that words end with; None where they do not."""
+    first = len(words)
+    while first and is_number(words[first - 1]):
+        first -= 1
+    return first if len(words) - first >= 2 else None
