@@ -178,8 +178,18 @@ def spot_slack(spot: Spot, radius: float) -> float:
 
     radius: of the scan, scan units.
     """
+    return float(slack_before(spot.spacing or 0.0, spot.uncertainty or 0.0, radius))
+
+
+def slack_before(
+    spacing: NDArray[np.float64] | float, sure: NDArray[np.float64] | float, radius: float
+) -> NDArray[np.float64] | float:
+    """How far before places the surface may be that is their own, scan units.
+
+    spacing: of the points around each. sure: how far off it is at most. radius: of the scan.
+    """
     spacings, share = _SLACK
-    return spacings * (spot.spacing or 0) + share * radius + (spot.uncertainty or 0)
+    return spacings * spacing + share * radius + sure
 
 
 def _six(spread: NDArray[np.float64]) -> tuple[float, float, float, float, float, float]:

@@ -178,16 +178,23 @@ class Canvas:
         """Texts at the right of places on the screen, (N, 2), of opacity (N,): the first ones, and of the
         others those that cover no text before them."""
         draw_list, line = imgui.get_window_draw_list(), imgui.get_text_line_height()
-        corners = places + np.array([1.6 * _MARK * self.em, -line / 2])
-        ends = corners + np.array([(imgui.calc_text_size(text).x, line) for text in texts]).reshape(-1, 2)
-        drawn = np.empty((0, 4))
-        for text, low, high, alpha in zip(texts, corners, ends, alphas.tolist(), strict=True):
-            is_off = (drawn[:, :2] >= high).any(axis=1) | (drawn[:, 2:] <= low).any(axis=1)
-            if not is_off.all():
+        corners = (places + np.array([1.6 * _MARK * self.em, -line / 2])).tolist()
+        inks = {
+            alpha: (theme.packed(_OUTLINE, alpha), theme.packed(_INK, alpha))
+            for alpha in set(alphas.tolist())
+        }
+        taken: set[tuple[int, int]] = set()  # cells as high as a line, and half as wide
+        for text, (left, top), alpha in zip(texts, corners, alphas.tolist(), strict=True):
+            row, column = int(top / line), int(2 * left / line)
+            if (row, column) in taken or (row + 1, column) in taken:
                 continue
-            drawn = np.vstack([drawn, [*low, *high]])
-            for shift, color in ((1.0, _OUTLINE), (0.0, _INK)):
-                draw_list.add_text(ImVec2(*(low + shift).tolist()), theme.packed(color, 0.9 * alpha), text)
+            columns = range(column, int(2 * (left + imgui.calc_text_size(text).x) / line) + 1)
+            cells = {(each, at) for at in columns for each in (row, row + 1)}
+            if taken.isdisjoint(cells):
+                taken |= cells
+                outline, ink = inks[alpha]
+                draw_list.add_text(ImVec2(left + 1, top + 1), outline, text)
+                draw_list.add_text(ImVec2(left, top), ink, text)
 
     def loupe(self, place: ImVec2) -> None:
         """The picture about a place on the screen, magnified in a square beside it, with a cross in its

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ....analysis.landmarks import Landmark, Template
 from ....analysis.landmarks.mirroring import Proposal, proposal_for
 from ....analysis.pick import are_seen
-from ....analysis.spot import Spot, moved_spot, spot_slack
+from ....analysis.spot import Spot, moved_spot, slack_before
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
@@ -25,6 +25,7 @@ from ...desk import Click, Desk, FrameSpan
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import overlay, panel
+from .computing import Computing
 from .exchange import Exchange
 from .following import Following
 from .notebook import Notebook
@@ -57,7 +58,7 @@ class Tool:
         self.desk = desk
         self.selected, self.corrects = "", False
         self.dragged: Vector | None = None
-        self.follower = Following(desk)
+        self.follower, self._computing = Following(desk), Computing(desk)
         self.notebook = Notebook(desk)
         self.exchange = Exchange(desk, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on
@@ -105,9 +106,9 @@ class Tool:
         of = shown, request, surface
         if self._seen is None or not _same(self._seen[0], of):
             radius = viewport.bounds(request.pose).radius
-            slacks = [spot_slack(one.keys[0], radius) if one.keys else 0.0 for one in shown.landmarks]
-            seen = are_seen(surface, self.positions, np.array(slacks)) if slacks else shown.is_there
-            self._seen = of, seen
+            slacks = np.asarray(slack_before(shown.spacings, np.nan_to_num(shown.sure), radius))
+            has_some = bool(shown.is_there.any())
+            self._seen = of, are_seen(surface, self.positions, slacks) if has_some else shown.is_there
         return self._seen[1]
 
     @property
@@ -366,8 +367,8 @@ class Tool:
 
     def advance(self, budget: float) -> bool:
         """Have landmarks followed; whether something new was found."""
-        self.follower.advance(self.desk.settings.follow)
-        return False
+        changed = self.follower.advance(self.desk.settings.follow)
+        return self._computing.advance(self.follower.is_running) or changed
 
 
 def _same(before: tuple[object, ...], now: tuple[object, ...]) -> bool:

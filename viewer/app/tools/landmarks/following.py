@@ -19,12 +19,14 @@ _CALM = 0.2  # seconds without a change of the landmarks before they are tracked
 class Following:
     """Has the landmarks of the open scan tracked, and tells all tools (`desk.followed`).
 
-    is_stopped: whether the user has cancelled it, until landmarks change or `resume` is called.
+    is_stopped: whether the user has cancelled it, until landmarks change or `resume` is called. pending: how
+    many of the tracks have frames that nobody has looked at yet.
     """
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self.is_stopped = False
+        self.pending = 0
         self._timeline: Timeline | None = None
         self._landmarks: Sequence[Landmark] | None = None
         self._tracker: ExactTracker | None = None
@@ -50,7 +52,7 @@ class Following:
         timeline, landmarks = self._desk.timeline, self._desk.document.part(Landmarks).all
         if self._task is not None and not self.is_running:
             self.is_stopped |= self._task.cancelled
-            self._is_done, self._task = True, None
+            self._is_done, self._task = not self._task.cancelled, None
         if timeline is not self._timeline or landmarks is not self._landmarks:
             if self._task is None:
                 self._take_up(timeline, landmarks)
@@ -61,7 +63,10 @@ class Following:
         is_same = timeline is self._timeline  # else what is there is of the scan before
         found: Mapping[str, Track] = self._tracker.tracks if self._tracker and is_same else {}
         self._desk.followed.is_busy = self.is_running
-        return self._desk.followed.take_tracks(found)
+        changed = self._desk.followed.take_tracks(found)
+        if changed:
+            self.pending = sum(not track.is_whole for track in found.values())
+        return changed
 
     def _take_up(self, timeline: Timeline, landmarks: Sequence[Landmark]) -> None:
         """Begin with other landmarks, and keep what still holds of the same scan."""
@@ -79,7 +84,7 @@ class Following:
             tracker.look_at(self._looked_at)
         waits = self.is_stopped or self._is_done or time.monotonic() < self._begins_at
         if is_wanted and self._task is None and not waits:
-            if all(track.is_whole for track in tracker.tracks.values()):
+            if not self.pending:
                 self._is_done = True
                 return
 

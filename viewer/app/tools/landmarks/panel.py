@@ -141,8 +141,7 @@ def _draw_following(tool: Tool) -> None:
     """Say how far landmarks are followed through time."""
     if len(tool.desk.timeline) < 2 or not tool.desk.followed.tracks:
         return
-    tracks = tool.desk.followed.tracks.values()
-    pending = sum(not track.is_whole for track in tracks)
+    tracks, pending = tool.desk.followed.tracks, tool.follower.pending
     if tool.follower.is_running:
         widgets.faint(f"Following {pending} of {len(tracks)} landmarks through all frames ...")
     elif pending and tool.follower.is_stopped:

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from ....analysis.landmarks import Landmark
 from ....analysis.pick import SURE
+from ....analysis.spot import Spot
 from ....analysis.track import Known, Track
 
 MISSING = "missing in this frame"
+_UNKNOWN = (np.nan,) * 6
+_ROWS = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # of a covariance's six numbers, as a matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,26 +39,33 @@ class ShownLandmarks:
     @classmethod
     def of(cls, landmarks: Sequence[Landmark], tracks: Mapping[str, Track], frame: int) -> ShownLandmarks:
         """The landmarks in a frame: as they were set there, else as they were tracked."""
-        count = len(landmarks)
+        count, gap = len(landmarks), int(Known.GAP)
         positions, spreads = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
         known, spacings = np.zeros(count, np.uint8), np.zeros(count)
-        reasons: dict[int, str] = {}
+        keyed: dict[int, Spot] = {}
+        tracked: dict[int, Track] = {}
         for number, landmark in enumerate(landmarks):
             if not landmark.keys:
                 continue
             spacings[number] = landmark.keys[0].spacing or 0.0
-            track = tracks.get(landmark.name)
             if frame in landmark.missing:
-                known[number] = Known.GAP
+                known[number] = gap
             elif (key := landmark.key_at(frame)) is not None:
-                positions[number], known[number] = key.position, Known.PLACED
-                if key.spread is not None:
-                    spreads[number] = key.spread
-            elif track is not None:
-                known[number] = track.known[frame]
-                positions[number], spreads[number] = track.positions[frame], track.covariances[frame]
-                if known[number] == Known.GAP:
-                    reasons[number] = track.reasons.get(frame, "")
+                keyed[number] = key
+            elif (track := tracks.get(landmark.name)) is not None:
+                tracked[number] = track
+        if keyed:
+            at = list(keyed)
+            known[at], positions[at] = Known.PLACED, [key.position for key in keyed.values()]
+            spreads[at] = np.array([key.covariance or _UNKNOWN for key in keyed.values()])[:, _ROWS]
+        if tracked:
+            at = list(tracked)
+            known[at] = [track.known[frame] for track in tracked.values()]
+            positions[at] = [track.positions[frame] for track in tracked.values()]
+            spreads[at] = [track.covariances[frame] for track in tracked.values()]
+        reasons = {
+            number: track.reasons.get(frame, "") for number, track in tracked.items() if known[number] == gap
+        }
         return cls(frame, landmarks, positions, known, _largest(spreads), spacings, reasons)
 
     @property

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
+
 from ....analysis.landmarks import Landmark
 from ....analysis.track import Known, Track
 from ....scan.units import Scale
@@ -28,15 +30,17 @@ def place_words(shown: ShownLandmarks, number: int, scale: Scale) -> str:
 
 def gap_spans(landmarks: Iterable[Landmark], tracks: Mapping[str, Track]) -> list[FrameSpan]:
     """The runs of frames in which the same landmarks are gaps, for the timeline."""
-    by_frame: dict[int, list[str]] = {}
-    for landmark in landmarks:
-        track = tracks.get(landmark.name)
-        if track is not None:
-            for frame in (track.known == Known.GAP).nonzero()[0].tolist():
-                by_frame.setdefault(frame, []).append(landmark.name)
+    listed = [landmark.name for landmark in landmarks if landmark.name in tracks]
+    if not listed:
+        return []
+    gaps = np.stack([tracks[name].known for name in listed], axis=1) == Known.GAP
+    by_frame = {
+        int(frame): [listed[number] for number in np.flatnonzero(gaps[frame])]
+        for frame in np.flatnonzero(gaps.any(axis=1))
+    }
     spans: list[FrameSpan] = []
     last: Sequence[str] = ()
-    for frame, names in sorted(by_frame.items()):
+    for frame, names in by_frame.items():
         if spans and spans[-1].frames.stop == frame and names == last:
             spans[-1] = FrameSpan(range(spans[-1].frames.start, frame + 1), _GAP_COLOR, spans[-1].words)
         else:
