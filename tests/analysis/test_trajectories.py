@@ -58,6 +58,8 @@ def test_a_rigid_motion_is_taken_off_and_what_moves_is_left() -> None:
     np.testing.assert_allclose(seen.positions, start.points(opening), atol=1e-6)
     wanted = np.abs(8 * 2 * math.pi / 3 * np.cos(2 * math.pi * TIMES / 3))
     np.testing.assert_allclose(seen.speeds[5:-5], wanted[5:-5], atol=0.05)
+    wanted = np.abs(8 * (2 * math.pi / 3) ** 2 * np.sin(2 * math.pi * TIMES / 3))
+    np.testing.assert_allclose(seen.pace(2)[0][5:-5], wanted[5:-5], atol=0.5)
     for name in ANCHORS:
         fixed = trajectory_of(tracks[name], Smoothing(), still)
         assert np.ptp(fixed.positions, axis=0).max() < 1e-6
@@ -82,7 +84,7 @@ def test_noise_of_anchors_is_spread_over_them_and_that_of_speeds_is_told() -> No
     noisy = [trajectory_of(track_of(line + 0.1 * rng.normal(size=(90, 3))), Smoothing()) for _ in range(100)]
     speeds = np.array([one.speeds for one in noisy])
     np.testing.assert_allclose(speeds.mean(axis=0)[5:-5], 20, atol=0.5)
-    np.testing.assert_allclose(speeds.std(axis=0), noisy[0].sigmas, rtol=0.3)
+    np.testing.assert_allclose(speeds.std(axis=0), noisy[0].pace(1)[1], rtol=0.3)
 
 
 def test_gaps_of_landmarks_and_of_anchors_are_gaps() -> None:

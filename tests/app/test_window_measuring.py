@@ -9,8 +9,6 @@ import csv
 import io
 import math
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +24,6 @@ from viewer.view import View
 FAR = np.array([1e7, -2e7, 1e7])  # of the size of UTM coordinates
 FACES = ((0, 1, 2), (1, 2, 3))
 CLICK = 0.45  # scan units, more than a pixel of the view that is started with
-_READ_CLIPBOARD = """
-import glfw, sys
-glfw.init()
-glfw.window_hint(glfw.VISIBLE, False)
-sys.stdout.buffer.write(glfw.get_clipboard_string(glfw.create_window(8, 8, "", None, None)))
-"""
 
 
 def grid(scale: float) -> NDArray[np.float64]:
@@ -75,12 +67,6 @@ def expect_reading(app: RunningApp, *distances: float, motion: str = "follows po
     """Wait until the measurements read so."""
     wanted = [(pytest.approx(distance, abs=2 * CLICK), motion) for distance in distances]
     app.see(lambda state: [(one["distance"], one["motion"]) for one in state.measurements] == wanted)
-
-
-def clipboard(screen: Screen) -> str:
-    """What another program would paste."""
-    command = [sys.executable, "-c", _READ_CLIPBOARD]
-    return subprocess.run(command, env=screen.env, check=True, capture_output=True).stdout.decode()
 
 
 def name_unit(app: RunningApp, name: str) -> None:
@@ -143,7 +129,7 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
 
         ctrl(screen, "c")
         app.told("Copied")
-        copied = list(csv.DictReader(io.StringIO(clipboard(screen)), delimiter="\t"))
+        copied = list(csv.DictReader(io.StringIO(screen.clipboard()), delimiter="\t"))
         ctrl(screen, "s")
         app.settle()
         screen.do("key", "Escape")

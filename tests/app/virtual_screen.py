@@ -30,6 +30,13 @@ PANEL = "panel/settings"  # name of the window's part with the parameters
 SIZE = (1024, 640)  # of the screen that tests share, pixels
 PATIENCE = 120.0  # seconds until what does not come about counts as failed
 
+_READ_CLIPBOARD = """
+import glfw, sys
+glfw.init()
+glfw.window_hint(glfw.VISIBLE, False)
+sys.stdout.buffer.write(glfw.get_clipboard_string(glfw.create_window(8, 8, "", None, None)))
+"""
+
 Found = TypeVar("Found")
 
 
@@ -52,6 +59,11 @@ class Screen:
         """An xdotool command line; real events."""
         command = ["xdotool", *map(str, words)]
         return subprocess.run(command, env=self.env, check=True, capture_output=True, text=True).stdout
+
+    def clipboard(self) -> str:
+        """What another program would paste; tests' own actions on widgets by name do not reach it."""
+        command = [sys.executable, "-c", _READ_CLIPBOARD]
+        return subprocess.run(command, env=self.env, check=True, capture_output=True).stdout.decode()
 
 
 def set_scale(display: str, scale: float) -> None:

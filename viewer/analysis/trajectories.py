@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +19,32 @@ _FLAT = 1e-6  # of the longest spread of anchors: in less across they lie on one
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """The way of a landmark. times: (T,) seconds. positions: (T, 3) scan units, NaN in gaps. speeds: (T,) the
-    length of the smoothed curve's velocity, scan units a second, NaN where not known; of noise alone it is
-    not 0. sigmas: (T,) of the speeds."""
+    """The way of a landmark.
+
+    times: (T,) seconds. positions: (T, 3) scan units, NaN in gaps. covariances: (T, 3, 3) of these, NaN where
+    not known. smoothing: of the curve that its speed is of.
+    """
 
     times: NDArray[np.float64]
     positions: NDArray[np.float64]
-    speeds: NDArray[np.float64]
-    sigmas: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    smoothing: Smoothing
+
+    def pace(self, order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The speed, 1, or the acceleration, 2: how long the derivative of the smoothed way is, (T,) scan
+        units a second (squared), and its standard deviation, (T,); NaN where not known. Noise makes it
+        longer: it is not 0 at rest."""
+        vectors, spread = smoothed(self.times, self.positions, self.covariances, self.smoothing, order)
+        lengths = np.sqrt((vectors**2).sum(axis=1))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            along = vectors / lengths[:, None]
+        variances = np.einsum("ti,tij,tj->t", along, spread, along)
+        return lengths, np.sqrt(np.maximum(variances, 0))
+
+    @cached_property
+    def speeds(self) -> NDArray[np.float64]:
+        """(T,) scan units a second, NaN where not known."""
+        return self.pace(1)[0]
 
 
 def trajectory_of(
@@ -40,12 +59,7 @@ def trajectory_of(
         turns = motions[:, :3, :3]
         positions = np.einsum("tij,tj->ti", turns, positions) + motions[:, :3, 3]
         covariances = turns @ covariances @ turns.transpose(0, 2, 1)
-    velocities, spread = smoothed(track.times, positions, covariances, smoothing, 1)
-    speeds = np.sqrt((velocities**2).sum(axis=1))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = velocities / speeds[:, None]
-    variances = np.einsum("ti,tij,tj->t", along, spread, along)
-    return Trajectory(track.times, positions, speeds, np.sqrt(np.maximum(variances, 0)))
+    return Trajectory(track.times, positions, covariances, smoothing)
 
 
 def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Rigid | None, ...]:

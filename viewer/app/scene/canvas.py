@@ -141,7 +141,9 @@ class Canvas:
         """
         there = np.logical_and.reduce(np.isfinite(places), axis=1)
         joined, points = there[:-1] & there[1:], places.tolist()
-        inks = [theme.packed(*ink) for ink in zip(colors, alphas.tolist(), strict=True)]
+        asked = list(zip(colors, alphas.tolist(), strict=True))
+        of_ink = {ink: theme.packed(*ink) for ink in set(asked)}
+        inks = [of_ink[ink] for ink in asked]
         draw_list, thick = imgui.get_window_draw_list(), _THICK * self.em
         for start, stop in _like_runs(joined, alphas.tolist()):
             color = theme.packed(_OUTLINE, 0.6 * float(alphas[start]))

@@ -25,7 +25,9 @@ from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import panel, plot
+from .adding import Adding
 from .choices import CurveChoices, Settings
+from .measurer import Measurer
 from .shown import Curve, Kept, Shown
 from .ways import Ways
 from .words import number_rows, numbers_in_words
@@ -36,14 +38,17 @@ TITLE = "Curves"
 class Tool:
     """The tool that plots measures over time, and draws the ways of landmarks.
 
-    shown: what is plotted. ways: what is drawn over the picture. pointed: the curve that the mouse points at
-    in the table, by name.
+    shown: what is plotted. ways: what is drawn over the picture. adding: the measure that is to be added.
+    measurer: what finds measures over time.
+    pointed: the curve that the mouse points at in the table, by name.
     """
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.shown = Shown()
         self.ways = Ways(desk)
+        self.adding = Adding()
+        self.measurer = Measurer(desk)
         self.pointed: str | None = None
         self.saving = SaveDialog(
             "Save curves", "What is plotted: a table (.csv) or a picture (.png, .svg)",
@@ -69,12 +74,19 @@ class Tool:
 
     def choose(self, step: str, **changes: Any) -> None:
         """Change choices about the open scan. step: what Undo calls it."""
-        self.desk.change(step, replace(self.choices, **changes))
+        self.desk.change(
+            step, replace(self.choices, **changes), merge=(step, *changes) if "noise" in changes else None
+        )
 
     @property
     def landmarks(self) -> Landmarks:
         """The landmarks of the open scan, and the measures of them."""
         return self.desk.document.part(Landmarks)
+
+    @property
+    def placed(self) -> list[str]:
+        """The names of the landmarks that are placed, in their order."""
+        return [landmark.name for landmark in self.landmarks.all if landmark.state == "placed"]
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -95,6 +107,15 @@ class Tool:
     def below(self, ui: Ui) -> None:
         """Declare the curves under the timeline."""
         plot.draw(self, ui)
+
+    def update(self) -> None:
+        """Find what is plotted now."""
+        ways = self.ways.trajectories(self.settings, self.choices)
+        count, series = len(self.times), self.desk.followed.series
+        fitting = {
+            name: one for name, one in series.items() if len(one.times) == count
+        }  # not of a scan before
+        self.shown.take(fitting, self.choices, self.settings, self.desk.scale, ways)
 
     def fit(self) -> None:
         """Have the axes show all of the curves."""
@@ -129,10 +150,11 @@ class Tool:
 
     def measure_distance(self) -> None:
         """Measure the distance of the two landmarks that stand last among those that are placed."""
-        placed = [landmark.name for landmark in self.landmarks.all if landmark.state == "placed"]
-        if len(placed) < 2:
+        measures = [one.name for one in self.landmarks.measures]
+        measure = Adding().measure(self.placed, measures)
+        if measure is None:
             raise InputError("A distance takes two landmarks: place them first.")
-        self.add(Measure(" to ".join(placed[-2:]), "distance", tuple(placed[-2:])))
+        self.add(measure)
 
     # --- in the window ----------------------------------------------------------------
 
@@ -145,8 +167,10 @@ class Tool:
         self.ways.draw(self.settings, self.choices, canvas, view)
 
     def advance(self, budget: float) -> bool:
-        """Have the scan held still by its anchors where that is chosen; whether that has changed."""
-        return self.ways.hold(self.settings, self.choices)
+        """Measure what is left to be measured, and have the scan held still by its anchors where that is
+        chosen; whether there is something new."""
+        has_measured = self.measurer.advance(budget, self.choices.noise)
+        return self.ways.hold(self.settings, self.choices) or has_measured
 
     def toggle_ways(self) -> None:
         """Draw the ways of the landmarks that are ticked, or not."""

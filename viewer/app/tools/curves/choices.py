@@ -22,7 +22,8 @@ class CurveChoices(Part, name="curves"):
 
     hidden: measures that are not plotted. abscissa: the measure that others are plotted against, "" for the
     first that is plotted. aligned: the one whose peaks repeats are aligned by, likewise. traced: landmarks
-    whose trajectories are drawn. anchors: those that hold the scan still.
+    whose trajectories are drawn. anchors: those that hold the scan still. noise: of the scanner, standard
+    deviation of a coordinate, scan units.
     """
 
     hidden: tuple[str, ...] = ()
@@ -30,6 +31,7 @@ class CurveChoices(Part, name="curves"):
     aligned: str = ""
     traced: tuple[str, ...] = ()
     anchors: tuple[str, ...] = ()
+    noise: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,9 @@ class Settings:
         0.5, "How much of a curve's range a peak stands out by to count as a repeat", low=0.05, high=1.0,
         title="least repeat",
     )  # fmt: skip
-    trajectories: bool = param(True, "Draw the ways of the landmarks that are ticked", basic=True)
+    trajectories: bool = param(
+        True, "Draw the ways of the landmarks that are ticked", title="Show ways", basic=True
+    )
     coordinates: str = param(
         SCAN, "Ways as the scan has them, or with the motion of the anchors taken off",
         choices=(SCAN, ANCHORS), words={SCAN: "Of the scan", ANCHORS: "Held still by anchors"}, basic=True,

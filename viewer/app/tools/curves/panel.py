@@ -10,6 +10,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from ....look import color_table
 from ... import widgets
 from ...ui import Ui
+from . import adding
 from .choices import ANCHORS, Settings
 from .ways import SPEED_MAP
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from . import Tool
 
 _OF_THE_PLOT = ("is_open", "mode", "order", "bands", "seconds", "least")
+_OPEN = imgui.TreeNodeFlags_.default_open.value
 _BAR_STEPS = 16  # of the bar of colours
 
 
@@ -27,6 +29,11 @@ def draw(tool: Tool, ui: Ui) -> None:
         tool.toggle()
     ui.tooltip("Measures over time, under the timeline", "curves")
     _draw_measures(tool)
+    if measures_there := bool(tool.landmarks.measures):
+        _draw_noise(tool)
+    if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
+        adding.draw(tool, ui)
+        imgui.tree_pop()
     _draw_ways(tool)
 
 
@@ -54,9 +61,19 @@ def _draw_measures(tool: Tool) -> None:
         imgui.pop_id()
 
 
+def _draw_noise(tool: Tool) -> None:
+    """The scanner's noise, which adds to how uncertain measures are."""
+    scale, noise = tool.desk.scale, tool.choices.noise
+    widgets.label("Noise", "Of the scanner: standard deviation of a coordinate. It makes measures less sure")
+    low, high, speed = 0.0, 1e9, 0.01
+    changed, new = imgui.drag_float("##noise", scale.factor * noise, speed, low, high, f"%.3g {scale.unit}")
+    if changed:
+        tool.choose("State noise", noise=max(float(f"{new / scale.factor:.6g}"), 0.0))
+
+
 def _draw_ways(tool: Tool) -> None:
     """The landmarks, each with whether its way is drawn and whether it holds the scan still."""
-    placed = [landmark.name for landmark in tool.landmarks.all if landmark.state == "placed"]
+    placed = tool.placed
     if not placed or not imgui.tree_node("Ways of landmarks"):
         return
     choices = tool.choices

@@ -42,7 +42,7 @@ _TABLE_FLAGS = (
 def draw(tool: Tool, ui: Ui) -> None:
     """Declare what is under the timeline."""
     _draw_bar(tool, ui)
-    tool.shown.take(tool.desk.followed.series, tool.choices, tool.settings, tool.desk.scale)
+    tool.update()
     plot = tool.shown.plot
     if plot is None:
         widgets.faint(_why_none(tool))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,9 +22,10 @@ from ....analysis.curves import (
     smoothed,
 )
 from ....analysis.measures import Series
+from ....analysis.trajectories import Trajectory
 from ....output.plots import PLOT_COLORS, CurvePlot, PlotLine
 from ....scan.units import Scale
-from .choices import AGAINST, REPEATS, CurveChoices, Settings
+from .choices import AGAINST, REPEATS, TIME, CurveChoices, Settings
 
 T = TypeVar("T")
 BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
@@ -79,10 +81,18 @@ class Shown:
         self._asked: tuple[object, ...] | None = None
 
     def take(
-        self, series: Mapping[str, Series], choices: CurveChoices, settings: Settings, scale: Scale
+        self,
+        series: Mapping[str, Series],
+        choices: CurveChoices,
+        settings: Settings,
+        scale: Scale,
+        ways: Mapping[str, Trajectory] = MappingProxyType({}),
     ) -> None:
-        """Find what is to be plotted; the same objects as before where nothing in them has changed."""
-        asked = series, choices, settings, scale
+        """Find what is to be plotted; the same objects as before where nothing in them has changed.
+
+        ways: of landmarks, whose speed or acceleration is plotted beside that of measures.
+        """
+        asked = series, choices, settings, scale, ways
         if asked == self._asked:  # a series equals itself alone
             return
         smoothing, keys, curves = settings.smoothing, set[object](), []
@@ -95,6 +105,30 @@ class Shown:
                 curves.append(self._kept.of(key, (one,), make))
         self._kept.forget_others(keys)
         self._asked, self.curves, self.plot = asked, tuple(curves), plot_of(curves, choices, settings)
+        if settings.mode == TIME and settings.derivative and ways:
+            lines = [
+                _line_of_way(name, color_of_way(number), way, settings, scale)
+                for number, (name, way) in enumerate(ways.items())
+            ]
+            self.plot = _with_lines(self.plot, lines, next(iter(ways.values())).times)
+
+
+def color_of_way(number: int) -> int:
+    """The colour of a landmark by its number among those whose ways are shown, 0xRRGGBB."""
+    return PLOT_COLORS[-1 - number % len(PLOT_COLORS)]
+
+
+def _line_of_way(name: str, color: int, way: Trajectory, settings: Settings, scale: Scale) -> PlotLine:
+    """The line of a landmark's speed or acceleration."""
+    values, sigmas = (scale.factor * part for part in way.pace(settings.derivative))
+    unit = scale.unit + _PER[settings.derivative]
+    return PlotLine(name, unit, values, _band(sigmas, settings), color)
+
+
+def _with_lines(plot: CurvePlot | None, lines: Sequence[PlotLine], times: NDArray[np.float64]) -> CurvePlot:
+    """A plot over time with more lines."""
+    before = () if plot is None else plot.lines
+    return CurvePlot("time", "s", times, (*before, *lines), np.arange(len(times)))
 
 
 def unit_of(quantity: str, unit: str) -> str:
@@ -122,8 +156,11 @@ def line_of(curve: Curve, settings: Settings) -> PlotLine:
         smoothing = settings.smoothing.wide_enough(curve.times)
         values, variances = smoothed(curve.times, values, sigmas**2, smoothing, order)
         sigmas = np.sqrt(variances)
-    band = BAND_SIGMAS * sigmas if settings.bands else np.full(len(values), np.nan)
-    return PlotLine(curve.name, curve.unit + _PER[order], values, band, curve.color)
+    return PlotLine(curve.name, curve.unit + _PER[order], values, _band(sigmas, settings), curve.color)
+
+
+def _band(sigmas: NDArray[np.float64], settings: Settings) -> NDArray[np.float64]:
+    return BAND_SIGMAS * sigmas if settings.bands else np.full(len(sigmas), np.nan)
 
 
 def plot_of(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) -> CurvePlot | None:

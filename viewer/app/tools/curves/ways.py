@@ -14,12 +14,11 @@ from ....analysis.track import Track
 from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
 from ....errors import InputError
 from ....look import color_table
-from ....output.plots import PLOT_COLORS
 from ....rigid import STILL, Rigid
 from ...desk import Desk
 from ...scene.canvas import Canvas, ViewPlace
 from .choices import ANCHORS, CurveChoices, Settings
-from .shown import Kept
+from .shown import Kept, color_of_way
 
 Still = tuple[Rigid | None, ...]
 SPEED_MAP = "viridis"
@@ -71,7 +70,7 @@ class Ways:
         still = self.still(choices) if settings.coordinates == ANCHORS else None
         found = {}
         for name in choices.traced:
-            if (track := tracks.get(name)) is not None and len(track.times):
+            if (track := tracks.get(name)) is not None and len(track.times) == len(self._desk.timeline):
                 found[name] = self._kept.of(
                     (name, smoothing), (track, still), partial(_way_of, track, smoothing, still)
                 )
@@ -95,17 +94,12 @@ class Ways:
         key = shown, tuple(found.values())
         if self._seen[0] != key:
             self._seen = key, {}
-        for name, one in found.items():
+        for number, (name, one) in enumerate(found.items()):
             places = motion.points(one.positions)
             if name not in self._seen[1]:
                 self._seen[1][name] = self._are_seen(places)
             alphas = np.where(self._seen[1][name], 1.0, _DIM)
-            number = list(desk.followed.tracks).index(name)
-            colors = (
-                self._colors(one)
-                if settings.by_speed
-                else [PLOT_COLORS[number % len(PLOT_COLORS)]] * len(places)
-            )
+            colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(places)
             canvas.path(view.all_on_screen(places), colors, alphas)
 
     def _colors(self, one: Trajectory) -> list[int]:

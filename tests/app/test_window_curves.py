@@ -1,0 +1,211 @@
+"""Curves under the timeline and ways over the picture, by real clicks and keys; a mouth opens as is known."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from virtual_screen import PANEL, RunningApp, Screen, running_app
+
+from viewer.camera import Camera
+
+RATE, FRAMES = 25.0, 50
+PEAK, WIDE, OPENING = 1.0, 0.25, 12.0  # seconds, seconds, scan units
+UPPER, LOWER = 112, 52  # points of the grid, two rows and four apart
+CLICK = 0.45  # scan units, more than a pixel of the view that is started with
+DRAWER = "drawer/curves"
+USE = "import viewer.app.tools\nviewer.app.tools.__path__.append({!r})\n"
+BELOW = """
+from imgui_bundle import imgui
+from viewer.app.commands import Command
+TITLE = "Below {name}"
+class Tool:
+    def __init__(self, desk): self.desk, self.is_on = desk, False
+    def toggle(self): self.is_on = not self.is_on
+    def is_below(self): return self.is_on
+    def below(self, ui):
+        if imgui.button("Press {name}"): {pressed}
+COMMANDS = {{"Tools": (Command("below_{name}", "Below {name}", Tool.toggle, "Alt+{key}"),)}}
+"""
+
+
+def opening(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    return OPENING * np.exp(-0.5 * ((times - PEAK) / WIDE) ** 2)
+
+
+def frames() -> NDArray[np.float64]:
+    """A grid of 15 x 11 points, whose upper half goes up as a mouth opens, (T, 165, 3)."""
+    x, y = np.meshgrid(np.arange(15) - 7, np.arange(11) - 5)
+    rest = np.stack([x.ravel(), y.ravel(), np.zeros(165)], axis=1) * 8.0
+    moved = np.repeat(rest[None], FRAMES, axis=0)
+    moved[:, 75:, 1] += opening(np.arange(FRAMES) / RATE)[:, None]
+    return moved
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    np.savez(tmp_path / "scan.npz", positions=frames(), faces=np.array([(0, 1, 2), (1, 2, 3)]))
+    return tmp_path / "scan.npz"
+
+
+@pytest.fixture
+def keys_file(tmp_path: Path) -> None:
+    """Keys for what has none of its own."""
+    folder = tmp_path / "config" / "scan4d"
+    folder.mkdir(parents=True)
+    (folder / "keys.toml").write_text('[keys]\ncopy_curves = "Ctrl+C"\ncopy_numbers = "Ctrl+K"\n')
+
+
+def click_point(app: RunningApp, number: int) -> None:
+    left, top, width, height = app.view()
+    place = Camera.from_json(app.state.camera).place_in_picture(tuple(frames()[0, number]))
+    assert place is not None
+    x, y = int(left + width / 2 + place[0] * height), int(top + height / 2 - place[1] * height)
+    app.screen.do("mousemove", x, y, "sleep", 0.2, "click", 1)
+    app.settle()
+
+
+def press(app: RunningApp, key: str) -> None:
+    app.screen.do("key", key)
+    app.settle()
+
+
+def ctrl(screen: Screen, key: str) -> None:
+    """As fingers do it: one key after the other."""
+    screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl")
+
+
+def pasted(screen: Screen) -> list[dict[str, str]]:
+    """The table that another program would paste."""
+    return list(csv.DictReader(io.StringIO(screen.clipboard()), delimiter="\t"))
+
+
+def save_as(app: RunningApp, name: str) -> Path:
+    app.act(DRAWER, ("item_click", "Save..."))
+    app.settle()
+    app.screen.do("type", "--delay", 40, name)
+    app.screen.do("key", "Return")
+    return Path(app.told(r"Saved (.+)")[1])
+
+
+def playhead(app: RunningApp) -> tuple[int, int]:
+    """A place on the line in the plot that is at the frame that is shown."""
+    _, top, _, height = app.view()
+    picture = app.screen.picture()[top + height :].astype(int)
+    is_text = (np.abs(picture - (0xE3, 0xE6, 0xEA)).max(axis=2) < 24)[:, : picture.shape[1] // 2]
+    column = int(is_text.sum(axis=0).argmax())
+    rows = np.flatnonzero(is_text[:, column])
+    return column, top + height + int(np.median(rows))
+
+
+def test_tools_stand_beside_each_other_under_the_timeline(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    folder = tmp_path / "tools"
+    folder.mkdir()
+    for name, key, pressed in (
+        ("one", "A", "self.desk.note('one is pressed')"),
+        ("two", "B", "raise ValueError('two is pressed')"),
+    ):
+        (folder / f"{name}.py").write_text(BELOW.format(name=name, key=key, pressed=pressed))
+    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
+        left, top, width, height = app.view()
+        press(app, "alt+a")
+        press(app, "alt+b")
+        lower = app.view()[3]
+        assert app.view()[:3] == (left, top, width)
+        assert lower < height - 150
+        app.act("drawer/one", ("item_click", "Press one"))
+        app.told("one is pressed")
+        bottom = screen.picture().shape[0] - (height - lower)
+        screen.do("mousemove", 300, bottom + 3, "sleep", 0.3, "mousedown", 1, "sleep", 0.2)
+        screen.do("mousemove_relative", "--", 0, -40)
+        screen.do("sleep", 0.2, "mouseup", 1)
+        app.settle()
+        assert app.view()[3] == pytest.approx(lower - 40, abs=3)
+        app.act("drawer/two", ("item_click", "Press two"))
+        app.told("two is switched off until the next start: ValueError: two is pressed")
+        press(app, "alt+a")
+        assert app.view()[3] == height
+
+
+@pytest.mark.usefixtures("keys_file")
+def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        press(app, "k")
+        click_point(app, UPPER)
+        click_point(app, LOWER)
+        press(app, "d")
+
+        ctrl(screen, "c")
+        app.told("Copied 1 curves")
+        rows = pasted(screen)
+        (name,) = (name for name in rows[0] if name.startswith("Distance") and "±" not in name)
+        wanted = np.linalg.norm(frames()[:, UPPER] - frames()[:, LOWER], axis=1)
+        assert [row["frame"] for row in rows] == [str(frame + 1) for frame in range(FRAMES)]
+        np.testing.assert_allclose([float(row[name]) for row in rows], wanted, atol=2 * CLICK)
+        ctrl(screen, "k")
+        app.told("Copied the numbers of 1 curves")
+        (numbers,) = pasted(screen)
+        assert float(numbers["amplitude"]) == pytest.approx(OPENING, rel=0.03)
+        reach = WIDE * math.sqrt(2 * math.log(10))
+        for field, seconds in (("peak", PEAK), ("onset", PEAK - reach), ("duration", 2 * reach)):
+            assert float(numbers[f"{field} [s]"]) == pytest.approx(seconds, abs=0.02), field
+
+        before = playhead(app)
+        x = screen.picture().shape[1] // 4
+        screen.do("mousemove", x, before[1], "sleep", 0.2, "click", 1)
+        clicked = app.settle().frame
+        assert 10 < clicked < FRAMES
+        column, row = playhead(app)
+        assert abs(column - x) < 12, "the line is where it was clicked"
+        screen.do("mousemove", column, row, "sleep", 0.3, "mousedown", 1, "sleep", 0.2)
+        screen.do("mousemove", column - 60, row, "sleep", 0.2, "mouseup", 1)
+        dragged = app.settle().frame
+        assert 0 < dragged < clicked - 3
+        ctrl(screen, "z")
+        app.settle()
+        assert not app.state.document["parts"]["landmarks"]["measures"]
+        assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_curves_are_saved_and_ways_are_drawn_and_held_still(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    with running_app(screen, tmp_path, scan) as app:
+        press(app, "k")
+        for number in (UPPER, LOWER, 0, 14):
+            click_point(app, number)
+        press(app, "Escape")
+        press(app, "d")
+        app.choose(DRAWER, "##order", "###speed")
+        app.settle()
+        saved = save_as(app, "speed.csv")
+        rows = list(csv.reader(io.StringIO(saved.read_text(encoding="utf-8"))))
+        assert rows[0][2].endswith("[units/s]")
+        assert save_as(app, "speed.svg").read_text().count("<svg") == 1
+        assert save_as(app, "speed.png").read_bytes()[:4] == b"\x89PNG"
+
+        press(app, "d")
+        for mode in ("against", "repeats", "time"):
+            app.choose(DRAWER, "##mode", f"###{mode}")
+            app.settle()
+        left, top, width, height = app.view()
+        before = screen.picture()[top : top + height, left : left + width].copy()
+        app.act(PANEL, ("item_open", "Ways of landmarks"))
+        app.act(PANEL, ("item_click", "Ways of landmarks/ways/$$0/##traced"))
+        app.settle()
+        after = screen.picture()[top : top + height, left : left + width]
+        assert (before != after).any(axis=2).sum() > 100
+        for number in (1, 2, 3):
+            app.act(PANEL, ("item_click", f"Ways of landmarks/ways/$${number}/##anchors"))
+        app.act(PANEL, ("item_click", "Ways of landmarks/hold/##value"))
+        app.settle()
+        assert "Traceback" not in app.log()
