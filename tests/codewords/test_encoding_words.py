@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from word_scenes import GREY, front_view, one_element, scattered
 
-from viewer.codewords.encode import Elements, Light, encode_elements
+from viewer.codewords.encode import Elements, Light, encode_elements, project_elements
 from viewer.codewords.engine import draw_words
+from viewer.codewords.project_kernels import NORMAL_I, NORMAL_J, SIZE
 from viewer.codewords.stream import WordStream
 from viewer.codewords.tables import PAPER, Steps, shape_table
 from viewer.codewords.words import decode_words
@@ -216,6 +217,24 @@ def test_the_table_is_off_by_its_steps_alone() -> None:
         margin = 0.5**0.5 + 0.25 + 0.5 * 0.2 * 2**0.5 * radius  # the centre, the size, the normal
         grown = ellipse(view, center, radius * (1 + margin / width), *tilt)
         assert not (seen & ~grown).any()
+
+
+@pytest.mark.parametrize("steps", [PAPER, Steps(33, 4, 121, 10)])
+def test_sizes_and_normals_are_within_half_a_step(steps: Steps) -> None:
+    """In a parallel view, where a disc's image is exactly one of the table's; opposite normals are one."""
+    view, elements = front_view((200, 150)), scattered(3000, (200, 150), 7)
+    found = project_elements(elements, view, FLAT, steps)
+    assert elements.normals is not None
+    assert elements.radii is not None
+    normals, radii = (each[found.rows].astype(float) for each in (elements.normals, elements.radii))
+    slopes = normals[:, :2] / normals[:, 2:] * [1, -1] * steps.normal_parts
+    inside = np.abs(slopes).max(axis=1) <= steps.steepest
+    assert inside.mean() > 0.8
+    stored = found.shapes[:, [NORMAL_I, NORMAL_J]]
+    apart = np.minimum(np.abs(stored - slopes).max(axis=1), np.abs(stored + slopes).max(axis=1))
+    assert apart[inside].max() <= 0.5 + 1e-6
+    assert np.abs(stored).max() == steps.steepest
+    assert np.abs(found.shapes[:, SIZE] - radii * steps.size_parts)[radii > 1].max() <= 0.5 + 1e-6
 
 
 def test_other_steps() -> None:

@@ -45,6 +45,18 @@ def test_entries_are_what_a_look_at_each_pixel_gives(steps: Steps) -> None:
             assert np.array_equal(bitmap(table, size, i, j), expected), (size, i, j)
 
 
+def test_every_entry_of_the_papers_table() -> None:
+    """The rule at each pixel of all shapes, of which opposite normals share one; the fractions above times 10."""
+    table, steps = shape_table(), np.arange(-30, 31)
+    u = 2 * np.arange(-table.reach, table.reach) + 1
+    for j in steps[30:]:
+        across = (steps[:, None, None] * u + j * u[:, None]) ** 2  # (i, y, x)
+        form = 25 * (u * u + (u * u)[:, None]) + across
+        for size in range(17):
+            shapes = np.array([bitmap(table, size, int(i), int(j)) for i in steps])
+            assert np.array_equal(shapes, form <= (5 * size) ** 2), (size, j)
+
+
 def test_shapes_are_symmetric_about_their_middle_and_opposite_normals_share_one() -> None:
     table = shape_table()
     for size, i, j in ((3, 4, -7), (9, -30, 11), (16, 30, 30)):
