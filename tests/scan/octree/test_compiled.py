@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 NOWHERE = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"  # no folder can be written
 KERNEL = """
 from viewer.scan.octree.compiled import compiled
@@ -74,6 +76,20 @@ def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     assert run(folder, cache) == (42, 0)
     assert run(folder, cache) == (42, 1)
+
+
+@pytest.mark.slow
+def test_what_another_file_has_is_compiled_anew_where_that_changes(tmp_path: Path) -> None:
+    folder, cache = written(tmp_path)
+    own = KERNEL.replace("2 * number", "doubled(number) + ZERO")
+    (folder / "kernel.py").write_text("from other import ZERO, doubled\n" + own)
+    other = KERNEL.replace("twice", "doubled")
+    (folder / "other.py").write_text(f"ZERO = 0\n{other}")
+    assert [run(folder, cache) for _ in range(2)] == [(42, 0), (42, 1)]
+    (folder / "other.py").write_text(f"ZERO = 0\n{other}".replace("2 *", "3 *"))
+    assert [run(folder, cache) for _ in range(2)] == [(63, 0), (63, 1)]
+    (folder / "other.py").write_text(f"ZERO = 5\n{other}")
+    assert [run(folder, cache) for _ in range(2)] == [(47, 0), (47, 1)]
 
 
 def test_damaged_files_are_made_anew(tmp_path: Path) -> None:

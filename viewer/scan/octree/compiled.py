@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from numbers import Number
 from typing import Any, TypeVar, cast
 
 from numba import njit
@@ -33,7 +34,23 @@ def compiled(function: F) -> F:
 
 
 class _Kept(FunctionCache):
-    """A cache on disk of what was compiled: damaged files are none, unwritable ones are passed over."""
+    """A cache on disk of what was compiled: damaged files are none, unwritable ones are passed over.
+
+    stamp: tells whether it is of this source; besides the file's own, that of what is imported from others,
+    functions and numbers, as these are compiled in too and numba looks at the file alone.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        known = function.__globals__.items()
+        numbers = {name: value for name, value in known if isinstance(value, Number)}
+        used = {
+            name: value._cache.stamp
+            for name, value in known
+            if isinstance(getattr(value, "_cache", None), _Kept) and value.__module__ != function.__module__
+        }
+        self.stamp = (self._impl.locator.get_source_stamp(), numbers, used)
+        self._cache_file._source_stamp = self.stamp
 
     def load_overload(self, *args: Any) -> Any:
         try:
