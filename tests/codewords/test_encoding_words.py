@@ -190,6 +190,31 @@ def test_exact_outlines_are_those_of_rays(perspective: bool) -> None:
 
 
 @pytest.mark.parametrize("perspective", [False, True])
+def test_exact_discs_end_at_the_near_plane(perspective: bool) -> None:
+    """About the eye, in front of it and behind, some far larger than what is seen of them."""
+    view, rng, shown = front_view((80, 60), perspective), np.random.default_rng(8), 0
+    for power in (0, 0, 0, 0, 0, 3, 6) * 6:
+        center = rng.uniform(-1, 1, 3) * [40, 30, 25] + [0, 0, 100]
+        elements = one_element(tuple(center), float(rng.uniform(2, 60)) * 10.0**power, rng.normal(size=3))
+        center, normal = elements.positions[0].astype(float), elements.normals[0].astype(float)  # type: ignore[index]
+        stream = encode_elements(elements, view, GREY, exact=True)
+        picture = draw_words(stream)
+        expected, depth = exact_disc(view, center, normal, float(elements.radii[0]))  # type: ignore[index]
+        expected &= depth >= 1.0
+        np.testing.assert_array_equal(picture.covered, expected)
+        if not expected.any():
+            assert len(stream) == 0
+            continue
+        shown += 1
+        ends = [1 / stream.near, 1 / stream.far] if perspective else [stream.far, stream.near]
+        seen = picture.depths()[expected]
+        error = 1 / seen - 1 / depth[expected] if perspective else seen - depth[expected]
+        assert np.abs(error).max() <= 1e-5 * (ends[0] - ends[1]) + 1e-6 * ends[0]
+        assert stream.near >= 0.999
+    assert shown > 10
+
+
+@pytest.mark.parametrize("perspective", [False, True])
 def test_depths_of_discs_that_are_seen_edge_on(perspective: bool) -> None:
     """However steep, what is shown of a disc is no nearer and no farther than the disc."""
     view, shown = front_view((80, 60), perspective), 0

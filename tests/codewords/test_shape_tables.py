@@ -46,7 +46,7 @@ def test_entries_are_what_a_look_at_each_pixel_gives(steps: Steps) -> None:
 
 
 def test_every_entry_of_the_papers_table() -> None:
-    """The rule at each pixel of all shapes, of which opposite normals share one; the fractions above times 10."""
+    """The rule at each pixel of all shapes, of which opposite normals share one, without fractions."""
     table, steps = shape_table(), np.arange(-30, 31)
     u = 2 * np.arange(-table.reach, table.reach) + 1
     for j in steps[30:]:

@@ -65,7 +65,7 @@ class Light:
 class Projected:
     """Elements that a picture may show, M of them, projected and in steps.
 
-    rows: (M,) uint32, which ones. shapes: (M, 7) int32, and planes: (M, 10) float64, see `project_kernels`.
+    rows: (M,) uint32, which ones. shapes: (M, 7) int32, and planes: (M, 15) float64, see `project_kernels`.
     near, far: depths from the view's base that the least and the largest Z stand for, scan units.
     """
 

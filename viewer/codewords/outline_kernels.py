@@ -3,7 +3,9 @@
 A row of `planes` (float64) has of a disc the depth at its centre, or its inverse in perspective; that at the
 corner of pixels that its centre is rounded to, how much it grows a pixel to the right and down; and the form
 of its outline, six numbers: a place (x, y) off the corner is inside where
-a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f <= 0.
+a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f <= 0. Then the least and the largest y of the outline, infinite
+for a disc that reaches the plane of the eye, whose outline is a branch of a hyperbola; and what the near
+plane leaves of it, three numbers: places where g + h x + i y <= 0.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..scan.octree.compiled import compiled
 
-PLANE_COLUMNS = 10
+PLANE_COLUMNS = 15
 Whole = int | np.integer
 
 
@@ -31,10 +33,11 @@ def project_outline(
     corner_y: float,
     scale: float,
     perspective: bool,
+    near: float,
     plane: NDArray[np.float64],
 ) -> None:
-    """The plane of a disc over the picture, and the form of its outline, from the corner that its centre is
-    rounded to: (corner_x, corner_y) from the line of sight, pixels.
+    """The plane of a disc over the picture, and its outline, from a corner of pixels: (corner_x, corner_y)
+    from the line of sight, pixels. near: depth of the near plane.
 
     A ray of the picture meets the plane where the inverse of its depth, and the disc's two coordinates times
     that, are linear in pixels. In parallel views coordinates and depth are.
@@ -62,12 +65,12 @@ def project_outline(
         lines[0, k] = (off[0] * u[0] + off[1] * u[1] + off[2] * u[2]) / first
         lines[1, k] = (off[0] * v[0] + off[1] * v[1] + off[2] * v[2]) / second
         lines[2, k] = weight
-    depth = -c[2] if perspective else 1.0
-    form = plane[4:]
+    unit = math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) if perspective else 1.0
+    form = plane[4:10]
     for k in range(6):
         form[k] = 0.0
     for k in range(3):
-        sign = (1.0 if k < 2 else -1.0) * depth * depth  # near 1 whatever the scan's unit
+        sign = (1.0 if k < 2 else -1.0) * unit * unit  # near 1 whatever the scan's unit
         one, right, down = lines[k]
         form[0] += sign * right * right
         form[1] += sign * right * down
@@ -75,6 +78,15 @@ def project_outline(
         form[3] += sign * right * one
         form[4] += sign * down * one
         form[5] += sign * one * one
+    reach = math.sqrt((first * u[2]) ** 2 + (second * v[2]) ** 2)
+    if perspective and reach >= -c[2]:
+        plane[10], plane[11] = -np.inf, np.inf
+    else:
+        plane[10], plane[11] = _extent(form[0], form[1], form[2], form[3], form[4], form[5])
+    side = 1.0 if perspective else -1.0
+    for k in range(3):
+        plane[12 + k] = side * plane[1 + k]
+    plane[12] -= side * (1.0 / near if perspective else near)
 
 
 @compiled
@@ -91,8 +103,10 @@ def _extent(a: float, b: float, c: float, d: float, e: float, f: float) -> tuple
 @compiled
 def is_outline_seen(plane: NDArray[np.float64], x: float, y: float, width: float, height: float) -> bool:
     """Whether the box around an outline reaches into the picture."""
+    top, bottom = plane[10], plane[11]
+    if top == -np.inf:
+        return True
     a, b, c, d, e, f = plane[4], plane[5], plane[6], plane[7], plane[8], plane[9]
-    top, bottom = _extent(a, b, c, d, e, f)
     left, right = _extent(c, b, a, e, d, f)
     return (
         top <= bottom
@@ -114,11 +128,11 @@ def exact_rows(
     first: NDArray[np.int32],
     last: NDArray[np.int32],
 ) -> tuple[Whole, Whole]:
-    """Fill the rows of an exact outline, cut to the picture."""
+    """Fill the rows of an exact outline, cut to the picture and at the near plane."""
     a, b, c, d, e, f = plane[4], plane[5], plane[6], plane[7], plane[8], plane[9]
-    low, high = _extent(a, b, c, d, e, f)
-    top = np.int64(max(math.ceil(y + low - 0.5), 0.0))
-    bottom = np.int64(min(math.floor(y + high - 0.5), height - 1.0))
+    is_open = plane[10] == -np.inf
+    top = np.int64(max(math.ceil(max(y + plane[10], -1.0) - 0.5), 0.0))
+    bottom = np.int64(min(math.floor(min(y + plane[11], height + 1.0) - 0.5), height - 1.0))
     for row in range(top, bottom + 1):
         off = row + 0.5 - y
         p, q = b * off + d, off * (c * off + 2.0 * e) + f
@@ -127,8 +141,57 @@ def exact_rows(
         if root < 0.0:
             continue
         root = math.sqrt(root)
-        begin = max(math.ceil(x + (-p - root) / a - 0.5), 0.0)
-        end = min(math.floor(x + (-p + root) / a - 0.5), width - 1.0)
+        if is_open:
+            left, right = _before_the_eye(a, p, q, root, plane[1] + off * plane[3], plane[2])
+        else:
+            left, right = (-p - root) / a, (-p + root) / a
+        cut = plane[12] + off * plane[14]
+        if plane[13] > 0.0:
+            right = min(right, -cut / plane[13])
+        elif plane[13] < 0.0:
+            left = max(left, -cut / plane[13])
+        elif cut > 0.0:
+            continue
+        begin = max(math.ceil(max(x + left, -1.0) - 0.5), 0.0)
+        end = min(math.floor(min(x + right, width + 1.0) - 0.5), width - 1.0)
         if begin <= end:
             first[row], last[row] = np.int32(begin), np.int32(end)
     return top, bottom
+
+
+@compiled
+def seen_range(
+    plane: NDArray[np.float64],
+    x: int,
+    y: int,
+    width: int,
+    height: int,
+    first: NDArray[np.int32],
+    last: NDArray[np.int32],
+) -> tuple[float, float]:
+    """The least and the largest depth, or inverse of it in perspective, of the pixels inside an outline; the
+    first is the larger one where there are none. first, last: as `exact_rows` fills them."""
+    low, high = np.inf, -np.inf
+    top, bottom = exact_rows(plane, x, y, width, height, first, last)
+    for row in range(top, bottom + 1):
+        if first[row] <= last[row]:
+            for column in (first[row], last[row]):
+                value = plane[1] + plane[2] * (column + 0.5 - x) + plane[3] * (row + 0.5 - y)
+                low, high = min(low, value), max(high, value)
+    return low, high
+
+
+@compiled
+def _before_the_eye(
+    a: float, p: float, q: float, root: float, inverse: float, step: float
+) -> tuple[float, float]:
+    """The places x of a row of a hyperbola, a x^2 + 2 p x + q <= 0, that lie before the eye, not behind it:
+    where the inverse of depth, which grows by step, is above 0. The first is the larger one where none do."""
+    if a > 0.0:
+        in_front = inverse - step * p / a > 0.0
+        return ((-p - root) / a, (-p + root) / a) if in_front else (1.0, -1.0)
+    k = -p - math.copysign(root, p)  # without cancellation
+    if k == 0.0:
+        return 1.0, -1.0
+    one, other = k / (a if a < 0.0 else -1e-300), q / k
+    return (max(one, other), np.inf) if step > 0.0 else (-np.inf, min(one, other))

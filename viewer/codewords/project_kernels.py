@@ -3,7 +3,7 @@
 Elements are points that the picture may show. Of each there is a row in `shapes` and in `planes`:
 
     shapes (int32)    x, y of the corner of pixels that its centre is rounded to, size, i, j, diffuse index,
-                      specular index
+                      specular index; of exact outlines no size and normal, and any corner
     planes (float64)  depth at the centre, or its inverse in perspective; of exact outlines also the rest, see
                       `outline_kernels`
 """
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan.octree.compiled import compiled
-from .outline_kernels import is_outline_seen, project_outline
+from .outline_kernels import is_outline_seen, project_outline, seen_range
 
 X, Y, SIZE, NORMAL_I, NORMAL_J, DIFFUSE, SPECULAR = range(7)
 SHAPE_COLUMNS = 7
@@ -52,10 +52,12 @@ def project(
     perspective, lit, light from the eye, leave out what faces away, exact outlines. spread: becomes the least
     and the largest depth, of centres, or of whole discs where outlines are exact.
     """
-    width, height, at_x, at_y, scale, near, far = lens
+    at_x, at_y, scale, near, far = lens[2:]
+    width, height = int(lens[0]), int(lens[1])
     perspective, lit, from_eye, cull, exact = flags
     size_parts, steepest, normal_parts = steps
     n, u, v, c, eye = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    left, right = np.empty(height, np.int32), np.empty(height, np.int32)
     count = 0
     spread[0], spread[1] = np.inf, -np.inf
     for row in range(len(positions)):
@@ -63,16 +65,19 @@ def project(
             c[k] = frame[k, 3]
             for m in range(3):
                 c[k] += frame[k, m] * positions[row, m]
-        depth = -c[2]
-        if not (depth >= near and depth <= far):
+        depth, distance = -c[2], math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+        if not (depth <= far and distance > 0.0 and distance < _UNKNOWN):
             continue
-        s = scale / depth if perspective else scale
+        held = max(depth, near)
+        s = scale / held if perspective else scale
         x, y = at_x + c[0] * s, at_y - c[1] * s
-        if not (abs(x) < _FARTHEST and abs(y) < _FARTHEST):
+        is_near = abs(x) < _FARTHEST and abs(y) < _FARTHEST
+        if not exact and not (depth >= near and is_near):
             continue
 
         # The frame of the disc: its normal towards the eye, and half-axes u, v of unit length.
-        distance = math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) if perspective else 1.0
+        if not perspective:
+            distance = 1.0
         for k in range(3):
             eye[k] = -c[k] / distance if perspective else (1.0 if k == 2 else 0.0)
         length = 0.0
@@ -103,31 +108,42 @@ def project(
         if len(axes):
             first, second = _half_axes(axes[row], frame, n, u, v, first, second, splats, s)
 
-        # The image of its half-axes, pixels right and down; with it the ellipse's squared widths.
-        tilt_x, tilt_y = (c[0] / depth, c[1] / depth) if perspective else (0.0, 0.0)
-        a_x, a_y = first * s * (u[0] + tilt_x * u[2]), -first * s * (u[1] + tilt_y * u[2])
-        b_x, b_y = second * s * (v[0] + tilt_x * v[2]), -second * s * (v[1] + tilt_y * v[2])
-        xx, xy, yy = a_x * a_x + b_x * b_x, a_x * a_y + b_x * b_y, a_y * a_y + b_y * b_y
-        reach_x, reach_y = math.sqrt(xx) + 1.0, math.sqrt(yy) + 1.0
-        reach_z = math.sqrt((first * u[2]) ** 2 + (second * v[2]) ** 2)
-        if exact and perspective and reach_z >= depth:
-            continue  # it reaches the eye's plane, and has no outline
-        if not exact and (x + reach_x < 0 or x - reach_x > width or y + reach_y < 0 or y - reach_y > height):
-            continue
-        corner_x, corner_y = np.rint(x), np.rint(y)
         shape, plane = shapes[count], planes[count]
-        shape[X], shape[Y] = np.int32(corner_x), np.int32(corner_y)
-        _quantise(xx, xy, yy, size_parts, steepest, normal_parts, shape)
-        plane[0] = 1.0 / depth if perspective else depth
+        plane[0] = 1.0 / held if perspective else held
         if exact:
-            project_outline(
-                c, n, u, v, first, second, corner_x - at_x, corner_y - at_y, scale, perspective, plane
-            )
+            reach_z = math.sqrt((first * u[2]) ** 2 + (second * v[2]) ** 2)
+            if not depth + reach_z >= near:
+                continue
+            corner_x = corner_y = 0.0
+            if not perspective or reach_z < depth:
+                if not is_near:
+                    continue
+                corner_x, corner_y = np.rint(x), np.rint(y)
+            shape[X], shape[Y], shape[SIZE] = np.int32(corner_x), np.int32(corner_y), 0
+            shape[NORMAL_I], shape[NORMAL_J] = 0, 0
+            off_x, off_y = corner_x - at_x, corner_y - at_y
+            project_outline(c, n, u, v, first, second, off_x, off_y, scale, perspective, near, plane)
             if not is_outline_seen(plane, corner_x, corner_y, width, height):
                 continue
-            spread[0], spread[1] = min(spread[0], depth - reach_z), max(spread[1], depth + reach_z)
+            nearest, farthest = depth - reach_z, depth + reach_z
+            if nearest < near:
+                low, high = seen_range(plane, shape[X], shape[Y], width, height, left, right)
+                if low > high:
+                    continue
+                nearest, farthest = (1.0 / high, 1.0 / low) if perspective else (low, high)
         else:
-            spread[0], spread[1] = min(spread[0], depth), max(spread[1], depth)
+            # The image of its half-axes, pixels right and down; with it the ellipse's squared widths.
+            tilt_x, tilt_y = (c[0] / depth, c[1] / depth) if perspective else (0.0, 0.0)
+            a_x, a_y = first * s * (u[0] + tilt_x * u[2]), -first * s * (u[1] + tilt_y * u[2])
+            b_x, b_y = second * s * (v[0] + tilt_x * v[2]), -second * s * (v[1] + tilt_y * v[2])
+            xx, xy, yy = a_x * a_x + b_x * b_x, a_x * a_y + b_x * b_y, a_y * a_y + b_y * b_y
+            reach_x, reach_y = math.sqrt(xx) + 1.0, math.sqrt(yy) + 1.0
+            if x + reach_x < 0 or x - reach_x > width or y + reach_y < 0 or y - reach_y > height:
+                continue
+            shape[X], shape[Y] = np.int32(np.rint(x)), np.int32(np.rint(y))
+            _quantise(xx, xy, yy, size_parts, steepest, normal_parts, shape)
+            nearest = farthest = depth
+        spread[0], spread[1] = min(spread[0], nearest), max(spread[1], farthest)
         shape[DIFFUSE], shape[SPECULAR] = 127, 0
         if lit:
             _shade(n, eye, light, from_eye, shape)

@@ -61,6 +61,22 @@ def test_exact_words_show_what_discs_show(draw: Draw, projection: str) -> None:
     np.testing.assert_array_equal(words.normal[same], discs.normal[same])
 
 
+def test_exact_words_show_what_discs_show_about_the_eye(draw: Draw) -> None:
+    """Those that reach the plane of the eye too: they end at the near plane."""
+    rng = np.random.default_rng(0)
+    cloud = PointCloud.from_arrays(
+        positions=rng.uniform(-1, 1, (400, 3)),
+        normals=rng.normal(size=(400, 3)),
+        radii=rng.uniform(0.05, 0.3, 400),
+    )
+    camera = Camera((0, 0, 0), (0.6, 0.2, 0.1), fov_y=70, near=0.01)
+    params = {"passes": "one", "radius": "own", "epsilon": 0.0}
+    discs = draw(cloud, camera, (320, 240), "surfels", params=params)
+    assert len(np.unique(discs.id)) > 10
+    words = draw(cloud, camera, (320, 240), "codeword", params={"quality": "exact"})
+    assert share_of_other_ids(discs, words) <= 0.005
+
+
 @pytest.mark.xfail(
     strict=True,
     reason="84 % differ: a word has one depth, so that of discs that overlap the one with the nearer centre "

@@ -33,14 +33,11 @@ from .engine import Sheet, WordBuffers, draw_bands
 TITLE = "Code words"
 
 _HELD = (
-    "words hold places, shapes, depths and colours in steps: the last bit moves some by a whole step, what "
-    "else there is moves the steps, and a disc that reaches the plane of the eye has no outline to hold"
+    "words hold places, shapes, depths and colours in steps: the last bit moves some by a whole step, and "
+    "what else there is moves the steps"
 )
 _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
-_EXACT = {"quality": ("exact",)}
 LIMITS = {
-    "zoomed in on 10^-3 of a splat": Limit(0.0, _HELD, _EXACT),
-    "zoomed in on 10^-6 of a splat": Limit(0.0, _HELD, _EXACT),
     "near plane inside the cloud": Limit(0.0, _HELD, _OF_PALETTE),
     "zoomed in on 10^-3 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
     "zoomed in on 10^-6 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
