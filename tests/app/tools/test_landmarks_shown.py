@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,14 +9,11 @@ import numpy as np
 import pytest
 
 from viewer.analysis.landmarks import Landmark
-from viewer.analysis.measures import Measure
 from viewer.analysis.spot import Spot
 from viewer.analysis.track import Known, Track
 from viewer.app.desk import Desk
-from viewer.app.followed import Followed
 from viewer.app.session import Session
 from viewer.app.tools.landmarks import Tool
-from viewer.app.tools.landmarks.computing import Computing
 from viewer.app.tools.landmarks.shown import ShownLandmarks
 from viewer.app.tools.landmarks.words import gap_spans, place_words
 from viewer.document.landmarks import Landmarks
@@ -104,26 +100,3 @@ def test_clicks_set_what_is_next() -> None:
     assert tool.target is None
     tool.rename("final")
     assert [one.name for one in tool.made.all] == ["placed", "final", "left out"]
-
-
-def test_measures_are_computed_of_what_is_known() -> None:
-    session = Session("scan")
-    timeline, notes = SimpleNamespace(times=TIMES), []
-    box = SimpleNamespace(
-        session=session,
-        playback=SimpleNamespace(timeline=timeline),
-        followed=Followed(),
-        note=notes.append,
-    )
-    computing = Computing(Desk(box, "landmarks"))  # type: ignore[arg-type]
-    width, wrong = Measure("width", "distance", ("placed", "other")), Measure("wrong", "none", ("placed",))
-    session.change("Begin", Landmarks(ALL, measures=(width, wrong, Measure("later", "distance", ("a", "b")))))
-    box.followed.take_tracks({**TRACKS, "other": track(*[Known.PLACED] * 4)})
-    assert computing.advance(is_tracking=False)
-    assert list(box.followed.series) == ["width"]
-    assert box.followed.series["width"].known.tolist() == [3, 2, 1, 1]
-    assert len(notes) == 1, "what is no measure is told once"
-    before = box.followed.series
-    time.sleep(0.12)
-    assert not computing.advance(is_tracking=False)
-    assert box.followed.series is before, "nothing has changed"

@@ -25,7 +25,6 @@ from ...desk import Click, Desk, FrameSpan
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import overlay, panel
-from .computing import Computing
 from .exchange import Exchange
 from .following import Following
 from .notebook import Notebook
@@ -58,7 +57,7 @@ class Tool:
         self.desk = desk
         self.selected, self.corrects = "", False
         self.dragged: Vector | None = None
-        self.follower, self._computing = Following(desk), Computing(desk)
+        self.follower = Following(desk)
         self.notebook = Notebook(desk)
         self.exchange = Exchange(desk, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on
@@ -367,8 +366,7 @@ class Tool:
 
     def advance(self, budget: float) -> bool:
         """Have landmarks followed; whether something new was found."""
-        changed = self.follower.advance(self.desk.settings.follow)
-        return self._computing.advance(self.follower.is_running) or changed
+        return self.follower.advance(self.desk.settings.follow)
 
 
 def _same(before: tuple[object, ...], now: tuple[object, ...]) -> bool:
