@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,6 @@ from landmark_sets import NAMES, assert_same, moving
 from viewer.analysis.landmarks.files import (
     holds_one_moment,
     is_landmark_file,
-    landmark_formats,
     landmark_suffixes,
     read_landmarks,
     write_landmarks,
@@ -56,9 +56,16 @@ def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
 def test_every_format_that_is_written_is_tried() -> None:
     tried = {suffix for suffix in landmark_suffixes(written=True) for name in FILES if name.endswith(suffix)}
     assert tried | {".txt"} == set(landmark_suffixes(written=True))
-    assert {suffix for suffixes in landmark_formats().values() for suffix in suffixes} == set(
-        landmark_suffixes()
-    )
+
+
+def test_the_docs_name_every_format() -> None:
+    page = Path(__file__).parents[3] / "docs" / "formats.md"
+    section = page.read_text("utf-8").split("\n## Landmarks\n")[1].split("\n## ")[0]
+    rows = [line.split("|") for line in section.splitlines() if line.startswith("| ")][1:]
+    read = {suffix: row for row in rows for suffix in re.findall(r"`(\.[\w.]+)`", row[2])}
+    assert set(read) == set(landmark_suffixes())
+    written = {suffix for suffix, row in read.items() if row[4].strip() != "\u2013"}
+    assert written == set(landmark_suffixes(written=True))
 
 
 @pytest.mark.parametrize("name", FILES)

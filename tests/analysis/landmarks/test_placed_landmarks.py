@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
-from viewer.analysis.landmarks.placed import landmarks_of, spot_at
+from viewer.analysis.landmarks.placed import landmarks_of, spot_at, told_beside
 from viewer.analysis.spot import followed
 from viewer.analysis.track import Known
 from viewer.scan.points import PointCloud
@@ -56,3 +56,16 @@ def test_one_moment_is_of_the_frame_that_is_shown() -> None:
     found = LandmarkSet.of(["a"], GRID[[[3]]] + 2 * STEP)
     (landmark,) = landmarks_of(found, POSES.__getitem__, len(POSES), 2)
     assert [key.frame for key in landmark.keys] == [2]
+
+
+def test_landmarks_beside_the_surface_are_told() -> None:
+    places = GRID[None, 100:110] + [[0.0, 0.0, 2.0]]
+    names = [f"p{n}" for n in range(10)]
+    for lifted, is_told in ((2, False), (3, True)):
+        places[0, :lifted, 2] = 9.0
+        made = landmarks_of(LandmarkSet.of(names, places), POSES.__getitem__, len(POSES), 0)
+        told = told_beside(made)
+        assert (told is not None) == is_told
+    assert told is not None
+    assert told.startswith("3 of 10 landmarks lie beside the surface (p0, p1, p2)")
+    assert told_beside([Landmark("a")]) is None

@@ -46,7 +46,7 @@ def own(**changes: Any) -> dict[str, Any]:
         "format": 1,
         "name": "mine",
         "landmarks": [{"name": "aL", "partner": "aR"}, {"name": "aR", "partner": "aL"}, {"name": "鼻"}],
-        "measures": [{"name": "w", "kind": "distance", "landmarks": ["aL", "aR"], "options": {"a": "b"}}],
+        "measures": [{"name": "w", "kind": "distance", "landmarks": ["aL", "aR"]}],
     }
     return data | changes
 
@@ -56,7 +56,7 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
     found = read_template(tmp_path / "mine.json")
     assert (found.name, found.title, found.source) == ("mine", "mine", "")
     assert [landmark.partner for landmark in found.landmarks] == ["aR", "aL", ""]
-    assert found.measures[0].options == {"a": "b"}
+    assert found.measures[0].landmarks == ("aL", "aR")
 
 
 @pytest.mark.parametrize(
@@ -78,6 +78,8 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
         ),
         ({"measures": [{"name": "w"}]}, r"measures\[0\]: has no 'kind'"),
         ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "options are no words"),
+        ({"measures": [{"name": "w", "kind": "width"}]}, r"measures\[0\]: unknown kind of measure 'width'"),
+        ({"measures": [{"name": "w", "kind": "angle", "landmarks": ["aL"]}]}, "takes 3 landmarks, not 1"),
         ({"more": 1}, "unknown field 'more'"),
         ({"name": " mine"}, "blanks around"),
     ],

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import shortened
 from ...geometry import vector
 from ...scan.pose import Pose
 from ...scan.spacing import nearest_row, spacing_at
@@ -20,6 +21,7 @@ from .landmark_set import LandmarkSet
 from .mirroring import partners_of
 
 _ON_SURFACE = 3.0  # spacings: farther from the nearest point, a place follows none
+_FEW = 0.2  # of the landmarks, which may lie beside the surface, as in holes
 
 
 def landmarks_of(
@@ -50,6 +52,22 @@ def landmarks_of(
         old = before.get(name, Landmark(name, partner=partners.get(name, "")))
         landmarks.append(Landmark(name, tuple(spots), partner=old.partner, about=about or old.about))
     return tuple(landmarks)
+
+
+def told_beside(landmarks: Sequence[Landmark]) -> str | None:
+    """How many landmarks are set beside the surface of their frames, in words; None for few.
+
+    Landmarks of another subject, or of another scan of the same one, lie within the bounds of this one, and
+    not on it.
+    """
+    set_here = [landmark for landmark in landmarks if landmark.keys]
+    beside = [one.name for one in set_here if all(key.id is None for key in one.keys)]
+    if len(beside) <= _FEW * len(set_here):
+        return None
+    some = ", ".join(map(shortened, beside[:3]))
+    return (
+        f"{len(beside)} of {len(set_here)} landmarks lie beside the surface ({some}): are they of this scan?"
+    )
 
 
 def spot_at(position: NDArray[np.float64], pose: Pose, sigma: float = math.nan) -> Spot:

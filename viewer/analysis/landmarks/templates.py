@@ -17,6 +17,7 @@ from ...errors import InputError, explained, shortened
 from ...files import parsed_json, read_text, whole_file
 from ...resources import resource_path
 from ..measures import Measure
+from ..measures.kinds import kind_of
 from . import Landmark, Template
 from .landmark_set import LONGEST_LANDMARK_NAME
 
@@ -59,7 +60,8 @@ def read_template(path: Path | str) -> Template:
     try:
         return _template(data)
     except InputError as error:
-        raise InputError(error.what, ", ".join(map(str, filter(None, (path, error.where)))), _HINT) from None
+        where = ", ".join(map(str, filter(None, (path, error.where))))
+        raise InputError(error.what, where, error.hint or _HINT) from None
 
 
 def _template(data: Any) -> Template:
@@ -106,7 +108,12 @@ def _measure(data: Any, names: set[str], where: str) -> Measure:
     if not isinstance(options, dict) or not all(isinstance(value, str) for value in options.values()):
         raise InputError("its options are no words by name", where)
     name, kind = (_text(fields, key, where, needed=True) for key in ("name", "kind"))
-    return Measure(name, kind, tuple(used), options)
+    measure = Measure(name, kind, tuple(used), options)
+    try:
+        kind_of(measure)
+    except InputError as error:
+        raise InputError(error.what, where, error.hint) from None
+    return measure
 
 
 def _fields(data: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:

@@ -51,11 +51,6 @@ def landmark_suffixes(written: bool = False) -> list[str]:
     return sorted(suffix for suffix, module in modules if not written or hasattr(module, "write"))
 
 
-def landmark_formats() -> dict[str, tuple[str, ...]]:
-    """The title of each format -> its suffixes."""
-    return {module.TITLE: module.SUFFIXES for _, module in _modules()}
-
-
 def is_landmark_file(path: Path | str) -> bool:
     """Whether a file holds landmarks: by its suffix and, where scans may have that one, by its start."""
     path = Path(path)
