@@ -1,0 +1,177 @@
+"""Landmarks are followed through all frames, in the order of need, and what nobody knows is a gap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_hills import SPACING, MovingHills, key, placed, truth
+
+from viewer.analysis.track import Known, Track
+from viewer.analysis.tracking import Tracker, TrackingSettings, track_landmarks
+from viewer.errors import InputError
+from viewer.scan.timeline import Timeline
+from viewer.task import Cancelled, Task
+
+FRAMES = 7
+PLACES = {"middle": (0.0, 0.0), "beside": (6.0, -5.0)}
+
+
+def timeline_of(source: MovingHills) -> Timeline:
+    return Timeline(source, source.times(), "mm")
+
+
+def errors(track: Track, place: tuple[float, float]) -> np.ndarray:
+    return np.linalg.norm(track.positions - truth(*place, len(track.times)), axis=1)
+
+
+@pytest.mark.parametrize("frame", [0, 3])
+def test_landmarks_are_followed_to_both_ends(frame: int) -> None:
+    landmarks = [placed(name, key(*place, frame)) for name, place in PLACES.items()]
+    tracks = track_landmarks(timeline_of(MovingHills(FRAMES)), landmarks)
+    assert list(tracks) == list(PLACES)
+    for name, place in PLACES.items():
+        track = tracks[name]
+        assert track.known[frame] == Known.PLACED
+        assert (np.delete(track.known, frame) == Known.TRACKED).all()
+        assert not track.reasons
+        off = errors(track, place)
+        assert off.max() < 0.25 * SPACING
+        others = np.arange(FRAMES) != frame
+        assert (off <= 3 * track.sigmas)[others].all()
+        assert off[frame] < 1e-9
+
+
+def test_a_hole_is_a_gap_and_the_landmark_is_found_again() -> None:
+    def hole(frame: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.hypot(x, y) < (4 * SPACING if frame in (3, 4) else 0)
+
+    tracks = track_landmarks(
+        timeline_of(MovingHills(FRAMES, hole=hole)), [placed("middle", key(0.0, 0.0, 0))]
+    )
+    track = tracks["middle"]
+    assert track.known.tolist() == [3, 2, 2, 1, 1, 2, 2]
+    assert sorted(track.reasons) == [3, 4]
+    assert "hole" in track.reasons[3]
+    assert np.isnan(track.positions[3]).all()
+    assert np.isnan(track.sigmas[4])
+    assert np.nanmax(errors(track, (0.0, 0.0))) < 0.25 * SPACING
+
+
+def test_between_keys_both_sides_count_and_a_key_that_was_moved_is_met() -> None:
+    first, last = key(0.0, 0.0, 0), key(0.5, 0.0, 6)  # the second one is set half a unit beside
+    track = track_landmarks(timeline_of(MovingHills(FRAMES)), [placed("middle", first, last)])["middle"]
+    assert track.known.tolist() == [3, 2, 2, 2, 2, 2, 3]
+    off = errors(track, (0.0, 0.0))
+    assert (np.diff(off) > -0.1).all()
+    assert 0.15 < off[3] < 0.4
+    assert track.sigmas[3] > track.sigmas[1]
+
+
+def test_what_is_marked_as_missing_is_a_gap() -> None:
+    landmark = replace(placed("middle", key(0.0, 0.0, 0)), missing=(2,))
+    track = track_landmarks(timeline_of(MovingHills(4)), [landmark])["middle"]
+    assert track.known.tolist() == [3, 2, 1, 2]
+    assert track.reasons == {2: "it is marked as missing"}
+
+
+def test_a_broken_frame_is_a_gap() -> None:
+    source = MovingHills(5, broken=frozenset({2}))
+    track = track_landmarks(timeline_of(source), [placed("middle", key(0.0, 0.0, 0))])["middle"]
+    assert track.known.tolist() == [3, 2, 1, 2, 2]
+    assert "damaged" in track.reasons[2]
+    lost = track_landmarks(timeline_of(source), [placed("middle", key(0.0, 0.0, 2))])["middle"]
+    assert lost.known.tolist() == [1, 1, 3, 1, 1]
+
+
+def test_the_frame_looked_at_comes_first_and_frames_are_read_once_in_each_direction() -> None:
+    source = MovingHills(FRAMES)
+    landmarks = [placed(name, key(*place, 3)) for name, place in PLACES.items()]
+    tracker = Tracker(timeline_of(source), landmarks, first=1)
+    order = tracker.run()
+    assert [next(order), next(order)] == [2, 1]
+    assert all(track.known[1] == Known.TRACKED for track in tracker.tracks.values())
+    assert all(track.known[5] == Known.PENDING for track in tracker.tracks.values())
+    tracker.look_at(5)
+    assert [next(order), next(order)] == [4, 5]
+    assert 0 < tracker.progress < 1
+    assert sorted(order) == [0, 6]
+    assert tracker.progress == 1
+    assert len(source.read) <= FRAMES + 4
+
+
+def test_only_what_changed_is_tracked_anew() -> None:
+    source = MovingHills(FRAMES)
+    timeline = timeline_of(source)
+    landmarks = [placed(name, key(*place, 0)) for name, place in PLACES.items()]
+    before = Tracker(timeline, landmarks)
+    list(before.run())
+    corrected = landmarks[0].with_key(key(*PLACES["middle"], 4))
+    after = Tracker(timeline, [corrected, landmarks[1]], known=before)
+    assert after.tracks["beside"] is before.tracks["beside"]
+    assert after.tracks["middle"].known.tolist() == [3, 2, 2, 2, 3, 0, 0]
+    assert sorted(after.run()) == [0, 1, 2, 3, 5, 6]
+    assert after.tracks["beside"] is before.tracks["beside"]
+    assert after.tracks["middle"].is_whole
+    assert errors(after.tracks["middle"], PLACES["middle"]).max() < 0.25
+
+
+def test_a_cancelled_tracker_goes_on_later() -> None:
+    tracker = Tracker(timeline_of(MovingHills(4)), [placed("middle", key(0.0, 0.0, 0))])
+    task = Task("tracking")
+    with task.current():
+        run = tracker.run()
+        assert next(run) == 1
+        task.cancel()
+        with pytest.raises(Cancelled):
+            next(run)
+    assert tracker.tracks["middle"].known.tolist() == [3, 2, 0, 0]
+    assert list(tracker.run()) == [2, 3]
+    assert tracker.tracks["middle"].is_whole
+
+
+def test_one_topology_is_followed_exactly() -> None:
+    from viewer.analysis.pick import Neighbor
+    from viewer.analysis.spot import Spot
+    from viewer.geometry import vector
+    from viewer.scan.demo import DemoSource
+
+    source = DemoSource()
+    timeline = Timeline(source, source.times(), source.unit)
+    row = 4321
+    spot = Spot(
+        0,
+        0.0,
+        vector(timeline.pose(0).cloud.world(row)),
+        "point",
+        row,
+        1.0,
+        0,
+        None,
+        (Neighbor(row, (0.0, 0.0, 0.0)),),
+    )
+    tracker = Tracker(timeline, [placed("point", spot)])
+    for frame in tracker.run():
+        if frame >= 5:
+            break
+    track = tracker.tracks["point"]
+    for frame in range(6):
+        assert np.array_equal(track.positions[frame], timeline.pose(frame).cloud.world(row))
+
+
+def test_a_scan_of_one_frame_and_landmarks_that_are_not_placed() -> None:
+    from viewer.analysis.landmarks import Landmark
+
+    tracks = track_landmarks(
+        timeline_of(MovingHills(1)),
+        [placed("middle", key(0.0, 0.0, 0)), Landmark("none"), placed("late", key(0.0, 0.0, 3))],
+    )
+    assert tracks["middle"].known.tolist() == [3]
+    assert "none" not in tracks
+    assert tracks["late"].known.tolist() == [1]
+
+
+def test_settings_are_numbers_above_zero() -> None:
+    with pytest.raises(InputError):
+        TrackingSettings(bound=-1.0)

@@ -1,0 +1,157 @@
+"""One landmark, followed from the frame in which it was set through the frames after or before it.
+
+In each frame the patch around it as it was when it was set is registered, so that errors do not add up; the
+patch as it was in the frame before only tells where to begin. Registered back, the patch found shows how
+sure the way is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..spot import Spot
+from .registration import PatchLevel, Placement, best_registered, patch_of, registered
+from .settings import TrackingSettings
+from .surface import MomentSurface
+
+Float = NDArray[np.float64]
+
+_FAR = PatchLevel(points=400, search=12.0, rounds=12, uses_color=False)
+_NEXT = (
+    PatchLevel(points=200, search=9.0, rounds=8, uses_color=False),
+    PatchLevel(points=200, search=3.0, rounds=4, uses_color=False),
+)
+_WIDE = PatchLevel(points=450, search=3.5, rounds=8, bending=0.05, turn=0.2)
+_FINE = PatchLevel(points=300, search=2.6, rounds=8, bending=0.1, turn=0.2)
+_BACK = PatchLevel(points=300, search=2.6, rounds=6, bending=0.05, turn=0.1)
+_WRONG = 0.3  # of the patch as in the frame before; where less is matched, it is looked for in the region
+_FREE = 8.0  # spacings: standard deviation of a place about which little is known
+_LOOSE = 1.5  # of one that is nearly known
+_MODEL = 0.06  # spacings that the wide patch is off, as it bends otherwise than the model says
+_MIDDLE = 0.5  # of the points next to the place, that have to be matched
+# How far a patch may be off the surface, standard deviation: times the noise, and spacings besides.
+_OFF_WIDE = 3.0, 0.3
+_OFF_FINE = 2.5, 0.15
+_CROP = 1.6  # wide radii of the surface that is kept of the frame in which it was set
+_NOISE = 1.5  # factor of variances of registration: residuals are not independent
+_FLOOR = 0.05  # spacings: what sampling leaves at least, standard deviation
+_APART = 0.5  # of the way between results that should be one: its share in the standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """A landmark in one frame, as seen from where it was set.
+
+    position: (3,) absolute, scan units; NaN where it is not known. covariance: (3, 3). reason: why it is
+    not known, in words; "" where it is.
+    """
+
+    position: Float
+    covariance: Float
+    reason: str = ""
+
+    @classmethod
+    def gap(cls, reason: str) -> Sighting:
+        """No sighting, and why."""
+        return cls(np.full(3, np.nan), np.full((3, 3), np.nan), reason)
+
+
+class Follower:
+    """A landmark that is looked for in frame after frame.
+
+    spot: where it was set. surface: of the frame in which it was, as all others relative to an origin,
+    (3,).
+    """
+
+    def __init__(self, spot: Spot, surface: MomentSurface, origin: Float, settings: TrackingSettings) -> None:
+        self._settings, self.spacing = settings, surface.spacing
+        self._origin = origin
+        self._place = np.array(spot.position, np.float64) - origin
+        self._spread = np.zeros((3, 3)) if spot.spread is None else spot.spread
+
+        def radius(share: tuple[float, float]) -> float:
+            return max(share[0] * surface.size, share[1] * surface.spacing)
+
+        self._wide_radius = radius(settings.wide)
+        self._far = patch_of(surface, self._place, radius(settings.far), _FAR.points)
+        self._wide = patch_of(surface, self._place, self._wide_radius, _WIDE.points)
+        self._fine = patch_of(surface, self._place, radius(settings.fine), _FINE.points)
+        self._own = surface.cropped(self._place, _CROP * self._wide_radius)
+        self._found = self._fine_found = self._region = Placement(self._place)
+        self._velocity = np.zeros(3)
+        self._is_lost = False
+
+    def step(self, surface: MomentSurface, before: MomentSurface) -> Sighting:
+        """Look for it in the next frame. before: the surface of the frame that it was looked for in
+        last."""
+        if self._wide is None or self._fine is None:
+            return Sighting.gap("there is no surface where it was set")
+        start = self._guess(surface, before)
+        if start is None:
+            self._is_lost = True
+            return Sighting.gap("the region around it was not found")
+        loose = (_LOOSE * self.spacing) ** 2 * np.eye(3)
+        wide = registered(self._wide, surface, start, _WIDE, loose)
+        if wide is None or wide.kept < self._settings.least_kept:
+            return self._lose("too little of the surface around it was found")
+        if wide.deviation > self._limit(_OFF_WIDE):
+            return self._lose("the surface around it has another shape")
+        slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
+        fine = registered(
+            self._fine, surface, Placement(wide.place, wide.turn, self._fine_found.bent), _FINE, slack
+        )
+        if fine is None or fine.middle < _MIDDLE:
+            return self._lose("it is hidden, or there is a hole")
+        if fine.deviation > self._limit(_OFF_FINE):
+            return self._lose("the surface around it has another shape")
+        patch = patch_of(surface, fine.place, self._wide_radius, _BACK.points)
+        back = None
+        if patch is not None:
+            back = registered(patch, self._own, Placement(self._place, wide.turn.T), _BACK, loose)
+        if back is None:
+            return self._lose("the way back was not found")
+        returned = wide.turn @ (back.place - self._place)
+        apart, bound = float(np.linalg.norm(returned)), self._settings.bound_at(self.spacing)
+        if apart > bound:
+            return self._lose(f"forward and backward are {apart:.3g} apart")
+        self._velocity = np.zeros(3) if self._is_lost else fine.place - self._found.place
+        self._found, self._fine_found, self._is_lost = wide.at(fine.place), fine, False
+        self._region = Placement(fine.place, wide.turn)
+        between = fine.place - wide.place
+        covariance = (
+            _NOISE * fine.covariance
+            + _APART**2 * (np.outer(returned, returned) + np.outer(between, between))
+            + (_FLOOR * self.spacing) ** 2 * np.eye(3)
+            + wide.turn @ self._spread @ wide.turn.T
+        )
+        return Sighting(fine.place + self._origin, covariance)
+
+    def _guess(self, surface: MomentSurface, before: MomentSurface) -> Placement | None:
+        """About where it is in a frame."""
+        free = (_FREE * self.spacing) ** 2 * np.eye(3)
+        if not self._is_lost:
+            patch = patch_of(before, self._found.place, self._wide_radius, _NEXT[0].points)
+            if patch is not None:
+                still = Placement(self._found.place)
+                starts = [still.at(still.place + self._velocity), still]
+                moved = best_registered(patch, surface, starts, _NEXT, free)
+                if moved is not None and moved.kept >= _WRONG:
+                    return Placement(moved.place, moved.turn @ self._found.turn, self._found.bent)
+        if self._far is None:
+            return None
+        region = best_registered(self._far, surface, [self._region], [_FAR], free)
+        if region is not None:
+            self._region = Placement(region.place, region.turn)
+        return region
+
+    def _limit(self, off: tuple[float, float]) -> float:
+        """How far a patch may be off the surface, scan units."""
+        assert self._wide is not None
+        return off[0] * self._wide.noise + off[1] * self.spacing
+
+    def _lose(self, reason: str) -> Sighting:
+        self._is_lost = True
+        return Sighting.gap(reason)

@@ -1,0 +1,136 @@
+"""Registration of the surface around a place of one moment to that of another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .surface import MomentSurface
+
+if TYPE_CHECKING:
+    from .register_kernels import SurfacePatch
+
+Float = NDArray[np.float64]
+
+_WAYS = 12  # to deform, see `register_kernels`
+_LEAST_DISTANCE = 0.01  # spacings: deviations of distances are taken to be this at least
+_LEAST_COLOR = 0.004  # of a byte's range, as of colours: a step of a byte
+
+
+@dataclass(frozen=True)
+class PatchLevel:
+    """How a patch is registered.
+
+    points: of the patch at most. search: spacings that a counterpart may be away. rounds: at most. bending:
+    the standard deviation of strains and bends over the patch; 0: rigid. turn: that of the turn, radians.
+    uses_color: whether colours are compared.
+    """
+
+    points: int
+    search: float
+    rounds: int
+    bending: float = 0.0
+    turn: float = 0.3
+    uses_color: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A patch as it lies in another moment.
+
+    place: (3,), of its centre. turn: (3, 3). bent: (12,) how it is deformed. covariance: (3, 3) of the
+    place, from noise and from what shape and colour leave open. kept: the share of the patch, by closeness,
+    that is matched. middle: that of the points next to the place. deviation: of the distances to the
+    surface, scan units.
+    """
+
+    place: Float
+    turn: Float = field(default_factory=lambda: np.eye(3))
+    bent: Float = field(default_factory=lambda: np.zeros(_WAYS))
+    covariance: Float = field(default_factory=lambda: np.full((3, 3), np.nan))
+    kept: float = 0.0
+    middle: float = 0.0
+    deviation: float = np.nan
+
+    @property
+    def misfit(self) -> float:
+        """How badly the patch fits: the deviation, and more the less of it is matched."""
+        return self.deviation / max(self.kept, 1e-9)
+
+    def at(self, place: Float) -> Placement:
+        """The placement moved to a place."""
+        return replace(self, place=place)
+
+
+def patch_of(surface: MomentSurface, place: Float, radius: float, points: int) -> SurfacePatch | None:
+    """The patch of a surface around a place, of so many points at most; None where it has no surface
+    there."""
+    from .register_kernels import RIGID, cut_patch
+
+    axes = surface.axes_at(place, radius)
+    if axes is None:
+        return None
+    rows = surface.rows_around(place, radius)
+    if len(rows) > points:
+        rows = rows[np.linspace(0, len(rows) - 1, points).astype(np.int64)]
+    patch = cut_patch(surface.held, place, axes, radius, rows, len(rows))
+    return patch if len(patch.local) > 3 * RIGID else None
+
+
+def registered(
+    patch: SurfacePatch, surface: MomentSurface, start: Placement, level: PatchLevel, slack: Float
+) -> Placement | None:
+    """The patch on a surface, from a placement on; None where too few of its points have counterparts.
+
+    slack: (3, 3), the covariance of the place from where it begins.
+    """
+    from .register_kernels import register_patch
+
+    place, turn, bent = start.place.copy(), start.turn.copy(), start.bent.copy()
+    if not level.bending:
+        bent[:] = 0.0
+    covariance, told = np.empty((3, 3)), np.empty(3)
+    least = np.array([_LEAST_DISTANCE * surface.spacing, *[_LEAST_COLOR] * patch.colors.shape[1]])
+    rounds = register_patch(
+        patch,
+        surface.held,
+        place,
+        turn,
+        bent,
+        np.full(_WAYS, level.bending),
+        np.linalg.inv(slack).astype(np.float64),
+        level.turn,
+        level.search * surface.spacing,
+        level.rounds,
+        level.uses_color and surface.held.colors.shape[1] == patch.colors.shape[1],
+        least,
+        covariance,
+        told,
+    )
+    if not rounds or not np.isfinite(place).all():
+        return None
+    return Placement(place, turn, bent, covariance, *(float(value) for value in told))
+
+
+def best_registered(
+    patch: SurfacePatch,
+    surface: MomentSurface,
+    starts: Sequence[Placement],
+    levels: Sequence[PatchLevel],
+    slack: Float,
+) -> Placement | None:
+    """The patch on a surface, from that of some placements from which it fits best: by how far it is off,
+    and how much of it. Levels follow each other."""
+    best = None
+    for start in starts:
+        found: Placement | None = start
+        for level in levels:
+            if found is not None:
+                found = registered(patch, surface, found, level, slack)
+        if found is not None and (best is None or found.misfit < best.misfit):
+            best = found
+    return best

@@ -1,0 +1,280 @@
+"""Landmarks through all frames of a scan, in the order of need."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...scan.pose import Pose
+from ...scan.timeline import Timeline
+from ...task import checkpoint
+from ..landmarks import Landmark
+from ..spot import Spot, followed
+from ..track import Track
+from .blending import track_of
+from .follower import Follower, Sighting
+from .settings import TrackingSettings
+from .surface import MomentSurface
+
+_MOMENTS = 4  # that are held: two in each direction
+
+
+@dataclass(eq=False)
+class _Moment:
+    """A pose, and its surface once it is needed."""
+
+    pose: Pose
+    origin: NDArray[np.float64]
+    spacing: float
+    _surface: MomentSurface | None = None
+
+    @property
+    def surface(self) -> MomentSurface:
+        if self._surface is None:
+            self._surface = MomentSurface.of(self.pose, self.origin, self.spacing)
+        return self._surface
+
+
+@dataclass(eq=False)
+class _Pass:
+    """A landmark followed from a spot in one direction, as far as it has come.
+
+    end: the last frame that it has to reach; it may come farther, where it had to before.
+    """
+
+    spot: Spot
+    direction: int
+    end: int
+    seen: dict[int, Sighting] = field(default_factory=dict)
+    at: int = -1  # the frame that was looked at last
+    follower: Follower | None = None
+    topology: str | None = None
+
+    def __post_init__(self) -> None:
+        self.at = self.spot.frame
+
+    @property
+    def left(self) -> int:
+        """How many frames are to be looked at."""
+        return max((self.end - self.at) * self.direction, 0)
+
+    def has_before(self, frame: int) -> bool:
+        """Whether a frame lies on its way that it has yet to reach."""
+        return 0 < (frame - self.at) * self.direction <= self.left
+
+
+class Tracker:
+    """Landmarks of a scan, followed from where they were set through all frames.
+
+    Nothing is computed before `run`. `tracks`, `look_at` and `progress` may be used from any thread.
+    """
+
+    def __init__(
+        self,
+        timeline: Timeline,
+        landmarks: Sequence[Landmark],
+        *,
+        first: int = 0,
+        settings: TrackingSettings | None = None,
+        known: Tracker | None = None,
+    ) -> None:
+        """first: the frame that is needed first. known: an earlier tracker of the same timeline, of which
+        is taken over what landmarks that have changed leave as it was; that one must not run any more."""
+        self.settings = settings or TrackingSettings()
+        self._timeline, self._first = timeline, first
+        self._landmarks = [landmark for landmark in landmarks if landmark.state == "placed"]
+        is_same = known is not None and known._timeline is timeline and known.settings == self.settings
+        old = known if is_same else None
+        self._origin: NDArray[np.float64] | None = old._origin if old else None
+        self._spacing: float = old._spacing if old else 1.0
+        self._moments: OrderedDict[int, _Moment] = old._moments if old else OrderedDict()
+        self._passes: dict[tuple[Spot, int], _Pass] = {}
+        for landmark in self._landmarks:
+            for part in _passes_of(landmark, len(timeline)):
+                name = part.spot, part.direction
+                held = self._passes.get(name) or (old._passes.get(name) if old else None)
+                if held is not None:
+                    held.end = part.end
+                self._passes[name] = held or part
+        before = {landmark.name: landmark for landmark in old._landmarks} if old else {}
+        self._tracks: dict[str, Track] = {}
+        for landmark in self._landmarks:
+            is_kept = old is not None and before.get(landmark.name) == landmark
+            self._tracks[landmark.name] = Track.pending(timeline.times)
+            if is_kept and old:
+                self._tracks[landmark.name] = old._tracks[landmark.name]
+            else:
+                self._update(landmark, range(len(timeline)))
+        self._whole = sum(part.left for part in self._passes.values())
+
+    @property
+    def tracks(self) -> Mapping[str, Track]:
+        """Each landmark's track so far, by name; what has not changed stays the same object."""
+        return dict(self._tracks)
+
+    @property
+    def progress(self) -> float:
+        """How much of what was to be done is done, 0..1."""
+        left = sum(part.left for part in self._passes.values())
+        return 1 - left / self._whole if self._whole else 1.0
+
+    def look_at(self, frame: int) -> None:
+        """Do first, from now on, what this frame needs."""
+        self._first = frame
+
+    def run(self) -> Iterator[int]:
+        """Follow the landmarks; gives each frame of which something new is known, as soon as it is.
+
+        Raises Cancelled between frames, see `checkpoint`; another call goes on from there.
+        """
+        for frame in sorted({part.spot.frame for part in self._passes.values() if part.left}):
+            if self._origin is None:  # that of the first key, in whatever order frames are read
+                self._read(frame)
+        with ThreadPoolExecutor(1, "scan4d-tracking") as reader:
+            ahead: tuple[int, Future[_Moment | InputError]] | None = None
+            while (step := self._next_step()) is not None:
+                checkpoint(self.progress)
+                direction, frame, parts = step
+                if ahead is not None and ahead[0] == frame:
+                    read = ahead[1].result()
+                    if isinstance(read, _Moment):
+                        self._hold(frame, read)
+                following = frame + direction
+                ahead = None
+                if any(part.left > 1 for part in parts) and following not in self._moments:
+                    ahead = following, reader.submit(self._read, following)
+                self._look(frame, parts)
+                seen = {part.spot: part.left for part in parts}
+                for landmark in self._landmarks:
+                    if any(key in seen for key in landmark.keys):
+                        is_drift_known = any(seen.get(key) == 0 for key in landmark.keys)
+                        self._update(landmark, range(len(self._timeline)) if is_drift_known else [frame])
+                yield frame
+        for part in self._passes.values():
+            part.follower = None if not part.left else part.follower
+        self._moments.clear()
+
+    def _next_step(self) -> tuple[int, int, list[_Pass]] | None:
+        """The direction and frame to be looked at next, and the passes that do; None: nothing is left.
+
+        Those that lag behind go first, so that all come to one frame together.
+        """
+        passes = [part for part in self._passes.values() if part.left]
+        if not passes:
+            return None
+        first = self._first
+        needed = [part for part in passes if part.has_before(first)] or passes
+        lagging = max(needed, key=lambda part: (part.direction, (first - part.at) * part.direction))
+        direction, at = lagging.direction, lagging.at
+        return direction, at + direction, [p for p in passes if p.direction == direction and p.at == at]
+
+    def _look(self, frame: int, parts: Sequence[_Pass]) -> None:
+        """Have passes look at a frame."""
+        try:
+            moment = self._moment(frame)
+        except InputError as error:
+            for part in parts:
+                part.seen[frame], part.at = Sighting.gap(f"the frame is not readable: {error.what}"), frame
+            return
+        for part in parts:
+            checkpoint()
+            try:
+                sighting = self._sighting(part, moment)
+            except InputError as error:
+                sighting = Sighting.gap(f"the frame in which it was set is not readable: {error.what}")
+            part.seen[frame], part.at = sighting, frame
+
+    def _sighting(self, part: _Pass, moment: _Moment) -> Sighting:
+        if part.topology is None and part.at == part.spot.frame:
+            part.topology = self._moment(part.spot.frame).pose.overview.topology
+        is_same = part.topology is not None and part.topology == moment.pose.overview.topology
+        if is_same and part.spot.id is not None:
+            return _exact(part.spot, moment.pose)
+        if part.follower is None:
+            key = self._moment(part.spot.frame)
+            assert self._origin is not None
+            part.follower = Follower(part.spot, key.surface, self._origin, self.settings)
+        try:
+            before = self._moment(part.at)
+        except InputError:
+            before = moment
+        return part.follower.step(moment.surface, before.surface)
+
+    def _moment(self, frame: int) -> _Moment:
+        """A frame as it is held, or read now. Raises InputError."""
+        if frame in self._moments:
+            self._moments.move_to_end(frame)
+            return self._moments[frame]
+        return self._hold(frame, self._read(frame))
+
+    def _hold(self, frame: int, read: _Moment | InputError) -> _Moment:
+        if isinstance(read, InputError):
+            raise read
+        self._moments[frame] = read
+        while len(self._moments) > _MOMENTS:
+            self._moments.popitem(last=False)
+        return read
+
+    def _read(self, frame: int) -> _Moment | InputError:
+        try:
+            pose = self._timeline.visit(frame)
+            if self._origin is None:
+                self._origin, self._spacing = pose.origin, pose.spacing
+            pose.cloud  # noqa: B018  merged here, beside the passes
+            return _Moment(pose, self._origin, self._spacing)
+        except InputError as error:
+            return error
+
+    def _update(self, landmark: Landmark, frames: Iterable[int]) -> None:
+        """Have the track of a landmark tell what is known now of some frames."""
+        seen = {name: part.seen for key in landmark.keys for name, part in self._of_key(key)}
+        bound = self.settings.bound_at(self._spacing)
+        self._tracks[landmark.name] = track_of(landmark, seen, bound, self._tracks[landmark.name], frames)
+
+    def _of_key(self, key: Spot) -> Iterator[tuple[tuple[Spot, int], _Pass]]:
+        for name in ((key, 1), (key, -1)):
+            if name in self._passes:
+                yield name, self._passes[name]
+
+
+def _passes_of(landmark: Landmark, count: int) -> Iterator[_Pass]:
+    """The ways from each key to the next ones and to the ends of a scan with so many frames."""
+    keys = [key for key in landmark.keys if key.frame < count]
+    for before, after in zip((None, *keys), (*keys, None), strict=True):
+        if before is not None:
+            yield _Pass(before, 1, after.frame if after else count - 1)
+        if after is not None:
+            yield _Pass(after, -1, before.frame if before else 0)
+
+
+def _exact(spot: Spot, pose: Pose) -> Sighting:
+    """A spot in a pose of the same topology."""
+    there = followed(spot, pose)
+    if there is None:
+        return Sighting.gap("its points are missing in this frame")
+    spread = np.zeros((3, 3)) if there.spread is None else there.spread
+    return Sighting(np.array(there.position), spread)
+
+
+def track_landmarks(
+    timeline: Timeline,
+    landmarks: Sequence[Landmark],
+    *,
+    first: int = 0,
+    settings: TrackingSettings | None = None,
+    known: Tracker | None = None,
+) -> Mapping[str, Track]:
+    """Follow landmarks through all frames of a scan; gives their tracks by name. See `Tracker`.
+
+    Raises Cancelled where the task is cancelled.
+    """
+    tracker = Tracker(timeline, landmarks, first=first, settings=settings, known=known)
+    for _ in tracker.run():
+        pass
+    return tracker.tracks
