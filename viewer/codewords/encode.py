@@ -13,7 +13,8 @@ one field; what follows is whole numbers.
     DIFFUSE, ...    127 times cosine and highlight
 
 With exact outlines size and normal are not rounded, nor is the centre: a pixel is covered where its centre is
-inside of the disc's image, perspective included, and depth follows the disc's plane, see `WordStream.finer`.
+inside of the disc's image, perspective included, and the disc behind the near plane there; depth follows the
+disc's plane, see `WordStream.finer`.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def project(
             for m in range(3):
                 c[k] += frame[k, m] * positions[row, m]
         depth, distance = -c[2], math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
-        if not (depth <= far and distance > 0.0 and distance < _UNKNOWN):
+        if not (depth <= far and distance < _UNKNOWN) or (perspective and distance == 0.0):
             continue
         held = max(depth, near)
         s = scale / held if perspective else scale
@@ -76,8 +76,6 @@ def project(
             continue
 
         # The frame of the disc: its normal towards the eye, and half-axes u, v of unit length.
-        if not perspective:
-            distance = 1.0
         for k in range(3):
             eye[k] = -c[k] / distance if perspective else (1.0 if k == 2 else 0.0)
         length = 0.0
