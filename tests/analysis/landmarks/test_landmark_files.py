@@ -160,6 +160,24 @@ def test_c3d_tells_what_it_rounds(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.is_defined[:, 0], [True, False, False, True])
 
 
+def test_lines_are_where_geomorph_looks_for_them(tmp_path: Path) -> None:
+    """It takes so many lines behind [rawpoints], drops what stands behind a quotation mark, and comments."""
+    wanted = moving(3)
+    count = len(wanted.names)
+    write_landmarks(tmp_path / "m.txt", wanted)
+    lines = [line.split('"')[0] for line in (tmp_path / "m.txt").read_text("utf-8").splitlines()]
+    assert sum("names" in line for line in lines) == sum("landmarks" in line for line in lines) == 1
+    start = lines.index("[rawpoints]") + 1
+    raw = [line for line in lines[start : start + 3 * count + 3] if "'" not in line]
+    assert [len(line.split()) for line in raw] == [3] * 3 * count
+    write_landmarks(tmp_path / "m.tps", wanted)
+    lines = (tmp_path / "m.tps").read_text("utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith("COMMENT=")]
+    assert [line for line in kept if "=" in line] == [
+        text for number in range(1, 4) for text in (f"LM3={count}", f"ID=frame_{number:04d}")
+    ]
+
+
 def test_one_moment_is_one_file(tmp_path: Path) -> None:
     wanted = moving()
     with pytest.raises(InputError, match=r"m_%04d\.mrk\.json"):

@@ -2,7 +2,7 @@
 
 Sections in brackets: `[individuals]`, `[landmarks]` and `[dimensions]` count, `[names]` has a line for each
 individual, `[rawpoints]` a line for each of its landmarks, below a line that begins with an apostrophe.
-Landmarks have no names: those written here stand in such a line.
+Landmarks have no names: those written here stand in such a line, the last.
 """
 
 from __future__ import annotations
@@ -134,8 +134,9 @@ def write(path: Path, landmarks: LandmarkSet) -> str | None:
         for name, number in zip(_COUNTS, (len(frames), len(landmarks.names), 3), strict=True):
             stream.write(f"[{name}]\n{number}\n")
         stream.writelines(["[names]\n", *(f"frame_{frame:04d}\n" for frame in frames)])
-        stream.write(f"[rawpoints]\n'{own_text(own)}\n")
+        stream.write("[rawpoints]\n")
         for frame, places in zip(frames, positions, strict=True):
             stream.write(f"'frame_{frame:04d}\n")
             stream.writelines(" ".join(map(digits_of, place)) + "\n" for place in places)
+        stream.write(f"'{own_text(own)}\n")  # the last: geomorph counts a line above each individual
     return without_states(landmarks, TITLE)
