@@ -2,7 +2,7 @@
 // picture without bands, become those of the views before it and this one.
 // CRISP: the picture is of the view of the largest weight, the mean of those that tie; else all count by their weights. Means
 // are of what bands are of, so that differences to them sum to nothing.
-// FINE: of four places in each pixel, or by a cubic where samples lie farther apart than pixels.
+// FINE: of four places in each pixel where samples lie closer than pixels.
 // A pixel has the sum of the weights (merged, alpha), the largest, and of how many views that is (winners, two halves).
 #include "common/color.glsl"
 #include "common/item.glsl"
@@ -48,7 +48,8 @@ float mask_around(RangeView v, int level, ivec2 uv) {
     return float(seen) / float(RING.length());
 }
 
-#if FINE && COLOR
+#if COLOR
+#if FINE
 // The mean of what a quarter of a pixel each shows, of the level that fits those.
 void look_closer(RangeView v, int level, int at, vec3 place, vec3 normal, inout vec3 color) {
     vec3 sum = vec3(0.0);
@@ -65,6 +66,20 @@ void look_closer(RangeView v, int level, int at, vec3 place, vec3 normal, inout 
     }
     if (count > 0) color = sum / float(count);
 }
+#else
+const float OF_A_PIXEL = 0.5 * log2(3.0);
+
+// The mean over a pixel. One between four samples is as wide where they are 1 / sqrt(3) pixels apart (the square box and the
+// tent of s have the variance s^2 / 4, a pixel 1 / 12); else of two levels, mixed so that it is.
+void look_between(RangeView v, int level, float fits, vec3 place, vec3 normal, inout vec3 color) {
+    int finer = int(floor(fits - OF_A_PIXEL)), other = finer == level ? level + 1 : finer;
+    LookedUp found;
+    if (finer < first_level || other > last_level || !look_up(v, other, place, normal, tolerance, found)) return;
+    float apart = exp2(float(finer) - fits);  // pixels
+    float coarse = (1.0 / (3.0 * apart * apart) - 1.0) / 3.0;
+    color = mix(color, found.color, other == finer ? 1.0 - coarse : coarse);
+}
+#endif
 
 // A cubic between 4 x 4 samples of the finest level (Catmull and Rom 1974), where all are of the surface of the nearest.
 void look_smoother(RangeView v, vec2 pixel, ivec2 nearest, inout vec3 color) {
@@ -110,12 +125,14 @@ void main() {
     float weight = 0.0;
     if (look_up(v, level, place, normal, tolerance, found)) {
         weight = competition_weight(mask_around(v, level, found.nearest), found.alpha, found.cosine);
-#if FINE && COLOR
+#if COLOR
+        if (fits < -0.5) look_smoother(v, found.pixel, found.nearest, found.color);
+#if FINE
         int closer = clamp(int(floor(fits - 1.0)), first_level, last_level);  // samples are half a pixel apart
         if (fits > 0.5) look_closer(v, closer, i, place, normal, found.color);
-        else if (fits < -0.5) look_smoother(v, found.pixel, found.nearest, found.color);
+#else
+        look_between(v, level, fits, place, normal, found.color);
 #endif
-#if COLOR
     } else if (own) {
         found.color = to_linear(texelFetch(own_colors, i).rgb);
 #endif

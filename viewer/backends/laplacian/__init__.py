@@ -85,8 +85,8 @@ class Params:
     cull_back: bool = param(False, "Leave out surfaces of range images that show their backs", group=_VIEWS)
     quality: str = param(
         "fast",
-        "How a pixel looks up what a view sees: once, between four samples; or, for pictures that can wait, "
-        "at four places, and between sixteen samples where these lie farther apart than pixels",
+        "How a pixel looks up what a view sees where samples lie closer than pixels: at one place, between "
+        "two levels; or, for pictures that can wait, at four places of a finer level",
         choices=("fast", "fine"),
         group=_VIEWS,
         sweep=("fast", "fine"),

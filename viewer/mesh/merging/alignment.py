@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bounds import Bounds
 from ...rigid import STILL, Rigid
 from ...scan.range_view import RangeView
 from ...task import checkpoint
 from ..scene import Rays
-from .competition import agreement_of, comparable, reach
+from .competition import SCATTER, agreement_of, comparable, normal_deviation, reach
 from .surfaces import RangeSurface, meet
 
 _ROUNDS = 3  # of registering all pairs and moving the views
@@ -29,8 +30,6 @@ _FEWEST = 200  # points, that tell a motion
 _SCALES = (1.0, 0.3, 0.1)  # of the reach: within which points correspond, one after another
 _ITERATIONS = 30  # of each
 _PATCHES = 12  # along an edge of the picture, whose residuals are taken as independent
-_SCATTER = 4.0  # deviations beyond which a pair of points is none
-_NORMAL_DEVIATION = 1.4826  # times the median of absolute values
 _SMOOTHING = 2  # pixels over which normals are averaged
 _SLIDING = 1e-4  # of a motion's mean square along the normals, below which surfaces only slide on each other
 _OF_NOISE = 4.0  # times what noise of the normals makes of that: so much is uncertain
@@ -81,9 +80,8 @@ class _Frame:
     @classmethod
     def of(cls, surfaces: Sequence[RangeSurface]) -> _Frame:
         """Put one in the middle of surfaces."""
-        low = np.min([surface.points.min(axis=0) for surface in surfaces], axis=0)
-        high = np.max([surface.points.max(axis=0) for surface in surfaces], axis=0)
-        return cls((low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+        bounds = Bounds.around([surface.bounds for surface in surfaces])
+        return cls(bounds.center, bounds.radius)
 
     def slopes(self, points: Rays, directions: NDArray[np.floating]) -> NDArray[np.float64]:
         """How points (N, 3) move along directions (N, 3) with a twist, (N, 6)."""
@@ -204,8 +202,7 @@ def _fit(moved: RangeSurface, fixed: RangeSurface, frame: _Frame, within: float)
     near = comparable(moved, met, within)
     if np.count_nonzero(near) < _FEWEST:
         return None
-    deviation = _NORMAL_DEVIATION * float(np.median(met.distance[near]))
-    near &= met.distance <= _SCATTER * deviation + met.spacing
+    near &= met.distance <= SCATTER * normal_deviation(met.distance[near]) + met.spacing
     rows = np.flatnonzero(near)
     points, spacing = moved.points[rows], float(np.median(met.spacing[rows]))
     residuals = (moved.rays(points) * met.normal[rows]).sum(axis=1) * met.depth[rows]

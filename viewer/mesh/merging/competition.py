@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bounds import Bounds
 from ...errors import InputError
 from ...scan.faces import Triangles
 from ...scan.range_view import RangeView
@@ -21,10 +22,10 @@ from ...task import checkpoint
 from ..scene import Rays
 from .surfaces import Meeting, RangeSurface, meet
 
-_SCATTER = 4.0  # deviations within which two measures are of one surface
+SCATTER = 4.0  # deviations within which two measures are of one surface
 _REACH = 0.1  # of the subject's radius: no farther apart are measures compared
 _SAME_SIDE = 0.5  # least cosine between normals of one surface
-_NORMAL_DEVIATION = 1.4826  # times the median of absolute values, of a normal distribution
+_NORMAL_DEVIATION = 1.4826  # times the median of absolute values
 _FACES_AT_ONCE = 1 << 17
 _FINEST = 6  # parts of an edge in which what covers a triangle is looked at, at most
 _INSET = 0.7  # of a triangle, in which that is: a sliver along its edge brings back none
@@ -168,7 +169,7 @@ class _Contest:
             return met.distance <= self.rules.tolerance
         deviation = self.tolerances[number, other]
         with np.errstate(invalid="ignore"):
-            return met.distance <= np.minimum(_SCATTER * deviation + met.spacing, self.reach)
+            return met.distance <= np.minimum(SCATTER * deviation + met.spacing, self.reach)
 
     def _uncovered(self, number: int, shown: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
         """Tell which faces of a view have a part that no other view shows, (F,)."""
@@ -220,9 +221,7 @@ class _Contest:
 def reach(surfaces: Sequence[RangeSurface]) -> float:
     """How far apart measures of several views may be, and still be compared: a tenth of the subject's radius,
     scan units."""
-    low = np.min([surface.points.min(axis=0) for surface in surfaces], axis=0)
-    high = np.max([surface.points.max(axis=0) for surface in surfaces], axis=0)
-    return _REACH * float(np.linalg.norm(high - low)) / 2
+    return _REACH * Bounds.around([surface.bounds for surface in surfaces]).radius
 
 
 def comparable(seen: RangeSurface, met: Meeting, within: float) -> NDArray[np.bool_]:
@@ -238,10 +237,15 @@ def agreement_of(seen: RangeSurface, met: Meeting, within: float) -> Agreement:
     if not near.any():
         return Agreement(0.0, np.nan, np.nan)
     depths, distances = met.depth[near], met.distance[near]
-    deviation = _NORMAL_DEVIATION * float(np.median(distances))
-    one = distances <= _SCATTER * deviation + met.spacing[near]
+    deviation = normal_deviation(distances)
+    one = distances <= SCATTER * deviation + met.spacing[near]
     rmse = float(np.sqrt(np.square(depths[one]).mean()))
     return Agreement(float(np.count_nonzero(one) / len(seen.points)), rmse, deviation)
+
+
+def normal_deviation(distances: NDArray[np.float64]) -> float:
+    """The standard deviation that distances (N,), of a normal distribution, have by their median."""
+    return _NORMAL_DEVIATION * float(np.median(distances))
 
 
 def _weights(surface: RangeSurface, confident: bool) -> NDArray[np.float64]:

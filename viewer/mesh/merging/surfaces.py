@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bounds import Bounds
 from ...scan.faces import Triangles
 from ...scan.range_view import RangeView
 from ..range_mesh import triangles_of
@@ -32,6 +33,11 @@ class RangeSurface:
     def of(cls, view: RangeView) -> RangeSurface:
         """The surface of a view."""
         return cls(view, view.positions(), view.normals(), triangles_of(view))
+
+    @property
+    def bounds(self) -> Bounds:
+        """The box around its points."""
+        return Bounds(self.points.min(axis=0), self.points.max(axis=0))
 
     def rays(self, points: Rays) -> Rays:
         """The directions in which the pod sees places (N, 3), as long as brings them one unit of depth on."""

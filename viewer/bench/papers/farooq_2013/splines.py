@@ -69,6 +69,7 @@ BEST, LINEAR = Way("best", BLENDED, {"blend": "best"}), Way("linear", BLENDED, {
 BY_LEVELS = tuple(Way(f"{count} levels", BACKEND, {"levels": count}) for count in LEVELS)
 CAPTURED = Way("6 levels of captures", BACKEND, {"levels": 6, "bands": "capture"})
 FINE = Way("6 levels, fine", BACKEND, {"levels": 6, "quality": "fine"})
+FRONT = "samples from the front"  # no way to merge: a pod in the camera's place
 VARIANTS = (
     Way("6 levels of linear light", BACKEND, {"levels": 6, "light": "linear"}),
     Way("6 levels, soft", BACKEND, {"levels": 6, "weights": "soft"}),
@@ -167,14 +168,14 @@ def _row(bench: Bench, scene: str) -> Row:
     }
 
 
-def _inside(reference: Reference, mask: Mask) -> Mask:
-    """The pixels of a mask, (H, W), that are away from its edge and from steps of the true depth."""
+def _inside(reference: Reference, mask: Mask, edge: int = _EDGE) -> Mask:
+    """The pixels of a mask, (H, W), that are so many away from its edge and from steps of the true depth."""
     from scipy import ndimage
 
     depth = np.where(reference.covered, reference.depth, 0)
     step = ndimage.maximum_filter(depth, 3) - ndimage.minimum_filter(depth, 3)
     smooth = step <= _STEEP * footprint(reference.view, depth)
-    return ndimage.binary_erosion(mask & smooth, iterations=_EDGE)
+    return ndimage.binary_erosion(mask & smooth, iterations=edge)
 
 
 # --- seams and fine detail ------------------------------------------------------------
@@ -289,32 +290,50 @@ def measure_sizes(
     """Yield a row for each way and zoom, of the first scene: holes and PSNR of a picture (`size_errors`)."""
     for scene, pair in _pairs(bench, scenes[:1], view_size):
         found = [size_errors(bench.renderer, pair, camera) for camera in pair.cameras(1, pair.size)]
-        for way, zoom in product(SIZED, ZOOMS):
-            by_view = [errors[way.name][zoom] for errors in found]
-            yield {**_row(bench, scene), "way": way.name, "zoom": zoom, "by_view": by_view}
+        for way, zoom in product(found[0], ZOOMS):
+            by_view = [errors[way][zoom] for errors in found]
+            yield {**_row(bench, scene), "way": way, "zoom": zoom, "by_view": by_view}
 
 
 def size_errors(
     renderer: Renderer, pair: Pair, camera: Camera, compared: Sequence[Way] = SIZED
 ) -> dict[str, dict[float, Errors]]:
-    """Holes and PSNR, dB, of pictures of several sizes, by the names of the ways and by zoom.
+    """Holes and PSNR, dB, of pictures of several sizes, by the names of the ways and by zoom; and, for what
+    samples can tell at all, of samples that a pod in the camera's place would take, resized.
 
-    The truth is the mean of what the rays of a pixel see, in linear light, where the pods see all of it.
+    The truth is the mean of what the rays of a pixel see, in linear light, where the pods see all of it, away
+    from edges.
     """
     density = round(_RAYS * max(ZOOMS))  # rays along an edge of a sample
     width, height = pair.size
     reference = trace(pair.moment.truth, camera, (density * width, density * height))
-    seen = _inside(reference, pods_facing(pair.moment.truth, reference, pair.pods).max(axis=0) > 0)
+    weights = pods_facing(pair.moment.truth, reference, pair.pods)
+    seen = _inside(reference, weights.max(axis=0) > 0, density * _EDGE)
+    samples = trace(pair.moment.truth, camera, pair.size)
     told: dict[str, dict[float, Errors]] = {}
     for zoom in ZOOMS:
         rays = round(density / zoom)
         size = round(zoom * width), round(zoom * height)
         true, inside = bytes_from_linear(_reduced(reference.color, rays)), _reduced(seen, rays) == 1
+
+        def errors(shown: Mask, color: NDArray[np.floating]) -> Errors:
+            return scanned(shown, bytes_from_linear(color), true, inside)  # noqa: B023
+
         for way in compared:
             drawn = Drawn.of(renderer, pair.alike, camera, size, way)
-            errors = scanned(np.isfinite(drawn.depth), bytes_from_linear(drawn.color), true, inside)
-            told.setdefault(way.name, {})[zoom] = errors
+            told.setdefault(way.name, {})[zoom] = errors(np.isfinite(drawn.depth), drawn.color)
+        told.setdefault(FRONT, {})[zoom] = errors(np.ones_like(inside), _resized(samples.color, zoom))
     return told
+
+
+def _resized(color: NDArray[np.floating], zoom: float) -> NDArray[np.float64]:
+    """A picture, (H, W, 3), with so many times as many pixels along an edge: means of them, or cubics."""
+    from scipy import ndimage
+
+    if zoom <= 1:
+        return _reduced(color, round(1 / zoom))
+    large = ndimage.zoom(np.asarray(color, np.float64), (zoom, zoom, 1), grid_mode=True, mode="nearest")
+    return np.clip(large, 0, 1)
 
 
 def _reduced(values: NDArray[Any], count: int) -> NDArray[np.float64]:
