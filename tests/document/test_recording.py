@@ -14,6 +14,7 @@ import pytest
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document import recording
+from viewer.document.landmarks import Note
 from viewer.document.recording import FORMAT, Entry, Recorder, Recording, fingerprint
 from viewer.errors import InputError
 from viewer.frame import Request
@@ -22,6 +23,7 @@ from viewer.output.export import write_png
 from viewer.output.marks import Marks
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers
+from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
@@ -115,6 +117,23 @@ def test_what_earlier_versions_did_not_tell_has_its_default(tmp_path: Path) -> N
         del data["entries"][0][name]
     path.write_text(json.dumps(data))
     assert Recording.load(path).entries[0] == replace(FIRST, marks=Marks(), unit=None)
+
+
+def test_notes_are_shown_in_their_frame_and_left_out_of_anonymous_pictures(tmp_path: Path) -> None:
+    notes = (Note("on it", 3), Note("at it", 3, (1.0, 0.0, 0.0)), Note("always"), Note("later", 4))
+    request = Request(POSE, FIRST.camera, "points", FIRST.params, Look())
+
+    def entry(marks: Marks) -> Entry:
+        return Entry.of(request, "knot", None, (96, 64), "mm", marks, notes=notes)
+
+    shown = entry(Marks(notes=True))
+    assert (shown.notes, entry(Marks(stamp=True)).notes) == (notes, ())
+    assert Recording.load(saved(tmp_path, Recording((shown,)))).entries == (shown,)
+    with open_scan("demo") as timeline:
+        legend = shown.legend(timeline, POSE)
+    assert legend.notes == ("on it", "always")
+    assert [(line.ends[0], line.text) for line in legend.lines] == [((1.0, 0.0, 0.0), "at it")]
+    assert shown.without_names().notes == ()
 
 
 def test_an_anonymous_description_tells_neither_scan_nor_a_unit_of_its_own() -> None:

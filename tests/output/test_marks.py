@@ -295,3 +295,12 @@ def test_the_colour_bar_says_where_its_range_is_from() -> None:
 @pytest.mark.parametrize("size", [(1, 1), (10, 8), (3, 100), (100, 3), (20, 20)])
 def test_in_the_smallest_pictures_what_has_no_pixel_is_left_out(size: tuple[int, int]) -> None:
     assert marked(gray(size), replace(LEGEND, marks=ALL), VALUES).shape == (*size[::-1], 4)
+
+
+def test_notes_on_a_frame_stand_below_the_stamp() -> None:
+    stamped = marked(gray(), replace(LEGEND, marks=Marks(stamp=True)), None)
+    told = marked(gray(), replace(LEGEND, marks=Marks(stamp=True, notes=True), notes=("scar",)), None)
+    rows = np.flatnonzero((told != stamped).any(axis=(1, 2)))
+    stamp_rows = np.flatnonzero((stamped != gray()).any(axis=(1, 2)))
+    assert rows.min() > stamp_rows.max(), "off the stamp"
+    assert rows.max() < stamp_rows.max() + 2 * len(stamp_rows)

@@ -32,12 +32,13 @@ import numpy as np
 
 from .. import __version__
 from ..analysis.measure import Measurement, distance_in_words, reading_of
-from ..analysis.spot import spot_slack
+from ..analysis.spot import slack_before, spot_slack
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..errors import InputError, shortened
 from ..files import open_plain, whole_file
 from ..frame import Request
+from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
 from ..output.marks import Legend, Marks, MeasuredLine
@@ -48,6 +49,7 @@ from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.units import Scale
 from .anonymous import anonymous_unit
+from .landmarks import Note
 from .schema import (
     DAMAGED,
     BackendName,
@@ -90,8 +92,9 @@ class Entry:
     params: the backend's own `Params`. marks: what is drawn over it. unit: of length, None for the scan's
     own. measurements: to draw over it, as they were made. shown_unit: that marks tell lengths in, None for
     `unit`. place: the matrix that the scan is moved by, None where it is not. anonymous: whether camera,
-    time, look, measurements and place are those of the scan as `anonymous_request` has it. at: seconds
-    since the recording began; entries that differ in it alone are equal.
+    time, look, measurements and place are those of the scan as `anonymous_request` has it. notes: of the
+    scan, where the marks show them. at: seconds since the recording began; entries that differ in it alone
+    are equal.
     """
 
     scan: ScanName | None
@@ -109,6 +112,7 @@ class Entry:
     shown_unit: Unit | None = None
     place: Matrix | None = None
     anonymous: bool = False
+    notes: tuple[Note, ...] = ()
     at: Stamp = field(default=0.0, compare=False)
 
     @classmethod
@@ -122,10 +126,11 @@ class Entry:
         marks: Marks | None = None,
         measurements: tuple[Measurement, ...] = (),
         shown_unit: str | None = None,
+        notes: tuple[Note, ...] = (),
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
-        measurements: kept where the marks show them.
+        measurements, notes: kept where the marks show them.
 
         Raises InputError where its colours come from a layer: these numbers are in no file.
         """
@@ -139,6 +144,7 @@ class Entry:
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
             measurements if marks.measurements else (), shown_unit, matrix_of(layers.place),
+            notes=notes if marks.notes else (),
         )  # fmt: skip
 
     def request(self, pose: Pose) -> Request:
@@ -160,9 +166,11 @@ class Entry:
         lines: tuple[MeasuredLine, ...] = ()
         if self.measurements and self.marks.measurements:
             lines = measured_lines(self.measurements, pose, timeline.one_topology, self.motion, scale)
+        notes = [one for one in self.notes if self.marks.notes and one.frame in (None, self.pose)]
+        pinned, on_frame = pinned_notes(notes, pose, self.motion)
         return Legend(
             self.marks, self.camera, self.look, scale.unit, self.pose, len(timeline), self.time,
-            lines=lines, factor=scale.factor,
+            lines=(*lines, *pinned), notes=on_frame, factor=scale.factor,
         )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
@@ -185,11 +193,12 @@ class Entry:
         return replace(entry, params=params)
 
     def without_names(self) -> Entry:
-        """The entry as an anonymous picture tells it, of a scan that is as `anonymous_request` has it."""
+        """The entry as an anonymous picture tells it, of a scan that is as `anonymous_request` has it; notes
+        may tell anything, and are left out."""
         unit, shown = (
             None if name is None else anonymous_unit(name) for name in (self.unit, self.shown_unit)
         )
-        return replace(self, scan=None, unit=unit, shown_unit=shown, anonymous=True)
+        return replace(self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=())
 
     def description(self) -> str:
         """The JSON text that a picture carries."""
@@ -208,6 +217,21 @@ def measured_lines(
         slack = spot_slack(first, pose.bounds.radius), spot_slack(second, pose.bounds.radius)
         lines.append(MeasuredLine((first.position, second.position), slack, f"{number}:  {words}"))
     return tuple(lines)
+
+
+def pinned_notes(
+    notes: Iterable[Note], pose: Pose, place: Rigid
+) -> tuple[tuple[MeasuredLine, ...], tuple[str, ...]]:
+    """Notes on a pose that is moved to a place: those at places as marks, and the texts of the others."""
+    lines, texts = [], []
+    for note in notes:
+        if note.position is None:
+            texts.append(note.text)
+        else:
+            at = vector(place.points(np.array(note.position)))
+            slack = float(slack_before(0.0, 0.0, pose.bounds.radius))
+            lines.append(MeasuredLine((at, at), (slack, slack), note.text))
+    return tuple(lines), tuple(texts)
 
 
 def matrix_of(place: Rigid) -> Matrix | None:

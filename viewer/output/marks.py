@@ -57,9 +57,10 @@ class Marks:
     )
     stamp: bool = param(False, "Number of the frame, and its time")
     measurements: bool = param(False, "Measured distances, as they stand in the frame")
+    notes: bool = param(False, "Notes that are pinned to places and to the frame")
 
     def __bool__(self) -> bool:
-        return self.scale_bar or self.color_bar or self.stamp or self.measurements
+        return any((self.scale_bar, self.color_bar, self.stamp, self.measurements, self.notes))
 
 
 MARKS = tuple(parameter.name for parameter in describe(Marks))
@@ -72,7 +73,7 @@ def marks_of(names: Sequence[str] | None) -> Marks:
 
 @dataclass(frozen=True)
 class MeasuredLine:
-    """A measured distance in a picture.
+    """A measured distance in a picture, or a note at a place, which is both ends.
 
     ends: two places, scan units. slack: of each, how far before it the surface may be that is its own, scan
     units. text: that stands beside it. hidden: whether something is before one of its ends.
@@ -89,7 +90,8 @@ class Legend:
     """The words and numbers that the marks of a picture show.
 
     unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
-    says of its numbers. lines: that were measured. factor: how many of `unit` one unit of the scan is.
+    says of its numbers. lines: that were measured, and notes at places. notes: on the frame. factor: how many
+    of `unit` one unit of the scan is.
     """
 
     marks: Marks
@@ -101,6 +103,7 @@ class Legend:
     time: float
     range_note: str = ""
     lines: tuple[MeasuredLine, ...] = ()
+    notes: tuple[str, ...] = ()
     factor: float = 1.0
 
 
@@ -209,7 +212,8 @@ def draw(
     values: tuple[float, float] | None,
     kind: ValueKind | None = None,
 ) -> None:
-    """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp upper left.
+    """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp and notes on
+    the frame upper left.
 
     size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar. kind: of
     its numbers, where the backend found them.
@@ -222,8 +226,8 @@ def draw(
             foot = _draw_color_bar(painter, size, legend, values, kind) - _GAP * painter.em
         if told := swatches(legend.look):
             _draw_swatches(painter, size, told, foot)
-    if legend.marks.stamp:
-        _draw_stamp(painter, size, legend)
+    upper_left = [stamp(legend)] if legend.marks.stamp else []
+    _draw_plates(painter, size, [*upper_left, *legend.notes])
 
 
 def scale_bar_box(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> Box:
@@ -309,12 +313,14 @@ def _draw_swatches(
         painter.text(x + (_MAP_WIDTH + _GAP) * em, y, text)
 
 
-def _draw_stamp(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> None:
-    em, text = painter.em, _shortened(painter, stamp(legend), size[0] - 2 * (_MARGIN + _PAD) * painter.em)
-    left = top = round(_MARGIN * em)
-    right, bottom = left + painter.width(text) + 2 * _PAD * em, top + round((1 + 2 * _PAD) * em)
-    painter.box((left, top, right, bottom), PLATE)
-    painter.text(left + _PAD * em, top + _PAD * em, text)
+def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequence[str]) -> None:
+    """Draw texts below each other upper left."""
+    em, left = painter.em, round(_MARGIN * painter.em)
+    height = round((1 + 2 * _PAD) * em)
+    for number, line in enumerate(texts):
+        text, top = _shortened(painter, line, size[0] - 2 * (_MARGIN + _PAD) * em), left + number * height
+        painter.box((left, top, left + painter.width(text) + 2 * _PAD * em, top + height), PLATE)
+        painter.text(left + _PAD * em, top + _PAD * em, text)
 
 
 def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend) -> None:
@@ -391,7 +397,7 @@ def marked(
         return image
     below = Image.fromarray(image)
     painter = _Overlay(below.size)
-    if legend.marks.measurements:
+    if legend.marks.measurements or legend.marks.notes:
         _draw_lines(painter, below.size, legend)
     draw(painter, below.size, legend, values, kind)
     return np.asarray(Image.alpha_composite(below, painter.image))

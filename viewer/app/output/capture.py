@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...document.journal import Journal, journal_folder, journals, saved, written
+from ...document.landmarks import Landmarks
 from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
 from ...errors import InputError, explained
@@ -72,7 +73,7 @@ class Capture:
         return Entry.of(
             request, session.scan, session.hash, viewport.size, self._playback.unit,
             self._marks() if marks is None else marks, session.document.part(Measurements).all,
-            session.document.shown_unit,
+            session.document.shown_unit, session.document.part(Landmarks).notes,
         )  # fmt: skip
 
     def screenshot(self) -> None:

@@ -25,6 +25,7 @@ _MARKS = {
     "color_bar": "Colour bar",
     "stamp": "Frame and time",
     "measurements": "Measurements",
+    "notes": "Notes",
 }
 _FIRST_MARKS = 0.55  # of a row of boxes, for the first one
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}

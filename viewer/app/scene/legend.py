@@ -44,7 +44,7 @@ class ViewMarks:
     @property
     def of_files(self) -> Marks:
         """The marks of saved pictures and recordings: as the view has them, or none."""
-        return replace(self.shown, measurements=True) if self.in_files else Marks()
+        return replace(self.shown, measurements=True, notes=True) if self.in_files else Marks()
 
     def toggle_in_files(self) -> None:
         """Have pictures saved with the marks of the view, or bare."""
