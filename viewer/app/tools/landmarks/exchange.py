@@ -14,7 +14,7 @@ from ....analysis.landmarks.files import (
     write_landmarks,
 )
 from ....analysis.landmarks.landmark_set import LandmarkSet, told_apart
-from ....analysis.landmarks.placed import landmarks_of
+from ....analysis.landmarks.placed import landmarks_of, told_beside
 from ....analysis.landmarks.templates import is_template_file, read_template, templates
 from ....analysis.track import Track
 from ....bounds import Bounds
@@ -109,6 +109,8 @@ class Exchange:
         self._desk.reveal()
         for text in found.told:
             self._desk.note(f"{path.name}: {text}.")
+        if beside := told_beside(landmarks):
+            self._desk.note(f"{path.name}: {beside}")
         self._desk.note(f"Read {len(landmarks)} landmarks of {path.name}.")
 
     def _save(self, file: Path) -> None:

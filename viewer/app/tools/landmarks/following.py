@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 
 from ....analysis.landmarks import Landmark
 from ....analysis.track import Track
+from ....analysis.tracking import Tracker
 from ....document.landmarks import Landmarks
 from ....scan.timeline import Timeline
 from ....task import Task
 from ...desk import Desk
-from .exact import ExactTracker
 
 _CALM = 0.2  # seconds without a change of the landmarks before they are tracked anew
 
@@ -29,7 +29,7 @@ class Following:
         self.pending = 0
         self._timeline: Timeline | None = None
         self._landmarks: Sequence[Landmark] | None = None
-        self._tracker: ExactTracker | None = None
+        self._tracker: Tracker | None = None
         self._task: Task | None = None
         self._is_done = False
         self._begins_at = 0.0  # by the clock
@@ -76,9 +76,9 @@ class Following:
         self._begins_at = time.monotonic() + _CALM
         if any(landmark.keys for landmark in landmarks):
             self._looked_at = self._desk.index
-            self._tracker = ExactTracker(timeline, landmarks, first=self._looked_at, known=known)
+            self._tracker = Tracker(timeline, landmarks, first=self._looked_at, known=known)
 
-    def _go_on(self, tracker: ExactTracker, is_wanted: bool) -> None:
+    def _go_on(self, tracker: Tracker, is_wanted: bool) -> None:
         if self._desk.index != self._looked_at:
             self._looked_at = self._desk.index
             tracker.look_at(self._looked_at)
