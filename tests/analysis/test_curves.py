@@ -141,6 +141,10 @@ def test_what_lies_beyond_a_gap_or_the_end_is_not_known() -> None:
     rising = movement_of(TIMES[:60], bump(TIMES[:60]), NONE[:60], Smoothing())
     assert rising is not None
     assert math.isnan(rising.end)
+    unsure = movement_of(TIMES, bump(TIMES), np.full(120, 2.0), Smoothing())
+    assert unsure is not None
+    assert math.isnan(unsure.onset)
+    assert unsure.amplitude == pytest.approx(1, abs=0.01)
     assert movement_of(TIMES, np.full(120, np.nan), NONE, Smoothing()) is None
     assert movement_of(TIMES, np.full(120, 3.0), NONE, Smoothing()) is None
 

@@ -23,6 +23,7 @@ _Array = NDArray[np.float64]
 
 _EDGE = 1e-9  # relative: a point at the very edge of the window is in it, whatever rounding says
 _ALIKE = 1e-9  # relative: peaks that rounding alone tells apart
+_CERTAIN = 2.0  # standard deviations, from which on an amplitude is told from noise
 _AT_FRAME = 1e-6  # of the time from one frame to the next
 _SAME = 1e-12  # relative to values: an amplitude that rounding makes
 
@@ -116,7 +117,8 @@ class Movement:
     rest: the mean of the values in the first window's width of the smoothing. peak: where the smoothed curve
     is farthest from rest, above or below. amplitude: from rest to peak, negative where it goes down. onset:
     before the peak, where the smoothed curve last was within the share of the amplitude from rest; end: after
-    it, where it first is again. Where a gap or the end of the scan is met before, they are not known.
+    it, where it first is again. Where a gap or the end of the scan is met before, or the amplitude is within
+    two standard deviations, they are not known.
     duration: from onset to end. The sigmas are standard deviations: of times, that of the value over the
     slope.
     """
@@ -164,11 +166,14 @@ def movement_of(
     amplitude = height - rest
     if abs(amplitude) <= _SAME * max(abs(height), abs(rest)):
         return None
+    sigma = math.sqrt(spread[top] + rest_variance)
+    if abs(amplitude) <= _CERTAIN * sigma:
+        unknown = math.nan
+        return Movement(rest, amplitude, sigma, peak, unknown, unknown, unknown, unknown)
     relative = (curve - rest) / amplitude
     slopes = smoothed(times, values, variances, smoothing, 1)[0]
     onset, onset_sigma = _crossing(times, relative, slopes, spread, int(top), -1, share)
     end, end_sigma = _crossing(times, relative, slopes, spread, int(top), 1, share)
-    sigma = math.sqrt(spread[top] + rest_variance)
     return Movement(rest, amplitude, sigma, peak, onset, onset_sigma, end, end_sigma)
 
 

@@ -91,16 +91,14 @@ class Ways:
             motion = motion.after(now.inverse)
         found = self.trajectories(settings, choices)
         shown = desk.viewport.request if desk.viewport.is_there else None
-        key = shown, tuple(found.values())
-        if self._seen[0] != key:
-            self._seen = key, {}
+        places = {name: motion.points(one.positions) for name, one in found.items()}
+        if places and self._seen[0] != (shown, tuple(found.values())):
+            seen = np.split(self._are_seen(np.concatenate([*places.values()])), len(places))
+            self._seen = (shown, tuple(found.values())), dict(zip(places, seen, strict=True))
         for number, (name, one) in enumerate(found.items()):
-            places = motion.points(one.positions)
-            if name not in self._seen[1]:
-                self._seen[1][name] = self._are_seen(places)
             alphas = np.where(self._seen[1][name], 1.0, _DIM)
-            colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(places)
-            canvas.path(view.all_on_screen(places), colors, alphas)
+            colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(alphas)
+            canvas.path(view.all_on_screen(places[name]), colors, alphas)
 
     def _colors(self, one: Trajectory) -> list[int]:
         """The colours of a way by its speed, 0xRRGGBB; that of rest where the speed is not known."""
