@@ -18,7 +18,7 @@ RATE, FRAMES = 25.0, 50
 PEAK, WIDE, OPENING = 1.0, 0.25, 12.0  # seconds, seconds, scan units
 UPPER, LOWER = 112, 52  # points of the grid, two rows and four apart
 CLICK = 0.45  # scan units, more than a pixel of the view that is started with
-DRAWER = "drawer/curves"
+DRAWER = "drawer/plotting"
 USE = "import viewer.app.tools\nviewer.app.tools.__path__.append({!r})\n"
 BELOW = """
 from imgui_bundle import imgui

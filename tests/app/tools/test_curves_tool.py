@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from viewer.analysis.measures import Quantity, Series
-from viewer.app.tools.curves.choices import AGAINST, REPEATS, CurveChoices, Settings
-from viewer.app.tools.curves.shown import Shown, unit_of
-from viewer.app.tools.curves.words import number_rows, numbers_in_words, with_spread
+from viewer.app.tools.plotting.choices import AGAINST, REPEATS, CurveChoices, Settings
+from viewer.app.tools.plotting.shown import Shown, unit_of
+from viewer.app.tools.plotting.words import number_rows, numbers_in_words, with_spread
 from viewer.scan.units import Scale
 
 TIMES = np.arange(240) / 30
