@@ -42,6 +42,13 @@ def length_of(line: Line) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
+def steps_along(line: Line, step: float) -> Line:
+    """Places on a line of straight pieces, one a step or a little more, its ends among them, (M, 3)."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    at = np.linspace(0, along[-1], max(int(along[-1] / step), 1) + 1)
+    return np.stack([np.interp(at, along, axis) for axis in line.T], axis=1)
+
+
 def kinked(line: Line, step: float) -> float:
     """How far its length may be off that of a smooth line, scan units: a quarter of the lengths of its pieces
     times the squared angles between them, where pieces are a `step` long.
@@ -50,15 +57,12 @@ def kinked(line: Line, step: float) -> float:
     is shorter than one on that, by about t^2 / 4: it runs beneath. A zigzag that turns by t at each step is
     longer than the straight line by t^2 / 8.
     """
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    count = int(along[-1] / step) if step > 0 else 0
-    if count < 2:
+    pieces = np.diff(steps_along(line, step), axis=0)
+    if len(pieces) < 2:
         return 0.0
-    at = np.linspace(0, along[-1], count + 1)
-    pieces = np.diff(np.stack([np.interp(at, along, axis) for axis in line.T], axis=1), axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
     cosines = (pieces[1:] * pieces[:-1]).sum(axis=1) / np.maximum(
         lengths[1:] * lengths[:-1], np.finfo(float).tiny
     )
     squared = np.arccos(np.clip(cosines, -1, 1)) ** 2
-    return float(squared.sum() * along[-1] / count) / 4
+    return float(squared.sum() * lengths.mean()) / 4

@@ -115,6 +115,14 @@ class PoseSurface:
         moved, _ = moved_to_quadrics(patch.vertices, self.radius, patch.vertex_normals)
         return Patch(moved, patch.faces, patch.sources)
 
+    def nearest(self, position: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """The place of the surface nearest to another, (3,); None where that is farther than four spacings
+        and as many deviations of noise."""
+        local, reach = position - self.origin, _ASTRAY * (self.spacing + self.noise)
+        patch = self.patch(lambda points: np.linalg.norm(points - local, axis=1) - 2 * reach)
+        place = patch.nearest(local) if len(patch.faces) else None
+        return place.position + self.origin if place is not None and place.away <= reach else None
+
     def path(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> Line | None:
         """The shortest path over the surface from one place to another, (P, 3); None where they are not on
         it, or nothing joins them.

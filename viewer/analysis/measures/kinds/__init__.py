@@ -79,8 +79,3 @@ def kind_of(measure: Measure) -> MeasureKind:
         if value not in kind.choices[name]:
             raise unknown_name(f"value of '{name}'", value, kind.choices[name])
     return kind
-
-
-def choice(kind: MeasureKind, options: Options, name: str) -> str:
-    """The value of an option, told or not."""
-    return options.get(name, kind.choices[name][0])

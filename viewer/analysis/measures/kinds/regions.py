@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....mesh.cutting import Piece, pieces_along
-from ....mesh.geodesic import Line, length_of
+from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
 from ..planes import THROUGH, plane_of
 from ..surface import Circuit, Found, PoseSurface
@@ -42,7 +42,7 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
     piece = None if loop is None else region_within(loop)
     if loop is None or piece is None:
         return None
-    edges = [line[:-1] for line in loop.lines]
+    edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]
     around = np.concatenate(edges)
     center, normal = _facing(piece, around)
     if not np.isfinite(normal).all():

@@ -1,0 +1,77 @@
+"""Measures defined in files: JSON or TOML with a list of `measures`, as templates have it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError, explained, shortened
+from ...files import parsed_json, read_text
+from . import Measure
+from .kinds import kind_of
+
+_MOST_BYTES = 4 * 2**20
+_MOST = 10_000
+_FIELDS = ("name", "kind", "landmarks", "options")
+_HINT = "docs/landmarks.md tells how measures are defined"
+
+
+def read_measures(path: Path | str) -> tuple[Measure, ...]:
+    """The measures of a file, of a template as well, at least one. Raises InputError, which tells what is
+    wrong and where."""
+    path = Path(path)
+    try:
+        text = read_text(path, _MOST_BYTES)
+        data = _toml(text) if path.suffix.lower() == ".toml" else parsed_json(text)
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    except ValueError as error:  # of the text's encoding as well
+        raise InputError(f"is neither JSON nor TOML ({error})", path, _HINT) from error
+    try:
+        return _measures(data)
+    except InputError as error:
+        where = ", ".join(map(str, filter(None, (path, error.where))))
+        raise InputError(error.what, where, error.hint or _HINT) from None
+
+
+def _toml(text: str) -> Any:
+    import tomllib
+
+    return tomllib.loads(text)
+
+
+def _measures(data: Any) -> tuple[Measure, ...]:
+    held = data.get("measures") if isinstance(data, dict) else data
+    if not isinstance(held, list) or not 0 < len(held) <= _MOST:
+        raise InputError(f"has no list of 'measures', of 1 to {_MOST}")
+    found = tuple(_measure(each, f"measures[{number}]") for number, each in enumerate(held))
+    names = [measure.name for measure in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two measures are called {shortened(name)!r}", "measures")
+    return found
+
+
+def _measure(data: Any, where: str) -> Measure:
+    if not isinstance(data, dict):
+        raise InputError("is no object", where)
+    for field in data:
+        if field not in _FIELDS:
+            raise InputError(f"has an unknown field '{shortened(field)}'", where)
+    name, kind = data.get("name"), data.get("kind")
+    landmarks, options = data.get("landmarks"), data.get("options", {})
+    if not (isinstance(name, str) and name and name.isprintable() and isinstance(kind, str)):
+        raise InputError("has no 'name' and 'kind' that are text", where)
+    if not (isinstance(landmarks, list) and all(isinstance(landmark, str) for landmark in landmarks)):
+        raise InputError("its 'landmarks' are no list of names", where)
+    if not (isinstance(options, dict) and all(isinstance(value, str) for value in options.values())):
+        raise InputError("its options are no words by name", where)
+    measure = Measure(name, kind, tuple(landmarks), options)
+    try:
+        kind_of(measure)
+    except InputError as error:
+        raise InputError(
+            error.what, ", ".join(filter(None, (where, str(error.where or "")))), error.hint
+        ) from None
+    return measure

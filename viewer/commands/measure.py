@@ -1,0 +1,246 @@
+"""Follow landmarks through a scan and measure, in all frames, without a window.
+
+The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
+the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..analysis.landmarks.files import AXES, landmark_suffixes, read_landmarks
+from ..analysis.landmarks.files.long_table import LONG_COLUMNS, STATES, cell, landmark_rows
+from ..analysis.landmarks.landmark_set import LandmarkSet, told_apart
+from ..analysis.landmarks.placed import landmarks_of, told_beside
+from ..analysis.measures import Measure, Quantity, Series
+from ..analysis.measures.definitions import read_measures
+from ..analysis.measures.series import all_series, surface_of
+from ..analysis.track import Known, Track
+from ..analysis.tracking import track_landmarks
+from ..csv_text import save_rows
+from ..errors import InputError
+from ..files import whole_file
+from ..output.export import check_output
+from ..scan.inputs import scan_inputs
+from ..scan.points import UNKNOWN_UNIT
+from ..scan.timeline import Timeline
+from ..scan.times import frame_in_words
+from ..task import Task
+from ._console import progress, tell, warn
+from ._outputs import add_force_argument, claim
+from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline
+
+_SUFFIXES = (".csv", ".json")
+_STEPS = 200  # of a progress bar
+_NAMED = 3  # landmarks that a message names
+_POWERS: Mapping[Quantity, str] = {"length": "", "area": "^2", "volume": "^3"}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d measure`."""
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
+    parser.add_argument(
+        "--landmarks", type=Path, metavar="FILE", required=True,
+        help=f"{' '.join(landmark_suffixes())}, or a series such as smile_%%04d.mrk.json",
+    )  # fmt: skip
+    parser.add_argument(
+        "--measures", type=Path, metavar="FILE", help="JSON or TOML, or a template; default: landmarks alone"
+    )
+    parser.add_argument(
+        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True, help=" or ".join(_SUFFIXES)
+    )
+    add_force_argument(parser)
+    add_pose_arguments(parser)
+    how = parser.add_argument_group("how")
+    how.add_argument(
+        "--noise", type=_length, default=0.0, metavar="SIGMA",
+        help="of the scanner: the standard deviation of a coordinate that it measures, scan units",
+    )  # fmt: skip
+    how.add_argument(
+        "--placed-in", type=int, metavar="I",
+        help="the pose that landmarks are of where FILE tells no frame; default: the first that is measured",
+    )  # fmt: skip
+    how.add_argument("--no-snap", action="store_true", help="leave landmarks where they are in FILE")
+    how.add_argument("--axes", choices=AXES, default=AXES[0], help="of the scan, default LPS")
+
+
+def run(args: Namespace) -> int:
+    """Write the table of the chosen poses, by default all."""
+    check_output(args.out, _SUFFIXES, several=False)
+    with open_timeline(args, args.scan) as timeline:
+        indices = chosen_poses(args, timeline) or list(range(len(timeline)))
+        inputs = [args.landmarks, *([args.measures] if args.measures else [])]
+        claim([args.out], [*scan_inputs(timeline), *inputs], args.force)
+        unit = None if timeline.unit == UNKNOWN_UNIT else timeline.unit
+        found = read_landmarks(args.landmarks, unit, args.axes)
+        measures = _measures(args, found)
+        for told in found.told:
+            warn(f"{args.landmarks}: {told}")
+        frame = indices[0] if args.placed_in is None else args.placed_in
+        timeline.label(frame)  # raises where there is none
+        _check_place(args, found, timeline)
+        with _shown(f"Measuring {timeline.name}"):
+            if not args.no_snap:
+                found = _on_surface(args, found, timeline, frame)
+            tracks = _with_noise(_tracks(found, timeline, frame), args.noise)
+        with _shown(f"Measuring {timeline.name}"):
+            series = all_series(measures, tracks, timeline, frames=indices)
+        _write(args.out, timeline, _rows(tracks, series, timeline, indices))
+        _tell_gaps(tracks, series, indices)
+    tell(args.out)
+    return 0
+
+
+def _length(text: str) -> float:
+    try:
+        length = float(text)
+    except ValueError:
+        length = math.nan
+    if not 0 <= length < math.inf:
+        raise ArgumentTypeError(f"'{text}' is no length of 0 or more")
+    return length
+
+
+def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
+    """The measures of whose landmarks the file has all; the others are told."""
+    if args.measures is None:
+        return []
+    kept, lacking = [], {}
+    for measure in read_measures(args.measures):
+        missing = [name for name in measure.landmarks if name not in found.names]
+        if missing:
+            lacking[measure.name] = missing[0]
+        else:
+            kept.append(measure)
+    for name, landmark in lacking.items():
+        warn(f"'{name}' is left out: {args.landmarks} has no landmark '{landmark}'")
+    if not kept:
+        hint = f"It has {', '.join(found.names[:_NAMED])}{', ...' if len(found.names) > _NAMED else ''}"
+        raise InputError(f"has the landmarks of no measure in {args.measures}", args.landmarks, hint)
+    return kept
+
+
+def _check_place(args: Namespace, found: LandmarkSet, timeline: Timeline) -> None:
+    """Raise InputError where landmarks are not of this scan, or there are none."""
+    if not found.is_defined.any() and not np.isfinite(found.positions).any():
+        raise InputError("has no landmark that is placed", args.landmarks, "Place some in the window first")
+    last = int(found.frames[-1])
+    if found.is_framed and last >= len(timeline):
+        raise InputError(
+            f"has landmarks of {frame_in_words(last)}, and the scan has {len(timeline)}", args.landmarks,
+            "They are of another scan",
+        )  # fmt: skip
+    apart = told_apart(found, framing(timeline, range(len(timeline))))
+    if apart is not None:
+        hint = "Use landmarks of this scan; --axes and --unit tell of the scan what it does not"
+        raise InputError(apart, args.landmarks, hint)
+
+
+def _on_surface(args: Namespace, found: LandmarkSet, timeline: Timeline, frame: int) -> LandmarkSet:
+    """The landmarks moved onto the surface, and how far, in words; those that are far from it stay."""
+    frames = found.frames if found.is_framed or len(found) > 1 else np.array([frame])
+    positions, moves, astray = found.positions.copy(), [0.0], []
+    for row, index in enumerate(frames.tolist()):
+        columns = np.flatnonzero(np.isfinite(positions[row]).all(axis=1))
+        if index >= len(timeline) or not len(columns):
+            continue
+        surface = surface_of(timeline, timeline.visit(index))
+        for column in columns:
+            place = surface.nearest(positions[row, column])
+            if place is None:
+                astray.append(found.names[column])
+            else:
+                moves.append(float(np.linalg.norm(place - positions[row, column])))
+                positions[row, column] = place
+    unit = timeline.unit
+    if max(moves) > 0:
+        mean = np.mean(moves[1:])
+        tell(f"landmarks are moved onto the surface by up to {max(moves):.3g} {unit}, {mean:.3g} on average")
+    if astray:
+        few = ", ".join(f"'{name}'" for name in list(dict.fromkeys(astray))[:_NAMED])
+        warn(f"{len(astray)} places lie off the surface and stay there, such as {few}")
+    return replace(found, positions=positions)
+
+
+def _tracks(found: LandmarkSet, timeline: Timeline, frame: int) -> dict[str, Track]:
+    """The landmarks in all frames, in the order of the file; those that are nowhere are pending."""
+    landmarks = landmarks_of(found, timeline.pose, len(timeline), frame)
+    beside = told_beside(landmarks)
+    if beside is not None:
+        warn(beside)
+    tracks = track_landmarks(timeline, landmarks, first=frame)
+    return {name: tracks.get(name) or Track.pending(timeline.times) for name in found.names}
+
+
+def _with_noise(tracks: Mapping[str, Track], noise: float) -> dict[str, Track]:
+    """The tracks with the scanner's noise in their covariances."""
+    spread = noise**2 * np.eye(3)
+    return {name: replace(track, covariances=track.covariances + spread) for name, track in tracks.items()}
+
+
+def _rows(
+    tracks: Mapping[str, Track], series: Mapping[str, Series], timeline: Timeline, indices: Sequence[int]
+) -> list[list[object]]:
+    """The rows of landmarks, then those of measures, frame by frame."""
+    landmarks = LandmarkSet.of_tracks(tracks, timeline.unit)
+    wanted = {index + 1 for index in indices}
+    rows = [row for row in landmark_rows(landmarks) if row[1] in wanted]
+    for index in sorted(indices):
+        for each in series.values():
+            state = STATES[Known(int(each.known[index]))]
+            values = cell(each.values[index]), cell(each.sigmas[index])
+            unit = "deg" if each.quantity == "angle" else f"{timeline.unit}{_POWERS[each.quantity]}"
+            time = cell(each.times[index])
+            rows.append(["measure", index + 1, time, each.name, None, None, None, state, *values, unit])
+    return rows
+
+
+def _write(path: Path, timeline: Timeline, rows: Sequence[Sequence[object]]) -> None:
+    """CSV, or the same as JSON: `rows` of objects by the names of the columns, null where a cell is empty."""
+    if path.suffix.lower() == ".csv":
+        save_rows(path, [LONG_COLUMNS, *rows])
+        return
+    objects = [dict(zip(LONG_COLUMNS, row, strict=True)) for row in rows]
+    table = {"scan": timeline.name, "unit": timeline.unit, "rows": objects}
+    with whole_file(path) as temporary:
+        text = json.dumps(table, indent=1, allow_nan=False, ensure_ascii=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _tell_gaps(tracks: Mapping[str, Track], series: Mapping[str, Series], indices: Sequence[int]) -> None:
+    """Say in how many of the frames each is not known."""
+    known = {name: each.known for name, each in tracks.items()}
+    known |= {name: each.known for name, each in series.items()}
+    for name, states in known.items():
+        gaps = int((states[list(indices)] < Known.TRACKED).sum())
+        if gaps:
+            warn(f"'{name}' is not known in {gaps} of {len(indices)} frames")
+
+
+@contextmanager
+def _shown(name: str) -> Iterator[None]:
+    """Have long work inside show how far it has come."""
+    with progress(_STEPS) as tick, _Ticking(name, tick).current():
+        yield
+
+
+class _Ticking(Task):
+    """A task that ticks as it gets on."""
+
+    def __init__(self, name: str, tick: Callable[[], object]) -> None:
+        super().__init__(name)
+        self._tick, self._ticked = tick, 0
+
+    def report(self, progress: float) -> None:
+        super().report(progress)
+        while self._ticked < progress * _STEPS:
+            self._ticked += 1
+            self._tick()
