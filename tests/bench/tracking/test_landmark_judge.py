@@ -47,6 +47,7 @@ def test_landmarks_are_set_once_at_the_truth(known: KnownScan) -> None:
         assert np.linalg.norm(near - key.position) < 1.5 * known.spacing
     later = replace(known, counted=np.arange(8)[:, None].repeat(len(known.names), 1) >= 3)
     assert {landmark.keys[0].frame for landmark in keyed_landmarks(later)} == {3}
+    assert [key.frame for key in keyed_landmarks(later, keys=3)[0].keys] == [3, 5, 7]
 
 
 def test_errors_and_their_calibration_are_found(known: KnownScan) -> None:

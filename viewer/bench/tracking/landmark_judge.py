@@ -44,21 +44,26 @@ class Judgement:
     seconds: float
 
 
-def keyed_landmarks(known: KnownScan) -> list[Landmark]:
-    """The landmarks of a scan, each set once, at the truth, in the first frame that has it."""
+def keyed_landmarks(known: KnownScan, keys: int = 1) -> list[Landmark]:
+    """The landmarks of a scan, each set at the truth, in the first of the frames that have it.
+
+    keys: in how many of these frames it is set; of several, the last is one, and the others are even.
+    """
     landmarks = []
     for number, name in enumerate(known.names):
-        frame = int(known.counted[:, number].argmax())
-        place = known.paths[frame, number]
-        row, _ = nearest_row(known.source.load(frame), place)
-        time = float(known.source.times()[frame])
-        spot = Spot(frame, time, vector(place), "surface", row, known.spacing, 0, _EXACT)
-        landmarks.append(Landmark(name).with_key(spot))
+        landmark, there = Landmark(name), np.flatnonzero(known.counted[:, number])
+        for frame in dict.fromkeys(there[np.linspace(0, len(there) - 1, keys).astype(int)].tolist()):
+            place = known.paths[frame, number]
+            row, _ = nearest_row(known.source.load(frame), place)
+            time = float(known.source.times()[frame])
+            spot = Spot(frame, time, vector(place), "surface", row, known.spacing, 0, _EXACT)
+            landmark = landmark.with_key(spot)
+        landmarks.append(landmark)
     return landmarks
 
 
 def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float = np.nan) -> Judgement:
-    """Judge the tracks of `keyed_landmarks`, by name. seconds: what tracking took a frame."""
+    """Judge tracks of `keyed_landmarks`, by name. seconds: what tracking took a frame."""
     states = np.stack([tracks[name].known for name in known.names], axis=1)
     positions = np.stack([tracks[name].positions for name in known.names], axis=1)
     sigmas = np.stack([tracks[name].sigmas for name in known.names], axis=1)
@@ -88,10 +93,13 @@ def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float =
 
 
 def judge_tracking(
-    known: KnownScan, tracker: Callable[[Timeline, Sequence[Landmark]], Mapping[str, Track]]
+    known: KnownScan, tracker: Callable[[Timeline, Sequence[Landmark]], Mapping[str, Track]], keys: int = 1
 ) -> Judgement:
-    """Judge a tracker on a scan. tracker: tracks the landmarks of a timeline, such as `track_landmarks`."""
-    landmarks = keyed_landmarks(known)
+    """Judge a tracker on a scan. tracker: tracks the landmarks of a timeline, such as `track_landmarks`.
+
+    keys: in how many frames each landmark is set, see `keyed_landmarks`.
+    """
+    landmarks = keyed_landmarks(known, keys)
     with Timeline(known.source, known.source.times()) as timeline:
         began = process_time()
         tracks = tracker(timeline, landmarks)

@@ -1,0 +1,75 @@
+"""The tables of docs/landmarks.md that tell how well landmarks are tracked, measured anew.
+
+    python docs/tables/landmarks.py [NAME ...]
+
+All but the times give the same figures on any machine. It needs the data folder and ten minutes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pictures import DATA, DOCS
+
+from viewer.analysis.tracking import track_landmarks
+from viewer.bench.report.measurement import markdown_table, remeasure_tables
+from viewer.bench.report.page import three_digits
+from viewer.bench.tracking.known import KnownScan, resampled_mesh, scanned_demo
+from viewer.bench.tracking.landmark_judge import Judgement, judge_tracking
+from viewer.scan.open import find_source
+
+PAGE = DOCS / "landmarks.md"
+# Variants, pods, noises in mm
+CASES = (("smile", 2, (0.1,)), ("sway", 2, (0.1,)), ("cough", 2, (0.1,)), ("sway", 1, (0.1,)))
+MESHES = {"crane": "crane_175", "horse-gallop": "horse_gallop_48"}
+FIGURES = ("median", "95 %", "worst", "within 2 sigma", "hidden", "gaps there", "gaps elsewhere", "s a frame")
+
+
+def _scans() -> Iterator[tuple[list[str], KnownScan]]:
+    """The scans with the cells that tell them: scan, pods, noise."""
+    for variant, pods, noises in CASES:
+        scan = f"demo:{variant}:1"
+        for noise, known in zip(noises, scanned_demo(scan, noises, pods=pods), strict=True):
+            yield [f"`{scan}`", str(pods), f"{noise:g} mm"], known
+
+
+def _in_mm(told: Judgement) -> list[str]:
+    return [f"{three_digits(length)} mm" for length in (told.median, told.p95, told.worst)]
+
+
+def _in_spacings(told: Judgement) -> list[str]:
+    return [three_digits(length / told.spacing) for length in (told.median, told.p95, told.worst)]
+
+
+def _shares(told: Judgement) -> list[str]:
+    """The figures that are no lengths, as cells."""
+    shares = [
+        "" if np.isnan(share) else f"{100 * share:.1f} %"
+        for share in (told.within, told.gaps_hit, told.gaps_false)
+    ]
+    return [shares[0], str(told.hidden), *shares[1:], f"{told.seconds:.2f}"]
+
+
+def tracked() -> str:
+    """Errors and gaps of the demo's variants, as pods see them."""
+    rows = []
+    for cells, known in _scans():
+        told = judge_tracking(known, track_landmarks)
+        rows.append([*cells, *_in_mm(told), *_shares(told)])
+    return markdown_table(["scan", "pods", "noise", *FIGURES], rows, left=("scan",))
+
+
+def tracked_meshes() -> str:
+    """Errors of meshes that are sampled anew in each frame, in spacings of their points."""
+    rows = []
+    for name, folder in MESHES.items():
+        known = resampled_mesh(find_source(DATA / "sequences" / folder), name)
+        near = f"{100 * (1 - known.counted.mean()):.1f} %"
+        told = judge_tracking(known, track_landmarks)
+        rows.append([f"`{name}`", str(told.frames), near, *_in_spacings(told), *_shares(told)])
+    return markdown_table(["scan", "frames", "near contact", *FIGURES], rows, left=("scan",))
+
+
+if __name__ == "__main__":
+    remeasure_tables(PAGE, tracked, tracked_meshes)
