@@ -7,6 +7,7 @@ sure the way is.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,25 +20,25 @@ from .surface import MomentSurface
 
 Float = NDArray[np.float64]
 
-_FAR = PatchLevel(points=400, search=12.0, rounds=12, uses_color=False)
+_FAR = PatchLevel(points=300, search=12.0, rounds=12, uses_color=False)
 _NEXT = (
-    PatchLevel(points=200, search=9.0, rounds=8, uses_color=False),
-    PatchLevel(points=200, search=3.0, rounds=4, uses_color=False),
+    PatchLevel(points=120, search=9.0, rounds=8, uses_color=False),
+    PatchLevel(points=120, search=3.0, rounds=4, uses_color=False),
 )
-_WIDE = PatchLevel(points=450, search=3.5, rounds=8, bending=0.05, turn=0.2)
-_FINE = PatchLevel(points=300, search=2.6, rounds=8, bending=0.1, turn=0.2)
-_BACK = PatchLevel(points=300, search=2.6, rounds=6, bending=0.05, turn=0.1)
+_WIDE = PatchLevel(points=400, search=3.5, rounds=8, bending=0.05, turn=0.2)
+_FINE = PatchLevel(points=250, search=2.6, rounds=8, bending=0.1, turn=0.2)
+_BACK = PatchLevel(points=220, search=2.6, rounds=6, bending=0.05, turn=0.1)
 _WRONG = 0.3  # of the patch as in the frame before; where less is matched, it is looked for in the region
 _FREE = 8.0  # spacings: standard deviation of a place about which little is known
 _LOOSE = 1.5  # of one that is nearly known
 _MODEL = 0.06  # spacings that the wide patch is off, as it bends otherwise than the model says
 _MIDDLE = 0.5  # of the points next to the place, that have to be matched
 # How far a patch may be off the surface, standard deviation: times the noise, and spacings besides.
-_OFF_WIDE = 3.0, 0.3
-_OFF_FINE = 2.5, 0.15
+_OFF_WIDE = 3.0, 0.12
+_OFF_FINE = 2.5, 0.12
 _CROP = 1.6  # wide radii of the surface that is kept of the frame in which it was set
-_NOISE = 1.5  # factor of variances of registration: residuals are not independent
-_FLOOR = 0.05  # spacings: what sampling leaves at least, standard deviation
+_NOISE = 1.2  # factor of variances of registration: residuals are not independent
+_FLOOR = 0.04  # spacings: what sampling leaves at least, standard deviation
 _APART = 0.5  # of the way between results that should be one: its share in the standard deviation
 
 
@@ -89,16 +90,18 @@ class Follower:
         last."""
         if self._wide is None or self._fine is None:
             return Sighting.gap("there is no surface where it was set")
-        start = self._guess(surface, before)
-        if start is None:
-            self._is_lost = True
-            return Sighting.gap("the region around it was not found")
         loose = (_LOOSE * self.spacing) ** 2 * np.eye(3)
-        wide = registered(self._wide, surface, start, _WIDE, loose)
-        if wide is None or wide.kept < self._settings.least_kept:
-            return self._lose("too little of the surface around it was found")
-        if wide.deviation > self._limit(_OFF_WIDE):
-            return self._lose("the surface around it has another shape")
+        reason = "the region around it was not found"
+        for start in self._guesses(surface, before):
+            wide = registered(self._wide, surface, start, _WIDE, loose)
+            if wide is None or wide.kept < self._settings.least_kept:
+                reason = "too little of the surface around it was found"
+            elif wide.deviation > self._limit(_OFF_WIDE):
+                reason = "the surface around it has another shape"
+            else:
+                break
+        else:
+            return self._lose(reason)
         slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
         fine = registered(
             self._fine, surface, Placement(wide.place, wide.turn, self._fine_found.bent), _FINE, slack
@@ -111,8 +114,10 @@ class Follower:
         back = None
         if patch is not None:
             back = registered(patch, self._own, Placement(self._place, wide.turn.T), _BACK, loose)
-        if back is None:
+        if back is None or back.kept < self._settings.least_kept:
             return self._lose("the way back was not found")
+        if back.deviation > self._limit(_OFF_WIDE):
+            return self._lose("the surface around it had another shape")
         returned = wide.turn @ (back.place - self._place)
         apart, bound = float(np.linalg.norm(returned)), self._settings.bound_at(self.spacing)
         if apart > bound:
@@ -129,23 +134,23 @@ class Follower:
         )
         return Sighting(fine.place + self._origin, covariance)
 
-    def _guess(self, surface: MomentSurface, before: MomentSurface) -> Placement | None:
-        """About where it is in a frame."""
+    def _guesses(self, surface: MomentSurface, before: MomentSurface) -> Iterator[Placement]:
+        """About where it may be in a frame, the likelier first."""
         free = (_FREE * self.spacing) ** 2 * np.eye(3)
         if not self._is_lost:
             patch = patch_of(before, self._found.place, self._wide_radius, _NEXT[0].points)
             if patch is not None:
                 still = Placement(self._found.place)
                 starts = [still.at(still.place + self._velocity), still]
-                moved = best_registered(patch, surface, starts, _NEXT, free)
+                enough = self._limit(_OFF_FINE)
+                moved = best_registered(patch, surface, starts, _NEXT, free, enough)
                 if moved is not None and moved.kept >= _WRONG:
-                    return Placement(moved.place, moved.turn @ self._found.turn, self._found.bent)
-        if self._far is None:
-            return None
-        region = best_registered(self._far, surface, [self._region], [_FAR], free)
-        if region is not None:
-            self._region = Placement(region.place, region.turn)
-        return region
+                    yield Placement(moved.place, moved.turn @ self._found.turn, self._found.bent)
+        if self._far is not None:
+            region = best_registered(self._far, surface, [self._region], [_FAR], free)
+            if region is not None:
+                self._region = Placement(region.place, region.turn)
+                yield region
 
     def _limit(self, off: tuple[float, float]) -> float:
         """How far a patch may be off the surface, scan units."""

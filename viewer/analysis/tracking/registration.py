@@ -122,9 +122,10 @@ def best_registered(
     starts: Sequence[Placement],
     levels: Sequence[PatchLevel],
     slack: Float,
+    enough: float = 0.0,
 ) -> Placement | None:
-    """The patch on a surface, from that of some placements from which it fits best: by how far it is off,
-    and how much of it. Levels follow each other."""
+    """The patch on a surface, from that of some placements from which it fits best. Levels follow each
+    other. enough: the misfit at which no other one is tried."""
     best = None
     for start in starts:
         found: Placement | None = start
@@ -133,4 +134,6 @@ def best_registered(
                 found = registered(patch, surface, found, level, slack)
         if found is not None and (best is None or found.misfit < best.misfit):
             best = found
+        if best is not None and best.misfit <= enough:
+            break
     return best

@@ -84,6 +84,18 @@ class MomentSurface:
             reaches=np.empty(count, np.float32),
         )
 
+    def unfitted(self) -> MomentSurface:
+        """The surface with no parabolas fitted yet; points and grid are shared."""
+        other, held = object.__new__(MomentSurface), self.held
+        other.size, other.spacing = self.size, self.spacing
+        other.held = held._replace(
+            state=np.zeros_like(held.state),
+            frames=np.empty_like(held.frames),
+            parabolas=np.empty_like(held.parabolas),
+            reaches=np.empty_like(held.reaches),
+        )
+        return other
+
     def rows_around(self, place: Float, reach: float) -> NDArray[np.int32]:
         """Rows of the points within reach of a place, increasing."""
         from .surface_kernels import rows_within

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -22,23 +23,25 @@ from .follower import Follower, Sighting
 from .settings import TrackingSettings
 from .surface import MomentSurface
 
-_MOMENTS = 4  # that are held: two in each direction
+_MOMENTS = 5  # that are held: two in each direction, and one in which landmarks were set
+_THREADS = max(1, min(4, os.cpu_count() or 1))
 
 
 @dataclass(eq=False)
 class _Moment:
-    """A pose, and its surface once it is needed."""
+    """A pose, and its surface once it is needed: one for each thread, which fit parabolas of their own."""
 
     pose: Pose
     origin: NDArray[np.float64]
     spacing: float
-    _surface: MomentSurface | None = None
+    _surfaces: list[MomentSurface] = field(default_factory=list)
 
-    @property
-    def surface(self) -> MomentSurface:
-        if self._surface is None:
-            self._surface = MomentSurface.of(self.pose, self.origin, self.spacing)
-        return self._surface
+    def surface(self, thread: int) -> MomentSurface:
+        while len(self._surfaces) <= thread:
+            first = self._surfaces[0] if self._surfaces else None
+            made = first.unfitted() if first else MomentSurface.of(self.pose, self.origin, self.spacing)
+            self._surfaces.append(made)
+        return self._surfaces[thread]
 
 
 @dataclass(eq=False)
@@ -54,7 +57,7 @@ class _Pass:
     seen: dict[int, Sighting] = field(default_factory=dict)
     at: int = -1  # the frame that was looked at last
     follower: Follower | None = None
-    topology: str | None = None
+    topology: str | None = None  # of the frame in which it was set
 
     def __post_init__(self) -> None:
         self.at = self.spot.frame
@@ -136,7 +139,10 @@ class Tracker:
         for frame in sorted({part.spot.frame for part in self._passes.values() if part.left}):
             if self._origin is None:  # that of the first key, in whatever order frames are read
                 self._read(frame)
-        with ThreadPoolExecutor(1, "scan4d-tracking") as reader:
+        with (
+            ThreadPoolExecutor(1, "scan4d-tracking-reads") as reader,
+            ThreadPoolExecutor(_THREADS, "scan4d-tracking") as pool,
+        ):
             ahead: tuple[int, Future[_Moment | InputError]] | None = None
             while (step := self._next_step()) is not None:
                 checkpoint(self.progress)
@@ -149,7 +155,7 @@ class Tracker:
                 ahead = None
                 if any(part.left > 1 for part in parts) and following not in self._moments:
                     ahead = following, reader.submit(self._read, following)
-                self._look(frame, parts)
+                self._look(frame, parts, pool)
                 seen = {part.spot: part.left for part in parts}
                 for landmark in self._landmarks:
                     if any(key in seen for key in landmark.keys):
@@ -174,37 +180,50 @@ class Tracker:
         direction, at = lagging.direction, lagging.at
         return direction, at + direction, [p for p in passes if p.direction == direction and p.at == at]
 
-    def _look(self, frame: int, parts: Sequence[_Pass]) -> None:
+    def _look(self, frame: int, parts: Sequence[_Pass], pool: ThreadPoolExecutor) -> None:
         """Have passes look at a frame."""
-        try:
-            moment = self._moment(frame)
-        except InputError as error:
-            for part in parts:
-                part.seen[frame], part.at = Sighting.gap(f"the frame is not readable: {error.what}"), frame
-            return
+        to_follow = []
         for part in parts:
-            checkpoint()
             try:
-                sighting = self._sighting(part, moment)
+                moment, key = self._moment(frame), None
+                topology = moment.pose.overview.topology
+                if part.follower is None and (topology is None or topology != part.topology):
+                    key = self._moment(part.spot.frame)
+                    part.topology = key.pose.overview.topology
             except InputError as error:
-                sighting = Sighting.gap(f"the frame in which it was set is not readable: {error.what}")
-            part.seen[frame], part.at = sighting, frame
+                part.seen[frame] = Sighting.gap(f"{error.where or 'a frame'} is not readable: {error.what}")
+                continue
+            is_same = topology is not None and topology == part.topology
+            if is_same and part.spot.id is not None:
+                part.seen[frame] = _exact(part.spot, moment.pose)
+                continue
+            try:
+                before = self._moment(part.at)
+            except InputError:
+                before = moment
+            to_follow.append((part, key, before, moment))
+        shares = [to_follow[thread::_THREADS] for thread in range(_THREADS)]
+        for thread, share in enumerate(shares):  # made here: what a thread makes, another one must not
+            for _, *moments in share:
+                for each in moments:
+                    if each is not None:
+                        each.surface(thread)
+        for done in [pool.submit(self._follow, *share, frame) for share in enumerate(shares)]:
+            done.result()
+        for part in parts:
+            part.at = frame
 
-    def _sighting(self, part: _Pass, moment: _Moment) -> Sighting:
-        if part.topology is None and part.at == part.spot.frame:
-            part.topology = self._moment(part.spot.frame).pose.overview.topology
-        is_same = part.topology is not None and part.topology == moment.pose.overview.topology
-        if is_same and part.spot.id is not None:
-            return _exact(part.spot, moment.pose)
-        if part.follower is None:
-            key = self._moment(part.spot.frame)
-            assert self._origin is not None
-            part.follower = Follower(part.spot, key.surface, self._origin, self.settings)
-        try:
-            before = self._moment(part.at)
-        except InputError:
-            before = moment
-        return part.follower.step(moment.surface, before.surface)
+    def _follow(
+        self, thread: int, share: Sequence[tuple[_Pass, _Moment | None, _Moment, _Moment]], frame: int
+    ) -> None:
+        """Have some passes, each with the moments of its key, of the frame before and of this one, look at
+        it."""
+        assert self._origin is not None
+        for part, key, before, moment in share:
+            if part.follower is None and key is not None:
+                part.follower = Follower(part.spot, key.surface(thread), self._origin, self.settings)
+            assert part.follower is not None
+            part.seen[frame] = part.follower.step(moment.surface(thread), before.surface(thread))
 
     def _moment(self, frame: int) -> _Moment:
         """A frame as it is held, or read now. Raises InputError."""
