@@ -25,8 +25,8 @@ _NEXT = (
     PatchLevel(points=120, search=9.0, rounds=8, uses_color=False),
     PatchLevel(points=120, search=3.0, rounds=4, uses_color=False),
 )
-_WIDE = PatchLevel(points=400, search=3.5, rounds=8, bending=0.05, turn=0.2)
-_FINE = PatchLevel(points=250, search=2.6, rounds=8, bending=0.1, turn=0.2)
+_WIDE = PatchLevel(points=500, search=3.5, rounds=8, bending=0.05, turn=0.2)
+_FINE = PatchLevel(points=300, search=2.6, rounds=8, bending=0.1, turn=0.2)
 _BACK = PatchLevel(points=220, search=2.6, rounds=6, bending=0.05, turn=0.1)
 _WRONG = 0.3  # of the patch as in the frame before; where less is matched, it is looked for in the region
 _FREE = 8.0  # spacings: standard deviation of a place about which little is known
