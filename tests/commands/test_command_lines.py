@@ -68,7 +68,7 @@ from viewer.renderer import Renderer
         (["--fps", "fast"], ["--fps", "'fast'"]),
         (["--nope"], ["unknown option '--nope'", "'scan4d render --help'"]),
         (["--bac", "points"], ["unknown option '--bac'", "'--backend'"]),
-        (["--bakend=points"], ["'--bakend'. Did you mean '--backend'?"]),
+        (["--bakend=points"], ["'--bakend'. Did you mean '--backend' or '--behind'?"]),
         (["--backend", "pionts"], ["Did you mean 'points'?"]),
         (["--backend", "points", "--set", "pointsize=2"], ["Did you mean 'point_size'?"]),
         (["--look", "colour_by=depth"], ["Did you mean 'color_by' or 'color_map'?"]),
