@@ -135,7 +135,7 @@ def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: 
     recording = Path(app.told(r"Recorded .* s\.  Saved (.+\.json)$")[1])
     entries = Recording.load(recording).entries
     assert [entry.pose for entry in entries] == [0, 1, 2]
-    assert {entry.marks for entry in entries} == {Marks(True, True, False, True)}
+    assert {entry.marks for entry in entries} == {Marks(True, True, False, True, True)}
     app.act("problems", ("item_click", "$$0/Save as film"))
     out = Path(app.told(r"Saved (.+\.mp4)")[1])
     frames, _ = film(out)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import sphere
-from test_window_measuring import clipboard, ctrl
+from test_window_measuring import ctrl
 from virtual_screen import PANEL, RunningApp, Screen, running_app
 
 from viewer.scan import formats
@@ -69,7 +69,7 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     assert made["distance"] < 0.25, "it is kept in units of the scan"
     ctrl(app.screen, "c")
     app.told("Copied")
-    row = next(csv.DictReader(io.StringIO(clipboard(app.screen)), delimiter="\t"))
+    row = next(csv.DictReader(io.StringIO(app.screen.clipboard()), delimiter="\t"))
     assert row["unit"] == "mm"
     assert float(row["distance"]) == pytest.approx(1000 * made["distance"])
     ctrl(app.screen, "z")
