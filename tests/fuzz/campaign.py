@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-HANGS = 5.0  # seconds that one input may take
-STARTS = 120.0  # seconds until a worker is ready
+HANGS = 30.0  # seconds that one input may take; compiling shaders for it counts too
+STARTS = 300.0  # seconds until a worker is ready
 AT_ONCE = 20_000  # inputs that one worker runs
 WORKER = Path(__file__).with_name("worker.py")
 
