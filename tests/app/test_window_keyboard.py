@@ -110,7 +110,7 @@ def test_f6_leads_through_panel_and_timeline_and_back(app: RunningApp) -> None:
 def test_a_widget_of_the_panel_is_worked_by_keys(app: RunningApp) -> None:
     assert app.settle().clicking is None
     press(app, "F6", "Home", "Return")  # closes the first section
-    press(app, "Tab", "Tab", "Tab", "Return")  # over the head of the next and the template to its first button
+    press(app, "Tab", "Tab", "Tab", "Return")  # over the next head and the template to a button
     assert app.settle().clicking == "landmarks"
     press(app, "Return")
     assert app.settle().clicking is None
