@@ -24,7 +24,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     _draw_template(tool)
     words = "Stop placing" if tool.is_active else "Place"
-    if imgui.button(f"{words}###landmarks", ui.button_size(3)):
+    if imgui.button(f"{words}###place", ui.button_size(3)):
         tool.toggle()
     ui.tooltip("Click each landmark's place in the view, one after the other", "landmarks")
     imgui.begin_disabled(not tool.is_active)
