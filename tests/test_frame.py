@@ -73,6 +73,7 @@ def test_a_look_can_ask_for_normals_too() -> None:
     assert np.ptp(lit.image()[lit.row != NOTHING][:, 0]) > 60
 
 
+@pytest.mark.slow
 def test_the_window_gets_points_until_what_it_asked_for_is_ready(renderer: Renderer) -> None:
     own = Renderer(renderer.gpu)
     surface = Surface(renderer.gpu, (64, 64))
@@ -417,6 +418,7 @@ def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> N
     own.release()
 
 
+@pytest.mark.slow
 def test_estimates_are_the_same_whoever_makes_them(renderer: Renderer) -> None:
     pose, surfels = Pose(0, 0.0, "x", BARE), find_backend("surfels")
     clouds = []

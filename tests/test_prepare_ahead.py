@@ -116,6 +116,7 @@ def test_poses_are_prepared_a_few_at_a_time_and_kept(own: Renderer, poses: list[
     assert own.latency > 0
 
 
+@pytest.mark.slow
 def test_estimates_come_first_and_what_is_derived_goes_by_them(own: Renderer) -> None:
     voxels, pose = find_backend("voxels"), Pose(0, 0.0, "x", BARE)
     wanted = want(pose, voxels)
@@ -134,6 +135,7 @@ def test_what_waits_is_dropped_when_other_poses_are_wanted(own: Renderer, poses:
     assert not any(own.is_prepared(one) for one in slow)
 
 
+@pytest.mark.slow
 def test_work_in_processes_is_ended_where_it_keeps_others_waiting(own: Renderer, poses: list[Pose]) -> None:
     backend = deriving(slowly, on_thread=False)
     slow, quick = ([want(pose, backend) for pose in poses if pose.index % 2 == odd] for odd in (0, 1))

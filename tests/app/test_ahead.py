@@ -189,6 +189,7 @@ def test_a_frame_that_is_not_prepared_leaves_the_one_before_and_counts_as_droppe
     assert playback.pose.index == 3
 
 
+@pytest.mark.slow
 def test_every_frame_waits_until_it_is_prepared(renderer: Noting, start: Callable) -> None:
     playback, ahead = start(every_frame=True)
     playback.toggle(0.0)
@@ -206,6 +207,7 @@ def test_every_frame_waits_until_it_is_prepared(renderer: Noting, start: Callabl
     assert playback.dropped == 0
 
 
+@pytest.mark.slow
 def test_a_scan_is_shown_before_anything_is_prepared(renderer: Noting, start: Callable) -> None:
     playback, ahead = start("voxels")
     assert playback.pose is not None

@@ -114,6 +114,7 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
     assert load(settings)[1] == []
 
 
+@pytest.mark.slow
 def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study: Path) -> None:
     (study / "wrong.json").write_text("{}")
     (study / "worse 1%.ply").write_bytes(b"no array")
@@ -213,6 +214,7 @@ def test_the_dialog_says_at_the_field_what_cannot_be_opened(
         close(app)
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_read_leaves_the_open_scan(
     screen: Screen, tmp_path: Path, study: Path
 ) -> None:
@@ -232,6 +234,7 @@ def test_a_folder_that_cannot_be_read_leaves_the_open_scan(
         close(app)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_read_at_the_start_is_told_over_the_demo_or_the_next(
     screen: Screen, tmp_path: Path, study: Path
 ) -> None:
@@ -272,6 +275,7 @@ def test_the_command_line_opens_the_window_on_what_cannot_be_read(screen: Screen
     assert (ended.returncode, ended.stdout) == (2, "")
 
 
+@pytest.mark.slow
 def test_a_card_over_the_demo_goes_with_the_first_act_for_good(screen: Screen, tmp_path: Path) -> None:
     with running_app(screen, tmp_path, DEMO) as app:
         state = app.settle()

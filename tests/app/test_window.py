@@ -302,6 +302,7 @@ def test_views_and_projection_by_keys(app: RunningApp) -> None:
     assert camera_of(app).projection == "perspective"
 
 
+@pytest.mark.slow
 def test_idle_it_draws_nothing_and_takes_no_processor_time(app: RunningApp) -> None:
     app.screen.do("key", "Escape")  # notes would go by themselves
     app.screen.do("mousemove", 470, 310)  # over the scan: a paused mouse asks for nothing new
@@ -314,6 +315,7 @@ def test_idle_it_draws_nothing_and_takes_no_processor_time(app: RunningApp) -> N
     assert app.cpu_seconds() - seconds < 0.04 * 3, "what it tells its watcher included"
 
 
+@pytest.mark.slow
 def test_a_parameter_and_the_look_are_changed_in_the_panel(app: RunningApp) -> None:
     """The points' size: a slider from 0 to 32."""
     size = "point_size"

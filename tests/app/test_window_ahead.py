@@ -63,6 +63,7 @@ def until(condition: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", CHOSEN)
 def test_no_frame_is_shown_as_points(app: RunningApp, backend: str) -> None:
     first = choose(app, backend)
@@ -77,6 +78,7 @@ def test_no_frame_is_shown_as_points(app: RunningApp, backend: str) -> None:
     assert "Traceback" not in app.log()
 
 
+@pytest.mark.slow
 def test_once_prepared_all_play_and_at_rest_nothing_is_done(app: RunningApp) -> None:
     choose(app, "surfels")
     app.screen.do("key", "space")
@@ -93,6 +95,7 @@ def test_once_prepared_all_play_and_at_rest_nothing_is_done(app: RunningApp) -> 
     assert app.state.jobs == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", CHOSEN)
 def test_stepping_keeps_the_picture_before_until_the_next_is_there(app: RunningApp, backend: str) -> None:
     first = choose(app, backend)
@@ -106,6 +109,7 @@ def test_stepping_keeps_the_picture_before_until_the_next_is_there(app: RunningA
     assert frames_of(stepped)[-1] == FRAMES - 1
 
 
+@pytest.mark.slow
 def test_the_first_picture_is_of_points_and_another_renderer_takes_over_from_the_one_before(
     app: RunningApp,
 ) -> None:

@@ -103,6 +103,7 @@ def playhead(app: RunningApp) -> tuple[int, int]:
     return column, top + height + int(np.median(rows))
 
 
+@pytest.mark.slow
 def test_tools_stand_beside_each_other_under_the_timeline(screen: Screen, tmp_path: Path, scan: Path) -> None:
     folder = tmp_path / "tools"
     folder.mkdir()

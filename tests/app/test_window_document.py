@@ -224,6 +224,7 @@ def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
         assert "Traceback" not in app.log()
 
 
+@pytest.mark.slow
 def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_there_is_shown_and_kept(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
@@ -261,6 +262,7 @@ def view(screen: Screen, home: Path, *words: object) -> subprocess.CompletedProc
     return subprocess.run(command, env=env, capture_output=True, text=True, cwd=home)
 
 
+@pytest.mark.slow
 def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:

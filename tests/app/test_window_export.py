@@ -124,6 +124,7 @@ def test_the_colour_bar_shows_the_map(app: RunningApp) -> None:
     assert all(np.abs(table[place] - color).max() <= 8 for place, color in zip(places, colored, strict=True))
 
 
+@pytest.mark.slow
 def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: Path) -> None:
     """With the marks of the view; the recording is saved before that."""
     app.screen.do("key", "r")
@@ -148,6 +149,7 @@ def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: 
         path.unlink()
 
 
+@pytest.mark.slow
 def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, folder: Path) -> None:
     app.screen.do("key", "Home", "key", "Right", "key", "i", "key", "Right", "key", "Right", "key", "shift+i")
     assert app.settle().document["span"] == [1, 3]
@@ -170,6 +172,7 @@ def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, fo
     assert app.settle().document["span"] is None
 
 
+@pytest.mark.slow
 def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
     dialog.choose("what", "###turntable")
@@ -207,6 +210,7 @@ def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Pa
     assert sizes == sorted(sizes), "the sphere grows"
 
 
+@pytest.mark.slow
 def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
     dialog.choose("format", "###exr")
@@ -223,6 +227,7 @@ def test_an_anonymous_surface_tells_no_name(app: RunningApp, folder: Path) -> No
     (folder / "again.exr").unlink()
 
 
+@pytest.mark.slow
 def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path) -> None:
     before = (folder / "view.exr").stat().st_mtime_ns
     dialog = Dialog(app)

@@ -46,6 +46,7 @@ def saved(app: RunningApp, key: str) -> Recording:
     return Recording.load(Path(app.told(r"Saved (.+)")[1]))
 
 
+@pytest.mark.slow
 def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
     screen: Screen, tmp_path: Path, lacking: Path
 ) -> None:

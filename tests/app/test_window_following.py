@@ -49,6 +49,7 @@ def keys(app: RunningApp, *names: str) -> object:
     return app.settle()
 
 
+@pytest.mark.slow
 def test_the_first_view_and_f_hold_all_frames(app: RunningApp) -> None:
     app.see(holds_all)
     assert app.settle().undoes is None, "nobody did anything"

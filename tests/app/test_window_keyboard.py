@@ -66,6 +66,7 @@ def looks_from(app: RunningApp) -> list[int]:
     return [int(part) for part in np.round(away / np.linalg.norm(away))]
 
 
+@pytest.mark.slow
 def test_alt_opens_the_menus_and_arrows_and_enter_choose(app: RunningApp) -> None:
     assert looks_from(app) == [0, 0, 1]
     press(app, "Alt_L", "Right", "Right")  # File, Edit, View
@@ -140,6 +141,7 @@ def test_the_mouse_takes_the_keyboard_back(app: RunningApp) -> None:
     assert app.settle().frame == 1
 
 
+@pytest.mark.slow
 def test_the_view_is_turned_panned_and_zoomed_by_keys(app: RunningApp) -> None:
     """By so many steps: on a slow machine a key that is pressed briefly repeats."""
     start = Camera.from_json(app.settle().camera)
@@ -161,6 +163,7 @@ def test_the_view_is_turned_panned_and_zoomed_by_keys(app: RunningApp) -> None:
     assert Camera.from_json(app.settle().camera).distance > near
 
 
+@pytest.mark.slow
 def test_the_dialog_that_exports_is_filled_in_by_keys(app: RunningApp) -> None:
     press(app, "ctrl+e")
     assert app.settle().is_export_open

@@ -84,6 +84,7 @@ def holes(app: RunningApp) -> int:
     return int((view[: len(view) // 2] == rgba(HOLE_COLOR)[:3]).all(axis=2).sum())
 
 
+@pytest.mark.slow
 def test_a_key_paints_holes_whatever_draws(app: RunningApp) -> None:
     assert not holes(app)
     for name in ("points", "surfels"):
@@ -154,6 +155,7 @@ def test_each_level_has_its_key(levels: RunningApp) -> None:
     np.testing.assert_array_equal(shown(app), before)
 
 
+@pytest.mark.slow
 def test_the_key_of_hidden_points_uncovers_what_is_seen_through_a_surface(levels: RunningApp) -> None:
     app, before = levels, shown(levels).copy()
     press(app, "shift+h")
@@ -163,6 +165,7 @@ def test_the_key_of_hidden_points_uncovers_what_is_seen_through_a_surface(levels
     np.testing.assert_array_equal(shown(app), before)
 
 
+@pytest.mark.slow
 def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
     app, view = levels, shown(levels)
     left, top, *_ = app.view()

@@ -53,6 +53,7 @@ def steps(frames: list[int]) -> set[int]:
     return {int(step) for step in np.diff(frames) % COUNT}
 
 
+@pytest.mark.slow
 def test_every_frame_backward_faster_and_real_time(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "e")
@@ -104,6 +105,7 @@ def drag_to(app: RunningApp, start: tuple[int, int], x: float) -> None:
     app.settle()
 
 
+@pytest.mark.slow
 def test_the_mouse_chooses_the_frames_that_are_played(app: RunningApp) -> None:
     first, last = handles(app)
     wide = (last[0] - first[0]) / COUNT  # of a frame
@@ -126,6 +128,7 @@ def test_the_mouse_chooses_the_frames_that_are_played(app: RunningApp) -> None:
     assert app.settle().document["span"] is None
 
 
+@pytest.mark.slow
 def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "l")

@@ -65,6 +65,7 @@ def saved(app: RunningApp) -> tuple[Path, np.ndarray]:
     return path, picture(again)
 
 
+@pytest.mark.slow
 def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     screen = app.screen
     screen.do("mousemove", *(v - 1 for v in SIZE), "key", "r", "key", "space")
@@ -88,6 +89,7 @@ def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     assert {entry.size for entry in recording.entries} == {(width, height)}, "recorded as asked for"
 
 
+@pytest.mark.slow
 def test_every_frame_leaves_none_out_and_real_time_does(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "e")
@@ -108,6 +110,7 @@ def test_every_frame_leaves_none_out_and_real_time_does(app: RunningApp) -> None
     expect_full(app)
 
 
+@pytest.mark.slow
 def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: RunningApp) -> None:
     screen = app.screen
     left, top, width, height = app.view()
@@ -128,6 +131,7 @@ def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: 
     assert "Traceback" not in app.log()
 
 
+@pytest.mark.slow
 def test_a_picture_at_rest_becomes_smooth_and_any_act_goes_first(app: RunningApp) -> None:
     screen = app.screen
     assert app.settle().samples == 5

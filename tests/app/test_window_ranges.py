@@ -45,6 +45,7 @@ def look_of(state: State) -> dict:
     return state.document["look"]
 
 
+@pytest.mark.slow
 def test_all_frames_have_one_range_that_two_actions_fix(app: RunningApp) -> None:
     app.choose(PANEL, "color_by/##value", "###displacement")
     app.see(spans(0, HIGHEST))
@@ -59,6 +60,7 @@ def test_all_frames_have_one_range_that_two_actions_fix(app: RunningApp) -> None
     assert app.state.undoes == "Change range"
 
 
+@pytest.mark.slow
 def test_each_frame_may_have_its_own(app: RunningApp) -> None:
     app.choose(PANEL, "color_by/##value", "###displacement")
     app.choose(PANEL, "range/##value", "###frame")
@@ -67,6 +69,7 @@ def test_each_frame_may_have_its_own(app: RunningApp) -> None:
     app.see(spans(0.04, 0.98 * 2))
 
 
+@pytest.mark.slow
 def test_an_end_that_is_no_longer_automatic_begins_where_it_was(app: RunningApp) -> None:
     app.choose(PANEL, "color_by/##value", "###displacement")
     app.see(spans(0, HIGHEST))

@@ -12,6 +12,7 @@ from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
 
+@pytest.mark.slow
 def test_a_rate_and_names_tell_the_times(screen: Screen, tmp_path: Path) -> None:
     scan = tmp_path / "scan"
     scan.mkdir()

@@ -82,6 +82,7 @@ def test_a_signal_closes_the_window_and_saves_all(
     assert left == {"config", "state", "log", path.name}
 
 
+@pytest.mark.slow
 def test_settings_are_kept_while_a_scan_plays(screen: Screen, tmp_path: Path, scan: Path) -> None:
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "space", "key", "t")
@@ -94,6 +95,7 @@ def test_settings_are_kept_while_a_scan_plays(screen: Screen, tmp_path: Path, sc
         app.see(lambda state: state.pictures > before + 1)
 
 
+@pytest.mark.slow
 def test_that_software_draws_is_told_once(screen: Screen, tmp_path: Path, scan: Path) -> None:
     told = []
     for _ in range(2):
@@ -131,6 +133,7 @@ def test_what_a_killed_window_had_recorded_is_saved_at_the_next_start(
     check_recording(Path(told[1]))
 
 
+@pytest.mark.slow
 def test_a_signal_before_the_window_is_there_is_quiet(screen: Screen, tmp_path: Path, scan: Path) -> None:
     """At any moment of the start."""
     env = {

@@ -53,6 +53,7 @@ def press_until(app: RunningApp, key: str, words: str) -> None:
     app.told(words)
 
 
+@pytest.mark.slow
 def test_opening_is_cancelled_replaced_and_done(app: RunningApp, folder: Path) -> None:
     small, text, bare, _ = names = [str(path) for path in sorted(folder.iterdir())]
     app.screen.do("key", "Next")

@@ -61,6 +61,7 @@ def close(app: RunningApp) -> None:
     assert app.process.wait(PATIENCE) == 0
 
 
+@pytest.mark.slow
 def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Path) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "adding-a-tool.md").read_text(), re.DOTALL)
     (tmp_path / "tools" / "pins").mkdir(parents=True)
@@ -179,6 +180,7 @@ def write_failing(folder: Path) -> dict[str, str]:
     return keys
 
 
+@pytest.mark.slow
 def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
@@ -220,6 +222,7 @@ def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
     assert json.loads(settings.read_text())["tools"] == before
 
 
+@pytest.mark.slow
 def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
@@ -260,6 +263,7 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     assert "first is switched off" not in told
 
 
+@pytest.mark.slow
 def test_a_tool_that_leaves_imgui_unbalanced_is_named_and_the_window_goes_on(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
@@ -280,6 +284,7 @@ def test_a_tool_that_leaves_imgui_unbalanced_is_named_and_the_window_goes_on(
     ]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:

@@ -35,6 +35,7 @@ def place(app: RunningApp) -> list[float]:
     return [float(number) for number in app.state.pointed[0].partition(" ±")[0].split(", ")]
 
 
+@pytest.mark.slow
 def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp) -> None:
     assert app.state.unit == "units", "a guess is nothing before somebody agrees"
     app.act(PANEL, ("item_click", "###accept"))

@@ -71,6 +71,7 @@ def test_each_scan_stands_upright_by_itself_and_keeps_what_its_user_said(
     assert kept_of(tmp_path, scans / "along_y.npy").document.look.up == "+y"
 
 
+@pytest.mark.slow
 def test_one_click_beside_the_cube_turns_the_view_upright(app: RunningApp) -> None:
     before, (x, y) = camera_of(app), below_cube(app)
     app.screen.do("mousemove", x, y, "sleep", 0.5)
@@ -82,6 +83,7 @@ def test_one_click_beside_the_cube_turns_the_view_upright(app: RunningApp) -> No
     assert camera_of(app) == before
 
 
+@pytest.mark.slow
 def test_a_side_can_be_the_front(app: RunningApp, tmp_path: Path, scans: Path) -> None:
     app.screen.do("key", "ctrl+3")
     left = camera_of(app)
@@ -93,6 +95,7 @@ def test_a_side_can_be_the_front(app: RunningApp, tmp_path: Path, scans: Path) -
     assert kept_of(tmp_path, scans / "along_y.npy").document.front == pytest.approx(90)
 
 
+@pytest.mark.slow
 def test_a_surface_that_is_clicked_faces_up(app: RunningApp) -> None:
     app.act("##MainMenuBar", ("menu_click", "View/###pick_up"))
     left, top, width, height = app.view()

@@ -38,6 +38,7 @@ def app(running: RunningApp) -> RunningApp:
     return running
 
 
+@pytest.mark.slow
 def test_on_a_display_of_scale_2_all_is_twice_as_large(tmp_path: Path) -> None:
     np.save(tmp_path / "box.npy", np.random.default_rng(0).random((100, 3)))
     views = {}
@@ -113,6 +114,7 @@ def test_bookmarks_come_back_by_key(app: RunningApp) -> None:
     assert camera_of(app) == cameras[1]
 
 
+@pytest.mark.slow
 def test_keys_typed_in_haste_are_what_was_typed(app: RunningApp) -> None:
     """Key and modifier go down and up between two frames."""
     before, told = app.state, len(app.notes)
@@ -139,6 +141,7 @@ def test_the_turntable_turns_until_a_key_or_the_mouse_stops_it(app: RunningApp) 
         assert camera.distance == pytest.approx(cameras[0].distance)
 
 
+@pytest.mark.slow
 def test_full_screen_is_the_view_alone_and_goes_back(app: RunningApp) -> None:
     screen = app.screen
     window = screen.do("search", "--name", "Scan4D").split()[-1]

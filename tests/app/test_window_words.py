@@ -31,6 +31,7 @@ def middle(app: RunningApp) -> np.ndarray:
     return shown(app)[height // 4 : height * 5 // 8, width // 8 : width * 13 // 16].astype(int)
 
 
+@pytest.mark.slow
 def test_qualities_and_lightings_are_chosen_and_look_like_surfels(app: RunningApp) -> None:
     app.choose(PANEL, "quality/##value", "###fast")
     app.choose(PANEL, "##backend", "###surfels")

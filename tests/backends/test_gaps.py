@@ -203,6 +203,7 @@ def test_radii_without_use_are_replaced(renderer: Renderer) -> None:
         np.testing.assert_array_equal(found(renderer, replace(cloud, radii=radii)), gaps)
 
 
+@pytest.mark.slow
 def test_discs_close_a_body_of_uneven_density(renderer: Renderer, draw: Draw) -> None:
     """At most 0.3 % of the true silhouette is empty or shows what is behind; of one radius for all, more."""
     mesh = tessellation.torus_mesh()

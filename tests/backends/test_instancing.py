@@ -84,6 +84,7 @@ def test_other_ways_agree_with_them(surfels: Draw, camera: Camera, way: str) -> 
     assert_agree(surfels(CLOUD, camera, instancing=way), surfels(CLOUD, camera, instancing="tbo"), 0.005)
 
 
+@pytest.mark.slow
 def test_of_100_000_splats_next_to_none_changes(surfels: Draw) -> None:
     """A share of the pixels: where more splats stand in a pixel, more of them are equally near."""
     cloud, camera, size = sphere(100_000), Camera((0.3, 0.5, 2.6), fov_y=46), (1920, 1280)

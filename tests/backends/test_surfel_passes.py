@@ -107,6 +107,7 @@ def test_discs_that_are_seen_edge_on_weigh_no_more_than_others(draw: Draw) -> No
     assert np.abs(tiles.color - quads.color).max() < 0.02
 
 
+@pytest.mark.slow
 def test_enlarging_closes_gaps_and_keeps_the_outline(draw: Draw) -> None:
     """Of what two pods with noise saw: at most half as many holes; outline and spill within a pixel."""
     mesh, size = tessellation.torus_mesh(), (240, 160)

@@ -414,6 +414,7 @@ def test_it_is_a_backend_like_others() -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fixed", [{}, {"max_depth": 7}, {"max_depth": 6}], ids=str)
 def test_the_demo_scan_is_closed_and_shows_the_surface(draw: Draw, fixed: dict[str, object]) -> None:
     """Each pixel against the exact surface, along its ray: nothing is open, nor open to the far side, where

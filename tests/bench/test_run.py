@@ -53,6 +53,7 @@ def by_backend(rows: list[Row]) -> dict[str, Row]:
     return {row["backend"]: row for row in rows}
 
 
+@pytest.mark.slow
 def test_a_row_says_all_that_is_needed_to_repeat_it(rows: list[Row], renderer: Renderer) -> None:
     assert [row["backend"] for row in rows] == [c.backend for c in DEFAULTS]
     for row in rows:
@@ -80,6 +81,7 @@ def test_the_time_on_the_gpu_is_that_of_the_passes(rows: list[Row]) -> None:
         assert 0.9 * low <= row["gpu_ms"]["median"] <= 1.1 * high
 
 
+@pytest.mark.slow
 def test_two_runs_give_identical_errors(rows: list[Row], renderer: Renderer) -> None:
     again = Bench(renderer, SETTINGS).measure(TORUS)
     for first, second in zip(rows, again, strict=True):

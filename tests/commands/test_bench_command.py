@@ -157,6 +157,7 @@ def test_two_files_of_one_name_are_refused(refused: Refused, tmp_path: Path) -> 
     assert "ball.ply" in refused("bench", "--scene", *files, "-o", tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_visible_points_of_a_mesh_of_ones_own_are_judged(run: Run, mesh: Path, tmp_path: Path) -> None:
     quick = ("--quick", "--suite", "hpr", "--scene", mesh, "--size", "96x64", "-o", tmp_path / "out")
     assert run("bench", *quick).code == 0

@@ -229,6 +229,7 @@ def test_a_benchmark_replaces_nothing_that_is_not_told(
     assert [file.read_text() for file in folder.glob("results/**/*") if file.is_file()] == ["mine"]
 
 
+@pytest.mark.slow
 def test_a_benchmark_keeps_former_results_whatever_their_number(run: Run, folder: Path) -> None:
     first = ("bench", "--suite", "numerics", "--backend", "points", "-o", "results")
     assert run(*first).code == 0

@@ -400,6 +400,7 @@ def test_pipes_and_devices_are_no_recordings(name: str, refused: Callable[..., s
     assert "no plain file" in refused("render", "--replay", "/dev/zero", "-o", "a.png")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "choice",
     [["--backend", "surfels"], ["--backend", "points", "--camera", "camera.json"]],

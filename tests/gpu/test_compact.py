@@ -99,6 +99,7 @@ def test_a_list_runs_as_many_invocations_as_it_has_items(renderer: Renderer) -> 
         each.release()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gpu", ["hardware"], indirect=True)
 def test_as_many_blocks_as_one_dimension_of_a_dispatch_does_not_take(gpu: Gpu) -> None:
     every = 1_000_003

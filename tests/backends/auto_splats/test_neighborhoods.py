@@ -142,6 +142,7 @@ def test_splats_reach_as_far_as_cells(name: str) -> None:
     assert np.count_nonzero(as_expected) >= 0.8 * len(expected) or name == "strays"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_planes_of_lines_go_through_the_nearest_beside_them(noise: float) -> None:
     """And splats reach no less far along the line than a quarter of how far they reach beside it."""

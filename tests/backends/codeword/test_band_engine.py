@@ -35,6 +35,7 @@ def test_ranks_that_do_not_fit_beside_z_are_looked_at_apart(renderer: Renderer, 
         assert_same(draw_stream(renderer.gpu, stream), draw_words_plainly(stream))
 
 
+@pytest.mark.slow
 @given(stream=streams(), bits=st.sampled_from([0, engine.RANK_BITS]))
 def test_bands_of_many_words_are_drawn_in_several_calls(
     renderer: Renderer, stream: WordStream, bits: int

@@ -150,6 +150,7 @@ def test_backs_are_seen_from_behind(draw: Draw) -> None:
     assert np.abs(captured.color - picture.color)[shown].mean() < 0.02
 
 
+@pytest.mark.slow
 def test_seams_are_less_seen(draw: Draw) -> None:
     cameras, unlike = pods(size=(320, 320), gains=DIFFERENT)
     _, alike = pods(size=(320, 320))
@@ -164,6 +165,7 @@ def test_seams_are_less_seen(draw: Draw) -> None:
     assert seen[0] < seen[1] / 20
 
 
+@pytest.mark.slow
 def test_the_same_bits_come_again_in_any_order(draw: Draw) -> None:
     _, views = pods(3, gains=(*DIFFERENT, (0.95, 1.0, 0.9)))
     one, same, turned = (

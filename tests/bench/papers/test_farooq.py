@@ -169,6 +169,7 @@ def test_every_number_of_levels_is_drawn_at_every_zoom() -> None:
     assert by_zoom[0].contenders[-1].backend == "range-mesh"
 
 
+@pytest.mark.slow
 def test_more_levels_leave_fewer_holes_and_polygons_are_as_good_as_the_mesh(renderer: Renderer) -> None:
     bench = Bench(renderer, BenchSettings(size=(160, 120), views=2, repeat=1, frames=0))
     (like, *_) = pyramids.groups()

@@ -96,6 +96,7 @@ def test_what_shows_another_surface_is_not_shown(renderer: Renderer) -> None:
     assert not replace(drawn, depth=drawn.depth + np.float32(0.2)).shows(reference).any()
 
 
+@pytest.mark.slow
 def test_a_row_for_each_scene_and_way(renderer: Renderer, tmp_path: Path) -> None:
     bench = Bench(renderer, BenchSettings(size=(64, 48), views=1, repeat=1), tmp_path)
     bench.subject = lambda _: subject()  # type: ignore[assignment]

@@ -257,6 +257,7 @@ class Page(HTMLParser):
         return [given[name] or "" for _, given in self.elements for name in attributes if name in given]
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_else(reported: Path) -> None:
     text = reported.read_text(encoding="utf-8")
     page = Page(text)

@@ -146,6 +146,7 @@ def test_a_model_comes_in_any_number_of_points(data_dir: Path) -> None:
     assert not np.array_equal(moment.pose.cloud.positions, other.pose.cloud.positions)
 
 
+@pytest.mark.slow
 def test_horses_hide_each_other(data_dir: Path) -> None:
     import open3d
 
@@ -213,6 +214,7 @@ def test_two_moments_are_kept() -> None:
         subject.moment(4)
 
 
+@pytest.mark.slow
 def test_hashes_tell_subjects_apart() -> None:
     def digest(name: str, **wanted: float) -> str:
         return catalog.subject(name, None, **wanted).hash
@@ -224,6 +226,7 @@ def test_hashes_tell_subjects_apart() -> None:
     assert len({*different, *noisy}) == 6
 
 
+@pytest.mark.slow
 def test_simulated_scans_are_as_noisy_as_asked_for() -> None:
     still, noisy = (catalog.subject("torus-simulated", None, noise=noise) for noise in (0.0, 1.0))
     assert (still.tolerance, still.noise, noisy.noise) == (None, 0.0, 1.0)

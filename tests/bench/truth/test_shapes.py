@@ -111,6 +111,7 @@ def test_a_scene_far_from_zero_is_seen_as_at_zero() -> None:
     assert np.abs(here.depth[here.covered] - there.depth[here.covered]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_demo_head_is_hit_where_its_surface_is() -> None:
     scene = AnalyticScene((DemoHead(time=0.8),))
     camera = Camera(eye=(80, 20, 700), fov_y=20)

@@ -456,6 +456,7 @@ def test_a_head_from_a_phone(data_dir: Path, tmp_path: Path) -> None:
     assert np.einsum("ij,ij->i", view.normals(), view.positions()).max() < 0  # all face the pod
 
 
+@pytest.mark.slow
 def test_two_poses_of_a_depth_camera_meet(data_dir: Path, tmp_path: Path) -> None:
     """Frames whose poses are stated as camera to world: what both see lies at the same place."""
     from PIL import Image

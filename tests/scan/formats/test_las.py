@@ -49,6 +49,7 @@ def test_room_for_colours_alone_is_no_colour(tmp_path: Path) -> None:
     assert read(save(tmp_path / "a.las")).colors is None
 
 
+@pytest.mark.slow
 def test_real_files_hold_as_many_points_as_stated(data_dir: Path) -> None:
     readme = (data_dir / "README.md").read_text(encoding="utf-8")
     stated = {name: int(count) for name, count in re.findall(r"\| (odd/las/\S+) \|.*? n=(\d+)", readme)}

@@ -104,6 +104,7 @@ LARGEST = float(np.nextafter(np.float32(1e18), np.float32(0)))
 floats = st.floats(-LARGEST, LARGEST, width=32)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.lists(st.tuples(floats, floats, floats), min_size=1, max_size=12), st.integers(0, DEEPEST))
 def test_any_positions_are_divided_exactly(points: list[tuple[float, float, float]], depth: int) -> None:

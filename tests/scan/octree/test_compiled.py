@@ -64,6 +64,7 @@ print(task.name, *heard, sep="|")
     return output(script, folder, cache).strip().split("|")
 
 
+@pytest.mark.slow
 def test_what_has_to_be_compiled_is_announced_and_what_is_kept_is_not(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     once = "Preparing once for this machine"
@@ -92,6 +93,7 @@ def test_what_another_file_has_is_compiled_anew_where_that_changes(tmp_path: Pat
     assert [run(folder, cache) for _ in range(2)] == [(47, 0), (47, 1)]
 
 
+@pytest.mark.slow
 def test_damaged_files_are_made_anew(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     run(folder, cache)
