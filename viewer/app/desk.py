@@ -14,9 +14,9 @@ from ..document.part import Part
 from ..geometry import Vector
 from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
-from ..scan.timeline import Timeline
+from ..scan.timeline import Timeline, TimelineClosed
 from ..scan.units import Scale
-from ..task import Task, in_background
+from ..task import Cancelled, Task, in_background
 from .followed import Followed
 from .laid import NumbersOf, PlaceOf
 from .scene.viewport import Viewport
@@ -63,9 +63,15 @@ class Work:
     then: Callable[[Any], object]
 
     def finish(self) -> None:
-        """Hand over the result, unless the work was cancelled; raises what that raised."""
-        if not self.task.cancelled:
-            self.then(self.future.result())
+        """Hand over the result, unless the work was cancelled or its scan is not open any more; raises what
+        else that raised."""
+        if self.task.cancelled:
+            return
+        try:
+            result = self.future.result()
+        except (Cancelled, TimelineClosed):  # the former where closing has ended reading that it waited for
+            return
+        self.then(result)
 
 
 class Desk:

@@ -44,6 +44,10 @@ class ScanMessage:
     index: int | None = None
 
 
+class TimelineClosed(ValueError):
+    """The timeline is closed, as another scan is open now: its poses are not read any more."""
+
+
 class Timeline:
     """The poses of a scan, read when asked for and kept in a cache bounded in bytes.
 
@@ -272,7 +276,7 @@ class Timeline:
 
     def _check_open(self) -> None:
         if self._closed:
-            raise ValueError("the timeline is closed")
+            raise TimelineClosed("the timeline is closed")
 
     def _note_broken(self, index: int, error: InputError) -> InputError:
         """Note why a frame cannot be read, once; returns the error to raise. Runs locked."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...camera import Camera
 from ...errors import InputError
 from ...scan.preview import preview_picture
-from ...scan.timeline import Timeline
+from ...scan.timeline import Timeline, TimelineClosed
 from ...task import Cancelled, Task, in_background
 
 _HEIGHT = 120  # pixels of a picture
@@ -119,7 +119,7 @@ def _picture(timeline: Timeline, camera: Camera, width: int, frame: int) -> Pict
     """Read a frame where it is not in memory, and draw it; None of one that cannot be."""
     try:
         return preview_picture(timeline.visit(frame), (width, _HEIGHT), camera)
-    except (InputError, ValueError):  # the latter where the scan was closed meanwhile
+    except (InputError, TimelineClosed):
         return None
 
 
