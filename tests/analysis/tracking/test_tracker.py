@@ -10,7 +10,10 @@ from moving_hills import SPACING, MovingHills, key, placed, truth
 
 from viewer.analysis.track import Known, Track
 from viewer.analysis.tracking import Tracker, TrackingSettings, track_landmarks
+from viewer.analysis.tracking.blending import track_of
+from viewer.analysis.tracking.follower import Sighting
 from viewer.errors import InputError
+from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline
 from viewer.task import Cancelled, Task
 
@@ -78,11 +81,14 @@ def test_what_is_marked_as_missing_is_a_gap() -> None:
 
 def test_a_broken_frame_is_a_gap() -> None:
     source = MovingHills(5, broken=frozenset({2}))
-    track = track_landmarks(timeline_of(source), [placed("middle", key(0.0, 0.0, 0))])["middle"]
+    landmarks = [placed("middle", key(0.0, 0.0, 0)), placed("beside", key(6.0, -5.0, 4))]
+    track = track_landmarks(timeline_of(source), landmarks)["middle"]
     assert track.known.tolist() == [3, 2, 1, 2, 2]
     assert "damaged" in track.reasons[2]
+    assert source.read.count(2) == 1
     lost = track_landmarks(timeline_of(source), [placed("middle", key(0.0, 0.0, 2))])["middle"]
     assert lost.known.tolist() == [1, 1, 3, 1, 1]
+    assert source.read.count(2) == 2, "once for each scan"
 
 
 def test_the_frame_looked_at_comes_first_and_frames_are_read_once_in_each_direction() -> None:
@@ -158,6 +164,49 @@ def test_one_topology_is_followed_exactly() -> None:
     track = tracker.tracks["point"]
     for frame in range(6):
         assert np.array_equal(track.positions[frame], timeline.pose(frame).cloud.world(row))
+
+
+@pytest.mark.parametrize("names", [("far", "near"), ("near", "far")])
+def test_landmarks_in_one_place_are_each_followed_as_far_as_they_go(names: tuple[str, str]) -> None:
+    first = key(0.0, 0.0, 0)
+    landmarks = {"far": placed("far", first), "near": placed("near", first, key(0.0, 0.0, 2))}
+    tracks = track_landmarks(timeline_of(MovingHills(5)), [landmarks[name] for name in names])
+    assert tracks["far"].known.tolist() == [3, 2, 2, 2, 2]
+    assert tracks["near"].known.tolist() == [3, 2, 3, 2, 2]
+
+
+def test_where_points_are_the_same_a_place_that_follows_none_is_followed_by_its_surface() -> None:
+    class Same(MovingHills):
+        def load(self, index: int) -> PointCloud:
+            return replace(super().load(index), topology="hills")
+
+    timeline = timeline_of(Same(5))
+    landmark = placed("middle", key(0.0, 0.0, 0), key(0.0, 0.0, 2))
+    before = Tracker(timeline, [landmark])
+    list(before.run())
+    farther = Tracker(timeline, [landmark.without_key(2)], known=before)
+    list(farther.run())
+    track = farther.tracks["middle"]
+    assert track.known.tolist() == [3, 2, 2, 2, 2]
+    assert errors(track, (0.0, 0.0)).max() < 0.25 * SPACING
+
+
+def test_keys_that_are_certain_are_blended_half_and_half() -> None:
+    def sighting(x: float) -> Sighting:
+        return Sighting(np.array([x, 0.0, 0.0]), np.zeros((3, 3)))
+
+    first, last = (replace(key(0.0, 0.0, frame), position=(0.0, 0.0, 0.0)) for frame in (0, 2))
+    forward, backward = {1: sighting(1.0), 2: sighting(0.0)}, {1: sighting(3.0), 0: sighting(0.0)}
+    track = track_of(
+        placed("middle", first, last),
+        {(first, 1): forward, (last, -1): backward},
+        10.0,
+        Track.pending(np.arange(3.0)),
+        range(3),
+    )
+    assert track.known.tolist() == [3, 2, 3]
+    assert track.positions[1].tolist() == [2, 0, 0]
+    assert track.sigmas[1] == 1
 
 
 def test_a_scan_of_one_frame_and_landmarks_that_are_not_placed() -> None:

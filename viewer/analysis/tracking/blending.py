@@ -87,8 +87,8 @@ def _between(
     apart = sides[0].position - sides[1].position
     if (distance := float(np.linalg.norm(apart))) > bound:
         return Sighting.gap(f"forward and backward are {distance:.3g} apart")
-    weights = np.array([1 / np.trace(side.covariance) for side in sides])
-    weights /= weights.sum()
+    spreads = np.array([np.trace(side.covariance) for side in reversed(sides)])  # each weighs by the other's
+    weights = spreads / spreads.sum() if spreads.any() else np.full(2, 0.5)
     # Both look at the same points of this frame: their errors are taken to be the same ones.
     return Sighting(
         weights[0] * sides[0].position + weights[1] * sides[1].position,

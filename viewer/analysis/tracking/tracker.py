@@ -67,6 +67,10 @@ class _Pass:
         """How many frames are to be looked at."""
         return max((self.end - self.at) * self.direction, 0)
 
+    def is_exact_in(self, topology: str | None) -> bool:
+        """Whether its points are known in frames of a topology."""
+        return self.spot.id is not None and topology is not None and topology == self.topology
+
     def has_before(self, frame: int) -> bool:
         """Whether a frame lies on its way that it has yet to reach."""
         return 0 < (frame - self.at) * self.direction <= self.left
@@ -101,7 +105,10 @@ class Tracker:
         for landmark in self._landmarks:
             for part in _passes_of(landmark, len(timeline)):
                 name = part.spot, part.direction
-                held = self._passes.get(name) or (old._passes.get(name) if old else None)
+                if (shared := self._passes.get(name)) is not None:  # of another landmark in the same place
+                    shared.end = max(shared.end, part.end, key=lambda frame: frame * part.direction)
+                    continue
+                held = old._passes.get(name) if old else None
                 if held is not None:
                     held.end = part.end
                 self._passes[name] = held or part
@@ -187,14 +194,13 @@ class Tracker:
             try:
                 moment, key = self._moment(frame), None
                 topology = moment.pose.overview.topology
-                if part.follower is None and (topology is None or topology != part.topology):
+                if part.follower is None and not part.is_exact_in(topology):
                     key = self._moment(part.spot.frame)
                     part.topology = key.pose.overview.topology
             except InputError as error:
                 part.seen[frame] = Sighting.gap(f"{error.where or 'a frame'} is not readable: {error.what}")
                 continue
-            is_same = topology is not None and topology == part.topology
-            if is_same and part.spot.id is not None:
+            if part.is_exact_in(topology):
                 part.seen[frame] = _exact(part.spot, moment.pose)
                 continue
             try:
