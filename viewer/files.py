@@ -80,6 +80,16 @@ def parsed_json(text: str) -> Any:
         raise ValueError("it is nested too deeply") from None
 
 
+def parsed_toml(text: str) -> dict[str, Any]:
+    """The tables of a TOML text. Raises ValueError, whatever is wrong."""
+    import tomllib
+
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
 def free_file(folder: Path, suffix: str) -> Path:
     """scan4d_0001 with this suffix, or the next number that no file in the folder has."""
     paths = (folder / f"scan4d_{n:04d}{suffix}" for n in count(1))

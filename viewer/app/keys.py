@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from imgui_bundle import imgui
 
 from ..errors import InputError, did_you_mean, shortened, unknown_name
-from ..files import read_text, whole_file
+from ..files import parsed_toml, read_text, whole_file
 from .keyboard import VIEW
 
 if TYPE_CHECKING:
@@ -142,12 +141,11 @@ def load_keys(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
 def _read(path: Path) -> tuple[dict[str, Any], list[InputError]]:
     """The content of a TOML file, and why it cannot be read; nothing where there is no file."""
     try:
-        return tomllib.loads(read_text(path, _MOST_BYTES)), []
+        return parsed_toml(read_text(path, _MOST_BYTES)), []
     except FileNotFoundError:
         return {}, []
-    except (OSError, ValueError, RecursionError) as error:  # of encoding and of TOML as well
-        nested = isinstance(error, RecursionError)
-        what = "it is nested too deeply" if nested else getattr(error, "strerror", None) or error
+    except (OSError, ValueError) as error:  # of encoding and of TOML as well
+        what = getattr(error, "strerror", None) or error
         return {}, [InputError(f"cannot be read ({what})", hint="The usual keys hold")]
 
 

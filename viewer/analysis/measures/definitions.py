@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError, explained, shortened
-from ...files import parsed_json, read_text
+from ...files import parsed_json, parsed_toml, read_text
 from . import Measure
 from .kinds import kind_of
 
@@ -22,7 +22,7 @@ def read_measures(path: Path | str) -> tuple[Measure, ...]:
     path = Path(path)
     try:
         text = read_text(path, _MOST_BYTES)
-        data = _toml(text) if path.suffix.lower() == ".toml" else parsed_json(text)
+        data = parsed_toml(text) if path.suffix.lower() == ".toml" else parsed_json(text)
     except OSError as error:
         what, hint = explained(error)
         raise InputError(f"cannot be read: {what}", path, hint) from error
@@ -33,12 +33,6 @@ def read_measures(path: Path | str) -> tuple[Measure, ...]:
     except InputError as error:
         where = ", ".join(map(str, filter(None, (path, error.where))))
         raise InputError(error.what, where, error.hint or _HINT) from None
-
-
-def _toml(text: str) -> Any:
-    import tomllib
-
-    return tomllib.loads(text)
 
 
 def _measures(data: Any) -> tuple[Measure, ...]:
