@@ -203,6 +203,7 @@ def test_points_without_faces_are_measured(run: Run) -> None:
         ({"a": ["nan", 0, 0]}, (), "landmarks.csv"),
         ({}, (), "landmarks.csv"),
         ({"a": [0, 0, 10]}, ("--noise", "-1"), "'-1' is no length of 0 or more"),
+        ({"a": [0, 0, 10]}, ("--noise", "1e200"), "'1e200' is no length of 0 or more, up to 1e+15"),
         ({"a": [0, 0, 10]}, ("--placed-in", "9"), "there is no pose 9"),
         ({"a": [0, 0, 10]}, ("--measures", "landmarks.csv"), "is neither JSON nor TOML"),
         ({"a": [0, 0, 10]}, ("--measures", "measures.json"), "has the landmarks of no measure"),

@@ -41,6 +41,7 @@ from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_t
 _SUFFIXES = (".csv", ".json")
 _STEPS = 200  # of a progress bar
 _NAMED = 3  # landmarks that a message names
+_LONGEST = 1e15  # scan units
 _POWERS: Mapping[Quantity, str] = {"length": "", "area": "^2", "volume": "^3"}
 
 
@@ -104,8 +105,8 @@ def _length(text: str) -> float:
         length = float(text)
     except ValueError:
         length = math.nan
-    if not 0 <= length < math.inf:
-        raise ArgumentTypeError(f"'{text}' is no length of 0 or more")
+    if not 0 <= length <= _LONGEST:
+        raise ArgumentTypeError(f"'{text}' is no length of 0 or more, up to {_LONGEST:g}")
     return length
 
 

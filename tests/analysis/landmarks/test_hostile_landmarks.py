@@ -67,7 +67,14 @@ BAD = {
     ("m.csv", f"{LONG}landmark,1,0,a,1,2,3,lost\n"): "the state is 'lost'",
     ("m.csv", "name,x,y,z,unit\na,1,2,3,mm\nb,1,2,3,feet\n"): "lengths are in 'feet'",
     ("m.csv", "frame,a_x,a_y,a_z\n2,1,2,3\n1,1,2,3\n"): "its frame is 1, after 2",
-    ("m.csv", "name,x,y,z\na,1e308,1e308,1e308\n"): "beyond",
+    ("m.csv", "name,x,y,z\na,1e308,1e308,1e308\n"): "line 2: '1e308' is beyond",
+    ("m.csv", "name,x,y,z\na,1e999,0,0\n"): "line 2: '1e999' is beyond",
+    ("m.csv", "name,x,y,z\na,1e100,0,0\n"): "has coordinates beyond",
+    ("m.csv", "name,x,y,z,sigma\na,1,2,3,1e100\n"): "has standard deviations beyond",
+    ("m.mrk.json", POINT % '{"position": [1e200, 2, 3]}'): "has coordinates beyond",
+    ("m.mrk.json", POINT % '{"position": [1, 2, 3], "scan4d": {"sigma": 1e200}}'): "deviations beyond",
+    ("m.tps", "LM3=1\n1e200 2 3\nSCALE=1e200\n"): "line 2: '1e200' is beyond",
+    ("m.tps", "LM3=1\n1e100 2 3\nSCALE=1e100\n"): "has coordinates beyond",
     ("m.c3d", "C3D" * 400): "is no C3D file",
     ("m.c3d", "\x02P"): "is no C3D file",
     ("m.c3d", "\x02P" * 600): "parameters or frames are damaged",
@@ -85,6 +92,25 @@ def test_bad_files_are_one_message(file: tuple[str, str], words: str, tmp_path: 
         read_landmarks(path)
     assert str(caught.value).startswith(str(path))
     assert len(str(caught.value)) < 700
+
+
+MORPHOLOGIKA = "[individuals]\n2\n[landmarks]\n1\n[dimensions]\n3\n[rawpoints]\n1 2 3\n4 5 6\n'scan4d %s\n"
+TWO_TPS = "LM3=1\n1 2 3\nCOMMENT=scan4d %s\nLM3=1\n4 5 6\nCOMMENT=scan4d %s\n"
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "is_framed"),
+    [("2", "4", True), ("1.2", "1.7", False), ("2", "2", False), ("0", "1", False), ("1", "1e18", False)],
+)
+def test_frames_are_whole_numbers_that_increase(
+    tmp_path: Path, first: str, last: str, is_framed: bool
+) -> None:
+    (tmp_path / "m.txt").write_text(MORPHOLOGIKA % f'{{"frames": [{first}, {last}]}}')
+    (tmp_path / "m.tps").write_text(TWO_TPS % (f'{{"frame": {first}}}', f'{{"frame": {last}}}'))
+    for name in ("m.txt", "m.tps"):
+        found = read_landmarks(tmp_path / name)
+        assert found.is_framed == is_framed
+        assert found.frames.tolist() == ([1, 3] if is_framed else [0, 1])
 
 
 def test_a_sparse_table_is_no_large_one(tmp_path: Path) -> None:

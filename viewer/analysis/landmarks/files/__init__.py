@@ -41,7 +41,7 @@ from ..landmark_set import LandmarkSet, check_cells
 
 AXES = ("LPS", "RAS")
 _HEAD = 4096  # bytes that tell a format
-_FARTHEST = 1e15  # of a coordinate, scan units
+_FARTHEST = 1e15  # of a coordinate, and of its standard deviation, scan units
 _NUMBER = re.compile(r"%(0\d)?d")  # in the name of a series
 
 
@@ -132,6 +132,8 @@ def _read(path: Path, unit: str | None, axes: str, frame: int | None) -> Landmar
     found = found.in_unit(unit)
     if (np.abs(found.positions) > _FARTHEST).any():
         raise InputError(f"has coordinates beyond {_FARTHEST:g}", path, "Check its unit")
+    if (np.abs(found.sigmas) > _FARTHEST).any():
+        raise InputError(f"has standard deviations beyond {_FARTHEST:g}", path, "Check its unit")
     return found if frame is None else replace(found, frames=np.array([frame]), is_framed=True)
 
 

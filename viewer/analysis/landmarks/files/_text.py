@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....errors import InputError, shortened
 from ....files import open_plain, parsed_json
@@ -20,6 +21,7 @@ from ..landmark_set import LandmarkSet
 
 MOST_BYTES = 64 * 2**20  # of a file of landmarks
 MISSING = "NA"  # in place of a coordinate, as geomorph reads it
+_LARGEST = 1e150  # so that numbers times a scale or a unit's factor can be told
 _ABSENT = {"na", "nan", "-nan", "none", "null", ""}
 _REAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 _OWN = "scan4d "
@@ -64,7 +66,8 @@ def is_number(word: str) -> bool:
 
 
 def number_of(word: str, line: int) -> float:
-    """The number of a word; NaN where it says that there is none. Raises InputError."""
+    """The number of a word; NaN where it says that there is none. Raises InputError for what is no number, and
+    for one beyond 1e150."""
     word = word.strip()
     if word.lower() in _ABSENT:
         return math.nan
@@ -72,7 +75,9 @@ def number_of(word: str, line: int) -> float:
         hint = "Decimals follow a point" if re.fullmatch(r"-?\d+,\d+", word) else None
         raise at_line(f"'{shortened(word)}' is no number", line, hint)
     value = float(word.replace("d", "e").replace("D", "e"))
-    return value if math.isfinite(value) else math.nan
+    if abs(value) > _LARGEST:
+        raise at_line(f"'{shortened(word)}' is beyond {_LARGEST:g}", line)
+    return value
 
 
 def count_of(word: str, line: int, what: str) -> int:
@@ -123,6 +128,14 @@ def own_number(values: Mapping[str, Any], key: str) -> float:
     value = values.get(key)
     fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
     return float(value) if fits else math.nan  # type: ignore[arg-type]
+
+
+def own_frames(frames: Sequence[float]) -> NDArray[np.int64] | None:
+    """Indices of frames that comments tell, which count from 1: whole numbers that increase, below 2^31; None
+    for others."""
+    listed = np.array(frames, np.float64)
+    fits = (listed >= 1) & (listed < 2**31) & (listed == np.floor(listed))
+    return listed.astype(np.int64) - 1 if fits.all() and (np.diff(listed) > 0).all() else None
 
 
 def own_unit(values: Mapping[str, Any]) -> str | None:

@@ -21,7 +21,7 @@ from ....scan.units import conversion, usable_unit
 from ...track import Known
 from ..landmark_set import LandmarkSet
 from ._tables import STATES
-from ._text import own_number, read_all
+from ._text import own_frames, own_number, read_all
 
 TITLE = "3D Slicer markups"
 SUFFIXES = (".mrk.json",)
@@ -61,8 +61,6 @@ def read(path: Path) -> LandmarkSet:
             "its markups are in several coordinate systems or units", hint="Save them one by one"
         )
     own = _own(data)
-    frame = own_number(own, "frame")
-    is_framed = frame >= 1 and frame == int(frame) and frame < 2**31
     unit = usable_unit(_word(own["unit"])) if "unit" in own else parts[0]["unit"]
     return LandmarkSet.of(
         [name for part in parts for name in part["names"]],
@@ -70,7 +68,7 @@ def read(path: Path) -> LandmarkSet:
         known=np.concatenate([part["known"] for part in parts])[np.newaxis],
         sigmas=np.concatenate([part["sigmas"] for part in parts])[np.newaxis],
         times=np.array([own_number(own, "time")]),
-        frames=[int(frame) - 1] if is_framed else None,
+        frames=own_frames([own_number(own, "frame")]),
         unit=unit,
         about=[text for part in parts for text in part["about"]],
         axes=parts[0]["axes"],

@@ -20,6 +20,7 @@ from ._text import (
     count_of,
     digits_of,
     numbered_lines,
+    own_frames,
     own_names,
     own_text,
     own_unit,
@@ -83,6 +84,7 @@ def read(path: Path) -> LandmarkSet:
     told = [f"Its {' and '.join(left_out)} are left out"] if left_out else []
     if flat:
         told.append("Its landmarks have two coordinates: z is taken for 0")
+    frames = _listed(own.get("frames"), individuals)
     names = own_names(own, count)
     if names is None:
         names = [str(number) for number in range(1, count + 1)]
@@ -90,7 +92,7 @@ def read(path: Path) -> LandmarkSet:
         names,
         np.array(positions).reshape(individuals, count, 3),
         times=_listed(own.get("times"), individuals),
-        frames=_frames(own.get("frames"), individuals),
+        frames=None if frames is None else own_frames(frames.tolist()),
         unit=own_unit(own),
         told=told,
     )
@@ -109,15 +111,6 @@ def _listed(values: Any, count: int) -> np.ndarray | None:
         return None
     fits = all(isinstance(value, int | float) and abs(value) < 1e15 for value in values)
     return np.array(values, np.float64) if fits else None
-
-
-def _frames(values: Any, count: int) -> np.ndarray | None:
-    """Indices of frames that a comment lists."""
-    listed = _listed(values, count)
-    fits = (
-        listed is not None and (listed >= 1).all() and (np.diff(listed) > 0).all() and (listed < 2**31).all()
-    )
-    return listed.astype(np.int64) - 1 if fits and listed is not None else None
 
 
 def write(path: Path, landmarks: LandmarkSet) -> str | None:

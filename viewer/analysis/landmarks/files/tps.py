@@ -22,6 +22,7 @@ from ._text import (
     digits_of,
     number_of,
     numbered_lines,
+    own_frames,
     own_names,
     own_number,
     own_text,
@@ -108,8 +109,6 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
     positions = np.array([specimen.points or missing for specimen in specimens]).reshape(-1, count, 3)
     positions *= np.array([specimen.scale for specimen in specimens])[:, np.newaxis, np.newaxis]
     own = specimens[0].own
-    frames = [own_number(specimen.own, "frame") for specimen in specimens]
-    is_framed = all(frame >= 1 for frame in frames) and (np.diff(frames) > 0).all()
     told = []
     if curves:
         told.append(f"{curves} curves are left out")
@@ -122,7 +121,7 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
         names,
         positions,
         times=np.array([own_number(specimen.own, "time") for specimen in specimens]),
-        frames=np.array(frames).astype(np.int64) - 1 if is_framed else None,
+        frames=own_frames([own_number(specimen.own, "frame") for specimen in specimens]),
         unit=own_unit(own),
         told=told,
     )
