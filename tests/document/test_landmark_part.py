@@ -46,6 +46,23 @@ def test_a_template_keeps_what_was_set() -> None:
     assert begun.begun_with(PAIR) == begun, "nothing is there twice"
 
 
+def test_what_a_file_does_not_place_stays_where_it_is() -> None:
+    placed, skipped = Landmark("left", (spot(0),), missing=(3,)), Landmark("right", skipped=True)
+    part = Landmarks((placed, skipped, Landmark("nose", (spot(2),))))
+    read = [
+        Landmark("left", about="the corner"),
+        Landmark("right"),
+        Landmark("nose", (spot(1),)),
+        Landmark("a"),
+    ]
+    assert part.with_read(read).all == (
+        replace(placed, about="the corner"),
+        skipped,
+        Landmark("nose", (spot(1),)),
+        Landmark("a"),
+    )
+
+
 def test_a_name_goes_wherever_it_is_spoken_of() -> None:
     part = Landmarks().begun_with(PAIR).renamed("left", "links")
     assert [(one.name, one.partner) for one in part.all] == [("links", "right"), ("right", "links")]

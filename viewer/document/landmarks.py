@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ..analysis.landmarks import Landmark, Template
@@ -41,6 +42,16 @@ class Landmarks(Part, name="landmarks"):
         if self.named(landmark.name) is None:
             return replace(self, all=(*self.all, landmark))
         return replace(self, all=tuple(landmark if one.name == landmark.name else one for one in self.all))
+
+    def with_read(self, read: Iterable[Landmark]) -> Landmarks:
+        """The landmarks with those of a file. What the file does not place stays as it is set here."""
+        made = self
+        for landmark in read:
+            here = self.named(landmark.name)
+            if here is not None and not landmark.keys:
+                landmark = replace(here, about=landmark.about)
+            made = made.with_landmark(landmark)
+        return made
 
     def without_landmark(self, name: str) -> Landmarks:
         """The landmarks without the one of a name, and without the measures of it."""

@@ -102,10 +102,7 @@ class Exchange:
         desk.run(f"Reading {path.name}", read, take)
 
     def _add(self, path: Path, found: LandmarkSet, landmarks: tuple[Landmark, ...]) -> None:
-        made = self._desk.document.part(Landmarks)
-        for landmark in landmarks:
-            made = made.with_landmark(landmark)
-        self._desk.change("Read landmarks", made)
+        self._desk.change("Read landmarks", self._desk.document.part(Landmarks).with_read(landmarks))
         self._desk.reveal()
         for text in found.told:
             self._desk.note(f"{path.name}: {text}.")
