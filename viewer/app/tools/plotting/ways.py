@@ -41,11 +41,13 @@ class Ways:
 
     def still(self, choices: CurveChoices) -> Still | None:
         """The motion of each frame that holds the scan still; None where the anchors do not tell one."""
-        tracks = self._desk.followed.tracks
-        anchors = tuple(name for name in choices.anchors if name in tracks)
+        tracks, anchors = self._desk.followed.tracks, self._anchors(choices)
         return self._kept.of(
             ("still", anchors), tuple(tracks[name] for name in anchors), lambda: self._found(tracks, anchors)
         )
+
+    def _anchors(self, choices: CurveChoices) -> tuple[str, ...]:
+        return tuple(name for name in choices.anchors if name in self._desk.followed.tracks)
 
     def _found(self, tracks: Mapping[str, Track], anchors: tuple[str, ...]) -> Still | None:
         try:
@@ -67,13 +69,14 @@ class Ways:
     def trajectories(self, settings: Settings, choices: CurveChoices) -> dict[str, Trajectory]:
         """The ways of the landmarks that are ticked, by name."""
         tracks, smoothing = self._desk.followed.tracks, settings.smoothing
-        still = self.still(choices) if settings.coordinates == ANCHORS else None
+        still = self.still(choices) if settings.coordinates == ANCHORS and choices.traced else None
         found = {}
         for name in choices.traced:
             if (track := tracks.get(name)) is not None and len(track.times) == len(self._desk.timeline):
                 found[name] = self._kept.of(
                     (name, smoothing), (track, still), partial(_way_of, track, smoothing, still)
                 )
+        self._kept.forget_others({("still", self._anchors(choices)), *((name, smoothing) for name in found)})
         speeds = [np.nanmax(one.speeds) for one in found.values() if np.isfinite(one.speeds).any()]
         self.fastest = float(max(speeds, default=0.0))
         return found
@@ -81,7 +84,10 @@ class Ways:
     def draw(self, settings: Settings, choices: CurveChoices, canvas: Canvas, view: ViewPlace) -> None:
         """Draw them, as they lie about the pose that is shown."""
         pose, desk = self._desk.pose, self._desk
-        if not settings.trajectories or not choices.traced or pose is None:
+        if not settings.trajectories or pose is None:
+            return
+        found = self.trajectories(settings, choices)
+        if not found:
             return
         motion = desk.motion(pose)
         if settings.coordinates == ANCHORS and (still := self.still(choices)) is not None:
@@ -89,7 +95,6 @@ class Ways:
             if now is None:  # nobody knows how the anchors lie in this frame
                 return
             motion = motion.after(now.inverse)
-        found = self.trajectories(settings, choices)
         shown = desk.viewport.request if desk.viewport.is_there else None
         places = {name: motion.points(one.positions) for name, one in found.items()}
         if places and self._seen[0] != (shown, tuple(found.values())):

@@ -1,0 +1,51 @@
+"""The ways of landmarks are found once, and forgotten where nobody asks for them any more."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from viewer.analysis.track import Known, Track
+from viewer.app.tools.plotting.choices import ANCHORS, CurveChoices, Settings
+from viewer.app.tools.plotting.ways import Ways
+
+TIMES = np.arange(30) / 30
+PLACES = {"a": (0, 0, 0), "b": (1, 0, 0), "c": (0, 1, 0)}
+
+
+def track_at(place: tuple[int, int, int]) -> Track:
+    positions = np.tile(np.array(place, np.float64), (30, 1))
+    return Track(TIMES, positions, np.zeros((30, 3, 3)), np.full(30, Known.TRACKED, np.uint8))
+
+
+@pytest.fixture
+def ways() -> Ways:
+    followed = SimpleNamespace(tracks={name: track_at(place) for name, place in PLACES.items()})
+    desk: Any = SimpleNamespace(followed=followed, timeline=TIMES)
+    return Ways(desk)
+
+
+def test_what_is_asked_for_again_is_the_same(ways: Ways) -> None:
+    settings, choices = Settings(coordinates=ANCHORS), CurveChoices(traced=("a", "b"), anchors=tuple(PLACES))
+    found, still = ways.trajectories(settings, choices), ways.still(choices)
+    again = ways.trajectories(settings, choices)
+    assert all(again[name] is found[name] for name in ("a", "b"))
+    assert ways.still(choices) is still
+
+
+@pytest.mark.parametrize("change", [{"traced": ("b",)}, {"traced": ()}, {"seconds": 0.5}])
+def test_ways_that_are_not_traced_any_more_are_forgotten(ways: Ways, change: dict[str, Any]) -> None:
+    settings, choices = Settings(), CurveChoices(traced=("a",))
+    former = weakref.ref(ways.trajectories(settings, choices)["a"])
+    if "seconds" in change:
+        ways.trajectories(replace(settings, **change), choices)
+    else:
+        ways.trajectories(settings, replace(choices, **change))
+    gc.collect()
+    assert former() is None
