@@ -169,9 +169,10 @@ def label(text: str, help: str = "", gutter: float = 0.0) -> None:
 def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:
     """A combo box; the word that is chosen now."""
     titles = titles or {}
-    if imgui.begin_combo(f"##{name}", titles.get(current, current)):
+    if imgui.begin_combo(f"##{name}", unhidden(titles.get(current, current))):
         for word in words:
-            if imgui.selectable(f"{titles.get(word, word)}###{word}", word == current)[0]:
+            label = f"{unhidden(titles.get(word, word))}###{unhidden(word)}"
+            if imgui.selectable(label, word == current)[0]:
                 current = word
         imgui.end_combo()
     return current
@@ -261,6 +262,12 @@ def dot(middle: ImVec2, color: int | None) -> None:
         draw_list.add_circle(middle, radius, imgui.get_color_u32(imgui.Col_.text_disabled))
     else:
         draw_list.add_circle_filled(middle, radius, theme.packed(color))
+
+
+def unhidden(text: str) -> str:
+    """A text, such as a name that a user gave, as part of a label: ImGui takes what follows "##" for an id
+    and does not show it, so that a space without width stands between."""
+    return text.replace("#", "#\u200b")
 
 
 def fitted(text: str, width: float) -> str:

@@ -67,9 +67,10 @@ def _draw_template(tool: Tool) -> None:
     titles = {"": _FREE, **{name: template.title for name, template in known.items()}}
     widgets.label("Template", "The landmarks that are to be placed, in their order")
     chosen = tool.made.template
-    if imgui.begin_combo("##template", titles.get(chosen, chosen)):
+    if imgui.begin_combo("##template", widgets.unhidden(titles.get(chosen, chosen))):
         for name, title in titles.items():
-            if imgui.selectable(f"{title}###template {name}", name == chosen)[0] and name != chosen:
+            label = f"{widgets.unhidden(title)}###template {widgets.unhidden(name)}"
+            if imgui.selectable(label, name == chosen)[0] and name != chosen:
                 tool.begin(known.get(name))
         imgui.end_combo()
 

@@ -176,7 +176,7 @@ def _draw_plot(tool: Tool, plot: CurvePlot, size: ImVec2) -> int | None:
 
 
 def _set_axes(plot: CurvePlot) -> None:
-    implot.setup_axis(_X, None if plot.x_unit == "s" else f"{plot.x_label} [{plot.x_unit}]")
+    implot.setup_axis(_X, None if plot.x_unit == "s" else f"{widgets.unhidden(plot.x_label)} [{plot.x_unit}]")
     if plot.x_unit == "s":
         implot.setup_axis_format(_X, "%g s")
     for number, unit in enumerate(plot.units):
@@ -292,10 +292,10 @@ def _draw_name(tool: Tool, curve: Curve) -> None:
     imgui.text(icons.ICON_FA_MINUS)
     imgui.pop_style_color()
     imgui.same_line()
-    if (
-        imgui.selectable(curve.name, False, imgui.SelectableFlags_.span_all_columns.value)[0]
-        and curve.movement
-    ):
+    is_clicked, _ = imgui.selectable(
+        widgets.unhidden(curve.name), False, imgui.SelectableFlags_.span_all_columns.value
+    )
+    if is_clicked and curve.movement:
         tool.desk.seek(nearest(curve.times, curve.movement.peak))
     if imgui.is_item_hovered():
         tool.pointed = curve.name
