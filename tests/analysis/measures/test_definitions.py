@@ -20,7 +20,11 @@ def test_measures_are_read_of_toml_and_json(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [("m.toml", "measures = " + "[" * 10_000), ("m.toml", "m = " + "{a=" * 10_000), ("m.json", "[" * 100_000)],
+    [
+        ("m.toml", "measures = " + "[" * 10_000),
+        ("m.toml", "m = " + "{a=" * 10_000),
+        ("m.json", "[" * 100_000),
+    ],
 )
 def test_what_is_nested_too_deeply_is_told(tmp_path: Path, name: str, text: str) -> None:
     (tmp_path / name).write_text(text)

@@ -66,8 +66,8 @@ def is_number(word: str) -> bool:
 
 
 def number_of(word: str, line: int) -> float:
-    """The number of a word; NaN where it says that there is none. Raises InputError for what is no number, and
-    for one beyond 1e150."""
+    """The number of a word; NaN where it says that there is none. Raises InputError for what is no number,
+    and for one beyond 1e150."""
     word = word.strip()
     if word.lower() in _ABSENT:
         return math.nan
