@@ -7,9 +7,10 @@ import pytest
 from shapes import Frames, sphere_points, track_of
 
 from viewer.analysis.measures import Measure
-from viewer.analysis.measures.series import all_series, found_on, series_of, surface_of
+from viewer.analysis.measures.series import all_series, lines_of, series_of
 from viewer.analysis.track import Known, Track
 from viewer.errors import InputError
+from viewer.mesh.geodesic import length_of
 from viewer.scan.faces import Faces
 from viewer.scan.points import PointCloud
 from viewer.task import Cancelled, Task
@@ -136,11 +137,34 @@ def test_each_pose_is_read_once_for_all_that_need_it() -> None:
         assert found["straight"].values[0] == pytest.approx(R * np.sqrt(0.4))
         one = all_series(MEASURES[:1], tracks, timeline, frames=[2])["way"]
         assert np.isfinite(one.values).tolist() == [False, False, True]
-        surface = surface_of(timeline, timeline.pose(0))
-        places = np.stack([tracks[name].positions[0] for name in "ab"])
-        (line,) = found_on(MEASURES[0], places, surface)
-        assert np.linalg.norm(line, axis=1) == pytest.approx(R, rel=0.01)
-        assert found_on(MEASURES[2], places, surface) == ()
+    (line,) = lines_of(MEASURES[0], found["way"], tracks, 2)
+    assert np.linalg.norm(line, axis=1) == pytest.approx(R, rel=0.01)
+    assert length_of(line) == pytest.approx(found["way"].values[2], rel=1e-3)
+    assert lines_of(MEASURES[0], found["way"], tracks, 1) == ()
+    assert len(lines_of(MEASURES[1], found["cheek"], tracks, 0)) == 3
+
+
+def test_lines_of_landmarks_alone_lie_where_they_are_measured() -> None:
+    places = {"a": (3.0, 4, 0), "b": (0.0, 0, 0), "c": (1.0, 0, 0), "d": (0.0, 1, 0), "e": (7.0, 8, 9)}
+    tracks = {name: track_of([place], 0.1) for name, place in places.items()}
+
+    def lines(kind: str, *names: str, **options: str) -> list[list[list[float]]]:
+        measure = Measure("m", kind, names, options)
+        found = lines_of(measure, series_of(measure, tracks), tracks, 0)
+        return [np.round(line, 9).tolist() for line in found]
+
+    a, b, c, _, e = map(list, places.values())
+    assert lines("distance", "a", "b") == [[a, b]]
+    assert lines("angle", "a", "b", "c") == [[a, b, c]]
+    assert lines("curve", "a", "b", "c", shape="straight", closed="yes") == [[a, b, c, a]]
+    (smooth,) = lines("curve", "a", "b", "c")
+    assert len(smooth) == 65
+    assert smooth[0] == a
+    assert smooth[32] == b
+    down, on = lines("plane_distance", "e", "b", "c", "d")
+    assert down == [e, [7, 8, 0]]
+    assert on == [[7, 8, 0], [round(1 / 3, 9), round(1 / 3, 9), 0]]
+    assert lines("plane_angle", "b", "e", "b", "c", "d") == [[b, e], [b, [7, 8, 0]]]
 
 
 def test_measuring_is_cancelled() -> None:

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mesh.geodesic import Line
+
 Quantity = Literal["length", "angle", "area", "volume"]
 
 
@@ -31,7 +33,8 @@ class Series:
 
     times: (T,) seconds. values: (T,) scan units, their square or cube, or degrees, by quantity; NaN where not
     known. sigmas: (T,) standard deviations of the values; NaN where not known. known: (T,) uint8, the least
-    of what is `Known` of its landmarks.
+    of what is `Known` of its landmarks. lines: frame -> lines along the surface that are measured there, or
+    are around what is, each (P, 3), to be drawn; none of measures of landmarks alone.
     """
 
     name: str
@@ -40,3 +43,4 @@ class Series:
     values: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     known: NDArray[np.uint8]
+    lines: Mapping[int, tuple[Line, ...]] = field(default_factory=dict)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...mesh.geodesic import Line
+from ...mesh.geodesic import Line, length_of, steps_along
 from ...scan.faces import Triangles
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
@@ -18,6 +18,8 @@ from ..track import Known, Track
 from . import Measure, Series
 from .kinds import MeasureKind, kind_of
 from .surface import PoseSurface
+
+_DRAWN = 48  # places of a line along the surface that are kept, in each frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,7 @@ class _Asked:
     known: NDArray[np.uint8]
     values: NDArray[np.float64]
     sigmas: NDArray[np.float64]
+    lines: dict[int, tuple[Line, ...]]
 
 
 def series_of(
@@ -72,13 +75,17 @@ def all_series(
     return {each.measure.name: _series(each, times) for each in asked}
 
 
-def found_on(measure: Measure, positions: NDArray[np.float64], surface: PoseSurface) -> tuple[Line, ...]:
-    """The lines that a measure of the surface measures, or that are around it, each (P, 3), to be drawn; none
-    for measures of landmarks alone. positions: (K, 3) of its landmarks. Raises InputError as `kind_of`."""
+def lines_of(measure: Measure, series: Series, tracks: Mapping[str, Track], frame: int) -> tuple[Line, ...]:
+    """The lines that a measure measures in a frame, or that are around what it does, each (P, 3), to be
+    drawn; none where its value is not known. series: of the measure. tracks: by the name of the landmark.
+    Raises InputError as `kind_of`."""
     kind = kind_of(measure)
-    compute: Callable = kind.compute
-    found = compute(surface, positions, measure.options) if kind.needs_surface else None
-    return () if found is None else found.lines
+    if frame >= len(series.values) or not np.isfinite(series.values[frame]):
+        return ()
+    if kind.lines is None:
+        return series.lines.get(frame, ())
+    positions = np.array([tracks[name].positions[frame] for name in measure.landmarks])
+    return tuple(kind.lines(positions, measure.options)) if np.isfinite(positions).all() else ()
 
 
 def surface_of(timeline: Timeline, pose: Pose, kept: dict[str, Triangles] | None = None) -> PoseSurface:
@@ -105,14 +112,14 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
     covariances = np.stack([track.covariances for track in own], axis=1) + noise**2 * np.eye(3)
     positions = np.stack([track.positions for track in own], axis=1)[:, which]
     empty = np.full((2, frames), np.nan)
-    return _Asked(measure, kind, positions, covariances, which, known, *empty)
+    return _Asked(measure, kind, positions, covariances, which, known, *empty, lines={})
 
 
 def _series(asked: _Asked, times: NDArray[np.float64]) -> Series:
     known = asked.known.copy()
     known[(known >= Known.TRACKED) & ~np.isfinite(asked.values)] = Known.GAP
     measure, quantity = asked.measure, asked.kind.quantity
-    return Series(measure.name, quantity, times, asked.values, asked.sigmas, known)
+    return Series(measure.name, quantity, times, asked.values, asked.sigmas, known, asked.lines)
 
 
 def _fill_points(asked: _Asked) -> None:
@@ -169,3 +176,9 @@ def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface) -> None:
     variance = np.einsum("ui,uij,uj->", gradient, asked.covariances[frame], gradient)
     asked.values[frame] = found.value
     asked.sigmas[frame] = np.sqrt(max(variance, 0) + found.deviation**2)
+    asked.lines[frame] = tuple(_thinned(line) for line in found.lines)
+
+
+def _thinned(line: Line) -> Line:
+    """A line through no more places than are drawn."""
+    return line if len(line) <= _DRAWN else steps_along(line, length_of(line) / (_DRAWN - 1))

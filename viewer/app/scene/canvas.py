@@ -133,11 +133,18 @@ class Canvas:
         draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
         self._take(place)
 
-    def path(self, places: NDArray[np.float64], colors: Sequence[int], alphas: NDArray[np.float64]) -> None:
+    def path(
+        self,
+        places: NDArray[np.float64],
+        colors: Sequence[int],
+        alphas: NDArray[np.float64],
+        *,
+        dots: bool = True,
+    ) -> None:
         """A line through places on the screen, (N, 2), with a dot at each where there is room; NaN: a gap.
 
         colors, alphas: N each; of the dots, and of the line from each place on. It costs little where they
-        are the same for many places in a row.
+        are the same for many places in a row. dots: whether there are any.
         """
         there = np.logical_and.reduce(np.isfinite(places), axis=1)
         joined, points = there[:-1] & there[1:], places.tolist()
@@ -150,6 +157,8 @@ class Canvas:
             draw_list.add_polyline(points[start : stop + 1], color, thick + 2, 0)
         for start, stop in _like_runs(joined, inks):
             draw_list.add_polyline(points[start : stop + 1], inks[start], thick, 0)
+        if not dots:
+            return
         steps = np.hypot(*np.diff(places, axis=0)[joined].T)
         if len(steps) and np.median(steps) < _DOT_ROOM * self.em:
             there[:-1] &= ~joined  # those that no line joins to the next

@@ -11,7 +11,7 @@ panel, the command line, series over time and the table in the docs are made of 
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -20,11 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....errors import InputError, unknown_name
+from ....mesh.geodesic import Line
 from .. import Measure, Quantity
 from ..surface import Found, PoseSurface
 
 Options = Mapping[str, str]
 OfPoints = Callable[[NDArray[np.float64], Options], NDArray[np.float64]]
+LinesOf = Callable[[NDArray[np.float64], Options], Sequence[Line]]
 OnSurface = Callable[[PoseSurface, NDArray[np.float64], Options], Found | None]
 
 
@@ -37,7 +39,8 @@ class MeasureKind:
     compute: `OfPoints` takes positions (T, K, 3) and gives values (T,), NaN where they tell none; `OnSurface`
     takes the surface of one pose and positions (K, 3); None: the surface tells none.
     needs_surface: which of both it is. choices: the values that each option may have, the first where it is
-    not told.
+    not told. lines: of a kind that needs no surface, takes positions (K, 3) and gives the lines to draw, each
+    (P, 3).
     """
 
     name: str
@@ -49,6 +52,7 @@ class MeasureKind:
     compute: OfPoints | OnSurface
     needs_surface: bool = False
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    lines: LinesOf | None = None
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ....mesh.geodesic import Line
 from ..planes import PLANES, plane_of
 from . import MeasureKind, Options
 
@@ -45,23 +46,53 @@ def _plane_distance(positions: Positions, options: Options) -> Values:
     return ((positions[:, 0] - center) * normal).sum(axis=1)
 
 
+def _joined(positions: NDArray[np.float64], _: Options) -> list[Line]:
+    return [positions]
+
+
+def _plane_angle_lines(positions: NDArray[np.float64], options: Options) -> list[Line]:
+    """The line, and its foot in the plane."""
+    line = positions[:2]
+    return [line, _feet(line, positions[2:], options)]
+
+
+def _plane_distance_lines(positions: NDArray[np.float64], options: Options) -> list[Line]:
+    """The line from the landmark to its foot, and on to the middle of the plane."""
+    foot = _feet(positions[:1], positions[1:], options)
+    center, _ = plane_of(positions[1:], options.get("plane", PLANES[0]))
+    return [np.concatenate([positions[:1], foot]), np.concatenate([foot, center[None]])]
+
+
+def _feet(places: Line, of_plane: NDArray[np.float64], options: Options) -> Line:
+    """The places of a plane that are nearest to others, (P, 3)."""
+    center, normal = plane_of(of_plane, options.get("plane", PLANES[0]))
+    return places - ((places - center) @ normal)[:, None] * normal
+
+
 def _curve(positions: Positions, options: Options) -> Values:
+    return np.linalg.norm(np.diff(_along(positions, options), axis=1), axis=2).sum(axis=1)
+
+
+def _curve_lines(positions: NDArray[np.float64], options: Options) -> list[Line]:
+    return [_along(positions[None], options)[0]]
+
+
+def _along(positions: Positions, options: Options) -> Positions:
+    """Places along the curves, (T, P, 3)."""
     if options.get("closed") == "yes":
         positions = np.concatenate([positions, positions[:, :1]], axis=1)
         before, after = positions[:, -2], positions[:, 1]
     else:
         before, after = 2 * positions[:, 0] - positions[:, 1], 2 * positions[:, -1] - positions[:, -2]
     if options.get("shape") == "straight":
-        return np.linalg.norm(np.diff(positions, axis=1), axis=2).sum(axis=1)
+        return positions
     knots = np.concatenate([before[:, None], positions, after[:, None]], axis=1)
-    lengths = np.zeros(len(positions))
-    for number in range(positions.shape[1] - 1):
-        lengths += _catmull_rom(knots[:, number : number + 4])
-    return lengths
+    pieces = [_catmull_rom(knots[:, number : number + 4]) for number in range(positions.shape[1] - 1)]
+    return np.concatenate([*(piece[:, :-1] for piece in pieces), positions[:, -1:]], axis=1)
 
 
-def _catmull_rom(knots: Positions) -> Values:
-    """Lengths of centripetal Catmull-Rom curves from the second to the third of four places, (T, 4, 3), with
+def _catmull_rom(knots: Positions) -> Positions:
+    """Places on centripetal Catmull-Rom curves from the second to the third of four places, (T, 4, 3), with
     the pyramid of Barry and Goldman (1988). Centripetal ones have no loops (Yuksel 2011)."""
     steps = np.sqrt(np.maximum(np.linalg.norm(np.diff(knots, axis=1), axis=2), np.finfo(float).tiny))
     times = np.concatenate([np.zeros((len(knots), 1)), np.cumsum(steps, axis=1)], axis=1)[:, :, None, None]
@@ -73,22 +104,28 @@ def _catmull_rom(knots: Positions) -> Values:
             level[n] + (time - times[:, n]) / (times[:, n + height] - times[:, n]) * (level[n + 1] - level[n])
             for n in range(4 - height)
         ]
-    return np.linalg.norm(np.diff(level[0], axis=1), axis=2).sum(axis=1)
+    return level[0]
 
 
 KINDS = (
-    MeasureKind("distance", "Distance", "from the first landmark to the second", "length", 2, 2, _distance),
-    MeasureKind("angle", "Angle", "at the second of three landmarks", "angle", 3, 3, _angle),
+    MeasureKind(
+        "distance", "Distance", "from the first landmark to the second", "length", 2, 2, _distance,
+        lines=_joined,
+    ),
+    MeasureKind(
+        "angle", "Angle", "at the second of three landmarks", "angle", 3, 3, _angle, lines=_joined
+    ),
     MeasureKind(
         "plane_angle", "Angle to a plane", f"of the line through the first two landmarks; {_PLANE}",
-        "angle", 5, None, _plane_angle, choices={"plane": PLANES},
+        "angle", 5, None, _plane_angle, choices={"plane": PLANES}, lines=_plane_angle_lines,
     ),
     MeasureKind(
         "plane_distance", "Distance to a plane", f"of the first landmark, with its sign; {_PLANE}",
-        "length", 4, None, _plane_distance, choices={"plane": PLANES},
+        "length", 4, None, _plane_distance, choices={"plane": PLANES}, lines=_plane_distance_lines,
     ),
     MeasureKind(
         "curve", "Curve", "through landmarks in their order, not along the surface",
         "length", 2, None, _curve, choices={"shape": ("smooth", "straight"), "closed": ("no", "yes")},
+        lines=_curve_lines,
     ),
 )  # fmt: skip

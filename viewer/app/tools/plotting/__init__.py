@@ -27,6 +27,7 @@ from ...ui import Ui
 from . import panel, plot
 from .adding import Adding
 from .choices import CurveChoices, Settings
+from .lines import MeasureLines
 from .measurer import Measurer
 from .shown import Curve, Kept, Shown
 from .ways import Ways
@@ -38,15 +39,16 @@ TITLE = "Curves"
 class Tool:
     """The tool that plots measures over time, and draws the ways of landmarks.
 
-    shown: what is plotted. ways: what is drawn over the picture. adding: the measure that is to be added.
-    measurer: what finds measures over time.
-    pointed: the curve that the mouse points at in the table, by name.
+    shown: what is plotted. ways, lines: what is drawn over the picture. adding: the measure that is to be
+    added. measurer: what finds measures over time. pointed: the curve that the mouse points at in the
+    table, by name.
     """
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.shown = Shown()
         self.ways = Ways(desk)
+        self.lines = MeasureLines(desk)
         self.adding = Adding()
         self.measurer = Measurer(desk)
         self.pointed: str | None = None
@@ -163,8 +165,10 @@ class Tool:
         panel.draw(self, ui)
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
-        """Draw the ways of landmarks."""
+        """Draw the ways of landmarks, and what is measured in the frame."""
         self.ways.draw(self.settings, self.choices, canvas, view)
+        if self.settings.lines:
+            self.lines.draw(self.landmarks.measures, self.choices.hidden, self.pointed, canvas, view)
 
     def advance(self, budget: float) -> bool:
         """Measure what is left to be measured, and have the scan held still by its anchors where that is
@@ -175,6 +179,10 @@ class Tool:
     def toggle_ways(self) -> None:
         """Draw the ways of the landmarks that are ticked, or not."""
         self.settings = replace(self.settings, trajectories=not self.settings.trajectories)
+
+    def show_lines(self) -> None:
+        """Draw what is measured in the view, or not."""
+        self.settings = replace(self.settings, lines=not self.settings.lines)
 
     def dialog(self) -> None:
         """Declare the dialog that names a file, while it is open."""
@@ -226,6 +234,10 @@ COMMANDS = {
                 Command(
                     "trajectories", "Ways of landmarks", Tool.toggle_ways, "W",
                     is_on=lambda tool: tool.settings.trajectories,
+                ),
+                Command(
+                    "measure_lines", "What is measured in the view", Tool.show_lines,
+                    is_on=lambda tool: tool.settings.lines,
                 ),
             ),
             (

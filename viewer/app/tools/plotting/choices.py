@@ -46,6 +46,7 @@ class Settings:
         0.3, "Width of the window in which curves are smoothed for speed, acceleration and numbers",
         low=0.02, high=5.0, unit="s", title="smoothing",
     )  # fmt: skip
+    lines: bool = param(True, "Draw in the view what is measured there, with its value", title="In the view")
     least: float = param(
         0.5, "How much of a curve's range a peak stands out by to count as a repeat", low=0.05, high=1.0,
         title="least repeat",

@@ -17,7 +17,7 @@ from .ways import SPEED_MAP
 if TYPE_CHECKING:
     from . import Tool
 
-_OF_THE_PLOT = ("is_open", "mode", "order", "bands", "seconds", "least")
+_OF_THE_PLOT = ("is_open", "mode", "order", "bands", "seconds", "lines", "least")
 _OPEN = imgui.TreeNodeFlags_.default_open.value
 _BAR_STEPS = 16  # of the bar of colours
 
@@ -30,6 +30,10 @@ def draw(tool: Tool, ui: Ui) -> None:
     ui.tooltip("Measures over time, under the timeline", "curves")
     _draw_measures(tool)
     if measures_there := bool(tool.landmarks.measures):
+        changed, _ = imgui.checkbox("Show in the view", tool.settings.lines)
+        if changed:
+            tool.show_lines()
+        ui.tooltip("The lines that are measured, each with its value", "measure_lines")
         _draw_noise(tool)
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
         adding.draw(tool, ui)

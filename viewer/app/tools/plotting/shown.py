@@ -131,15 +131,20 @@ def _with_lines(plot: CurvePlot | None, lines: Sequence[PlotLine], times: NDArra
     return CurvePlot("time", "s", times, (*before, *lines), np.arange(len(times)))
 
 
+def power_of(quantity: str) -> int:
+    """Which power of a length a quantity is; 0 for an angle."""
+    return _POWERS.get(quantity, 0)
+
+
 def unit_of(quantity: str, unit: str) -> str:
     """The unit of a quantity where lengths have this one."""
-    power = _POWERS.get(quantity)
-    return "°" if power is None else f"{unit}{_RAISED[power]}"
+    power = power_of(quantity)
+    return f"{unit}{_RAISED[power]}" if power else "°"
 
 
 def curve_of(series: Series, color: int, scale: Scale, smoothing: Smoothing) -> Curve:
     """The curve of a measure, in the unit that lengths are told in."""
-    factor = scale.factor ** _POWERS.get(series.quantity, 0)
+    factor = scale.factor ** power_of(series.quantity)
     times, values, sigmas = series.times, factor * series.values, factor * series.sigmas
     wide = smoothing.wide_enough(times)
     speeds = np.abs(smoothed(times, values, np.zeros(len(values)), wide, 1)[0])

@@ -1,0 +1,122 @@
+"""The lines of measures over the picture: what is measured in the frame that is shown, and its value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from imgui_bundle import ImVec2
+from numpy.typing import NDArray
+
+from ....analysis.measures import Measure, Series
+from ....analysis.measures.series import lines_of
+from ....analysis.pick import are_seen
+from ....mesh.geodesic import length_of, steps_along
+from ....output.plots import PLOT_COLORS
+from ....scan.pose import Pose
+from ....scan.units import Scale
+from ...desk import Desk
+from ...scene.canvas import Canvas, Label, ViewPlace
+from .shown import power_of, unit_of
+from .words import with_spread
+
+HIDDEN = 0.3  # opacity where a line is behind a surface
+_SLACK = 0.01  # of the scan's radius: how far before a line a surface may be that it lies on
+_PIECES = 24  # of a straight line, so that a part of it may be hidden
+_MOST_LABELS = 8  # measures that are told by name and value; of more, the one that is pointed at
+
+
+@dataclass(frozen=True, eq=False)
+class ShownLine:
+    """A line of a measure in a frame. places: (P, 3) where it is shown. seen: (P,), which are not hidden."""
+
+    measure: str
+    color: int
+    places: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+
+
+class MeasureLines:
+    """The lines of the measures that are plotted, in the frame that is shown; found once a picture."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._found: tuple[tuple[object, ...], tuple[ShownLine, ...]] = (), ()
+
+    def shown(self, measures: tuple[Measure, ...], hidden: tuple[str, ...]) -> tuple[ShownLine, ...]:
+        """The lines of measures but for hidden ones, where they are in the picture."""
+        desk, pose = self._desk, self._desk.pose
+        if pose is None:
+            return ()
+        request = desk.viewport.request if desk.viewport.is_there else None
+        inputs = measures, hidden, desk.followed.series, desk.followed.tracks, pose, request
+        if len(self._found[0]) != len(inputs) or any(
+            a is not b for a, b in zip(inputs, self._found[0], strict=True)
+        ):
+            self._found = inputs, self._lines(measures, hidden, pose)
+        return self._found[1]
+
+    def _lines(
+        self, measures: tuple[Measure, ...], hidden: tuple[str, ...], pose: Pose
+    ) -> tuple[ShownLine, ...]:
+        desk = self._desk
+        series, tracks, motion = desk.followed.series, desk.followed.tracks, desk.motion(pose)
+        numbers = {name: number for number, name in enumerate(series)}
+        found: list[tuple[str, int, NDArray[np.float64]]] = []
+        for measure in measures:
+            if measure.name in hidden or measure.name not in series:
+                continue
+            if not all(name in tracks for name in measure.landmarks):
+                continue
+            color = PLOT_COLORS[numbers[measure.name] % len(PLOT_COLORS)]
+            for line in lines_of(measure, series[measure.name], tracks, pose.index):
+                pieces = (
+                    line if len(line) > _PIECES else steps_along(line, max(length_of(line) / _PIECES, 1e-300))
+                )
+                found.append((measure.name, color, motion.points(pieces)))
+        if not found:
+            return ()
+        seen = self._are_seen(np.concatenate([places for *_, places in found]), pose)
+        parts = np.split(seen, np.cumsum([len(places) for *_, places in found])[:-1])
+        return tuple(ShownLine(*one, part) for one, part in zip(found, parts, strict=True))
+
+    def _are_seen(self, places: NDArray[np.float64], pose: Pose) -> NDArray[np.bool_]:
+        viewport = self._desk.viewport
+        if viewport.surface is None or not viewport.is_there:
+            return np.ones(len(places), bool)
+        return are_seen(viewport.surface, places, np.full(len(places), _SLACK * viewport.bounds(pose).radius))
+
+    def draw(
+        self,
+        measures: tuple[Measure, ...],
+        hidden: tuple[str, ...],
+        pointed: str | None,
+        canvas: Canvas,
+        view: ViewPlace,
+    ) -> None:
+        """Draw the lines, and the values of a few. pointed: the measure that the mouse points at, by name."""
+        pose, labels = self._desk.pose, []
+        shown = self.shown(measures, hidden)
+        told = set(dict.fromkeys(line.measure for line in shown))
+        if len(told) > _MOST_LABELS:
+            told &= {pointed}
+        for line in shown:
+            on_screen = view.all_on_screen(line.places)
+            alphas = np.where(line.seen, 1.0, HIDDEN)
+            canvas.path(on_screen, [line.color] * len(alphas), alphas, dots=False)
+            if line.measure in told and pose is not None and np.isfinite(on_screen).all():
+                told.discard(line.measure)
+                series, scale = self._desk.followed.series[line.measure], self._desk.scale
+                first, last = ImVec2(*on_screen[0].tolist()), ImVec2(*on_screen[-1].tolist())
+                inside = view.box.clipped(first, last)
+                if inside is not None:
+                    text = f"{line.measure}: {value_in_words(series, pose.index, scale)}"
+                    labels.append(Label([text], inside, faint=not line.seen.any()))
+        canvas.labels(labels)
+
+
+def value_in_words(series: Series, frame: int, scale: Scale) -> str:
+    """The value of a measure in a frame with its uncertainty and unit; a dash where it is not known."""
+    factor = scale.factor ** power_of(series.quantity)
+    value, sigma = factor * series.values[frame], factor * series.sigmas[frame]
+    return with_spread(float(value), float(sigma), unit_of(series.quantity, scale.unit))
