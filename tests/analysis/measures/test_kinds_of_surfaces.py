@@ -75,6 +75,28 @@ def test_a_region_is_a_cap(ball: PoseSurface) -> None:
     assert turned.value == pytest.approx(area, rel=3e-3)
 
 
+def test_all_in_a_prism_is_on_both_sides(ball: PoseSurface) -> None:
+    """What lies over a polygon about the pole lies beneath it as well: two caps of the sphere."""
+    corners = rim(24)
+    front = found(ball, "area", corners + AWAY)
+    through = found(ball, "area", corners + AWAY, depth="through")
+    around = found(ball, "perimeter", corners + AWAY, depth="through")
+    assert front is not None
+    assert through is not None
+    assert around is not None
+    shadow = 12 * (R * np.sin(CAP)) ** 2 * np.sin(np.pi / 12)  # of the polygon, in its plane
+    assert shadow < through.value / 2 < front.value
+    cap = 2 * np.pi * R**2 * (1 - np.cos(CAP))
+    assert through.value == pytest.approx(2 * cap * shadow / (np.pi * (R * np.sin(CAP)) ** 2), rel=5e-3)
+    assert around.value == pytest.approx(2 * 2 * np.pi * R * np.sin(CAP), rel=5e-3)
+    assert {bool(line[0, 2] > AWAY[2]) for line in around.lines} == {True, False}
+    outward = corners * (1, 1, 0) / np.linalg.norm(corners * (1, 1, 0), axis=1, keepdims=True)
+    grown = found(ball, "area", corners + 0.5 * outward + AWAY, depth="through")
+    assert grown is not None
+    widened = float((0.5 * outward * through.gradient).sum())
+    assert grown.value - through.value == pytest.approx(widened, rel=0.1)
+
+
 @pytest.mark.parametrize("kind", ["area", "perimeter", "volume", "path"])
 def test_gradients_are_of_values(ball: PoseSurface, kind: str) -> None:
     """As a landmark slides along the surface."""

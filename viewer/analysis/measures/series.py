@@ -111,8 +111,8 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
     known = np.min([track.known for track in own], axis=0).astype(np.uint8)
     covariances = np.stack([track.covariances for track in own], axis=1) + noise**2 * np.eye(3)
     positions = np.stack([track.positions for track in own], axis=1)[:, which]
-    empty = np.full((2, frames), np.nan)
-    return _Asked(measure, kind, positions, covariances, which, known, *empty, lines={})
+    values, sigmas = np.full((2, frames), np.nan)
+    return _Asked(measure, kind, positions, covariances, which, known, values, sigmas, {})
 
 
 def _series(asked: _Asked, times: NDArray[np.float64]) -> Series:

@@ -8,16 +8,23 @@ from numpy.typing import NDArray
 from ....mesh.cutting import Piece, pieces_along
 from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
+from ....mesh.smoothing import Points
 from ..planes import THROUGH, plane_of
+from ..prism import Prism, area_through, is_within, patch_through, rim_through
 from ..surface import Circuit, Found, PoseSurface
 from . import MeasureKind, Options
 from .along import direction, off_smooth
 
+FRONT, ALL = "front", "through"
+DEPTHS = (FRONT, ALL)  # the surface that the landmarks are on, or all that is before and behind it as well
 _STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
+_WIDE_STEP = 0.5  # the same, where all in a prism is measured
 _BENT = 3.0  # of the squared angles at a face's edges, by which it is smaller than what it stands for
 
 
-def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
+def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+    if options.get("depth") == ALL:
+        return _through(surface, positions, is_rim=True)
     loop = surface.loop(positions)
     if loop is None:
         return None
@@ -28,13 +35,46 @@ def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], _: Options)
     )
 
 
-def _area(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
+def _area(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+    if options.get("depth") == ALL:
+        return _through(surface, positions, is_rim=False)
     loop = surface.loop(positions)
     piece = None if loop is None else region_within(loop)
     if loop is None or piece is None:
         return None
     deviation = float((piece.areas * loop.patch.bends[piece.sources]).sum()) / _BENT
     return Found(float(piece.areas.sum()), _widening(loop), deviation, _absolute(surface, loop))
+
+
+def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bool) -> Found | None:
+    """The area, or the rim, of all of a surface in the prism over the polygon of landmarks."""
+    local, step = positions - surface.origin, _WIDE_STEP * surface.spacing
+    prism = Prism.over(local)
+    patch = None if prism is None else patch_through(surface, prism)
+    if prism is None or patch is None or not len(patch.faces):
+        return None
+    lines, areas = rim_through(patch, prism), area_through(patch, prism)
+    if not lines:
+        return None
+
+    def value(places: Points) -> float:
+        moved = Prism.over(places)
+        if moved is None:
+            return np.nan
+        if is_rim:
+            return sum(map(length_of, rim_through(patch, moved)))
+        return float(area_through(patch, moved).sum())
+
+    gradient = np.zeros_like(local)
+    for index in np.ndindex(local.shape):
+        sides = []
+        for side in (step, -step):
+            moved = local.copy()
+            moved[index] += side
+            sides.append(value(moved))
+        gradient[index] = (sides[0] - sides[1]) / (2 * step)
+    deviation = off_smooth(surface, lines) if is_rim else float((areas * patch.bends).sum()) / _BENT
+    return Found(value(local), gradient, deviation, tuple(line + surface.origin for line in lines))
 
 
 def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
@@ -90,18 +130,6 @@ def region_within(loop: Circuit) -> Piece | None:
         np.concatenate([piece.faces + before for piece, before in zip(chosen, counts, strict=False)]),
         np.concatenate([piece.sources for piece in chosen]),
     )
-
-
-def is_within(places: NDArray[np.float64], outline: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether places (N, 2) lie within a closed outline (P, 2): a ray to the right crosses it oddly often."""
-    inside = np.zeros(len(places), bool)
-    x, y = places.T
-    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        rises = (start[1] > y) != (end[1] > y)
-        if rises.any():
-            at = start[0] + (y[rises] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
-            inside[np.flatnonzero(rises)[x[rises] < at]] ^= True
-    return inside
 
 
 def _widening(loop: Circuit) -> NDArray[np.float64]:
@@ -160,11 +188,11 @@ def _below(piece: Piece, center: NDArray[np.float64], normal: NDArray[np.float64
 KINDS = (
     MeasureKind(
         "area", "Area of a region", "within the paths along the surface from landmark to landmark",
-        "area", 3, None, _area, True,
+        "area", 3, None, _area, True, {"depth": DEPTHS},
     ),
     MeasureKind(
         "perimeter", "Perimeter of a region", "the paths along the surface from landmark to landmark",
-        "length", 3, None, _perimeter, True,
+        "length", 3, None, _perimeter, True, {"depth": DEPTHS},
     ),
     MeasureKind(
         "volume", "Volume over a plane", "between a region and the plane of its outline; negative beneath",

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
-from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from ....analysis.measures import Measure
@@ -20,13 +20,14 @@ from ....files import free_file, working_folder
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
 from ...commands import Command, Menu
-from ...desk import Desk
+from ...desk import Click, Desk
 from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import panel, plot
 from .adding import Adding
 from .choices import CurveChoices, Settings
+from .lasso import Lasso
 from .lines import MeasureLines
 from .measurer import Measurer
 from .shown import Curve, Kept, Shown
@@ -39,7 +40,7 @@ TITLE = "Curves"
 class Tool:
     """The tool that plots measures over time, and draws the ways of landmarks.
 
-    shown: what is plotted. ways, lines: what is drawn over the picture. adding: the measure that is to be
+    shown: what is plotted. ways, lines: what is drawn over the picture. lasso: draws regions. adding: the measure that is to be
     added. measurer: what finds measures over time. pointed: the curve that the mouse points at in the
     table, by name.
     """
@@ -50,6 +51,7 @@ class Tool:
         self.ways = Ways(desk)
         self.lines = MeasureLines(desk)
         self.adding = Adding()
+        self.lasso = Lasso(desk)
         self.measurer = Measurer(desk)
         self.pointed: str | None = None
         self.saving = SaveDialog(
@@ -158,6 +160,36 @@ class Tool:
             raise InputError("A distance takes two landmarks: place them first.")
         self.add(measure)
 
+    # --- regions ----------------------------------------------------------------------
+
+    def prompt(self) -> str:
+        """The words that say what a drag does."""
+        return self.lasso.prompt()
+
+    def on_click(self, click: Click) -> bool:
+        """A click goes round nothing."""
+        return False
+
+    def on_press(self, mouse: ImVec2) -> bool:
+        """Whether a drag draws a region."""
+        return self.lasso.is_drawn
+
+    def on_drag(self, click: Click, ends: bool) -> None:
+        """Draw round a region, and measure it where the button is let go of."""
+        self.lasso.take(click, ends)
+
+    def on_escape(self) -> bool:
+        """Put the lasso away; whether it was there."""
+        return self.lasso.put_away()
+
+    def is_under_way(self) -> bool:
+        """Whether a region is being drawn."""
+        return self.lasso.is_under_way
+
+    def abandon(self) -> None:
+        """Let go of the region that is being drawn."""
+        self.lasso.abandon()
+
     # --- in the window ----------------------------------------------------------------
 
     def panel(self, ui: Ui) -> None:
@@ -165,10 +197,11 @@ class Tool:
         panel.draw(self, ui)
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
-        """Draw the ways of landmarks, and what is measured in the frame."""
+        """Draw the ways of landmarks, what is measured in the frame, and the region that is being drawn."""
         self.ways.draw(self.settings, self.choices, canvas, view)
         if self.settings.lines:
             self.lines.draw(self.landmarks.measures, self.choices.hidden, self.pointed, canvas, view)
+        self.lasso.draw(canvas, view)
 
     def advance(self, budget: float) -> bool:
         """Measure what is left to be measured, and have the scan held still by its anchors where that is
@@ -232,6 +265,10 @@ COMMANDS = {
                     "measure_distance", "Distance of the two placed last", Tool.measure_distance, "D"
                 ),
                 Command(
+                    "lasso", "Area and outline of a region", lambda tool: tool.lasso.toggle(),
+                    is_on=lambda tool: tool.lasso.is_drawn,
+                ),
+                Command(
                     "trajectories", "Ways of landmarks", Tool.toggle_ways, "W",
                     is_on=lambda tool: tool.settings.trajectories,
                 ),
@@ -249,6 +286,7 @@ COMMANDS = {
     )
 }  # fmt: skip
 MOUSE = (
+    ("Drag, after Region", "Measure the area and the outline of what you go round"),
     ("Drag the line in a plot of curves, or click", "Go to that frame"),
     ("Wheel, drag, right drag, double click in a plot of curves", "Zoom, move, zoom to a box, show all"),
 )

@@ -35,6 +35,13 @@ def draw(tool: Tool, ui: Ui) -> None:
             tool.show_lines()
         ui.tooltip("The lines that are measured, each with its value", "measure_lines")
         _draw_noise(tool)
+    words = "Stop" if tool.lasso.is_drawn else "Region"
+    if imgui.button(f"{words}###region", ui.button_size(2)):
+        tool.lasso.toggle()
+    ui.tooltip("Go round a part of the surface: its area and outline are measured", "lasso")
+    imgui.same_line()
+    _, tool.lasso.through = imgui.checkbox("Through", tool.lasso.through)
+    ui.tooltip("What lies before and behind the region is measured with it", "lasso")
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
         adding.draw(tool, ui)
         imgui.tree_pop()

@@ -1,0 +1,135 @@
+"""All of a surface that lies in a prism: what a region goes around and what is before and behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mesh.cutting import plane_section
+from ...mesh.geodesic import Line
+from ...mesh.patch import Patch
+from ...mesh.smoothing import Points
+from .planes import THROUGH, plane_of
+from .surface import PoseSurface
+
+_PARTS = 8  # into which each side of a face on the rim is divided
+_SLAB = 2.0  # spacings around the prism that its patch reaches
+
+Outline = NDArray[np.float64]  # (P, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Prism:
+    """The prism over a polygon, without end on both sides of its plane.
+
+    center, normal: of the plane, (3,). axes: (2, 3), in it. corners: (K, 2) along these.
+    """
+
+    center: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    corners: Outline
+
+    @classmethod
+    def over(cls, places: Points) -> Prism | None:
+        """The prism over places (K, 3), across the plane nearest to them; None where they tell none."""
+        center, normal = plane_of(places, THROUGH)
+        if not np.isfinite(normal).all():
+            return None
+        axes = np.linalg.svd(normal[None])[2][1:]
+        return cls(center, normal, axes, (places - center) @ axes.T)
+
+    def flat(self, points: Points) -> NDArray[np.float64]:
+        """Where points (..., 3) are in the plane, (..., 2)."""
+        return (points - self.center) @ self.axes.T
+
+    def beyond(self, points: Points) -> NDArray[np.float64]:
+        """How far points (N, 3) are outside the prism, negative within, (N,)."""
+        flat = self.flat(points)
+        away = np.full(len(flat), np.inf)
+        for start, end in zip(self.corners, np.roll(self.corners, -1, axis=0), strict=True):
+            side = end - start
+            share = np.clip((flat - start) @ side / max(side @ side, np.finfo(float).tiny), 0, 1)
+            away = np.minimum(away, np.hypot(*(flat - start - share[:, None] * side).T))
+        return np.where(is_within(flat, self.corners), -away, away)
+
+
+def patch_through(surface: PoseSurface, prism: Prism) -> Patch:
+    """The part of a surface in a prism and a little around it; the prism is relative to the origin."""
+    return surface.patch(lambda points: prism.beyond(points) - _SLAB * surface.spacing)
+
+
+def area_through(patch: Patch, prism: Prism) -> NDArray[np.float64]:
+    """How much of each face of a patch lies in a prism, (F,), squared scan units; those on the rim as many of
+    64 parts as have their middles in it."""
+    inside = prism.beyond(patch.vertices)
+    rim = np.linalg.norm(patch.corners - np.roll(patch.corners, 1, axis=0), axis=2).max(axis=0)
+    of_face = inside[patch.faces]
+    share = (of_face.mean(axis=1) < 0).astype(np.float64)
+    straddling = np.flatnonzero((np.abs(of_face) <= rim[:, None]).any(axis=1))
+    if len(straddling):
+        middles = np.einsum("pc,cfi->fpi", _MIDDLES, patch.corners[:, straddling])
+        within = is_within(prism.flat(middles).reshape(-1, 2), prism.corners)
+        share[straddling] = within.reshape(len(straddling), -1).mean(axis=1)
+    areas: NDArray[np.float64] = share * np.linalg.norm(patch.doubled, axis=1) / 2
+    return areas
+
+
+def _middles(parts: int) -> NDArray[np.float64]:
+    """The middles of the equal triangles that a triangle is divided into, as weights, (parts^2, 3)."""
+    found = []
+    for i in range(parts):
+        for j in range(parts - i):
+            found.append((i + 1 / 3, j + 1 / 3))
+            if i + j < parts - 1:
+                found.append((i + 2 / 3, j + 2 / 3))
+    one, other = np.array(found).T / parts
+    return np.stack([one, other, 1 - one - other], axis=1)
+
+
+_MIDDLES = _middles(_PARTS)
+
+
+def rim_through(patch: Patch, prism: Prism) -> list[Line]:
+    """The lines in which the walls of a prism cut a patch, each (P, 3)."""
+    lines: list[Line] = []
+    sides = np.roll(prism.corners, -1, axis=0) - prism.corners
+    for corner, side in zip(prism.corners, sides, strict=True):
+        length = float(np.hypot(*side))
+        if not length:
+            continue
+        along = side @ prism.axes / length
+        start = prism.center + corner @ prism.axes
+        for line in plane_section(patch, start, np.cross(along, prism.normal)):
+            lines += _between(line, (line - start) @ along, length)
+    return lines
+
+
+def _between(line: Line, at: NDArray[np.float64], length: float) -> list[Line]:
+    """The pieces of a line that are between 0 and a length, where its places are `at`."""
+    pieces: list[list[NDArray[np.float64]]] = []
+    for start, end, a, b in zip(line[:-1], line[1:], at[:-1], at[1:], strict=True):
+        low, high = (0.0, 1.0) if a == b else sorted((-a / (b - a), (length - a) / (b - a)))
+        low, high = max(low, 0.0), min(high, 1.0)
+        if low >= high or (a == b and not 0 <= a <= length):
+            continue
+        if not pieces or low > 0:
+            pieces.append([start + low * (end - start)])
+        pieces[-1].append(start + high * (end - start))
+        if high < 1:
+            pieces.append([])
+    return [np.array(piece) for piece in pieces if len(piece) > 1]
+
+
+def is_within(places: Outline, outline: Outline) -> NDArray[np.bool_]:
+    """Whether places (N, 2) lie within a closed outline (P, 2): a ray to the right crosses it oddly often."""
+    inside = np.zeros(len(places), bool)
+    x, y = places.T
+    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        rises = (start[1] > y) != (end[1] > y)
+        if rises.any():
+            at = start[0] + (y[rises] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
+            inside[np.flatnonzero(rises)[x[rises] < at]] ^= True
+    return inside

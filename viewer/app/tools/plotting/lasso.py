@@ -1,0 +1,137 @@
+"""A lasso: a drag round a part of the surface, whose area and outline are then measured over time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....analysis.landmarks import Landmark
+from ....analysis.measures import Measure
+from ....analysis.spot import Spot, moved_spot
+from ....document.landmarks import Landmarks
+from ....errors import InputError
+from ....geometry import Vector, vector
+from ...desk import Click, Desk
+from ...scene.canvas import Canvas, ViewPlace
+
+FEWEST, MOST = 6, 16  # corners of a region
+_OFF = 0.03  # of its width, that the outline may run off the line from corner to corner
+_COLOR = 0xFFFFFF
+_TITLE = "Region"
+
+
+class Lasso:
+    """The lasso. is_drawn: whether drags in the view draw one, now or next. through: whether regions hold
+    what is before and behind them as well."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.is_drawn = False
+        self.through = False
+        self._desk = desk
+        self._places: list[Vector] = []  # that were drawn over, where the scan is shown
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether one is being drawn."""
+        return bool(self._places)
+
+    def toggle(self) -> None:
+        """Have the next drag draw one, or not."""
+        self.put_away() if self.is_drawn else self._take_up()
+
+    def _take_up(self) -> None:
+        self.is_drawn = True
+        self._desk.take_clicks()
+
+    def put_away(self) -> bool:
+        """Let drags be as without it; whether they were not."""
+        was_drawn, self.is_drawn = self.is_drawn, False
+        self._places.clear()
+        self._desk.leave_clicks()
+        return was_drawn
+
+    def abandon(self) -> None:
+        """Let go of the outline that is being drawn."""
+        self._places.clear()
+
+    def take(self, click: Click, ends: bool) -> None:
+        """The drag has come to a place. Raises InputError where it ends and has gone round nothing."""
+        if click.picked is not None:
+            self._places.append(click.picked.place)
+        self._desk.redraw()
+        if ends:
+            places = np.array(self._places)
+            self._places.clear()
+            self._add(places)
+
+    def _add(self, places: NDArray[np.float64]) -> None:
+        """Add a region: landmarks at its corners, its area and its outline."""
+        made = self._desk.document.part(Landmarks)
+        spots = [self._spot(place) for place in (places[corners_of(places)] if len(places) > 2 else ())]
+        found = [spot for spot in spots if spot is not None]
+        if len(found) < 3:
+            raise InputError("Go round a part of the surface: that was round nothing.")
+        name = _free_name(made)
+        names = tuple(f"{name}.{number}" for number in range(1, len(found) + 1))
+        landmarks = (Landmark(each).with_key(spot) for each, spot in zip(names, found, strict=True))
+        options = {"depth": "through"} if self.through else {}
+        measures = (
+            Measure(f"{name}, area", "area", names, options),
+            Measure(f"{name}, outline", "perimeter", names, options),
+        )
+        made = replace(made, all=(*made.all, *landmarks), measures=(*made.measures, *measures))
+        self._desk.change("Add region", made)
+        self.put_away()
+
+    def _spot(self, place: NDArray[np.float64]) -> Spot | None:
+        """The spot at a place that was drawn over; None where nothing was measured there."""
+        click = self._desk.seen_at(vector(place))
+        if click is None or click.picked is None or not click.picked.measured:
+            return None
+        return moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
+
+    def draw(self, canvas: Canvas, view: ViewPlace) -> None:
+        """Draw the outline as far as it goes."""
+        if len(self._places) > 1:
+            places = view.all_on_screen(np.array([*self._places, self._places[0]]))
+            alphas = np.ones(len(places))
+            alphas[-2] = 0.4  # what will close it
+            canvas.path(places, [_COLOR] * len(places), alphas, dots=False)
+
+    def prompt(self) -> str:
+        """The words that say what a drag does."""
+        return "Region: press on the surface, go round it, let go.  Esc ends."
+
+
+def corners_of(places: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The places of a closed outline, (M, 3), that tell its form: the two farthest apart, then again and again
+    the one that lies farthest off the line between those beside it, in their order, (K,).
+
+    K is 6 to 16, as few as keep the outline within 3 % of its width, and M where that is less.
+    """
+    count = len(places)
+    first = int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmax())
+    away = np.linalg.norm(places - places[first], axis=1)
+    corners, width = sorted({first, int(away.argmax())}), float(away.max())
+    while len(corners) < min(MOST, count):
+        off = np.zeros(count)
+        for start, end in zip(corners, [*corners[1:], corners[0] + count], strict=True):
+            between = np.arange(start + 1, end) % count
+            side = places[end % count] - places[start]
+            offsets = places[between] - places[start]
+            share = np.clip(offsets @ side / max(side @ side, np.finfo(float).tiny), 0, 1)
+            off[between] = np.linalg.norm(offsets - share[:, None] * side, axis=1)
+        off[corners] = -1
+        farthest = int(off.argmax())
+        if len(corners) >= FEWEST and off[farthest] <= _OFF * width:
+            break
+        corners = sorted([*corners, farthest])
+    return np.array(corners)
+
+
+def _free_name(made: Landmarks) -> str:
+    heads = [one.name.partition(".")[0] for one in made.all]
+    taken = {*heads, *(one.name.partition(",")[0] for one in made.measures)}
+    return next(name for number in range(1, len(taken) + 2) if (name := f"{_TITLE} {number}") not in taken)
