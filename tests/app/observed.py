@@ -135,6 +135,7 @@ def shown(app: App) -> dict[str, Any]:
         "clicking": app.tools.clicking,
         "is_under_way": app.tools.is_under_way,
         "landmarks": landmarks(app),
+        "measured": {name: one.values.tolist() for name, one in app.tools.followed.series.items()},
         "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),

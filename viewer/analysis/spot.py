@@ -24,6 +24,7 @@ from .pick import Neighbor, Picked, largest_deviation
 
 _SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is before what it hides
 _SAME = 1e-14  # share of coordinates that rounding changes
+_FLAT = 0.1  # of how far points reach along a line, that they reach across it where they have a plane
 _TURNING = 4  # points that tell how a place turns and how well they do
 
 
@@ -141,21 +142,39 @@ def followed(spot: Spot, pose: Pose, motion: Rigid = STILL) -> Spot | None:
 def _carried(
     position: NDArray[np.float64], was: NDArray[np.float64], now: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """A place that points (n, 3) carry with them as a rigid body would: where it is, how it is turned (3, 3),
-    and the standard deviation of each of its coordinates, by how far the points are off such a motion.
+    """A place that points (n, 3) carry with them: where it is, how it is turned (3, 3), and the standard
+    deviation of each of its coordinates, by how far the points are off the motion of a rigid body.
 
-    Fewer than four do not tell a turn and how good it is: the nearest alone is followed, at the same offset,
-    which may have turned any way.
+    It stays at the same mean of the points where it lies among them (`_shares`), so that it goes along with
+    a surface that stretches; what it is off that mean is turned as a rigid body would be. Fewer than four do
+    not tell a turn and how good it is: that offset may have turned any way.
     """
+    shares = _shares(position, was)
     if len(was) < _TURNING:
-        offset = position - was[0]
-        return now[0] + offset, np.eye(3), float(np.linalg.norm(offset)) / math.sqrt(3)
+        offset = position - shares @ was
+        return shares @ now + offset, np.eye(3), float(np.linalg.norm(offset)) / math.sqrt(3)
     before, after = was.mean(axis=0), now.mean(axis=0)
     left, _, right = np.linalg.svd((now - after).T @ (was - before))  # Kabsch 1976
     turned = left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
     off = (now - after) - (was - before) @ turned.T
     free = 3 * len(was) - 6  # of the coordinates, six make the motion
-    return after + turned @ (position - before), turned, math.sqrt(float((off**2).sum()) / free)
+    placed = shares @ now + turned @ (position - shares @ was)
+    return placed, turned, math.sqrt(float((off**2).sum()) / free)
+
+
+def _shares(position: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The weights of points (n, 3) whose mean is the place nearest to a position in their plane, (n,), the
+    evenest of these. Where the position lies beside them, or they have no plane: even ones, or the first's
+    alone where they do not tell a turn."""
+    count, offsets = len(points), points - points.mean(axis=0)
+    usual = np.full(count, 1 / count) if count >= _TURNING else np.eye(count)[0]
+    _, widths, axes = np.linalg.svd(offsets, full_matrices=False)
+    if count < 3 or not widths[1] > _FLAT * widths[0]:
+        return usual
+    rows = np.column_stack([offsets @ axes[:2].T, np.ones(count)])
+    wanted = np.append(axes[:2] @ (position - points.mean(axis=0)), 1.0)
+    shares = np.linalg.lstsq(rows.T, wanted, rcond=None)[0]
+    return shares if shares @ shares <= 1 else usual  # else errors of points would grow
 
 
 def moved_spot(spot: Spot, motion: Rigid) -> Spot:

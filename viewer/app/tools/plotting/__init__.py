@@ -40,9 +40,9 @@ TITLE = "Curves"
 class Tool:
     """The tool that plots measures over time, and draws the ways of landmarks.
 
-    shown: what is plotted. ways, lines: what is drawn over the picture. lasso: draws regions. adding: the measure that is to be
-    added. measurer: what finds measures over time. pointed: the curve that the mouse points at in the
-    table, by name.
+    shown: what is plotted. ways, lines: what is drawn over the picture. lasso: draws regions. adding: the
+    measure that is to be added. measurer: what finds measures over time. pointed: the curve that the mouse
+    points at in the table, by name.
     """
 
     def __init__(self, desk: Desk) -> None:

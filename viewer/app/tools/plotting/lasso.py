@@ -106,8 +106,8 @@ class Lasso:
 
 
 def corners_of(places: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The places of a closed outline, (M, 3), that tell its form: the two farthest apart, then again and again
-    the one that lies farthest off the line between those beside it, in their order, (K,).
+    """The places of a closed outline, (M, 3), that tell its form, in their order, (K,): two that lie far
+    apart, then again and again the one that lies farthest off the line between those beside it.
 
     K is 6 to 16, as few as keep the outline within 3 % of its width, and M where that is less.
     """

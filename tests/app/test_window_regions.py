@@ -1,0 +1,130 @@
+"""What is measured is drawn over the picture; regions by a lasso, with real drags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from virtual_screen import PANEL, RunningApp, Screen, State, running_app
+
+from viewer.app.tools.plotting.lasso import FEWEST, MOST, corners_of
+from viewer.output.plots import PLOT_COLORS
+
+SIDE, HEIGHT, STEP = 41, 30.0, 2.0  # points along a side, between two sheets, between points; scan units
+FRAMES = 3
+GROWS = 0.1  # of its size, from frame to frame
+
+
+def sheets() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Two flat sheets, one behind the other, that grow: positions (T, 2 N, 3), and faces."""
+    x, y = np.meshgrid(np.arange(SIDE) - SIDE // 2, np.arange(SIDE) - SIDE // 2)
+    flat = np.stack([x.ravel(), y.ravel(), np.zeros(SIDE**2)], axis=1) * STEP
+    corner = (np.arange(SIDE - 1)[:, None] * SIDE + np.arange(SIDE - 1)).ravel()
+    one = np.stack([corner, corner + 1, corner + SIDE], axis=1)
+    other = np.stack([corner + 1, corner + SIDE + 1, corner + SIDE], axis=1)
+    front = np.concatenate([one, other])
+    both = np.concatenate([flat + (0, 0, HEIGHT), flat])
+    scales = (1 + GROWS * np.arange(FRAMES))[:, None, None]
+    return both * scales, np.concatenate([front, front + SIDE**2])
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    positions, faces = sheets()
+    np.savez(tmp_path / "scan.npz", positions=positions, faces=faces)
+    return tmp_path / "scan.npz"
+
+
+def drag_round(app: RunningApp, radius: float) -> None:
+    """Drag a square round the middle of the view. radius: half its side, pixels."""
+    left, top, width, height = app.view()
+    x, y = left + width // 2, top + height // 2
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -0.9))
+    places = [(x + radius * a, y + radius * b) for a, b in corners]
+    app.screen.do("mousemove", *map(int, places[0]), "sleep", 0.2, "mousedown", 1, "sleep", 0.2)
+    for start, end in zip(places[:-1], places[1:], strict=True):
+        for share in np.linspace(0.1, 1, 10):
+            at = [round(a + share * (b - a)) for a, b in zip(start, end, strict=True)]
+            app.screen.do("mousemove", *at, "sleep", 0.05)
+    app.screen.do("mouseup", 1)
+    app.settle()
+
+
+def pixels_of(picture: NDArray[np.uint8], color: int) -> float:
+    """How many pixels are of a colour, 0xRRGGBB."""
+    wanted = np.array([color >> 16, color >> 8 & 255, color & 255])
+    return float((np.abs(picture.astype(int) - wanted).max(axis=2) < 12).sum())
+
+
+def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        left, top, width, height = app.view()
+        view = slice(top, top + height), slice(left, left + width)
+        assert pixels_of(screen.picture()[view], PLOT_COLORS[0]) < 20
+        app.act(PANEL, ("item_click", "###region"))
+        assert app.settle().clicking == "plotting"
+        drag_round(app, height / 8)
+        assert app.state.clicking is None
+        parts = app.state.document["parts"]["landmarks"]
+        assert [measure["kind"] for measure in parts["measures"]] == ["area", "perimeter"]
+        count = len(parts["all"])
+        assert 6 <= count <= 16
+        places = np.array([one["keys"][0]["position"] for one in parts["all"]])
+        assert np.abs(places[:, 2] - HEIGHT).max() < 1e-3, "on the front sheet"
+        x, y = places[:, :2].T
+        area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+        def areas(state: State) -> list[float]:
+            return state.measured.get("Region 1, area", [np.nan])
+
+        front = areas(app.see(lambda state: np.isfinite(areas(state)).all()))
+        np.testing.assert_allclose(front, area * (1 + GROWS * np.arange(FRAMES)) ** 2, rtol=1e-3)
+        app.settle()
+        picture = screen.picture()[view]
+        assert pixels_of(picture, PLOT_COLORS[0]) + pixels_of(picture, PLOT_COLORS[1]) > 4 * height / 8
+
+        app.act(PANEL, ("item_click", "Through"), ("item_click", "###region"))
+        drag_round(app, height / 8)
+        name = "Region 2, area"
+        both = app.see(lambda state: np.isfinite(state.measured.get(name, [np.nan])).all()).measured[name]
+        np.testing.assert_allclose(both, 2 * np.array(front), rtol=0.05)
+
+        app.act(PANEL, ("item_click", "###region"))
+        left, top, *_ = app.view()
+        screen.do("mousemove", left + 4, top + 40, "sleep", 0.2, "mousedown", 1, "sleep", 0.1)
+        screen.do("mousemove", left + 20, top + 60, "sleep", 0.2, "mouseup", 1)
+        app.told("Go round a part of the surface")
+        assert app.settle().clicking == "plotting"
+        screen.do("key", "Escape")
+        assert app.settle().clicking is None
+        assert len(app.state.document["parts"]["landmarks"]["measures"]) == 4
+        assert "Traceback" not in app.log()
+
+
+def test_corners_tell_the_form_of_an_outline() -> None:
+    turns = 2 * np.pi * np.arange(200) / 200
+    circle = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+    corners = corners_of(circle)
+    assert FEWEST < len(corners) <= MOST
+    assert (np.diff(corners) > 0).all()
+    gaps = np.diff([*turns[corners], turns[corners[0]] + 2 * np.pi])
+    assert 1 - np.cos(gaps.max() / 2) < 0.03 * 2
+    side = np.linspace(0, 1, 50, endpoint=False)
+    square = np.concatenate(
+        [
+            np.stack([a, b, 0 * a], 1)
+            for a, b in (
+                (side, 0 * side),
+                (1 + 0 * side, side),
+                (1 - side, 1 + 0 * side),
+                (0 * side, 1 - side),
+            )
+        ]
+    )
+    assert {0, 50, 100, 150} <= set(corners_of(square).tolist())
+    assert corners_of(circle[:2]).tolist() == [0, 1]
+    assert len(corners_of(np.zeros((9, 3)))) <= MOST
