@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def sheets() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     one = np.stack([corner, corner + 1, corner + SIDE], axis=1)
     other = np.stack([corner + 1, corner + SIDE + 1, corner + SIDE], axis=1)
     front = np.concatenate([one, other])
-    both = np.concatenate([flat + (0, 0, HEIGHT), flat])
+    both = np.concatenate([flat + np.array([0, 0, HEIGHT]), flat])
     scales = (1 + GROWS * np.arange(FRAMES))[:, None, None]
     return both * scales, np.concatenate([front, front + SIDE**2])
 
@@ -44,7 +45,7 @@ def drag_round(app: RunningApp, radius: float) -> None:
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -0.9))
     places = [(x + radius * a, y + radius * b) for a, b in corners]
     app.screen.do("mousemove", *map(int, places[0]), "sleep", 0.2, "mousedown", 1, "sleep", 0.2)
-    for start, end in zip(places[:-1], places[1:], strict=True):
+    for start, end in pairwise(places):
         for share in np.linspace(0.1, 1, 10):
             at = [round(a + share * (b - a)) for a, b in zip(start, end, strict=True)]
             app.screen.do("mousemove", *at, "sleep", 0.05)
