@@ -81,16 +81,14 @@ def _chords(
             if (start == end).all():
                 continue
             near = list(set.intersection(*(around[corner] for corner in place)))
-            tried = np.array([(start + end) / 2, end])
+            tried = np.array([(start + end) / 2, end, start])
             corners = patch.corners[:, near]
-            weights = [nearest_weights(corners - position) for position in tried]
-            off = sum(
-                np.linalg.norm(np.einsum("fc,cfi->fi", found, corners) - position, axis=1)
-                for found, position in zip(weights, tried, strict=True)
-            )
-            best = int(np.argmin(off))
+            from_tried = corners[:, None] - tried[:, None]  # one call for all three: most are of few faces
+            weights = nearest_weights(from_tried.reshape(3, -1, 3)).reshape(3, -1, 3)
+            off = np.linalg.norm(np.einsum("pfc,cpfi->pfi", weights, from_tried), axis=2)
+            best = int(np.argmin(off[0] + off[1]))
             face, ends = near[best], []
-            for found in (nearest_weights(corners[:, [best]] - start)[0], weights[1][best]):
+            for found in (weights[2, best], weights[1, best]):
                 found = np.where(found < _SAME, 0.0, found)
                 ends.append(found / found.sum())
             place = {int(corner) for corner in patch.faces[face][ends[1] > 0]}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,16 @@ class Prism:
         """Where points (..., 3) are in the plane, (..., 2)."""
         return (points - self.center) @ self.axes.T
 
+    def with_corner(self, number: int, corner: Outline) -> Prism:
+        """The prism over the same plane with another place of one corner, (2,)."""
+        corners = self.corners.copy()
+        corners[number] = corner
+        return replace(self, corners=corners)
+
+    def has(self, flat: Outline) -> NDArray[np.bool_]:
+        """Whether places in the plane, (..., 2), are in the polygon, (...)."""
+        return is_within(flat.reshape(-1, 2), self.corners).reshape(flat.shape[:-1])
+
     def beyond(self, points: Points) -> NDArray[np.float64]:
         """How far points (N, 3) are outside the prism, negative within, (N,)."""
         flat = self.flat(points)
@@ -64,17 +75,24 @@ def patch_through(surface: PoseSurface, prism: Prism) -> Patch:
 def area_through(patch: Patch, prism: Prism) -> NDArray[np.float64]:
     """How much of each face of a patch lies in a prism, (F,), squared scan units; those on the rim as many of
     64 parts as have their middles in it."""
-    inside = prism.beyond(patch.vertices)
-    rim = np.linalg.norm(patch.corners - np.roll(patch.corners, 1, axis=0), axis=2).max(axis=0)
-    of_face = inside[patch.faces]
-    share = (of_face.mean(axis=1) < 0).astype(np.float64)
-    straddling = np.flatnonzero((np.abs(of_face) <= rim[:, None]).any(axis=1))
-    if len(straddling):
-        middles = np.einsum("pc,cfi->fpi", _MIDDLES, patch.corners[:, straddling])
-        within = is_within(prism.flat(middles).reshape(-1, 2), prism.corners)
-        share[straddling] = within.reshape(len(straddling), -1).mean(axis=1)
+    widths = np.linalg.norm(patch.corners - np.roll(patch.corners, 1, axis=0), axis=2).max(axis=0)
+    inside = prism.beyond(patch.vertices)[patch.faces]
+    share = (inside.mean(axis=1) < 0).astype(np.float64)
+    on_rim = np.flatnonzero((np.abs(inside) <= widths[:, None]).any(axis=1))
+    share[on_rim] = prism.has(prism.flat(middles_of(patch, on_rim))).mean(axis=1)
     areas: NDArray[np.float64] = share * np.linalg.norm(patch.doubled, axis=1) / 2
     return areas
+
+
+def middles_of(patch: Patch, faces: NDArray[np.intp]) -> NDArray[np.float64]:
+    """The middles of the 64 parts of equal area of faces by number, (F', 64, 3)."""
+    return np.tensordot(patch.corners[:, faces], _MIDDLES, (0, 1)).transpose(0, 2, 1)
+
+
+def near_rim(patch: Patch, prism: Prism, reach: float) -> Patch:
+    """The faces of a patch that have a corner no farther than `reach` off the walls of a prism."""
+    near = np.abs(prism.beyond(patch.vertices)) <= reach
+    return Patch.of(patch.vertices, patch.faces[near[patch.faces].any(axis=1)])
 
 
 def _middles(parts: int) -> NDArray[np.float64]:
@@ -92,16 +110,17 @@ def _middles(parts: int) -> NDArray[np.float64]:
 _MIDDLES = _middles(_PARTS)
 
 
-def rim_through(patch: Patch, prism: Prism) -> list[Line]:
-    """The lines in which the walls of a prism cut a patch, each (P, 3)."""
+def rim_through(patch: Patch, prism: Prism, walls: Sequence[int] | None = None) -> list[Line]:
+    """The lines in which the walls of a prism cut a patch, each (P, 3). walls: of these corners to the next;
+    None: all."""
     lines: list[Line] = []
     sides = np.roll(prism.corners, -1, axis=0) - prism.corners
-    for corner, side in zip(prism.corners, sides, strict=True):
-        length = float(np.hypot(*side))
+    for wall in range(len(sides)) if walls is None else walls:
+        length = float(np.hypot(*sides[wall]))
         if not length:
             continue
-        along = side @ prism.axes / length
-        start = prism.center + corner @ prism.axes
+        along = sides[wall] @ prism.axes / length
+        start = prism.center + prism.corners[wall] @ prism.axes
         for line in plane_section(patch, start, np.cross(along, prism.normal)):
             lines += _between(line, (line - start) @ along, length)
     return lines

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from ....mesh.cutting import Piece, pieces_along
 from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
-from ....mesh.smoothing import Points
 from ..planes import THROUGH, plane_of
-from ..prism import Prism, area_through, is_within, patch_through, rim_through
+from ..prism import Prism, area_through, is_within, near_rim, patch_through, rim_through
 from ..surface import Circuit, Found, PoseSurface
 from . import MeasureKind, Options
 from .along import direction, off_smooth
@@ -18,7 +17,8 @@ from .along import direction, off_smooth
 FRONT, ALL = "front", "through"
 DEPTHS = (FRONT, ALL)  # the surface that the landmarks are on, or all that is before and behind it as well
 _STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
-_WIDE_STEP = 0.5  # the same, where all in a prism is measured
+_WIDE_STEP = 1.0  # the same, where all in a prism is measured
+_RIM = 4.0  # spacings off the walls of a prism within which that changes something
 _BENT = 3.0  # of the squared angles at a face's edges, by which it is smaller than what it stands for
 
 
@@ -48,33 +48,40 @@ def _area(surface: PoseSurface, positions: NDArray[np.float64], options: Options
 
 def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bool) -> Found | None:
     """The area, or the rim, of all of a surface in the prism over the polygon of landmarks."""
-    local, step = positions - surface.origin, _WIDE_STEP * surface.spacing
-    prism = Prism.over(local)
+    prism = Prism.over(positions - surface.origin)
     patch = None if prism is None else patch_through(surface, prism)
-    if prism is None or patch is None or not len(patch.faces):
+    lines = rim_through(patch, prism) if prism is not None and patch is not None and len(patch.faces) else []
+    if prism is None or patch is None or not lines:
         return None
-    lines, areas = rim_through(patch, prism), area_through(patch, prism)
-    if not lines:
-        return None
+    if is_rim:
+        value, deviation = sum(map(length_of, lines)), off_smooth(surface, lines)
+    else:
+        areas = area_through(patch, prism)
+        value, deviation = float(areas.sum()), float((areas * patch.bends).sum()) / _BENT
+    gradient = _gradient_through(
+        near_rim(patch, prism, _RIM * surface.spacing), prism, surface.spacing, is_rim
+    )
+    return Found(value, gradient, deviation, tuple(line + surface.origin for line in lines))
 
-    def value(places: Points) -> float:
-        moved = Prism.over(places)
-        if moved is None:
-            return np.nan
+
+def _gradient_through(rim: Patch, prism: Prism, spacing: float, is_rim: bool) -> NDArray[np.float64]:
+    """How the area, or the rim, changes as each landmark moves in the plane of them all, (K, 3)."""
+    count, step = len(prism.corners), _WIDE_STEP * spacing
+    middles = prism.flat(rim.corners.mean(axis=0))
+    areas = np.linalg.norm(rim.doubled, axis=1) / 2
+
+    def value(number: int, corner: NDArray[np.float64]) -> float:
+        moved = prism.with_corner(number, corner)
         if is_rim:
-            return sum(map(length_of, rim_through(patch, moved)))
-        return float(area_through(patch, moved).sum())
+            return sum(map(length_of, rim_through(rim, moved, [number - 1, number])))
+        return float(areas[moved.has(middles)].sum())
 
-    gradient = np.zeros_like(local)
-    for index in np.ndindex(local.shape):
-        sides = []
-        for side in (step, -step):
-            moved = local.copy()
-            moved[index] += side
-            sides.append(value(moved))
-        gradient[index] = (sides[0] - sides[1]) / (2 * step)
-    deviation = off_smooth(surface, lines) if is_rim else float((areas * patch.bends).sum()) / _BENT
-    return Found(value(local), gradient, deviation, tuple(line + surface.origin for line in lines))
+    gradient = np.zeros((count, 3))
+    for number, corner in enumerate(prism.corners):
+        for axis, away in zip(prism.axes, step * np.eye(2), strict=True):
+            change = value(number, corner + away) - value(number, corner - away)
+            gradient[number] += change / (2 * step) * axis
+    return gradient
 
 
 def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
