@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 _Array = NDArray[np.float64]
 
+ORDERS = ("value", "speed", "acceleration")  # by how often a curve is differentiated
 _EDGE = 1e-9  # relative: a point at the very edge of the window is in it, whatever rounding says
 _ALIKE = 1e-9  # relative: peaks that rounding alone tells apart
 _CERTAIN = 2.0  # standard deviations, from which on an amplitude is told from noise
@@ -88,7 +89,7 @@ def _fit(run: bytes, smoothing: Smoothing, order: int) -> tuple[NDArray[np.intp]
     rows = first[:, None] + np.arange((behind - first).max())
     is_in = rows < behind[:, None]
     rows = np.minimum(rows, count - 1)
-    scale = max(half, 1e-300)
+    scale = min(half, float(times[-1] - times[0])) or 1.0
     offsets = (times[rows] - times[:, None]) / scale
     powers = offsets[..., None] ** np.arange(smoothing.degree + 1) * is_in[..., None]
     weights = np.linalg.pinv(powers)[:, order].astype(np.float64) * (math.factorial(order) / scale**order)

@@ -2,12 +2,14 @@
 
 The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
 the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
+The numbers of the measures' movements are another table.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,23 +18,33 @@ from pathlib import Path
 
 import numpy as np
 
+from ..analysis.curves import ORDERS, Smoothing
 from ..analysis.landmarks.files import AXES, landmark_suffixes, read_landmarks
 from ..analysis.landmarks.files.long_table import LONG_COLUMNS, STATES, cell, landmark_rows
 from ..analysis.landmarks.landmark_set import LandmarkSet, told_apart
 from ..analysis.landmarks.placed import landmarks_of, told_beside
 from ..analysis.measures import Measure, Quantity, Series
+from ..analysis.measures.curves import (
+    NUMBER_COLUMNS,
+    PER_ORDER,
+    MeasureCurve,
+    number_rows,
+    power_of,
+    unit_of,
+)
 from ..analysis.measures.definitions import read_measures
 from ..analysis.measures.series import all_series, surface_of
 from ..analysis.track import Known, Track
 from ..analysis.tracking import track_landmarks
 from ..csv_text import save_rows
 from ..errors import InputError
-from ..files import whole_file
+from ..files import absolute, whole_file
 from ..output.export import check_output
 from ..scan.inputs import scan_inputs
 from ..scan.points import UNKNOWN_UNIT
 from ..scan.timeline import Timeline
 from ..scan.times import frame_in_words
+from ..scan.units import Scale
 from ..task import Task
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
@@ -42,7 +54,6 @@ _SUFFIXES = (".csv", ".json")
 _STEPS = 200  # of a progress bar
 _NAMED = 3  # landmarks that a message names
 _LONGEST = 1e15  # scan units
-_POWERS: Mapping[Quantity, str] = {"length": "", "area": "^2", "volume": "^3"}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -58,12 +69,25 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True, help=" or ".join(_SUFFIXES)
     )
+    parser.add_argument(
+        "--numbers", type=Path, metavar="FILE",
+        help=f"the largest movement of each measure: amplitude, onset, peak, ...; {' or '.join(_SUFFIXES)}",
+    )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
     how = parser.add_argument_group("how")
     how.add_argument(
         "--noise", type=_length, default=0.0, metavar="SIGMA",
         help="of the scanner: the standard deviation of a coordinate that it measures, scan units",
+    )  # fmt: skip
+    how.add_argument(
+        "--order", choices=ORDERS, default=ORDERS[0],
+        help=f"what is told of measures: values, or how fast these change; default {ORDERS[0]}",
+    )  # fmt: skip
+    how.add_argument(
+        "--smoothing", type=_time, metavar="SECONDS",
+        help="width of the window in which curves are smoothed for speed, acceleration and numbers; "
+        f"default {Smoothing().seconds}",
     )  # fmt: skip
     how.add_argument(
         "--placed-in", type=int, metavar="I",
@@ -74,12 +98,12 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Write the table of the chosen poses, by default all."""
-    check_output(args.out, _SUFFIXES, several=False)
+    """Write the tables of the chosen poses, by default all."""
+    outputs = _outputs(args)
     with open_timeline(args, args.scan) as timeline:
-        indices = chosen_poses(args, timeline) or list(range(len(timeline)))
+        indices = sorted(chosen_poses(args, timeline) or range(len(timeline)))
         inputs = [args.landmarks, *([args.measures] if args.measures else [])]
-        claim([args.out], [*scan_inputs(timeline), *inputs], args.force)
+        claim(outputs, [*scan_inputs(timeline), *inputs], args.force)
         unit = None if timeline.unit == UNKNOWN_UNIT else timeline.unit
         found = read_landmarks(args.landmarks, unit, args.axes)
         measures = _measures(args, found)
@@ -93,21 +117,56 @@ def run(args: Namespace) -> int:
                 found = _on_surface(args, found, timeline, frame)
             tracks = _with_noise(_tracks(found, timeline, frame), args.noise)
         with _shown(f"Measuring {timeline.name}"):
-            series = all_series(measures, tracks, timeline, frames=indices)
-        _write(args.out, timeline, _rows(tracks, series, timeline, indices))
-        _tell_gaps(tracks, series, indices)
-    tell(args.out)
+            found_series = all_series(measures, tracks, timeline, frames=indices)
+        series = [_in_frames(each, indices) for each in found_series.values()]
+        order = ORDERS.index(args.order)
+        curves = _curves(args, series, timeline) if order or args.numbers else []
+        if order:
+            series = [_changes(*each, order) for each in zip(series, curves, strict=True)]
+        _write(args.out, timeline, LONG_COLUMNS, _rows(tracks, series, timeline, indices, order))
+        if args.numbers:
+            _write(args.numbers, timeline, NUMBER_COLUMNS, number_rows(curves))
+        _tell_gaps(tracks, series, indices, order)
+    for path in outputs:
+        tell(path)
     return 0
 
 
 def _length(text: str) -> float:
-    try:
-        length = float(text)
-    except ValueError:
-        length = math.nan
+    length = _number(text)
     if not 0 <= length <= _LONGEST:
         raise ArgumentTypeError(f"'{text}' is no length of 0 or more, up to {_LONGEST:g}")
     return length
+
+
+def _time(text: str) -> float:
+    seconds = _number(text)
+    if not 0 < seconds < math.inf:
+        raise ArgumentTypeError(f"'{text}' is no time above 0, in seconds")
+    return seconds
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _outputs(args: Namespace) -> list[Path]:
+    """The files to write. Raises InputError, before any work, where one cannot be, or a flag does nothing."""
+    outputs = [args.out, *([args.numbers] if args.numbers else [])]
+    for path in outputs:
+        check_output(path, _SUFFIXES, several=False)
+    if len({os.path.realpath(absolute(path)) for path in outputs}) < len(outputs):
+        raise InputError("is the file of the long table", args.numbers, "Write --numbers to another file")
+    asked = [*(["--numbers"] if args.numbers else []), *(["--order"] if args.order != ORDERS[0] else [])]
+    if asked and args.measures is None:
+        raise InputError("is of measures, and there are none", asked[0], "Tell them by --measures")
+    if args.smoothing is not None and not asked:
+        hint = f"Use it with --numbers, or --order {' or '.join(ORDERS[1:])}"
+        raise InputError("smooths nothing that is asked for", "--smoothing", hint)
+    return outputs
 
 
 def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
@@ -187,43 +246,78 @@ def _with_noise(tracks: Mapping[str, Track], noise: float) -> dict[str, Track]:
     return {name: replace(track, covariances=track.covariances + spread) for name, track in tracks.items()}
 
 
+def _in_frames(series: Series, indices: Sequence[int]) -> Series:
+    """The values in these frames alone."""
+    rows = list(indices)
+    times, values, sigmas = series.times[rows], series.values[rows], series.sigmas[rows]
+    return replace(series, times=times, values=values, sigmas=sigmas, known=series.known[rows])
+
+
+def _curves(args: Namespace, series: Sequence[Series], timeline: Timeline) -> list[MeasureCurve]:
+    """The curves of the measures, as the window has them."""
+    smoothing = Smoothing() if args.smoothing is None else Smoothing(args.smoothing)
+    return [MeasureCurve.of(each, Scale(timeline.unit), smoothing) for each in series]
+
+
+def _changes(series: Series, curve: MeasureCurve, order: int) -> Series:
+    """The speed or acceleration of a measure in place of its values; a gap where that is not known."""
+    values, sigmas = curve.derivative(order)
+    known = np.where(np.isfinite(values), series.known, np.minimum(series.known, Known.GAP))
+    return replace(series, values=values, sigmas=sigmas, known=known.astype(np.uint8))
+
+
 def _rows(
-    tracks: Mapping[str, Track], series: Mapping[str, Series], timeline: Timeline, indices: Sequence[int]
+    tracks: Mapping[str, Track],
+    series: Sequence[Series],
+    timeline: Timeline,
+    indices: Sequence[int],
+    order: int,
 ) -> list[list[object]]:
-    """The rows of landmarks, then those of measures, frame by frame."""
+    """The rows of landmarks, then those of measures, frame by frame. series: in these frames. order: of the
+    derivative that they hold."""
     landmarks = LandmarkSet.of_tracks(tracks, timeline.unit)
     wanted = {index + 1 for index in indices}
     rows = [row for row in landmark_rows(landmarks) if row[1] in wanted]
-    for index in sorted(indices):
-        for each in series.values():
-            state = STATES[Known(int(each.known[index]))]
-            values = cell(each.values[index]), cell(each.sigmas[index])
-            unit = "deg" if each.quantity == "angle" else f"{timeline.unit}{_POWERS[each.quantity]}"
-            time = cell(each.times[index])
+    for row, index in enumerate(indices):
+        for each in series:
+            state = STATES[Known(int(each.known[row]))]
+            values = cell(each.values[row]), cell(each.sigmas[row])
+            time, unit = cell(each.times[row]), _unit(each.quantity, timeline.unit, order)
             rows.append(["measure", index + 1, time, each.name, None, None, None, state, *values, unit])
     return rows
 
 
-def _write(path: Path, timeline: Timeline, rows: Sequence[Sequence[object]]) -> None:
+def _unit(quantity: Quantity, unit: str, order: int) -> str:
+    """The unit of a measure's values in plain letters, or that of their derivatives as the window has it."""
+    if order:
+        return unit_of(quantity, unit) + PER_ORDER[order]
+    power = power_of(quantity)
+    return "deg" if not power else unit if power == 1 else f"{unit}^{power}"
+
+
+def _write(path: Path, timeline: Timeline, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     """CSV, or the same as JSON: `rows` of objects by the names of the columns, null where a cell is empty."""
     if path.suffix.lower() == ".csv":
-        save_rows(path, [LONG_COLUMNS, *rows])
+        save_rows(path, [columns, *rows])
         return
-    objects = [dict(zip(LONG_COLUMNS, row, strict=True)) for row in rows]
+    objects = [dict(zip(columns, row, strict=True)) for row in rows]
     table = {"scan": timeline.name, "unit": timeline.unit, "rows": objects}
     with whole_file(path) as temporary:
         text = json.dumps(table, indent=1, allow_nan=False, ensure_ascii=False)
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _tell_gaps(tracks: Mapping[str, Track], series: Mapping[str, Series], indices: Sequence[int]) -> None:
+def _tell_gaps(
+    tracks: Mapping[str, Track], series: Sequence[Series], indices: Sequence[int], order: int
+) -> None:
     """Say in how many of the frames each is not known."""
-    known = {name: each.known for name, each in tracks.items()}
-    known |= {name: each.known for name, each in series.items()}
+    what = f"the {ORDERS[order]} of " if order else ""
+    known = {f"'{name}'": each.known[list(indices)] for name, each in tracks.items()}
+    known |= {f"{what}'{each.name}'": each.known for each in series}
     for name, states in known.items():
-        gaps = int((states[list(indices)] < Known.TRACKED).sum())
+        gaps = int((states < Known.TRACKED).sum())
         if gaps:
-            warn(f"'{name}' is not known in {gaps} of {len(indices)} frames")
+            warn(f"{name} is not known in {gaps} of {len(indices)} frames")
 
 
 @contextmanager

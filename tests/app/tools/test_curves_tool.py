@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from viewer.analysis.measures import Quantity, Series
+from viewer.analysis.measures.curves import NUMBER_COLUMNS, number_rows, unit_of
 from viewer.app.tools.plotting.choices import AGAINST, REPEATS, CurveChoices, Settings
-from viewer.app.tools.plotting.shown import Shown, unit_of
-from viewer.app.tools.plotting.words import number_rows, numbers_in_words, with_spread
+from viewer.app.tools.plotting.shown import Shown
+from viewer.app.tools.plotting.words import numbers_in_words, with_spread
 from viewer.scan.units import Scale
 
 TIMES = np.arange(240) / 30
@@ -123,7 +124,7 @@ def test_a_scan_of_one_frame_and_one_that_nothing_is_known_of_are_plotted() -> N
                     measure, replace(measure, name="c"), settings=replace(SETTINGS, mode=mode, order=order)
                 )
                 assert numbers_in_words(shown.curves[0])[1] == "-"
-                assert number_rows(shown.curves)[1][0] == measure.name
+                assert number_rows(shown.curves)[0][0] == measure.name
 
 
 def test_numbers_are_told_with_how_sure_they_are() -> None:
@@ -136,10 +137,10 @@ def test_numbers_are_told_with_how_sure_they_are() -> None:
     assert peak == "1.50 s"
     assert duration.startswith("1.29 s")
     assert fastest.endswith(" mm/s")
-    head, row = number_rows([curve])
-    told = dict(zip(head, row, strict=True))
-    assert float(told["duration [s]"]) == pytest.approx(0.6 * math.sqrt(2 * math.log(10)), abs=5e-3)
-    assert float(told["fastest per s"]) == pytest.approx(10 / 0.3 * math.exp(-0.5), rel=0.02)
+    (row,) = number_rows([curve])
+    told = dict(zip(NUMBER_COLUMNS, row, strict=True))
+    assert told["duration [s]"] == pytest.approx(0.6 * math.sqrt(2 * math.log(10)), abs=5e-3)
+    assert told["fastest per s"] == pytest.approx(10 / 0.3 * math.exp(-0.5), rel=0.02)
     assert with_spread(12.3456, 0.1) == "12.35 ± 0.20"
     assert with_spread(1234.5, 30, "mm") == "1234 ± 60 mm"
     assert with_spread(12.3456, math.nan, "mm") == "12.35 mm"

@@ -13,6 +13,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
 from ....analysis.measures import Measure
+from ....analysis.measures.curves import NUMBER_COLUMNS, number_rows
 from ....csv_text import to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError
@@ -32,7 +33,7 @@ from .lines import MeasureLines
 from .measurer import Measurer
 from .shown import Curve, Kept, Shown
 from .ways import Ways
-from .words import number_rows, numbers_in_words
+from .words import numbers_in_words
 
 TITLE = "Curves"
 
@@ -231,7 +232,8 @@ class Tool:
 
     def copy_numbers(self) -> None:
         """Put amplitude, onset, peak and duration of each curve into the clipboard, as a table."""
-        imgui.set_clipboard_text(to_text(number_rows(self.shown.curves), "\t"))
+        rows = [NUMBER_COLUMNS, *number_rows(self.shown.curves)]
+        imgui.set_clipboard_text(to_text(rows, "\t"))
         self.desk.note(f"Copied the numbers of {len(self.shown.curves)} curves as a table.")
 
     def ask_to_save(self) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ....analysis.curves import Smoothing
+from ....analysis.curves import ORDERS, Smoothing
 from ....document.part import Part
 from ....params import param
 
 TIME, AGAINST, REPEATS = "time", "against", "repeats"
-VALUE, SPEED, ACCELERATION = "value", "speed", "acceleration"
+VALUE, SPEED, ACCELERATION = ORDERS
 SCAN, ANCHORS = "scan", "anchors"
-ORDERS = (VALUE, SPEED, ACCELERATION)  # in the order of derivatives
 MODE_WORDS = {TIME: "Over time", AGAINST: "Against another", REPEATS: "Repeats"}
 ORDER_WORDS = {VALUE: "Values", SPEED: "Speed", ACCELERATION: "Acceleration"}
 

@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2
 from numpy.typing import NDArray
 
 from ....analysis.measures import Measure, Series
+from ....analysis.measures.curves import power_of, unit_of
 from ....analysis.measures.series import lines_of
 from ....analysis.pick import are_seen
 from ....mesh.geodesic import length_of, steps_along
@@ -17,7 +18,6 @@ from ....scan.pose import Pose
 from ....scan.units import Scale
 from ...desk import Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
-from .shown import power_of, unit_of
 from .words import with_spread
 
 HIDDEN = 0.3  # opacity where a line is behind a surface

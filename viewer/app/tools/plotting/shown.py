@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -11,45 +11,22 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis.curves import (
-    Movement,
-    Repeats,
-    Smoothing,
-    correlation,
-    movement_of,
-    peaks_of,
-    repeats_of,
-    smoothed,
-)
+from ....analysis.curves import Repeats, Smoothing, correlation, peaks_of, repeats_of
 from ....analysis.measures import Series
+from ....analysis.measures.curves import BAND_SIGMAS, PER_ORDER, MeasureCurve
 from ....analysis.trajectories import Trajectory
 from ....output.plots import PLOT_COLORS, CurvePlot, PlotLine
 from ....scan.units import Scale
 from .choices import AGAINST, REPEATS, TIME, CurveChoices, Settings
 
 T = TypeVar("T")
-BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
-_PER = ("", "/s", "/s²")
-_POWERS = {"length": 1, "area": 2, "volume": 3}
-_RAISED = {1: "", 2: "²", 3: "³"}
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
-    """A measure over time as it is told.
+class Curve(MeasureCurve):
+    """A measure over time as it is plotted. color: 0xRRGGBB."""
 
-    color: 0xRRGGBB. unit: of the values, such as "mm". times, values, sigmas: (T,). movement: the largest
-    one, None where there is none. fastest: the largest speed to either side, NaN where not known.
-    """
-
-    name: str
-    color: int
-    unit: str
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    sigmas: NDArray[np.float64]
-    movement: Movement | None
-    fastest: float
+    color: int = 0
 
 
 class Kept:
@@ -121,7 +98,7 @@ def color_of_way(number: int) -> int:
 def _line_of_way(name: str, color: int, way: Trajectory, settings: Settings, scale: Scale) -> PlotLine:
     """The line of a landmark's speed or acceleration."""
     values, sigmas = (scale.factor * part for part in way.pace(settings.derivative))
-    unit = scale.unit + _PER[settings.derivative]
+    unit = scale.unit + PER_ORDER[settings.derivative]
     return PlotLine(name, unit, values, _band(sigmas, settings), color)
 
 
@@ -131,37 +108,16 @@ def _with_lines(plot: CurvePlot | None, lines: Sequence[PlotLine], times: NDArra
     return CurvePlot("time", "s", times, (*before, *lines), np.arange(len(times)))
 
 
-def power_of(quantity: str) -> int:
-    """Which power of a length a quantity is; 0 for an angle."""
-    return _POWERS.get(quantity, 0)
-
-
-def unit_of(quantity: str, unit: str) -> str:
-    """The unit of a quantity where lengths have this one."""
-    power = power_of(quantity)
-    return f"{unit}{_RAISED[power]}" if power else "°"
-
-
 def curve_of(series: Series, color: int, scale: Scale, smoothing: Smoothing) -> Curve:
     """The curve of a measure, in the unit that lengths are told in."""
-    factor = scale.factor ** power_of(series.quantity)
-    times, values, sigmas = series.times, factor * series.values, factor * series.sigmas
-    wide = smoothing.wide_enough(times)
-    speeds = np.abs(smoothed(times, values, np.zeros(len(values)), wide, 1)[0])
-    fastest = float(np.nanmax(speeds)) if np.isfinite(speeds).any() else float("nan")
-    movement = movement_of(times, values, sigmas, wide)
-    unit = unit_of(series.quantity, scale.unit)
-    return Curve(series.name, color, unit, times, values, sigmas, movement, fastest)
+    return replace(Curve.of(series, scale, smoothing), color=color)
 
 
 def line_of(curve: Curve, settings: Settings) -> PlotLine:
     """The line of a curve: its values, speed or acceleration."""
-    values, sigmas, order = curve.values, curve.sigmas, settings.derivative
-    if order:
-        smoothing = settings.smoothing.wide_enough(curve.times)
-        values, variances = smoothed(curve.times, values, sigmas**2, smoothing, order)
-        sigmas = np.sqrt(variances)
-    return PlotLine(curve.name, curve.unit + _PER[order], values, _band(sigmas, settings), curve.color)
+    values, sigmas = curve.derivative(settings.derivative)
+    unit = curve.unit + PER_ORDER[settings.derivative]
+    return PlotLine(curve.name, unit, values, _band(sigmas, settings), curve.color)
 
 
 def _band(sigmas: NDArray[np.float64], settings: Settings) -> NDArray[np.float64]:
@@ -192,8 +148,7 @@ def chosen_of(curves: Sequence[Curve], name: str) -> Curve:
 def repeats_in(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) -> Repeats | None:
     """The repeats of the curve that others are aligned by; None where it has no peak."""
     curve = chosen_of(curves, choices.aligned)
-    smoothing = settings.smoothing.wide_enough(curve.times)
-    events = peaks_of(curve.times, curve.values, smoothing, settings.least)
+    events = peaks_of(curve.times, curve.values, curve.smoothing, settings.least)
     return repeats_of(curve.times, curve.values, events) if len(events) else None
 
 

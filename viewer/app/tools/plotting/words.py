@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-from .shown import BAND_SIGMAS, Curve
+from ....analysis.measures.curves import BAND_SIGMAS, MeasureCurve
 
 UNKNOWN = "-"
 NUMBERS_HELP = {
@@ -15,8 +14,6 @@ NUMBERS_HELP = {
     "Duration": "From onset until it is back within 10 % of the amplitude from rest",
     "Fastest": "The largest speed to either side",
 }
-_ROWS = ("measure", "unit", "rest", "amplitude", "amplitude ±", "onset [s]", "onset ± [s]", "peak [s]",
-         "end [s]", "end ± [s]", "duration [s]", "duration ± [s]", "fastest per s")  # fmt: skip
 
 
 def with_spread(value: float, sigma: float, unit: str = "") -> str:
@@ -30,7 +27,7 @@ def with_spread(value: float, sigma: float, unit: str = "") -> str:
     return f"{value:.{decimals}f} ± {spread:.{decimals}f} {unit}".rstrip()
 
 
-def numbers_in_words(curve: Curve) -> tuple[str, ...]:
+def numbers_in_words(curve: MeasureCurve) -> tuple[str, ...]:
     """The numbers of a curve's movement, in the order of NUMBERS_HELP."""
     movement = curve.movement
     fastest = UNKNOWN if math.isnan(curve.fastest) else f"{curve.fastest:.3g} {curve.unit}/s"
@@ -47,18 +44,3 @@ def numbers_in_words(curve: Curve) -> tuple[str, ...]:
 
 def _seconds(time: float, sigma: float) -> str:
     return UNKNOWN if math.isnan(time) else f"{time:.2f} s" + (f" ± {2 * sigma:.2f}" if sigma > 0 else "")
-
-
-def number_rows(curves: Sequence[Curve]) -> list[list[object]]:
-    """A table of the numbers of the movements: a row for each curve."""
-    rows: list[list[object]] = [list(_ROWS)]
-    for curve in curves:
-        one = curve.movement
-        two = BAND_SIGMAS
-        told = [math.nan] * 10 if one is None else [
-            one.rest, one.amplitude, two * one.amplitude_sigma, one.onset, two * one.onset_sigma, one.peak,
-            one.end, two * one.end_sigma, one.duration, two * one.duration_sigma,
-        ]  # fmt: skip
-        numbers = ["" if math.isnan(number) else f"{number:.6g}" for number in (*told, curve.fastest)]
-        rows.append([curve.name, curve.unit, *numbers])
-    return rows

@@ -1,0 +1,169 @@
+"""`scan4d measure`: the numbers of a movement that is known, its speed, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+
+from viewer.analysis.measures.curves import NUMBER_COLUMNS
+
+FPS, HEIGHT, OWN, NOISE = 30, 4.0, 0.03, 0.04
+TIMES = np.arange(FPS + 1) / FPS
+LENGTHS = 10 + HEIGHT * (1 - (2 * TIMES - 1) ** 2)  # up and down again within a second
+WORDS = (
+    "measure", "seq", "--landmarks", "landmarks.csv", "--measures", "measures.json", "--no-snap",
+    "--fps", f"{FPS}", "--unit", "mm", "--noise", f"{NOISE}", "-o", "out.csv",
+)  # fmt: skip
+SIGMA = math.sqrt(2) * math.hypot(OWN, NOISE)  # of a distance
+# Savitzky and Golay's table for a cubic through nine points
+MIDDLE, SLOPES = 59 / 231, np.array([86, -142, -193, -126, 0, 126, 193, 142, -86]) / 1188
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory: a scan, landmarks in all its frames LENGTHS apart, and measures."""
+    monkeypatch.chdir(tmp_path)
+    Path("seq").mkdir()
+    rows: list[tuple[object, ...]] = [("frame", "name", "x", "y", "z", "sigma")]
+    for number, length in enumerate(LENGTHS, 1):
+        places = np.array([[0, 0, 0], [0, length, 0], [0, 0, length]])
+        np.save(f"seq/f{number:02d}.npy", places)
+        rows += [(number, name, *place, OWN) for name, place in zip("abc", places.tolist(), strict=True)]
+    write_table(Path("landmarks.csv"), rows)
+    measures = [
+        {"name": "way", "kind": "distance", "landmarks": ["a", "b"]},
+        {"name": "still", "kind": "angle", "landmarks": ["b", "a", "c"]},
+    ]
+    Path("measures.json").write_text(json.dumps({"measures": measures}))
+    return tmp_path
+
+
+def write_table(path: Path, rows: list[tuple[object, ...]]) -> None:
+    with open(path, "w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream).writerows(rows)
+
+
+def table(path: str) -> list[dict[str, str]]:
+    with open(path, encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def told(path: str, name: str, column: str) -> np.ndarray:
+    """A column of the rows of a measure, (T,), NaN where it is empty."""
+    return np.array([float(row[column] or "nan") for row in table(path) if row["name"] == name])
+
+
+def test_the_numbers_of_a_movement_are_those_of_its_formula(run: Run) -> None:
+    done = run(*WORDS, "--numbers", "numbers.csv")
+    assert done.code == 0, done.err
+    assert done.out.splitlines()[-2:] == ["out.csv", "numbers.csv"]
+    way, still = table("numbers.csv")
+    assert tuple(way) == NUMBER_COLUMNS
+    assert (way["measure"], way["unit"]) == ("way", "mm")
+    first = TIMES <= 0.3
+    rest = LENGTHS[first].mean()
+    amplitude = 10 + HEIGHT - rest
+    assert float(way["rest"]) == pytest.approx(rest, rel=1e-5)
+    assert float(way["amplitude"]) == pytest.approx(amplitude, rel=1e-5)
+    spread = 2 * SIGMA * math.sqrt(MIDDLE + 1 / first.sum())
+    assert float(way["amplitude ±"]) == pytest.approx(spread, rel=1e-5)
+    assert float(way["peak [s]"]) == pytest.approx(0.5, abs=1e-5)
+    # where 10 + HEIGHT (1 - (2 t - 1)^2) is rest + 0.1 amplitude
+    half = math.sqrt(0.9 * amplitude / HEIGHT) / 2
+    assert float(way["onset [s]"]) == pytest.approx(0.5 - half, abs=1e-3)
+    assert float(way["end [s]"]) == pytest.approx(0.5 + half, abs=1e-3)
+    assert float(way["duration [s]"]) == pytest.approx(2 * half, abs=2e-3)
+    onset, end, duration = (float(way[f"{name} ± [s]"]) for name in ("onset", "end", "duration"))
+    assert onset == pytest.approx(2 * SIGMA * math.sqrt(MIDDLE) / (8 * HEIGHT * half), rel=0.05)
+    assert duration == pytest.approx(math.hypot(onset, end), rel=1e-5)
+    assert float(way["fastest per s"]) == pytest.approx(4 * HEIGHT, rel=1e-5)
+    assert abs(float(still.pop("fastest per s"))) < 1e-9
+    assert still == {**dict.fromkeys(NUMBER_COLUMNS[:-1], ""), "measure": "still", "unit": "°"}
+
+
+def test_json_holds_the_same_numbers(run: Run) -> None:
+    assert run(*WORDS, "--numbers", "numbers.csv").code == 0
+    assert run(*WORDS, "--numbers", "numbers.json", "--force").code == 0
+    held = json.loads(Path("numbers.json").read_text(encoding="utf-8"))
+    assert (held["scan"], held["unit"]) == ("seq", "mm")
+    assert held["rows"][0]["peak [s]"] == pytest.approx(0.5)
+    for one, other in zip(held["rows"], table("numbers.csv"), strict=True):
+        assert {name: "" if value is None else str(value) for name, value in one.items()} == other
+
+
+def test_speed_and_acceleration_are_those_of_the_formula(run: Run) -> None:
+    assert run(*WORDS).code == 0
+    values = table("out.csv")
+    assert run(*WORDS, "--order", "speed", "--force").code == 0
+    np.testing.assert_allclose(told("out.csv", "way", "value"), 8 * HEIGHT * (0.5 - TIMES), atol=1e-9)
+    middle = told("out.csv", "way", "sigma")[4:-4]
+    np.testing.assert_allclose(middle, SIGMA * FPS * np.linalg.norm(SLOPES), rtol=1e-5)
+    speeds = table("out.csv")
+    assert {row["name"]: row["unit"] for row in speeds} == dict(
+        a="mm", b="mm", c="mm", way="mm/s", still="°/s"
+    )
+    changed = ("value", "sigma", "unit")
+    for value, speed in zip(values, speeds, strict=True):
+        for column, text in value.items():
+            assert speed[column] == text or (value["kind"] == "measure" and column in changed)
+    assert run(*WORDS, "--order", "acceleration", "--force").code == 0
+    np.testing.assert_allclose(told("out.csv", "way", "value"), -8 * HEIGHT, rtol=1e-9)
+    assert {row["unit"] for row in table("out.csv") if row["name"] == "way"} == {"mm/s²"}
+
+
+@pytest.mark.parametrize(("seconds", "side"), [("0.6", 9), ("1e300", 15), ("1e-300", 2)])
+def test_smoothing_is_as_wide_as_is_told(run: Run, seconds: str, side: int) -> None:
+    """From the least window that a cubic takes up to all frames; side: points to a side of the middle one."""
+    done = run(*WORDS, "--order", "speed", "--smoothing", seconds)
+    assert done.code == 0, done.err
+    np.testing.assert_allclose(told("out.csv", "way", "value"), 8 * HEIGHT * (0.5 - TIMES), atol=1e-9)
+    cubic = np.vander(np.arange(-side, side + 1) / FPS, 4, increasing=True)
+    expected = SIGMA * np.linalg.norm(np.linalg.pinv(cubic)[1])
+    assert told("out.csv", "way", "sigma")[15] == pytest.approx(expected, rel=1e-5)
+
+
+def test_chosen_frames_are_a_curve_of_their_own_and_too_few_are_told(run: Run) -> None:
+    done = run(*WORDS, "--order", "speed", "--poses", "0:31:3")
+    assert done.code == 0, done.err
+    np.testing.assert_allclose(told("out.csv", "way", "value"), 8 * HEIGHT * (0.5 - TIMES[::3]), atol=1e-9)
+    done = run(*WORDS, "--order", "speed", "--numbers", "numbers.csv", "--poses", "4:7", "--force")
+    assert done.code == 0, done.err
+    assert "the speed of 'way' is not known in 3 of 3 frames" in done.err
+    rows = [row for row in table("out.csv") if row["name"] == "way"]
+    assert {(row["state"], row["value"]) for row in rows} == {("gap", "")}
+    assert set(table("numbers.csv")[0].values()) == {"way", "mm", ""}
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--numbers", "numbers.txt"), "numbers.txt: cannot write '.txt' files. Known: .csv, .json"),
+        (("--numbers", "no/numbers.csv"), "there is no folder 'no'"),
+        (("--numbers", "seq/../out.csv"), "is the file of the long table"),
+        (("--numbers", "measures.json"), "is read by this command, and is not replaced"),
+        (("--order", "jerk"), "jerk"),
+        (("--smoothing", "0", "--order", "speed"), "'0' is no time above 0, in seconds"),
+        (("--smoothing", "nan", "--order", "speed"), "'nan' is no time above 0, in seconds"),
+        (("--smoothing", "0.5"), "--smoothing: smooths nothing that is asked for"),
+    ],
+)
+def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str, ...], told: str) -> None:
+    done = run(*WORDS, *words)
+    assert done.code == 2
+    assert told in done.err
+    assert "Traceback" not in done.err
+    assert not Path("out.csv").exists()
+
+
+@pytest.mark.parametrize("words", [("--numbers", "numbers.csv"), ("--order", "speed")])
+def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
+    done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
+    assert done.code == 2
+    assert f"{words[0]}: is of measures, and there are none. Tell them by --measures" in done.err
+    assert not Path("out.csv").exists()

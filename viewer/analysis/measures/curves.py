@@ -1,0 +1,95 @@
+"""Curves of measures, in the unit that they are told in: their speed, and the numbers of movements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scan.units import Scale
+from ..curves import Movement, Smoothing, movement_of, smoothed
+from . import Series
+
+BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
+PER_ORDER = ("", "/s", "/s²")  # what derivatives add to a unit, by their order
+NUMBER_COLUMNS = (
+    "measure", "unit", "rest", "amplitude", "amplitude ±", "onset [s]", "onset ± [s]", "peak [s]",
+    "end [s]", "end ± [s]", "duration [s]", "duration ± [s]", "fastest per s",
+)  # fmt: skip
+_POWERS = {"length": 1, "area": 2, "volume": 3}
+_RAISED = {1: "", 2: "²", 3: "³"}
+_DIGITS = 6  # of a number in a table
+
+
+def power_of(quantity: str) -> int:
+    """The power of a length that a quantity is; 0 for an angle."""
+    return _POWERS.get(quantity, 0)
+
+
+def unit_of(quantity: str, unit: str) -> str:
+    """The unit of a quantity where lengths have this one."""
+    power = power_of(quantity)
+    return f"{unit}{_RAISED[power]}" if power else "°"
+
+
+@dataclass(frozen=True, eq=False)
+class MeasureCurve:
+    """A measure over time as it is told.
+
+    unit: of the values, such as "mm". times, values, sigmas: (T,). smoothing: with a window wide enough for
+    these times. movement: the largest one, None where there is none. fastest: the largest speed to either
+    side, NaN where not known.
+    """
+
+    name: str
+    unit: str
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+    smoothing: Smoothing
+    movement: Movement | None
+    fastest: float
+
+    @classmethod
+    def of(cls, series: Series, scale: Scale, smoothing: Smoothing) -> Self:
+        """The curve of a measure, at least one frame, in the unit that lengths are told in."""
+        factor = scale.factor ** power_of(series.quantity)
+        times, values, sigmas = series.times, factor * series.values, factor * series.sigmas
+        wide = smoothing.wide_enough(times)
+        speeds = np.abs(smoothed(times, values, np.zeros(len(values)), wide, 1)[0])
+        fastest = float(np.nanmax(speeds)) if np.isfinite(speeds).any() else math.nan
+        movement = movement_of(times, values, sigmas, wide)
+        unit = unit_of(series.quantity, scale.unit)
+        return cls(series.name, unit, times, values, sigmas, wide, movement, fastest)
+
+    def derivative(self, order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The values as they are, 0, or the speed, 1, or acceleration, 2, of the smoothed curve, and the
+        standard deviations, (T,) each, per second (squared); NaN where not known."""
+        if not order:
+            return self.values, self.sigmas
+        values, variances = smoothed(self.times, self.values, self.sigmas**2, self.smoothing, order)
+        return values, np.sqrt(variances)
+
+
+def number_rows(curves: Iterable[MeasureCurve]) -> list[list[object]]:
+    """The numbers of the movements, a row for each curve below NUMBER_COLUMNS; None for what is not known.
+    Each ± is two standard deviations."""
+    return [[curve.name, curve.unit, *map(_rounded, _numbers(curve))] for curve in curves]
+
+
+def _numbers(curve: MeasureCurve) -> list[float]:
+    one, two = curve.movement, BAND_SIGMAS
+    if one is None:
+        return [*(math.nan,) * (len(NUMBER_COLUMNS) - 3), curve.fastest]
+    return [
+        one.rest, one.amplitude, two * one.amplitude_sigma, one.onset, two * one.onset_sigma, one.peak,
+        one.end, two * one.end_sigma, one.duration, two * one.duration_sigma, curve.fastest,
+    ]  # fmt: skip
+
+
+def _rounded(number: float) -> float | None:
+    return float(f"{number:.{_DIGITS}g}") if math.isfinite(number) else None
