@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapes import Frames, sphere_points, track_of
 
-from viewer.analysis.measures import Measure
+from viewer.analysis.measures import Measure, Series
 from viewer.analysis.measures.series import all_series, lines_of, series_of
 from viewer.analysis.track import Known, Track
 from viewer.errors import InputError
@@ -142,6 +142,20 @@ def test_each_pose_is_read_once_for_all_that_need_it() -> None:
     assert length_of(line) == pytest.approx(found["way"].values[2], rel=1e-3)
     assert lines_of(MEASURES[0], found["way"], tracks, 1) == ()
     assert len(lines_of(MEASURES[1], found["cheek"], tracks, 0)) == 3
+
+
+def test_what_is_known_is_told_frame_by_frame_in_the_order_asked_for() -> None:
+    told: list[dict[str, Series]] = []
+    with sphere_frames().timeline() as timeline:
+        order = [2, 0, 1]
+        whole = all_series(MEASURES, on_sphere(3), timeline, 0.0, order, told.append)
+    assert [np.isfinite(found["way"].values).tolist() for found in told] == [
+        [False, False, True], [True, False, True], [True, True, True],
+    ]  # fmt: skip
+    assert told[0]["way"].known.tolist() == [Known.PENDING, Known.PENDING, Known.TRACKED]
+    assert np.isfinite(told[0]["straight"].values).all()
+    assert set(told[0]["way"].lines) == {2}
+    np.testing.assert_array_equal(told[-1]["way"].values, whole["way"].values)
 
 
 def test_lines_of_landmarks_alone_lie_where_they_are_measured() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ _DRAWN = 48  # places of a line along the surface that are kept, in each frame
 @dataclass(frozen=True, eq=False)
 class _Asked:
     """A measure with what is known of its landmarks. positions: (T, K, 3). covariances: (T, U, 3, 3), of its
-    landmarks, each once. which: (K,), of these. known: (T,)."""
+    landmarks, each once. which: (K,), of these. known: (T,). is_left: (T,), whether its surface has yet to be looked at."""
 
     measure: Measure
     kind: MeasureKind
@@ -36,6 +36,7 @@ class _Asked:
     values: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     lines: dict[int, tuple[Line, ...]]
+    is_left: NDArray[np.bool_]
 
 
 def series_of(
@@ -54,13 +55,15 @@ def all_series(
     timeline: Timeline | None = None,
     noise: float = 0.0,
     frames: Sequence[int] | None = None,
+    tell: Callable[[dict[str, Series]], object] | None = None,
 ) -> dict[str, Series]:
     """The values of measures by name in all frames.
 
     tracks: by the name of the landmark, all of the same frames, at least one. timeline: the scan; each pose
     is read once for all measures that need its surface, and none where none does. noise: of the scanner,
     standard deviation of a coordinate of what it measures, scan units. frames: those in which the surface is
-    looked at; None: all. What a frame does not tell, because a landmark is not known there, is not on the
+    looked at, in this order, others stay pending; None: all. tell: called after each with the series as far
+    as they are known. What a frame does not tell, because a landmark is not known there, is not on the
     surface, or the frame is broken, is a gap. Long work: it can be cancelled. Raises InputError for measures
     that are none.
     """
@@ -70,9 +73,10 @@ def all_series(
             _fill_points(each)
     on_surface = [each for each in asked if each.kind.needs_surface]
     if on_surface and timeline is not None:
-        _fill_surfaces(on_surface, timeline, range(len(timeline)) if frames is None else frames)
-    times = next(iter(tracks.values())).times if tracks else np.zeros(0)
-    return {each.measure.name: _series(each, times) for each in asked}
+        for _ in _fill_surfaces(on_surface, timeline, range(len(timeline)) if frames is None else frames):
+            if tell is not None:
+                tell(_series(asked, tracks))
+    return _series(asked, tracks)
 
 
 def lines_of(measure: Measure, series: Series, tracks: Mapping[str, Track], frame: int) -> tuple[Line, ...]:
@@ -112,14 +116,31 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
     covariances = np.stack([track.covariances for track in own], axis=1) + noise**2 * np.eye(3)
     positions = np.stack([track.positions for track in own], axis=1)[:, which]
     values, sigmas = np.full((2, frames), np.nan)
-    return _Asked(measure, kind, positions, covariances, which, known, values, sigmas, {})
+    return _Asked(
+        measure,
+        kind,
+        positions,
+        covariances,
+        which,
+        known,
+        values,
+        sigmas,
+        {},
+        np.full(frames, kind.needs_surface),
+    )
 
 
-def _series(asked: _Asked, times: NDArray[np.float64]) -> Series:
-    known = asked.known.copy()
-    known[(known >= Known.TRACKED) & ~np.isfinite(asked.values)] = Known.GAP
-    measure, quantity = asked.measure, asked.kind.quantity
-    return Series(measure.name, quantity, times, asked.values, asked.sigmas, known, asked.lines)
+def _series(asked: Sequence[_Asked], tracks: Mapping[str, Track]) -> dict[str, Series]:
+    """What is known of measures by now, by name."""
+    times = next(iter(tracks.values())).times if tracks else np.zeros(0)
+    found = {}
+    for each in asked:
+        known, values = each.known.copy(), each.values.copy()
+        is_open = (known >= Known.TRACKED) & ~np.isfinite(values)
+        known[is_open] = np.where(each.is_left[is_open], Known.PENDING, Known.GAP)
+        name, quantity = each.measure.name, each.kind.quantity
+        found[name] = Series(name, quantity, times, values, each.sigmas.copy(), known, dict(each.lines))
+    return found
 
 
 def _fill_points(asked: _Asked) -> None:
@@ -151,11 +172,14 @@ def _roots(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
     return axes * np.sqrt(np.maximum(widths, 0))[..., None, :]
 
 
-def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence[int]) -> None:
+def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence[int]) -> Iterator[int]:
+    """Look at the surface of one frame after the other, and tell which was done."""
     needed = [frame for frame in frames if any(each.known[frame] >= Known.TRACKED for each in asked)]
     faces: dict[str, Triangles] = {}
     for done, frame in enumerate(needed):
         checkpoint(done / len(needed))
+        for each in asked:
+            each.is_left[frame] = False
         try:
             surface = surface_of(timeline, timeline.visit(frame), faces)
         except InputError:  # told by the timeline
@@ -164,6 +188,7 @@ def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence
             checkpoint()
             if each.known[frame] >= Known.TRACKED and np.isfinite(each.positions[frame]).all():
                 _fill_surface(each, frame, surface)
+        yield frame
 
 
 def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface) -> None:

@@ -36,14 +36,18 @@ class Inputs:
         return dict(zip(dict.fromkeys(self.measure.landmarks), self.tracks, strict=True))
 
 
+Found = dict[str, tuple[Inputs, Series]]  # by the name of the measure
+
+
 class Measurer:
     """Finds the series of measures, each again where its landmarks were tracked anew, and tells all tools
     (`desk.followed`). is_running: whether measures of surfaces are being found."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._found: dict[str, tuple[Inputs, Series]] = {}
+        self._found: Found = {}
         self._asked: dict[str, Inputs] = {}  # those of surfaces that were asked for last, found or not
+        self._begun: Found = {}  # of those that are being found, as far as they are
         self._task: Task | None = None
         self._refused: set[str] = set()
 
@@ -69,7 +73,9 @@ class Measurer:
             name: known for name, known in self._found.items()
             if name in wanted and (wanted[name].is_like(known[0]) or wanted[name] in quick)
         }  # fmt: skip
-        found = {name: self._found[name][1] for name in wanted if name in self._found}
+        begun, known = self._begun, self._found
+        begun = {name: one for name, one in begun.items() if name in wanted and wanted[name].is_like(one[0])}
+        found = {name: (known | begun)[name][1] for name in wanted if name in known or name in begun}
         return self._desk.followed.take_series(found) or bool(quick)
 
     def _inputs(self, name: str) -> Inputs | None:
@@ -97,7 +103,8 @@ class Measurer:
 
     def _measure_surfaces(self, missing: Sequence[Inputs], noise: float) -> None:
         """Have measures of surfaces found beside the window, once their landmarks are known in all frames;
-        those that the user has cancelled, when something is added or changed."""
+        those that the user has cancelled, when something is added or changed. The frame that the user is at
+        comes first, then those beside it, and each is shown as soon as it is found."""
         ready = [one for one in missing if all(track.is_whole for track in one.tracks)]
         if all(one.is_like(self._asked.get(one.measure.name)) for one in ready):
             return
@@ -106,10 +113,18 @@ class Measurer:
         self._asked = {one.measure.name: one for one in ready}
         timeline, measures = self._desk.timeline, [one.measure for one in ready]
         tracks = {name: track for one in ready for name, track in one.named.items()}
+        now = self._desk.index
+        frames = sorted(range(len(timeline)), key=lambda frame: (abs(frame - now), frame))
+
+        def tell(found: Mapping[str, Series]) -> None:
+            self._begun = {one.measure.name: (one, found[one.measure.name]) for one in ready}
 
         def take(found: Mapping[str, Series]) -> None:
             self._found |= {one.measure.name: (one, found[one.measure.name]) for one in ready}
+            self._begun = {}
 
-        self._task = self._desk.run(
-            "Measuring surfaces", lambda: all_series(measures, tracks, timeline, noise), take
-        )
+        def measure() -> Mapping[str, Series]:
+            return all_series(measures, tracks, timeline, noise, frames, tell)
+
+        self._begun = {}
+        self._task = self._desk.run("Measuring surfaces", measure, take)
