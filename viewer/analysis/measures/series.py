@@ -25,7 +25,8 @@ _DRAWN = 48  # places of a line along the surface that are kept, in each frame
 @dataclass(frozen=True, eq=False)
 class _Asked:
     """A measure with what is known of its landmarks. positions: (T, K, 3). covariances: (T, U, 3, 3), of its
-    landmarks, each once. which: (K,), of these. known: (T,). is_left: (T,), whether its surface has yet to be looked at."""
+    landmarks, each once. which: (K,), of these. known: (T,). is_left: (T,), whether its
+    surface has yet to be looked at."""
 
     measure: Measure
     kind: MeasureKind
