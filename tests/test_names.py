@@ -90,7 +90,6 @@ def test_a_riddle_is_told_from_a_docstring(text: str, found: int) -> None:
     assert len(riddles(ast.parse(f'class A:\n    def f(self):\n        """{text}"""\n'))) == found
 
 
-@pytest.mark.slow
 def test_docstrings_name_their_subject() -> None:
     found = {path: riddles(syntax) for path, syntax in modules()}
     assert not {path: told for path, told in found.items() if told}

@@ -19,6 +19,7 @@ from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.analysis.landmarks.templates import save_template, templates
 from viewer.camera import Camera
+from viewer.document.landmarks import Landmarks
 
 FACES = ((0, 1, 2), (1, 2, 3))
 CLICK = 0.45  # scan units, more than a pixel of the view that is started with
@@ -205,7 +206,7 @@ def test_notes_are_pinned_and_kept(screen: Screen, tmp_path: Path, scan: Path) -
         press(app, "Return")
         app.process.terminate()
         assert app.process.wait(60) == 0
-    assert len(kept_of(tmp_path, scan).document.parts["landmarks"]["notes"]) == 2
+    assert len(kept_of(tmp_path, scan).document.part(Landmarks).notes) == 2
     with running_app(screen, tmp_path, scan, home=tmp_path) as app:
         app.act(PANEL, ("item_click", "$$0/\uf1f8"))
         state = app.settle()

@@ -171,8 +171,8 @@ def _shares(position: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     _, widths, axes = np.linalg.svd(offsets, full_matrices=False)
     if count < 3 or not widths[1] > _FLAT * widths[0]:
         return usual
-    rows = np.column_stack([offsets @ axes[:2].T, np.ones(count)])
-    wanted = np.append(axes[:2] @ (position - points.mean(axis=0)), 1.0)
+    rows = np.column_stack([offsets @ axes[:2].T / widths[0], np.ones(count)])
+    wanted = np.append(axes[:2] @ (position - points.mean(axis=0)) / widths[0], 1.0)
     shares = np.linalg.lstsq(rows.T, wanted, rcond=None)[0]
     return shares if shares @ shares <= 1 else usual  # else errors of points would grow
 

@@ -43,7 +43,7 @@ class Prism:
         return cls(center, normal, axes, (places - center) @ axes.T)
 
     def flat(self, points: Points) -> NDArray[np.float64]:
-        """Where points (..., 3) are in the plane, (..., 2)."""
+        """Places of points (..., 3) in the plane, (..., 2)."""
         return (points - self.center) @ self.axes.T
 
     def with_corner(self, number: int, corner: Outline) -> Prism:

@@ -132,7 +132,7 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
 
 
 def _series(asked: Sequence[_Asked], tracks: Mapping[str, Track]) -> dict[str, Series]:
-    """What is known of measures by now, by name."""
+    """The series of measures as far as they are known, by name."""
     times = next(iter(tracks.values())).times if tracks else np.zeros(0)
     found = {}
     for each in asked:

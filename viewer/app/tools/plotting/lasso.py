@@ -23,14 +23,17 @@ _TITLE = "Region"
 
 
 class Lasso:
-    """The lasso. is_drawn: whether drags in the view draw one, now or next. through: whether regions hold
-    what is before and behind them as well."""
+    """The lasso. through: whether regions hold what is before and behind them as well."""
 
     def __init__(self, desk: Desk) -> None:
-        self.is_drawn = False
         self.through = False
         self._desk = desk
         self._places: list[Vector] = []  # that were drawn over, where the scan is shown
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether drags in the view draw one, now or next."""
+        return self._desk.has_clicks
 
     @property
     def is_under_way(self) -> bool:
@@ -39,15 +42,12 @@ class Lasso:
 
     def toggle(self) -> None:
         """Have the next drag draw one, or not."""
-        self.put_away() if self.is_drawn else self._take_up()
-
-    def _take_up(self) -> None:
-        self.is_drawn = True
-        self._desk.take_clicks()
+        if not self.put_away():
+            self._desk.take_clicks()
 
     def put_away(self) -> bool:
         """Let drags be as without it; whether they were not."""
-        was_drawn, self.is_drawn = self.is_drawn, False
+        was_drawn = self.is_drawn
         self._places.clear()
         self._desk.leave_clicks()
         return was_drawn

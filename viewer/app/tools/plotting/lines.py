@@ -11,17 +11,16 @@ from numpy.typing import NDArray
 from ....analysis.measures import Measure, Series
 from ....analysis.measures.curves import power_of, unit_of
 from ....analysis.measures.series import lines_of
-from ....analysis.pick import are_seen
 from ....mesh.geodesic import length_of, steps_along
 from ....output.plots import PLOT_COLORS
 from ....scan.pose import Pose
 from ....scan.units import Scale
 from ...desk import Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
+from .seen import DIM, seen_in_view
+from .shown import Kept
 from .words import with_spread
 
-HIDDEN = 0.3  # opacity where a line is behind a surface
-_SLACK = 0.01  # of the scan's radius: how far before a line a surface may be that it lies on
 _PIECES = 24  # of a straight line, so that a part of it may be hidden
 _MOST_LABELS = 8  # measures that are told by name and value; of more, the one that is pointed at
 
@@ -41,7 +40,7 @@ class MeasureLines:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._found: tuple[tuple[object, ...], tuple[ShownLine, ...]] = (), ()
+        self._kept = Kept()
 
     def shown(self, measures: tuple[Measure, ...], hidden: tuple[str, ...]) -> tuple[ShownLine, ...]:
         """The lines of measures but for hidden ones, where they are in the picture."""
@@ -50,11 +49,7 @@ class MeasureLines:
             return ()
         request = desk.viewport.request if desk.viewport.is_there else None
         inputs = measures, hidden, desk.followed.series, desk.followed.tracks, pose, request
-        if len(self._found[0]) != len(inputs) or any(
-            a is not b for a, b in zip(inputs, self._found[0], strict=True)
-        ):
-            self._found = inputs, self._lines(measures, hidden, pose)
-        return self._found[1]
+        return self._kept.of("lines", inputs, lambda: self._lines(measures, hidden, pose))
 
     def _lines(
         self, measures: tuple[Measure, ...], hidden: tuple[str, ...], pose: Pose
@@ -76,15 +71,9 @@ class MeasureLines:
                 found.append((measure.name, color, motion.points(pieces)))
         if not found:
             return ()
-        seen = self._are_seen(np.concatenate([places for *_, places in found]), pose)
+        seen = seen_in_view(desk, np.concatenate([places for *_, places in found]))
         parts = np.split(seen, np.cumsum([len(places) for *_, places in found])[:-1])
         return tuple(ShownLine(*one, part) for one, part in zip(found, parts, strict=True))
-
-    def _are_seen(self, places: NDArray[np.float64], pose: Pose) -> NDArray[np.bool_]:
-        viewport = self._desk.viewport
-        if viewport.surface is None or not viewport.is_there:
-            return np.ones(len(places), bool)
-        return are_seen(viewport.surface, places, np.full(len(places), _SLACK * viewport.bounds(pose).radius))
 
     def draw(
         self,
@@ -102,7 +91,7 @@ class MeasureLines:
             told &= {pointed}
         for line in shown:
             on_screen = view.all_on_screen(line.places)
-            alphas = np.where(line.seen, 1.0, HIDDEN)
+            alphas = np.where(line.seen, 1.0, DIM)
             canvas.path(on_screen, [line.color] * len(alphas), alphas, dots=False)
             if line.measure in told and pose is not None and np.isfinite(on_screen).all():
                 told.discard(line.measure)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis.curves import Smoothing
-from ....analysis.pick import are_seen
 from ....analysis.track import Track
 from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
 from ....errors import InputError
@@ -18,13 +17,12 @@ from ....rigid import STILL, Rigid
 from ...desk import Desk
 from ...scene.canvas import Canvas, ViewPlace
 from .choices import ANCHORS, CurveChoices, Settings
+from .seen import DIM, seen_in_view
 from .shown import Kept, color_of_way
 
 Still = tuple[Rigid | None, ...]
 SPEED_MAP = "viridis"
 _LEVELS = 16  # of speed that are told apart
-_DIM = 0.3  # opacity where a way is behind a surface
-_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that it lies on
 
 
 class Ways:
@@ -98,10 +96,10 @@ class Ways:
         shown = desk.viewport.request if desk.viewport.is_there else None
         places = {name: motion.points(one.positions) for name, one in found.items()}
         if places and self._seen[0] != (shown, tuple(found.values())):
-            seen = np.split(self._are_seen(np.concatenate([*places.values()])), len(places))
+            seen = np.split(seen_in_view(desk, np.concatenate([*places.values()])), len(places))
             self._seen = (shown, tuple(found.values())), dict(zip(places, seen, strict=True))
         for number, (name, one) in enumerate(found.items()):
-            alphas = np.where(self._seen[1][name], 1.0, _DIM)
+            alphas = np.where(self._seen[1][name], 1.0, DIM)
             colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(alphas)
             canvas.path(view.all_on_screen(places[name]), colors, alphas)
 
@@ -111,13 +109,6 @@ class Ways:
         levels = np.round(np.clip(share, 0, 1) * (_LEVELS - 1)) / (_LEVELS - 1)
         red, green, blue = color_table(SPEED_MAP)[np.round(levels * 255).astype(int), :3].astype(int).T
         return (red << 16 | green << 8 | blue).tolist()
-
-    def _are_seen(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        viewport, pose = self._desk.viewport, self._desk.pose
-        if viewport.surface is None or pose is None or not viewport.is_there:
-            return np.ones(len(places), bool)
-        slack = _SLACK * viewport.bounds(pose).radius
-        return are_seen(viewport.surface, places, np.full(len(places), slack))
 
 
 def _way_of(track: Track, smoothing: Smoothing, still: Still | None) -> Trajectory:
