@@ -155,6 +155,7 @@ def register_patch(
     system, side = np.zeros((free, free)), np.zeros((free, 1))
     cross = np.zeros((free, free))
     jacobian = np.zeros((free, 3))
+    along, along_one, along_other = np.empty(free), np.empty(free), np.empty(free)
     distances, weights = np.empty(count), np.empty(count)
     off = np.empty((count, _CHANNELS))
     color_weights = np.empty((count, _CHANNELS))
@@ -166,8 +167,6 @@ def register_patch(
     scratch = np.empty(count)
     own = np.empty(3)
     shift = np.empty(_CHANNELS)
-    sums = np.zeros((_CHANNELS, free))
-    totals = np.zeros(_CHANNELS)
     axes = np.empty((3, 3))
     settled = False
     for told_round in range(rounds + 1):
@@ -255,8 +254,6 @@ def register_patch(
 
         system[:] = 0.0
         side[:] = 0.0
-        sums[:] = 0.0
-        totals[:] = 0.0
         cross[:] = 0.0
         for i in range(count):
             weights[i] = 0.0
@@ -301,29 +298,22 @@ def register_patch(
                     residual = off[i, c] - shift[c]
                 if weight == 0.0:
                     continue
-                mx, my, mz = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)
-                for p in range(free):
-                    along = jacobian[p, 0] * mx + jacobian[p, 1] * my + jacobian[p, 2] * mz
-                    side[p, 0] -= weight * along * residual
-                    for q in range(p + 1):
-                        system[p, q] += (
-                            weight * along * (jacobian[q, 0] * mx + jacobian[q, 1] * my + jacobian[q, 2] * mz)
-                        )
                 if is_last:
                     # Noise of the two surfaces is independent: products of both have none of it.
                     for p in range(free):
-                        one = jacobian[p, 0] * ax + jacobian[p, 1] * ay + jacobian[p, 2] * az
-                        other = jacobian[p, 0] * bx + jacobian[p, 1] * by + jacobian[p, 2] * bz
+                        along_one[p] = jacobian[p, 0] * ax + jacobian[p, 1] * ay + jacobian[p, 2] * az
+                        along_other[p] = jacobian[p, 0] * bx + jacobian[p, 1] * by + jacobian[p, 2] * bz
                         for q in range(p + 1):
                             cross[p, q] += (
-                                0.5
-                                * weight
-                                * (
-                                    one * (jacobian[q, 0] * bx + jacobian[q, 1] * by + jacobian[q, 2] * bz)
-                                    + other
-                                    * (jacobian[q, 0] * ax + jacobian[q, 1] * ay + jacobian[q, 2] * az)
-                                )
+                                0.5 * weight * (along_one[p] * along_other[q] + along_other[p] * along_one[q])
                             )
+                    continue
+                mx, my, mz = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)
+                for p in range(free):
+                    along[p] = jacobian[p, 0] * mx + jacobian[p, 1] * my + jacobian[p, 2] * mz
+                    side[p, 0] -= weight * along[p] * residual
+                    for q in range(p + 1):
+                        system[p, q] += weight * along[p] * along[q]
         if is_last:
             break
         for k in range(3):

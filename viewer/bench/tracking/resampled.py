@@ -66,20 +66,43 @@ class ResampledDemo(_Anew):
     """The demo or a variant of it by its name, about 78 000 points a frame, with colours and without normals.
 
     Each frame has places of its own on the exact surface, and a grain of 1 % in their colours. behind: mm;
-    what is farther back at rest is left out, which saves time; half of the points are before 30.
+    what is farther back at rest is left out, which saves time; half of the points are before 30. count: of
+    the points before anything is left out, None: 78 000. frames: how many, as the motion repeats; None: of
+    one period.
     """
 
-    def __init__(self, scan: str, noise: float = 0.0, seed: int = 0, behind: float = -np.inf) -> None:
+    def __init__(
+        self,
+        scan: str,
+        noise: float = 0.0,
+        seed: int = 0,
+        behind: float = -np.inf,
+        *,
+        count: int | None = None,
+        frames: int | None = None,
+    ) -> None:
         demo = DemoSource(scan)
         super().__init__(demo, noise, seed)
         self.demo = demo
-        self._behind = behind
+        self._behind, self._count = behind, count
+        self._frames = len(demo) if frames is None else frames
+
+    def __len__(self) -> int:
+        return self._frames
+
+    def times(self) -> NDArray[np.float64]:
+        """(T,) seconds."""
+        return np.arange(self._frames) / self.demo.fps
 
     def load(self, index: int) -> PointCloud:
         """Sample one frame."""
-        chance, time, motion = self._chance(index), float(self.demo.times()[index]), self.demo.motion
+        chance, time, motion = self._chance(index), float(self.times()[index]), self.demo.motion
         rest = rest_points()
-        chosen = np.flatnonzero((chance.random(len(rest.radii)) < _KEPT) & (rest.positions[2] > self._behind))
+        if self._count is None:
+            chosen = np.flatnonzero(chance.random(len(rest.radii)) < _KEPT)
+        else:  # some more than once: each time it is strewn elsewhere
+            chosen = np.sort(chance.integers(len(rest.radii), size=self._count))
+        chosen = chosen[rest.positions[2, chosen] > self._behind]
         skin = chosen < rest.skin
         parts = [
             _strewn(solid, chosen[rows], chance) for solid, rows in ((head.skin, skin), (head.eyes, ~skin))
