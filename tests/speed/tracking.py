@@ -108,9 +108,8 @@ def main() -> None:
     frames = options.frames
     print(f"{frames} frames of {options.points:,} points, {len(PLACES)} landmarks, {CORES} cores")
     print(f"first result {told['first']:.2f} s (tracker made in {1e3 * told['made']:.1f} ms)")
-    print(
-        f"all {told['wall']:.1f} s, processor {told['processor']:.1f} s, {told['processor'] / frames:.3f} a frame"
-    )
+    each = told["processor"] / frames
+    print(f"all {told['wall']:.1f} s, processor {told['processor']:.1f} s, {each:.3f} a frame")
     print(f"memory {told['before']:.0f} MB before, {told['peak']:.0f} MB at most")
     print(f"errors: median {told['median']:.4f} mm, 95 % {told['p95']:.4f} mm, gaps {told['gaps']:.2%}")
 

@@ -169,7 +169,7 @@ class Desk:
         not come to an end. Raises TypeError where a part holds what cannot be kept, and changes nothing.
         """
         for part in parts:
-            part.check_kept()
+            part.check_kept(self.document.part(type(part)))
         self._toolbox.session.change(name, *parts, merge=merge, **fields)
 
     # --- the window -------------------------------------------------------------------

@@ -48,9 +48,12 @@ class Part:
                 raise TypeError(f"{name}.{field.name} has no default, which a scan without a '{name}' has")
         check_declaration(cls, name)
 
-    def check_kept(self) -> None:
-        """Check that it can be kept as it is; raises TypeError, which names the place: "notes.all[0]"."""
-        check_kept(self, self.part_name)
+    def check_kept(self, known: Part | None = None) -> None:
+        """Check that it can be kept as it is; raises TypeError, which names the place: "notes.all[0]".
+
+        known: one that was checked, of which this one is a change; only what is new is checked.
+        """
+        check_kept(self, self.part_name, known)
 
 
 def _full_name(kind: type) -> str:

@@ -211,11 +211,34 @@ def check_declaration(kind: Any, where: str) -> None:
         raise TypeError(f"{where} cannot be kept as {name}: {_KEPT}")
 
 
-def check_kept(value: Any, name: str) -> None:
+def check_kept(value: Any, name: str, known: Any = None) -> None:
     """Check that a value of a declared dataclass is read again from JSON as it is.
 
-    Raises TypeError, which names the place within it after `name`: "notes.all[0].position".
+    known: one of the same kind that was checked; what its tuples have in common with the value's, as the very
+    same objects, is not checked again. Raises TypeError, which names the place within it after `name`:
+    "notes.all[0].position".
     """
+    if type(known) is type(value):
+        try:
+            return _check_kept(_new_in(value, known), name)
+        except (TypeError, InputError):
+            pass  # told with its place in the whole
+    _check_kept(value, name)
+
+
+def _new_in(value: Any, known: Any) -> Any:
+    """A dataclass's value with those elements of its tuples of any length alone that another one lacks."""
+    hints, new = get_type_hints(type(value)), {}
+    for field in fields(value):
+        now, before = getattr(value, field.name), getattr(known, field.name)
+        of_any_length = get_origin(hints[field.name]) is tuple and get_args(hints[field.name])[-1] is Ellipsis
+        if of_any_length and type(now) is tuple and type(before) is tuple:
+            held = {id(one) for one in before}
+            new[field.name] = tuple(one for one in now if id(one) not in held)
+    return replace(value, **new)
+
+
+def _check_kept(value: Any, name: str) -> None:
     from cattrs.errors import BaseValidationError
 
     try:

@@ -224,3 +224,21 @@ def test_a_scan_of_one_frame_and_landmarks_that_are_not_placed() -> None:
 def test_settings_are_numbers_above_zero() -> None:
     with pytest.raises(InputError):
         TrackingSettings(bound=-1.0)
+
+
+def test_what_an_earlier_tracker_saw_of_a_key_is_told_where_another_key_changes() -> None:
+    timeline = timeline_of(MovingHills(FRAMES))
+    landmark = replace(placed("middle", key(0.0, 0.0, 0), key(0.0, 0.0, 4)), missing=(6, FRAMES + 3))
+    before = Tracker(timeline, [landmark])
+    assert before.tracks["middle"].known.tolist() == [3, 0, 0, 0, 3, 0, 1]
+    for _ in before.run():
+        pass
+    changed = replace(landmark.without_key(0), missing=(5,))
+    after = Tracker(timeline, [changed], known=before).tracks["middle"]
+    assert after.known.tolist() == [2, 2, 2, 2, 3, 1, 2]
+    np.testing.assert_array_equal(after.known == Known.GAP, [key in after.reasons for key in range(FRAMES)])
+
+
+def test_a_landmark_that_was_set_in_a_frame_that_is_not_there_is_a_gap_in_all() -> None:
+    track = Tracker(timeline_of(MovingHills(3)), [placed("middle", key(0.0, 0.0, 5))]).tracks["middle"]
+    assert track.known.tolist() == [Known.GAP] * 3
