@@ -134,7 +134,7 @@ def supersample(renderer: Renderer, request: Request, surface: Surface, *, wait:
             return True
         state.mean.add(state.sample.picture)
         if state.mean.count % 4 == 1:
-            state.mean.write(surface.picture)
+            state.mean.write(surface.take_picture())
             surface.stats.samples = state.mean.count
     return state.mean.count < samples
 

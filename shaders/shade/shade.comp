@@ -4,7 +4,7 @@
 // filled have none. TURNED: the pose is, so that its axes are not the world's. With its colour comes how much of the pixel is covered; the rest is background.
 // LEVEL_COLORS: how many colours there are of filled levels, in place of the colour map; 0: pixels are not coloured by level.
 // BY_LOG: the colour map goes by the logarithm of the value. SAMPLES: rows are samples of range views, whose colours or normals are read.
-// One invocation for each listed pixel; the others hold the background already.
+// One invocation for each slot of the list of pixels that show something; the others hold the background already.
 #include "common/view.glsl"
 #include "common/color.glsl"
 #include "common/item.glsl"
@@ -172,9 +172,11 @@ void main() {
     // All variants read the view: of those that did not, Mesa's Zink (22.3.6) took the view for the params, after
     // other programs had read it.
     if (i >= list_count || view_size.x == 0) return;
-    vec4 color = vec4(shade(int(list[i])), 1.0);
+    uint pixel = list[i];
+    if (pixel == NOTHING) return;
+    vec4 color = vec4(shade(int(pixel)), 1.0);
 #if OWN_COLOR
-    color = over_background(color, texelFetch(own_colors, int(list[i])).a);
+    color = over_background(color, texelFetch(own_colors, int(pixel)).a);
 #endif
-    picture[list[i]] = packUnorm4x8(color);
+    picture[pixel] = packUnorm4x8(color);
 }

@@ -118,6 +118,7 @@ class Storage(IntEnum):
     PICTURE = 0
     PIXEL_BITS = 1
     LIGHT_SUMS = 1
+    CLEARED_PICTURE = 4  # beside depths, rows and a list
     # Scatter, beside a list; what says which cells are visited has those from 4 on.
     KEYS = 0
     BEST = 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import gl
 from .bindings import Storage
-from .constants import GROUP, GROUP_LIMIT
+from .constants import GROUP, GROUP_LIMIT, NOTHING
 from .context import Gpu, Program
 
 _RUN = 8  # pixels an invocation of compact/covered.comp looks at, words one of compact/sums.comp adds
@@ -41,10 +41,17 @@ class IndexList:
         """Make it empty."""
         self._dispatch.write(struct.pack("4I", 0, self._rows, 1, 0))
 
+    def clear_slots(self, count: int) -> None:
+        """Make it `count` slots, to be filled by their numbers; 0xFFFFFFFF, which is no index, in each."""
+        gl.clear_words(self.texels.buffer, NOTHING, count)
+        self._write_length(count)
+
     def write(self, indices: NDArray[np.uint32]) -> None:
         """Make it these indices, (N,)."""
-        count = len(indices) * self.each
         self.texels.buffer.write(indices)
+        self._write_length(len(indices) * self.each)
+
+    def _write_length(self, count: int) -> None:
         self._dispatch.write(struct.pack("4I", -(-count // (GROUP * self._rows)), self._rows, 1, count))
 
     def bind(self, indices: Storage = Storage.LIST, dispatch: Storage = Storage.DISPATCH) -> None:

@@ -126,12 +126,13 @@ def divide_depth(divisor: float) -> None:
     GL_1_0.glDepthRange(0.0, 1.0 / divisor)
 
 
-def clear_words(buffer: moderngl.Buffer, word: int) -> None:
-    """Fill a buffer with one 32-bit word."""
+def clear_words(buffer: moderngl.Buffer, word: int, count: int | None = None) -> None:
+    """Fill a buffer with one 32-bit word. count: only so many words of it, the first ones."""
     value = np.array([word], np.uint32)
+    size = buffer.size if count is None else 4 * count
     GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, buffer.glo)
-    GL_4_3.glClearBufferData(
-        _COPY_WRITE_BUFFER, R32UI, _RED_INTEGER, _UNSIGNED_INT, ctypes.c_void_p(value.ctypes.data)
+    GL_4_3.glClearBufferSubData(
+        _COPY_WRITE_BUFFER, R32UI, 0, size, _RED_INTEGER, _UNSIGNED_INT, ctypes.c_void_p(value.ctypes.data)
     )
 
 

@@ -57,31 +57,19 @@ def scatter(
     visits: Visits,
     keys: gl.BufferTexture,
     best: gl.BufferTexture,
-    listed: IndexList | None = None,
+    *,
+    cleared: bool = False,
 ) -> None:
     """Keep the least key of those that visit a cell, then the lowest item that has it.
 
     visits: their keys are below +inf bits. keys, best: one R32UI texel a cell; +inf bits and 0xFFFFFFFF where
-    nothing went. listed: filled with the cells that were hit.
+    nothing went. cleared: whether all of them hold that already.
     """
-    gl.clear_words(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
-    gl.clear_words(best.buffer, NOTHING)
-    if listed is not None:
-        listed.clear()
-
-    def bind(_: Program) -> None:
-        keys.buffer.bind_to_storage_buffer(Storage.KEYS)
-        keys.bind(Texture.KEYS)
-        best.buffer.bind_to_storage_buffer(Storage.BEST)
-        best.bind(Texture.BEST)
-        if listed is not None:
-            listed.bind()
-
+    if not cleared:
+        gl.clear_words(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
+        gl.clear_words(best.buffer, NOTHING)
     take_keys(gpu, visits, keys)
     take_items(gpu, visits, keys, best)
-    if listed is not None:
-        with gpu.timers.measure("list"):
-            visits.send(gpu, "scatter/best.glsl", bind, PASS=2)
 
 
 def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:
@@ -104,6 +92,27 @@ def take_items(gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.Buffer
 
     with gpu.timers.measure("id"):
         visits.send(gpu, "scatter/best.glsl", bind, PASS=1)
+
+
+def list_hits(
+    gpu: Gpu,
+    visits: Visits,
+    keys: gl.BufferTexture,
+    best: gl.BufferTexture,
+    listed: IndexList,
+    slots: int,
+) -> None:
+    """List the cells that were hit, after `scatter`, in slots of the list; those that are not needed hold
+    0xFFFFFFFF. slots: how many cells an item visits at most."""
+    listed.clear_slots(slots * visits.count)
+
+    def bind(_: Program) -> None:
+        keys.bind(Texture.KEYS)
+        best.bind(Texture.BEST)
+        listed.bind()
+
+    with gpu.timers.measure("list"):
+        visits.send(gpu, "scatter/best.glsl", bind, PASS=2, SLOTS=slots)
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def shade(surface: Surface, look: Look) -> None:
         params=_shading(surface, look, by_log),
     )
     surface.bind_view()
-    covered = surface.list_covered()
+    shown = surface.list_shown()
     with gpu.timers.measure("shade"):
         surface.bind_textures()
         for name, texture in (("color", Texture.COLORS), ("normal", Texture.NORMALS)):
@@ -126,9 +126,9 @@ def shade(surface: Surface, look: Look) -> None:
             gpu.keep(_level_colors, LEVEL_COLORS).bind(Texture.COLOR_MAP)
             if surface.is_own("level"):
                 surface.own("level").bind(Texture.LEVELS)
-        gl.clear_words(surface.picture, _word(look.background))
         surface.picture.bind_to_storage_buffer(Storage.PICTURE)
-        covered.run(program)
+        surface.clear_picture(look.background)
+        shown.run(program)
     if look.holes:
         _paint_holes(surface)
     surface.shaded_by = shade
@@ -139,7 +139,7 @@ def _paint_holes(surface: Surface) -> None:
     gpu, bits = surface.gpu, surface.keep(_PixelBits)
     with gpu.timers.measure("holes"):
         surface.depths.bind(Texture.DEPTHS)
-        surface.picture.bind_to_storage_buffer(Storage.PICTURE)
+        surface.take_picture().bind_to_storage_buffer(Storage.PICTURE)
         bits.buffer.bind_to_storage_buffer(Storage.PIXEL_BITS)
         for step in range(3):
             program = gpu.compute("shade/holes.comp", {"STEP": step, "HOLE_REACH": HOLE_REACH})
@@ -157,11 +157,6 @@ class _PixelBits:
 
     def release(self) -> None:
         self.buffer.release()
-
-
-def _word(color: str) -> int:
-    """A colour of a look as pictures hold it."""
-    return int.from_bytes(bytes(rgba(color)), "little")
 
 
 def _shading(surface: Surface, look: Look, by_log: bool) -> _Shading:

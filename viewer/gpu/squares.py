@@ -16,7 +16,7 @@ from . import gl
 from .bindings import Texture
 from .context import Program
 from .pose import GpuPose
-from .scatter import Visits, scatter
+from .scatter import Visits, list_hits, scatter
 from .surface import Surface
 
 # The points can list the pixels that they hit, at a third pass over the points; looking for
@@ -64,10 +64,13 @@ def draw_squares(
 
     defines = {"SINGLE": int(size == 1), "SAMPLED": int(rows is not None), "FILTERED": int(shown is not None)}
     visits = Visits("points/cells.glsl", count, bind, defines, _Squares(size))
-    listed = surface.take_covered() if sparse else None
-    scatter(pose.gpu, visits, surface.depths, surface.rows, listed)
     if sparse:
-        surface.stats.skipped["compact"] = "few points: they list the pixels themselves"
+        listed = surface.start_listed()
+        scatter(pose.gpu, visits, surface.depths, surface.rows, cleared=True)
+        list_hits(pose.gpu, visits, surface.depths, surface.rows, listed, size**2)
+        surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
+    else:
+        scatter(pose.gpu, visits, surface.depths, surface.rows)
     return is_sample
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import TypeVar
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -86,7 +87,9 @@ class RenderTarget:
         self.color_range: tuple[float, float] | None = None
         self.stats = Stats()
         self.covered = IndexList(gpu, width * height)
-        self._covered_known = False
+        self._covered_known = self._slots_known = False
+        self._clear_as: str | None = None  # the background of all pixels that `covered` does not list
+        self._left_as: str | None = None  # the same of the picture before
         self._written: set[str] = set()
         self.is_lit = False
         self.drawn: dict[str, object] = {}
@@ -112,7 +115,8 @@ class RenderTarget:
         self._given = None
         self._block.write(ViewBlock.of(view))
         self.bind_view()
-        self._covered_known = False
+        self._covered_known = self._slots_known = False
+        self._left_as, self._clear_as = self._clear_as if self.drawn else None, None
         self._written.clear()
         self.is_lit = False
         self.stats = Stats()
@@ -153,14 +157,44 @@ class RenderTarget:
         InputError where there are no range views."""
         self.samples = self.pose.range_points
 
-    def take_covered(self) -> IndexList:
-        """The list of covered pixels, for a backend that can fill it at less than the cost of
-        looking at every pixel."""
-        self._covered_known = True
+    def start_listed(self) -> IndexList:
+        """Clear the picture, depths and rows, for a backend that lists the pixels that it covers at less than
+        the cost of looking at every pixel; that list, whose slots may be no pixel, 0xFFFFFFFF.
+
+        Where the picture before was listed as well, its pixels alone are cleared.
+        """
+        background = self.look.background
+        if self._left_as == background:
+            with self.gpu.timers.measure("clear"):
+                self.bind_storage()
+                self.picture.bind_to_storage_buffer(Storage.CLEARED_PICTURE)
+                program = self.gpu.compute("shade/clear.comp")
+                self.gpu.set(program, background=picture_word(background))
+                self.covered.run(program)
+        else:
+            self.clear()
+            gl.clear_words(self.picture, picture_word(background))
+        self._clear_as, self._slots_known = background, True
         return self.covered
 
+    def take_picture(self) -> moderngl.Buffer:
+        """The picture, to write to pixels that are not covered too."""
+        self._clear_as = None
+        return self.picture
+
+    def clear_picture(self, background: str) -> None:
+        """Make the picture this colour, at least where nothing is shown."""
+        if self._clear_as != background:
+            gl.clear_words(self.picture, picture_word(background))
+            self._clear_as = background if self._slots_known else None
+
+    def list_shown(self) -> IndexList:
+        """The list of the pixels that show something, in no order, which may have slots that are no pixel,
+        0xFFFFFFFF: what shading works on."""
+        return self.covered if self._slots_known else self.list_covered()
+
     def list_covered(self) -> IndexList:
-        """The list of the pixels that show something, in no order: what shading works on."""
+        """The list of the pixels that show something, in no order."""
         if not self._covered_known:
             self.depths.bind(Texture.DEPTHS)
             list_covered(self.gpu, self.size[0] * self.size[1], self.covered)
@@ -242,7 +276,9 @@ class RenderTarget:
         if name == "value":
             self._blended = self.value_source, self.look.up
         if name == "level":
-            self._covered_known = False  # a list of what points cover lacks what is filled
+            self._covered_known = self._slots_known = (
+                False  # a list of what points cover lacks what is filled
+            )
         return self._own[name]
 
     def bind_own(self, *names: str) -> None:
@@ -439,3 +475,8 @@ class RenderTarget:
         texel_format, size = _CHANNELS[name]
         buffer = self.gpu.ctx.buffer(reserve=size * self.size[0] * self.size[1])
         return gl.BufferTexture(buffer, texel_format)
+
+
+def picture_word(color: str) -> int:
+    """A colour of a look as a pixel of a picture."""
+    return int.from_bytes(bytes(rgba(color)), "little")
