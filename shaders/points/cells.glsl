@@ -1,6 +1,10 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
+// CHUNKED: a list says which chunks, in whose order positions are, and with SAMPLED a list of rows.
 // FILTERED: those that are not visible are left out. SINGLE: squares are of one pixel.
 #include "common/view.glsl"
+#if CHUNKED
+#include "common/list.glsl"
+#endif
 
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 #if SAMPLED
@@ -12,13 +16,21 @@ layout(binding = TEXTURE_VISIBLE) uniform usamplerBuffer visible;
 #include <params>
 
 void scatter(uint i) {
+#if CHUNKED
+    i = list[i / uint(CHUNK)] * uint(CHUNK) + i % uint(CHUNK);
+    if (i >= uint(point_count)) return;
+    vec3 position = texelFetch(positions, int(i)).xyz;
+#endif
 #if SAMPLED
     i = texelFetch(drawn_rows, int(i)).r;
+#endif
+#if !CHUNKED
+    vec3 position = texelFetch(positions, int(i)).xyz;
 #endif
 #if FILTERED
     if (texelFetch(visible, int(i)).r == 0u) return;
 #endif
-    vec3 view = to_view(texelFetch(positions, int(i)).xyz);
+    vec3 view = to_view(position);
     float depth = -view.z;
     // Depths are positive, so their bits are in the order of their values.
     uint key = floatBitsToUint(depth);

@@ -31,6 +31,7 @@ from viewer.bench import baselines
 from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame, supersample
+from viewer.gpu import chunks
 from viewer.gpu.amplify import FEEDS
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
@@ -203,6 +204,22 @@ def draw_packed(renderer: Renderer, whole: bool) -> None:
                 render_frame(renderer, Request(pose, camera, packed.backend(few, drawing, ellipses)), surface)
 
 
+def draw_chunks(renderer: Renderer) -> None:
+    """Pictures of points of which chunks are left out, in the order of the file and in another one."""
+    cloud = sphere(1500)
+    for ordered, size in product((chunks.in_file_order, chunks.in_coarse_order), (1, 9)):
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(chunks, "LEAST", 1)
+            patched.setattr(chunks, "_SCATTERED", 2.0)
+            patched.setattr(chunks, "in_file_order", ordered)
+            pose, surface = Pose(0, 0.0, "test", cloud), Surface(renderer.gpu, (40, 30))
+            camera = Camera.orbit(pose.bounds, **CAMERA)
+            for shown in (False, False, True):
+                params = backend("points").params({"point_size": size, "hide_hidden": shown})
+                render_frame(renderer, Request(pose, camera, "points", params), surface)
+            assert surface.stats.counted
+
+
 def use_primitives(gpu: Gpu) -> None:
     """What backends may use of each primitive, whether one does or not."""
     gpu.activate()
@@ -235,6 +252,7 @@ def programs(request: pytest.FixtureRequest) -> list[list[Source]]:
     draw_all(renderer, whole)
     draw_samples(renderer)
     draw_packed(renderer, whole)
+    draw_chunks(renderer)
     use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader

@@ -1,4 +1,4 @@
-"""Few points list the pixels that are cleared and shaded: pictures are as on a surface that was never drawn to."""
+"""Few points list the pixels to clear and shade: pictures are as on a surface that was never drawn to."""
 
 from __future__ import annotations
 

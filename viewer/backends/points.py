@@ -55,4 +55,4 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter the points; complete where all shall be drawn."""
     params: Params = frame.params
     shown = mark_visible(pose, frame, surface) if params.hide_hidden and len(pose.cloud) else None
-    return draw_squares(pose, surface, params.point_size, frame.share, shown)
+    return draw_squares(pose, surface, params.point_size, frame.share, shown, "pose" not in frame.changed)

@@ -66,6 +66,9 @@ class Texture(IntEnum):
     AWAY_STARTS = auto()  # of discs that face away
     AWAY_LISTED = auto()
     DISCS = auto()  # of each row of a pose
+    # Chunks of points.
+    BOXES = auto()
+    FARTHEST_TILES = auto()
     # Neighborhoods, beside splats.
     SLOTS = auto()  # participants in the order of their cells
     NEAR_TO = auto()
@@ -122,6 +125,9 @@ class Storage(IntEnum):
     # Scatter, beside a list; what says which cells are visited has those from 4 on.
     KEYS = 0
     BEST = 1
+    # Chunks of points, beside a list.
+    FARTHEST_TILES = 0
+    SEEN = 4
     # Bins, beside what says which cells are visited, which has those from 2 on.
     CURSORS = 0
     VISITS = 1

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from ..task import Task, in_background
 from ..view import View
 from .pose import GpuPose
 
-CHUNK = 1 << 12  # points
+CHUNK = 1 << 10  # points
 LEAST = 1 << 18  # points of a pose, below which looking at all of them takes next to no time
 _MOST = 0.5  # share of the points from which on all are looked at, as that needs no list
 _SCATTERED = 0.5  # mean size of the boxes, in that of the pose, from which on an order is of no use
@@ -39,7 +40,7 @@ class Ordered:
     low: NDArray[np.float32]
     high: NDArray[np.float32]
 
-    @property
+    @cached_property
     def is_scattered(self) -> bool:
         """Whether chunks are about as large as the whole."""
         whole = np.linalg.norm(self.high.max(axis=0) - self.low.min(axis=0))
@@ -108,6 +109,15 @@ class Chunks:
         if self._found[0] != found_for:
             self._found = found_for, self._find(order, view, margin, reach)
         return self._found[1]
+
+    @property
+    def order(self) -> Ordered | None:
+        """An order of the points in which chunks are small beside the pose; None where there are few points,
+        or it is not known yet."""
+        if len(self._pose.cloud) < LEAST:
+            return None
+        order = self._known_order(self._pose.cloud)
+        return None if order.is_scattered else order
 
     def _find(self, order: Ordered, view: View, margin: float, reach: float) -> NDArray[np.uint32] | None:
         pose, cloud = self._pose, self._pose.cloud

@@ -14,9 +14,11 @@ from ..scan.spacing import sparse_spacing, typical_spacing
 from ..view import View
 from . import gl
 from .bindings import Texture
+from .compact import IndexList
 from .context import Program
+from .culling import CulledChunks, culled_chunks
 from .pose import GpuPose
-from .scatter import Visits, list_hits, scatter
+from .scatter import Visits, list_hits, scatter, take_items, take_keys
 from .surface import Surface
 
 # The points can list the pixels that they hit, at a third pass over the points; looking for
@@ -31,9 +33,10 @@ LARGEST_SQUARE = 32  # pixels
 
 @dataclass(frozen=True)
 class _Squares:
-    """Numbers that points/cells.glsl reads. point_size: edge, pixels."""
+    """Numbers that points/cells.glsl reads. point_size: edge, pixels. point_count: of all."""
 
     point_size: int
+    point_count: int
 
 
 def draw_squares(
@@ -42,18 +45,27 @@ def draw_squares(
     point_size: int,
     share: float = 1.0,
     shown: gl.BufferTexture | None = None,
+    stays: bool = False,
 ) -> bool:
     """Write the points to the Surface as squares; True if a later call would draw more of them.
 
     point_size: edge, pixels; 0: as far as the next point. share: of the points that are drawn. shown: R32UI,
-    a texel a row, 0 where a point is left out; None: none is.
+    a texel a row, 0 where a point is left out; None: none is. stays: whether the picture before was of this
+    pose, so that what that one showed is of use.
     """
     size = point_size or _touching(pose, surface.view)
+    chunks = (
+        culled_chunks(pose)
+        if stays and share >= 1 and not _is_sparse(surface, len(pose.cloud), size)
+        else None
+    )
+    if chunks is not None:
+        _draw_chunks(pose, surface, size, shown, chunks)
+        return False
     rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
     is_sample = surface.stats.share < 1
     if is_sample:
         size = min(round(size / math.sqrt(surface.stats.share)), LARGEST_SQUARE)
-    sparse = count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
 
     def bind(_: Program) -> None:
         pose.array("positions").bind(Texture.POSITIONS)
@@ -62,9 +74,8 @@ def draw_squares(
         if shown is not None:
             shown.bind(Texture.VISIBLE)
 
-    defines = {"SINGLE": int(size == 1), "SAMPLED": int(rows is not None), "FILTERED": int(shown is not None)}
-    visits = Visits("points/cells.glsl", count, bind, defines, _Squares(size))
-    if sparse:
+    visits = Visits("points/cells.glsl", count, bind, _defines(size, shown, rows), _Squares(size, count))
+    if _is_sparse(surface, count, size):
         listed = surface.start_listed()
         scatter(pose.gpu, visits, surface.depths, surface.rows, cleared=True)
         list_hits(pose.gpu, visits, surface.depths, surface.rows, listed, size**2)
@@ -72,6 +83,45 @@ def draw_squares(
     else:
         scatter(pose.gpu, visits, surface.depths, surface.rows)
     return is_sample
+
+
+def _is_sparse(surface: Surface, count: int, size: int) -> bool:
+    """Whether there are far fewer points than pixels."""
+    return count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
+
+
+def _draw_chunks(
+    pose: GpuPose, surface: Surface, size: int, shown: gl.BufferTexture | None, chunks: CulledChunks
+) -> None:
+    """Write the points of the chunks alone that the picture may show."""
+
+    def bind(_: Program) -> None:
+        chunks.bind(pose)
+        if shown is not None:
+            shown.bind(Texture.VISIBLE)
+
+    defines = {**_defines(size, shown), **chunks.defines}
+    given = _Squares(size, chunks.count)
+
+    def visits(listed: IndexList) -> Visits:
+        return Visits("points/cells.glsl", chunks.count, bind, defines, given, listed)
+
+    surface.clear()
+    take_keys(pose.gpu, visits(chunks.start(surface, margin=size / 2)), surface.depths)
+    take_keys(pose.gpu, visits(chunks.late(surface)), surface.depths)
+    take_items(pose.gpu, visits(chunks.shown(surface)), surface.depths, surface.rows)
+
+
+def _defines(
+    size: int, shown: gl.BufferTexture | None, rows: gl.BufferTexture | None = None
+) -> dict[str, object]:
+    given = {
+        "SINGLE": size == 1,
+        "SAMPLED": rows is not None,
+        "FILTERED": shown is not None,
+        "CHUNKED": False,
+    }
+    return {name: int(value) for name, value in given.items()}
 
 
 def _touching(pose: GpuPose, view: View) -> int:

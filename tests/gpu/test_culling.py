@@ -1,0 +1,114 @@
+"""Chunks that are hidden or out of view are not drawn, and pictures are the same to the bit."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.frame import Request, render_frame
+from viewer.gpu import chunks
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+COUNT, SIZE = 60_000, (120, 80)
+MIDDLE = np.array([1e6, 0, -1e6])
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "LEAST", 1)
+    monkeypatch.setattr(chunks, "CHUNK", 256)
+
+
+def shells(order: str) -> PointCloud:
+    """Spheres in one another, each place of them twice; along bands, one after another, or by chance."""
+    rng = np.random.default_rng(6)
+    points = rng.standard_normal((COUNT // 2, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    radii = np.resize([1.0, 0.8, 0.6, 0.4, 0.2], len(points))
+    if order == "bands":
+        along = np.lexsort((points[:, 0], np.floor(points[:, 1] * 8), -radii))
+        points, radii = points[along], radii[along]
+    points = np.repeat(points * radii[:, None], 2, axis=0)
+    return PointCloud.from_arrays(points + MIDDLE, colors=rng.random((COUNT, 3)))
+
+
+def request_of(cloud: PointCloud, camera: Camera, size: int = 2) -> Request:
+    params = backend("points").params({"point_size": size})
+    return Request(Pose(0, 0.0, "", cloud), camera, "points", params, Look(light="flat"))
+
+
+def looking(cloud: PointCloud, azimuth: float, nearer: float = 1.0, **changes: object) -> Camera:
+    camera = Camera.orbit(cloud.bounds(), azimuth, 20, aspect=1.5)
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    return replace(camera, eye=tuple(target + (eye - target) * nearer), **changes)
+
+
+def in_order(renderer: Renderer, request: Request, surface: Surface) -> None:
+    """Draw until the points are in an order of use."""
+    end = time.monotonic() + 60
+    while "chunks" not in surface.stats.counted and time.monotonic() < end:
+        render_frame(renderer, request, surface)
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("order", ["bands", "chance"])
+@pytest.mark.parametrize("size", [1, 2, 5])
+def test_pictures_are_the_same_to_the_bit(renderer: Renderer, order: str, size: int) -> None:
+    cloud = shells(order)
+    surface = Surface(renderer.gpu, SIZE)
+    request = request_of(cloud, looking(cloud, 0), size)
+    in_order(renderer, request, surface)
+    turns = ((0, 1), (5, 1), (90, 0.5), (270, 0.1), (10, 4))
+    views = [looking(cloud, azimuth, nearer) for azimuth, nearer in turns]
+    views += [looking(cloud, 30, projection="orthographic"), looking(cloud, 40, 30, fov_y=0.4)]
+    views += [looking(cloud, 50, near=2.2), looking(cloud, 50, near=1.2, far=2.4), looking(cloud, 60, 0.02)]
+    for camera in views:
+        for _ in range(2):
+            render_frame(renderer, replace(request, camera=camera), surface)
+            counted = surface.stats.counted["chunks"]()
+            assert sum(counted.values()) == -(-COUNT // 256)
+        fresh = Surface(renderer.gpu, SIZE)
+        render_frame(renderer, replace(request, camera=camera), fresh)
+        assert not fresh.stats.counted, "it has no picture before"
+        for name in ("depth", "id", "color"):
+            np.testing.assert_array_equal(getattr(surface, name), getattr(fresh, name), err_msg=str(camera))
+        np.testing.assert_array_equal(surface.image(), fresh.image())
+
+
+def test_what_is_hidden_or_beside_the_picture_is_not_drawn(renderer: Renderer) -> None:
+    cloud = shells("bands")
+    surface = Surface(renderer.gpu, (600, 400))
+    request = request_of(cloud, looking(cloud, 0), 16)
+    in_order(renderer, request, surface)
+    render_frame(renderer, request, surface)
+    total = -(-COUNT // 256)
+    counted = surface.stats.counted["chunks"]()
+    assert counted["hidden"] > 0.5 * total, counted
+    assert counted["outside"] == 0
+    away = looking(cloud, 0)
+    eye, target = np.array(away.eye), np.array(away.target)
+    render_frame(renderer, replace(request, camera=replace(away, target=tuple(2 * eye - target))), surface)
+    assert surface.stats.counted["chunks"]() == {"shown": 0, "hidden": 0, "outside": total}
+
+
+def test_others_are_shown_as_soon_as_what_hid_them_is_gone(renderer: Renderer) -> None:
+    """Through a hole cut into the outermost shell the next one is seen."""
+    cloud = shells("bands")
+    surface = Surface(renderer.gpu, SIZE)
+    camera = looking(cloud, 0)
+    request = request_of(cloud, camera, 5)
+    in_order(renderer, request, surface)
+    distance = float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
+    for near, radius in ((distance - 0.9, 0.8), (distance - 0.7, 0.6), (None, 1.0)):
+        render_frame(renderer, replace(request, camera=replace(camera, near=near)), surface)
+        middle = cloud.positions[surface.id[SIZE[1] // 2, SIZE[0] // 2]] + (cloud.origin - MIDDLE)
+        assert np.linalg.norm(middle) == pytest.approx(radius, abs=1e-3)
