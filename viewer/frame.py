@@ -100,6 +100,7 @@ def render_frame(
     frame = FrameView(view, params, prepared and prepared.derived, share, budget_ms, changed, moving)
     refinable = backend.draw(pose, frame, surface)
     surface.drawn = drawn
+    surface.is_whole = not (refinable or prepared is None or stats.simplified) and stats.share >= 1
     shade(surface, look)
 
     stats.upload_ms = sum(each.take_ms("upload") for each in {pose, surface.pose})
@@ -108,6 +109,39 @@ def render_frame(
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
     return refinable or prepared is None
+
+
+def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
+    """Shade the surface anew where it shows the request already, in another look at most; whether it did.
+
+    Nothing is drawn, uploaded or derived for it. What it does not take up, `render_frame` does.
+    """
+    if not surface.is_whole or colorable(request) is not request:
+        return False
+    start = time.perf_counter()
+    pose, before, layers = renderer.resident(request.pose), surface.drawn, surface.layers
+    wanted = {
+        "pose": pose,
+        "camera": view_of(request, surface.size).key,
+        "parameters": _chosen(request),
+        "size": surface.size,
+    }
+    same_numbers = layers is request.layers or not (layers.scalars or request.layers.scalars)
+    if any(before[name] != value for name, value in wanted.items()) or not same_numbers:
+        return False
+    if not surface.take_look(request.look):
+        return False
+    renderer.gpu.timers.start_frame()
+    surface.drawn = {**before, "values": surface.values_key}
+    shade(surface, request.look)
+    stats = surface.stats
+    stats.skipped["draw"] = "what is seen is the same"
+    stats.samples = 1
+    stats.upload_ms, stats.derive_ms = pose.take_ms("upload"), 0.0
+    stats.passes = renderer.gpu.timers.passes()
+    stats.gpu_ms = sum(ms for _, ms in stats.passes)
+    stats.cpu_ms = (time.perf_counter() - start) * 1e3
+    return True
 
 
 def supersample(renderer: Renderer, request: Request, surface: Surface, *, wait: bool = True) -> bool:

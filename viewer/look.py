@@ -236,6 +236,11 @@ def wants_normals(look: Look) -> bool:
     return look.light in ("head", "fixed") or look.color_by == "normal"
 
 
+def is_lit(look: Look) -> bool:
+    """Whether the look shows normals where there are some."""
+    return look.light != "flat" or look.color_by == "normal"
+
+
 def light_direction(look: Look) -> tuple[float, float, float]:
     """Direction to the fixed light, view space: azimuth 0 and elevation 0 is where the eye is."""
     a, e = math.radians(look.azimuth), math.radians(look.elevation)

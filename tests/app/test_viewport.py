@@ -77,6 +77,18 @@ def test_nothing_is_picked_where_there_is_no_picture(viewport: Viewport) -> None
     assert viewport.is_visible, "until another one is drawn"
 
 
+def test_another_look_is_shaded_in_full_at_once(viewport: Viewport) -> None:
+    viewport.draw(REQUEST)
+    for color in ("#ff0000", "#00ff00"):
+        look = replace(REQUEST.look, color_by="plain", plain=color)
+        assert viewport.draw(replace(REQUEST, look=look), held=True)
+        assert viewport.surface is not None
+        assert "draw" in viewport.surface.stats.skipped
+        assert not viewport.is_preview
+        middle = viewport.surface.image()[20, 30]
+        assert middle[color.index("f") // 2] > 100 > middle[(color.index("f") // 2 + 1) % 3]
+
+
 def test_a_preview_is_drawn_in_full_at_rest_and_on_demand(viewport: Viewport) -> None:
     viewport.draw(REQUEST)
     full = shown(viewport)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry import up_vector
-from ..look import Look, ValueKind, rgba, value_source
+from ..look import Look, ValueKind, is_lit, rgba, value_source, wants_normals
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
@@ -45,7 +45,8 @@ class RenderTarget:
     shows, 0xFFFFFFFF: none), one word a pixel. A pixel is covered where its depth is finite. Colour,
     normal and value are those of the row, unless the backend wrote its `own`; a pixel without a row is
     filled, and what the backend did not write of it is unknown.
-    drawn: what the picture was made of, by name; empty before, and where drawing failed.
+    drawn: what the picture was made of, by name; empty before, and where drawing failed. is_whole: whether
+    that is drawn in full, so that drawing it again would change nothing.
     look: what it is drawn for, and shaded in last. layers: over the pose. needs: names of what the backend
     has of the pose, stored or estimated. finds: the numbers that the backend finds for rows, by name, unless
     the scan or a layer has one of that name.
@@ -93,6 +94,7 @@ class RenderTarget:
         self._written: set[str] = set()
         self.is_lit = False
         self.drawn: dict[str, object] = {}
+        self.is_whole = False
         self._blended: tuple[str | None, str] | None = None  # the source that its own values are of, and up
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
@@ -115,7 +117,7 @@ class RenderTarget:
         self._given = None
         self._block.write(ViewBlock.of(view))
         self.bind_view()
-        self._covered_known = self._slots_known = False
+        self._covered_known = self._slots_known = self.is_whole = False
         self._left_as, self._clear_as = self._clear_as if self.drawn else None, None
         self._written.clear()
         self.is_lit = False
@@ -372,6 +374,21 @@ class RenderTarget:
         axis = self.height_axis if source == "height" else None
         numbers = self.layers.scalars.get(source or "")
         return source, axis, None if numbers is None else self.scanned.layer(numbers), self.look.plain
+
+    def take_look(self, look: Look) -> bool:
+        """Be shaded in another look next, where what is drawn is the same for it; whether it is."""
+        if (
+            self.is_lit
+            or wants_normals(look) != wants_normals(self.look)
+            or is_lit(look) != is_lit(self.look)
+        ):
+            return False
+        before, key = self.look, self.values_key
+        self.look = look
+        if self.values_key == key or not (self._written or self.wanted):
+            return True
+        self.look = before
+        return False
 
     @property
     def value_zero(self) -> float:

@@ -12,7 +12,17 @@ from typing import Any
 from ...analysis.pick import Picked, before_gap, pick
 from ...bounds import Bounds
 from ...errors import Scan4DError
-from ...frame import Request, bring, colorable, fallback, is_prepared, prepare, render_frame, supersample
+from ...frame import (
+    Request,
+    bring,
+    colorable,
+    fallback,
+    is_prepared,
+    prepare,
+    render_frame,
+    reshade,
+    supersample,
+)
 from ...gpu.present import Presenter
 from ...gpu.surface import Surface
 from ...look import SAMPLES
@@ -105,6 +115,12 @@ class Viewport:
             self.problem, self._prepared_at = None, math.inf
             self.size = size
             moving = playing or now < self._motion.ends
+            full = self._surfaces.get("full")
+            is_kept = full is not None and full.size == size and drawn is request
+            if full is not None and is_kept and reshade(self.renderer, request, full):
+                self._detail, self.surface = Detail(), full
+                self._note_drawn(request, full, as_asked=True, refinable=False)
+                return True
             self._detail = self._budget(request).detail if moving else Detail()
             self.surface = surface = self._surface_of(self._detail)
             share = self._detail.share
@@ -215,7 +231,7 @@ class Viewport:
     def took(self, ms: float, goal_ms: float) -> None:
         """Say how long the window took to show what was drawn last, and how long it may take."""
         surface, request = self.surface, self.request
-        if self.problem is not None or surface is None or request is None:
+        if self.problem is not None or surface is None or request is None or "draw" in surface.stats.skipped:
             return
         is_typical = surface.stats.simplified or not self._simplifies[str(request.backend)]  # of motion
         if surface.stats.backend == str(request.backend) and is_typical:

@@ -15,7 +15,7 @@ from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits
 from ...gpu.surface import Surface
-from ...look import Look
+from ...look import is_lit
 
 MODES = ("nearest", "linear", "best")  # as of_views.glsl numbers them
 _SPARE = 1 << 16  # entries of a list for the parts of large tiles
@@ -99,7 +99,7 @@ class ViewSource:
 
     def channels(self, surface: Surface) -> list[str]:
         found = ["color"] if self.samples.has_color else []
-        if lit := self._lit or wants_lit(surface.look):
+        if lit := self._lit or is_lit(surface.look):
             found.append("normal")
         if lit or self._blend:
             self._texels["normal"] = self.samples.normals(self._tiles.listed)
@@ -135,11 +135,6 @@ class ViewSource:
         for name, unit in (("normal", Texture.RANGE_NORMALS), ("value", Texture.VALUES)):
             if name in self._texels:
                 self._texels[name].bind(unit)
-
-
-def wants_lit(look: Look) -> bool:
-    """Whether a picture of range views needs normals, which are always to be had."""
-    return look.light != "flat" or look.color_by == "normal"
 
 
 def _causes() -> dict[str, object]:
