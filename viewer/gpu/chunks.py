@@ -107,8 +107,18 @@ class Chunks:
         order = self._known_order(cloud)
         found_for = (order, view.key, margin, reach)
         if self._found[0] != found_for:
-            self._found = found_for, self._find(order, view, margin, reach)
+            shown = self.shown_in(order, view, margin, reach)
+            few = len(shown) <= _MOST * len(order.low)
+            self._found = found_for, order.rows_of(shown, len(cloud)) if few else None
         return self._found[1]
+
+    def shown_in(self, order: Ordered, view: View, margin: float, reach: float = 0.0) -> NDArray[np.intp]:
+        """The chunks, (C,) ascending, that a view may show. margin, reach: as above."""
+        pose = self._pose
+        moved = pose.cloud.origin - view.origin
+        reach += _ROUNDING * pose.bounds.radius
+        low, high = order.low + (moved - reach), order.high + (moved + reach)
+        return np.flatnonzero(view.may_show(low, high, margin + _SLACK))
 
     @property
     def order(self) -> Ordered | None:
@@ -118,16 +128,6 @@ class Chunks:
             return None
         order = self._known_order(self._pose.cloud)
         return None if order.is_scattered else order
-
-    def _find(self, order: Ordered, view: View, margin: float, reach: float) -> NDArray[np.uint32] | None:
-        pose, cloud = self._pose, self._pose.cloud
-        moved = cloud.origin - view.origin
-        reach += _ROUNDING * pose.bounds.radius
-        low, high = order.low + (moved - reach), order.high + (moved + reach)
-        shown = np.flatnonzero(view.may_show(low, high, margin + _SLACK))
-        if len(shown) > _MOST * len(order.low):
-            return None
-        return order.rows_of(shown, len(cloud))
 
     def _known_order(self, cloud: PointCloud) -> Ordered:
         if self._order is None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from ..view import View
 from . import chunks, gl
 from .bindings import Storage, Texture
 from .compact import IndexList
@@ -55,7 +56,8 @@ class CulledChunks:
 
     def __init__(self, pose: GpuPose, order: chunks.Ordered) -> None:
         gpu = pose.gpu
-        self._gpu, self.count, self._size = gpu, len(pose.cloud), chunks.CHUNK
+        self._pose, self._order, self._gpu = pose, order, gpu
+        self.count, self._size = len(pose.cloud), chunks.CHUNK
         self._chunks = len(order.low)
         boxes = np.stack([order.low, order.high], axis=1)
         self._boxes = gl.BufferTexture(gpu.ctx.buffer(boxes), gl.RGB32F)
@@ -73,11 +75,23 @@ class CulledChunks:
         """Macros of points/cells.glsl."""
         return {"CHUNKED": 1, "CHUNK": self._size, "SAMPLED": int(self.rows is not None)}
 
-    def bind(self, pose: GpuPose) -> None:
-        """Bind the positions and rows of the pose's points, in the order of chunks."""
-        (self._positions or pose.array("positions")).bind(Texture.POSITIONS)
+    def bind(self) -> None:
+        """Bind the positions and rows of the points, in the order of chunks."""
+        (self._positions or self._pose.array("positions")).bind(Texture.POSITIONS)
         if self.rows is not None:
             self.rows.bind(Texture.DRAWN_ROWS)
+
+    def few(self, view: View, margin: float, most: float) -> tuple[IndexList, int] | None:
+        """The chunks that a view may show, and how many points that are, where these are at most so many: so
+        few that looking for hidden ones would take longer. margin: as in `start`."""
+        if view.holds(self._pose.bounds.corners() - view.origin):
+            return None
+        found = self._pose.keep(chunks.Chunks).shown_in(self._order, view, margin)
+        if (points := min(len(found) * self._size, self.count)) > most:
+            return None
+        listed = self._lists[0]
+        listed.write(found.astype(np.uint32))
+        return listed, points
 
     def start(self, surface: RenderTarget, margin: float) -> IndexList:
         """The chunks to draw first. margin: pixels around a point that it may cover."""

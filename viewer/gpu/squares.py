@@ -54,13 +54,10 @@ def draw_squares(
     pose, so that what that one showed is of use.
     """
     size = point_size or _touching(pose, surface.view)
-    chunks = (
-        culled_chunks(pose)
-        if stays and share >= 1 and not _is_sparse(surface, len(pose.cloud), size)
-        else None
-    )
+    few = _LIST_BELOW * surface.size[0] * surface.size[1] / size**2
+    chunks = culled_chunks(pose) if stays and share >= 1 and len(pose.cloud) > few else None
     if chunks is not None:
-        _draw_chunks(pose, surface, size, shown, chunks)
+        _draw_chunks(pose, surface, size, shown, chunks, few)
         return False
     rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
     is_sample = surface.stats.share < 1
@@ -75,39 +72,52 @@ def draw_squares(
             shown.bind(Texture.VISIBLE)
 
     visits = Visits("points/cells.glsl", count, bind, _defines(size, shown, rows), _Squares(size, count))
-    if _is_sparse(surface, count, size):
-        listed = surface.start_listed()
-        scatter(pose.gpu, visits, surface.depths, surface.rows, cleared=True)
-        list_hits(pose.gpu, visits, surface.depths, surface.rows, listed, size**2)
-        surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
+    if count < few:
+        _draw_listed(surface, visits, size)
     else:
         scatter(pose.gpu, visits, surface.depths, surface.rows)
     return is_sample
 
 
-def _is_sparse(surface: Surface, count: int, size: int) -> bool:
-    """Whether there are far fewer points than pixels."""
-    return count * size**2 < _LIST_BELOW * surface.size[0] * surface.size[1]
+def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
+    """Write points that are far fewer than pixels."""
+    listed = surface.start_listed()
+    scatter(surface.gpu, visits, surface.depths, surface.rows, cleared=True)
+    list_hits(surface.gpu, visits, surface.depths, surface.rows, listed, size**2)
+    surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
 
 
 def _draw_chunks(
-    pose: GpuPose, surface: Surface, size: int, shown: gl.BufferTexture | None, chunks: CulledChunks
+    pose: GpuPose,
+    surface: Surface,
+    size: int,
+    shown: gl.BufferTexture | None,
+    chunks: CulledChunks,
+    few: float,
 ) -> None:
-    """Write the points of the chunks alone that the picture may show."""
+    """Write the points of the chunks alone that the picture may show. few: points, fewer than which list
+    their pixels."""
 
     def bind(_: Program) -> None:
-        chunks.bind(pose)
+        chunks.bind()
         if shown is not None:
             shown.bind(Texture.VISIBLE)
 
     defines = {**_defines(size, shown), **chunks.defines}
     given = _Squares(size, chunks.count)
 
-    def visits(listed: IndexList) -> Visits:
-        return Visits("points/cells.glsl", chunks.count, bind, defines, given, listed)
+    def visits(listed: IndexList, count: int = chunks.count) -> Visits:
+        return Visits("points/cells.glsl", count, bind, defines, given, listed)
 
+    margin = size / 2
+    if found := chunks.few(surface.view, margin, few):
+        _draw_listed(surface, visits(*found), size)
+        surface.stats.skipped["points"] = (
+            f"{chunks.count - found[1]:,} of {chunks.count:,} are in chunks out of view"
+        )
+        return
     surface.clear()
-    take_keys(pose.gpu, visits(chunks.start(surface, margin=size / 2)), surface.depths)
+    take_keys(pose.gpu, visits(chunks.start(surface, margin)), surface.depths)
     take_keys(pose.gpu, visits(chunks.late(surface)), surface.depths)
     take_items(pose.gpu, visits(chunks.shown(surface)), surface.depths, surface.rows)
 
