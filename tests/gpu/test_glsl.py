@@ -211,6 +211,7 @@ def draw_chunks(renderer: Renderer) -> None:
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(chunks, "LEAST", 1)
             patched.setattr(chunks, "_SCATTERED", 2.0)
+            patched.setattr(chunks, "_LOOSE", 2.0)
             patched.setattr(chunks, "in_file_order", ordered)
             pose, surface = Pose(0, 0.0, "test", cloud), Surface(renderer.gpu, (40, 30))
             camera = Camera.orbit(pose.bounds, **CAMERA)

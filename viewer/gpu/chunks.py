@@ -7,6 +7,7 @@ part of it out of view; until then all are looked at. Pictures are the same to t
 
 from __future__ import annotations
 
+import weakref
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,10 +20,13 @@ from ..task import Task, in_background
 from ..view import View
 from .pose import GpuPose
 
-CHUNK = 1 << 10  # points
+_CHUNKS = 1 << 12  # about as many as a pose has: fewer hide less, more take longer to test
+_CHUNK = 1 << 8  # points at least
 LEAST = 1 << 18  # points of a pose, below which looking at all of them takes next to no time
 _MOST = 0.5  # share of the points from which on all are looked at, as that needs no list
-_SCATTERED = 0.5  # mean size of the boxes, in that of the pose, from which on an order is of no use
+# Mean size of the boxes, in that of the pose: from where on another order is worth a second of a thread,
+# and from where on an order is of no use.
+_LOOSE, _SCATTERED = 0.15, 0.5
 _SLACK = 1.0  # pixels beyond the edges, for what float32 rounds
 _ROUNDING = 1e-5  # of the pose's size, by which boxes are larger for the same reason
 _PART = 1 << 18  # points that are worked on at a time, so that they stay near the processor
@@ -33,40 +37,52 @@ _DIGITS = np.array(_THIRDS, np.uint16)  # the bits of a number, two zeros betwee
 
 @dataclass(frozen=True, eq=False)
 class Ordered:
-    """An order of points, and the boxes of its chunks. rows: (N,), None for that of the file. low, high:
-    (C, 3) float32 corners relative to the cloud's origin."""
+    """An order of points, and the boxes of its chunks. chunk: points of one. rows: (N,), None for that of the
+    file. low, high: (C, 3) float32 corners relative to the cloud's origin."""
 
+    chunk: int
     rows: NDArray[np.uint32] | None
     low: NDArray[np.float32]
     high: NDArray[np.float32]
 
     @cached_property
+    def looseness(self) -> float:
+        """The mean size of the boxes, in that of all."""
+        whole = np.linalg.norm(self.high.max(axis=0) - self.low.min(axis=0))
+        return float(np.linalg.norm(self.high - self.low, axis=1).mean() / max(whole, np.finfo(float).tiny))
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether another order is to be found."""
+        return self.rows is None and self.looseness > _LOOSE
+
+    @property
     def is_scattered(self) -> bool:
         """Whether chunks are about as large as the whole."""
-        whole = np.linalg.norm(self.high.max(axis=0) - self.low.min(axis=0))
-        return bool(np.linalg.norm(self.high - self.low, axis=1).mean() > _SCATTERED * whole)
+        return self.looseness > _SCATTERED
 
     def rows_of(self, chunks: NDArray[np.intp], count: int) -> NDArray[np.uint32]:
         """The rows of some chunks of `count` points, ascending."""
         if self.rows is None:
-            rows = (chunks[:, None] * CHUNK + np.arange(CHUNK)).astype(np.uint32).ravel()
+            rows = (chunks[:, None] * self.chunk + np.arange(self.chunk)).astype(np.uint32).ravel()
             return rows[: np.searchsorted(rows, count)]
         listed = np.zeros(count, bool)
         for chunk in chunks:
-            listed[self.rows[chunk * CHUNK : (chunk + 1) * CHUNK]] = True
+            listed[self.rows[chunk * self.chunk : (chunk + 1) * self.chunk]] = True
         return np.flatnonzero(listed).astype(np.uint32)
 
 
 def in_file_order(cloud: PointCloud) -> Ordered:
     """The points as they are."""
-    return Ordered(None, *_boxes(cloud.positions))
+    chunk = _chunk_of(cloud)
+    return Ordered(chunk, None, *_boxes(cloud.positions, chunk))
 
 
 def in_coarse_order(cloud: PointCloud) -> Ordered:
     """The points by the cells of a grid of 32 along each axis, along a Morton curve; those of one cell as in
     the file."""
     positions = cloud.positions
-    lows, highs = _boxes(positions)
+    lows, highs = _boxes(positions, _PART)
     low, high = lows.min(axis=0), highs.max(axis=0)
     steps = np.float32(1 << _LEVEL) / np.maximum(high - low, np.finfo(np.float32).tiny)
     codes = np.empty(len(positions), np.uint16)
@@ -76,11 +92,18 @@ def in_coarse_order(cloud: PointCloud) -> Ordered:
         x, y, z = (_DIGITS[column] for column in cells.T)
         codes[part] = x | y << 1 | z << 2
     rows = np.argsort(codes, kind="stable").astype(np.uint32)  # of 16 bits: by their digits, in linear time
-    return Ordered(rows, *_boxes(positions.take(rows, axis=0)))
+    chunk = _chunk_of(cloud)
+    return Ordered(chunk, rows, *_boxes(positions.take(rows, axis=0), chunk))
 
 
-def _boxes(positions: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    starts = np.arange(0, len(positions), CHUNK)
+def _chunk_of(cloud: PointCloud) -> int:
+    """How many points a chunk has: a power of two."""
+    return max(_CHUNK, 1 << max(len(cloud) // _CHUNKS, 1).bit_length() - 1)
+
+
+def _boxes(positions: NDArray[np.float32], chunk: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Lower and upper corners of each so many points."""
+    starts = np.arange(0, len(positions), chunk)
     return np.minimum.reduceat(positions, starts, axis=0), np.maximum.reduceat(positions, starts, axis=0)
 
 
@@ -90,7 +113,7 @@ class Chunks:
     nbytes = 0
 
     def __init__(self, pose: GpuPose) -> None:
-        self._pose = pose
+        self._pose = weakref.proxy(pose)  # which keeps this
         self._order: Ordered | None = None
         self._coarse: Future[Ordered] | None = None
         self._found: tuple[object, NDArray[np.uint32] | None] = None, None
@@ -120,14 +143,19 @@ class Chunks:
         low, high = order.low + (moved - reach), order.high + (moved + reach)
         return np.flatnonzero(view.may_show(low, high, margin + _SLACK))
 
-    @property
-    def order(self) -> Ordered | None:
-        """An order of the points in which chunks are small beside the pose; None where there are few points,
-        or it is not known yet."""
+    def take_order(self) -> Ordered | None:
+        """The order that points stay in from now on, if chunks are small in it; None where there are few
+        points, or it is not known yet, which each call brings nearer."""
         if len(self._pose.cloud) < LEAST:
             return None
         order = self._known_order(self._pose.cloud)
-        return None if order.is_scattered else order
+        return None if order.is_scattered or order.is_loose else order
+
+    @property
+    def known(self) -> Ordered:
+        """The order that is known."""
+        assert self._order is not None, "take_order comes before"
+        return self._order
 
     def _known_order(self, cloud: PointCloud) -> Ordered:
         if self._order is None:
@@ -135,7 +163,7 @@ class Chunks:
         elif self._coarse is not None:
             if self._coarse.done():
                 self._order, self._coarse = self._coarse.result(), None
-        elif self._order.rows is None and self._order.is_scattered:
+        elif self._order.is_loose:
             self._coarse = in_background(Task("Ordering points"), lambda: in_coarse_order(cloud))
         return self._order
 

@@ -13,8 +13,9 @@ import moderngl
 import numpy as np
 
 from ..view import View
-from . import chunks, gl
+from . import gl
 from .bindings import Storage, Texture
+from .chunks import Chunks
 from .compact import IndexList
 from .context import Gpu
 from .pose import GpuPose
@@ -39,13 +40,8 @@ class _Culling:
 def culled_chunks(pose: GpuPose) -> CulledChunks | None:
     """The chunks of a pose whose points are in an order of use; None where they are not, or few."""
     counted_alike = (pose.origin == pose.cloud.origin).all()
-    return pose.keep(_in_order) if counted_alike and pose.keep(chunks.Chunks).order else None
-
-
-def _in_order(pose: GpuPose) -> CulledChunks:
-    order = pose.keep(chunks.Chunks).order
-    assert order is not None
-    return CulledChunks(pose, order)
+    is_of_use = counted_alike and pose.keep(Chunks).take_order() is not None
+    return pose.keep(CulledChunks) if is_of_use else None
 
 
 class CulledChunks:
@@ -54,10 +50,10 @@ class CulledChunks:
     rows: the row of each point, in that order; None where they are in that of the file.
     """
 
-    def __init__(self, pose: GpuPose, order: chunks.Ordered) -> None:
-        gpu = pose.gpu
-        self._pose, self._order, self._gpu = pose, order, gpu
-        self.count, self._size = len(pose.cloud), chunks.CHUNK
+    def __init__(self, pose: GpuPose) -> None:
+        self._gpu = gpu = pose.gpu
+        self._order = order = pose.keep(Chunks).known
+        self.count, self._size = len(pose.cloud), order.chunk
         self._chunks = len(order.low)
         boxes = np.stack([order.low, order.high], axis=1)
         self._boxes = gl.BufferTexture(gpu.ctx.buffer(boxes), gl.RGB32F)
@@ -75,18 +71,18 @@ class CulledChunks:
         """Macros of points/cells.glsl."""
         return {"CHUNKED": 1, "CHUNK": self._size, "SAMPLED": int(self.rows is not None)}
 
-    def bind(self) -> None:
-        """Bind the positions and rows of the points, in the order of chunks."""
-        (self._positions or self._pose.array("positions")).bind(Texture.POSITIONS)
+    def bind(self, pose: GpuPose) -> None:
+        """Bind the positions and rows of the pose's points, in the order of chunks."""
+        (self._positions or pose.array("positions")).bind(Texture.POSITIONS)
         if self.rows is not None:
             self.rows.bind(Texture.DRAWN_ROWS)
 
-    def few(self, view: View, margin: float, most: float) -> tuple[IndexList, int] | None:
+    def few(self, pose: GpuPose, view: View, margin: float, most: float) -> tuple[IndexList, int] | None:
         """The chunks that a view may show, and how many points that are, where these are at most so many: so
         few that looking for hidden ones would take longer. margin: as in `start`."""
-        if view.holds(self._pose.bounds.corners() - view.origin):
+        if view.holds(pose.bounds.corners() - view.origin):
             return None
-        found = self._pose.keep(chunks.Chunks).shown_in(self._order, view, margin)
+        found = pose.keep(Chunks).shown_in(self._order, view, margin)
         if (points := min(len(found) * self._size, self.count)) > most:
             return None
         listed = self._lists[0]

@@ -99,7 +99,7 @@ def _draw_chunks(
     their pixels."""
 
     def bind(_: Program) -> None:
-        chunks.bind()
+        chunks.bind(pose)
         if shown is not None:
             shown.bind(Texture.VISIBLE)
 
@@ -110,7 +110,7 @@ def _draw_chunks(
         return Visits("points/cells.glsl", count, bind, defines, given, listed)
 
     margin = size / 2
-    if found := chunks.few(surface.view, margin, few):
+    if found := chunks.few(pose, surface.view, margin, few):
         _draw_listed(surface, visits(*found), size)
         surface.stats.skipped["points"] = (
             f"{chunks.count - found[1]:,} of {chunks.count:,} are in chunks out of view"
