@@ -92,7 +92,7 @@ def is_idle(app: App) -> bool:
     goes_on = (
         app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on,
         app.glide.is_on,
-        app.tasks.all, app.scans.waits, app.browser.waits,
+        app.tasks.all, app.tools.followed.is_busy, app.scans.waits, app.browser.waits,
         playback.pose is not None and not app.viewport.is_complete,
         playback.pose is not None and not (app.viewport.is_refined or app.steering.moves),
     )  # fmt: skip
@@ -135,6 +135,7 @@ def shown(app: App) -> dict[str, Any]:
         "clicking": app.tools.clicking,
         "is_under_way": app.tools.is_under_way,
         "landmarks": landmarks(app),
+        "followed": {name: track.is_whole for name, track in app.tools.followed.tracks.items()},
         "measured": {name: one.values.tolist() for name, one in app.tools.followed.series.items()},
         "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
         "camera": document.camera and document.camera.to_json(),

@@ -106,6 +106,17 @@ def test_21_landmarks_take_21_clicks_and_are_followed(screen: Screen, tmp_path: 
         assert "Traceback" not in app.log()
 
 
+def test_the_window_is_at_rest_only_when_landmarks_are_followed(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        press(app, "k")
+        for number, name in ((34, "Landmark 1"), (60, "Landmark 2")):
+            state = click(app, grid(1)[number])
+            assert state.followed[name], "following begins a moment after the click, and has ended"
+            assert len(state.followed) == len(state.landmarks)
+
+
 @pytest.mark.slow
 def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path: Path, scan: Path) -> None:
     points = [grid(scale) for scale in GROWTH]

@@ -14,14 +14,19 @@ class Followed:
 
     tracks: by landmark, of those that are placed, in their order; frames nobody has looked at yet are
     pending. Positions are those of the scan, whatever tools move it to. series: by measure; those that were
-    computed. Either is another object where something has changed, and only then. is_busy: whether more is
-    being found.
+    computed. Either is another object where something has changed, and only then. is_following: whether
+    more of the tracks is being found, or is about to be; is_measuring: likewise of measures of surfaces.
     """
 
     def __init__(self) -> None:
         self.tracks: Mapping[str, Track] = MappingProxyType({})
         self.series: Mapping[str, Series] = MappingProxyType({})
-        self.is_busy = False
+        self.is_following = self.is_measuring = False
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether more is going to be known, without the user's doing."""
+        return self.is_following or self.is_measuring
 
     def take_tracks(self, tracks: Mapping[str, Track]) -> bool:
         """Take in the tracks that are there now; whether one is another object than before."""

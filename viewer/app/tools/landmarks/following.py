@@ -62,10 +62,11 @@ class Following:
             self._go_on(self._tracker, is_wanted)
         is_same = timeline is self._timeline  # else what is there is of the scan before
         found: Mapping[str, Track] = self._tracker.tracks if self._tracker and is_same else {}
-        self._desk.followed.is_busy = self.is_running
         changed = self._desk.followed.take_tracks(found)
         if changed:
             self.pending = sum(not track.is_whole for track in found.values())
+        is_left = self.pending > 0 and not (self._is_done or self.is_stopped)
+        self._desk.followed.is_following = self.is_running or (is_wanted and is_left)
         return changed
 
     def _take_up(self, timeline: Timeline, landmarks: Sequence[Landmark]) -> None:

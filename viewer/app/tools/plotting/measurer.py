@@ -69,6 +69,7 @@ class Measurer:
             one = quick.pop(0)
             self._found[one.measure.name] = one, series_of(one.measure, one.named, None, noise)
         self._measure_surfaces([one for one in missing if kind_of(one.measure).needs_surface], noise)
+        self._desk.followed.is_measuring = self.is_running
         self._found = {
             name: known for name, known in self._found.items()
             if name in wanted and (wanted[name].is_like(known[0]) or wanted[name] in quick)
