@@ -15,6 +15,7 @@ from viewer.camera import Camera
 from viewer.document.recording import Entry
 from viewer.look import Look
 from viewer.output.marks import Marks
+from viewer.output.overlays import Drawn, DrawnLandmark
 from viewer.rigid import STILL, Rigid
 
 TIMES: NDArray[np.float64] = np.arange(10, dtype=np.float64) * 0.04
@@ -63,6 +64,17 @@ def test_each_frame_is_where_it_is_moved_to() -> None:
 
     entries = recording(replace(VIEW, what="frames", last=3), SHOWN, MARKS, TIMES, None, place).entries
     assert [entry.place and entry.place[1] for entry in entries] == [None, (0, 1, 0, 1), (0, 1, 0, 2)]
+
+
+def test_each_frame_has_what_tools_draw_over_it() -> None:
+    def drawn(index: int) -> Drawn:
+        return Drawn((DrawnLandmark((float(index), 0.0, 0.0), "a", True),))
+
+    choices = replace(VIEW, what="frames", first=2, last=3)
+    frames = recording(choices, SHOWN, Marks(landmarks=True), TIMES, None, lambda _: STILL, drawn).entries
+    assert [entry.landmarks[0].place[0] for entry in frames] == [1, 2]
+    bare = recording(choices, SHOWN, Marks(notes=True), TIMES, None, lambda _: STILL, drawn).entries
+    assert [entry.landmarks for entry in bare] == [(), ()]
 
 
 def test_a_film_of_frames_keeps_their_pace() -> None:

@@ -5,14 +5,20 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PANEL, RunningApp, Screen, running_app
+from PIL import Image
+from virtual_screen import PANEL, ROOT, RunningApp, Screen, running_app
 
 from viewer.camera import Camera
+from viewer.document.recording import Recording
+from viewer.output.overlays import PLACED_COLOR
 
 RATE, FRAMES = 25.0, 50
 PEAK, WIDE, OPENING = 1.0, 0.25, 12.0  # seconds, seconds, scan units
@@ -122,10 +128,7 @@ def test_tools_stand_beside_each_other_under_the_timeline(screen: Screen, tmp_pa
         app.act("drawer/one", ("item_click", "Press one"))
         app.told("one is pressed")
         bottom = screen.picture().shape[0] - (height - lower)
-        screen.do("mousemove", 300, bottom + 3, "sleep", 0.3, "mousedown", 1, "sleep", 0.2)
-        screen.do("mousemove_relative", "--", 0, -40)
-        screen.do("sleep", 0.2, "mouseup", 1)
-        app.settle()
+        app.drag((300, bottom + 3), (300, bottom - 37))
         assert app.view()[3] == pytest.approx(lower - 40, abs=3)
         app.act("drawer/two", ("item_click", "Press two"))
         app.told("two is switched off until the next start: ValueError: two is pressed")
@@ -165,14 +168,50 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
         assert 10 < clicked < FRAMES
         column, row = playhead(app)
         assert abs(column - x) < 12, "the line is where it was clicked"
-        screen.do("mousemove", column, row, "sleep", 0.3, "mousedown", 1, "sleep", 0.2)
-        screen.do("mousemove", column - 60, row, "sleep", 0.2, "mouseup", 1)
-        dragged = app.settle().frame
+        dragged = app.drag((column, row), (column - 60, row)).frame
         assert 0 < dragged < clicked - 3
         ctrl(screen, "z")
         app.settle()
         assert not app.state.document["parts"]["landmarks"]["measures"]
         assert "Traceback" not in app.log()
+
+
+def check_saved_picture(app: RunningApp, folder: Path) -> None:
+    """A picture that is saved has landmarks, ways and measures as the view has them, and is drawn again."""
+    press(app, "p")
+    saved = Path(app.told(r"Saved (.+\.png)")[1])
+    picture = np.asarray(Image.open(saved).convert("RGB")).astype(int)
+    left, top, width, height = app.view()
+    view = app.screen.picture()[top : top + height, left : left + width].astype(int)
+    entry = Recording.load(saved).entries[0]
+    assert len(entry.landmarks) == 4
+    assert sum(len(path.places) for path in entry.trajectories) == FRAMES
+    assert [path.name.split()[0] for path in entry.measure_lines] == ["Distance", "Distance"]
+    marks = [(one.place, PLACED_COLOR) for one in entry.landmarks]
+    (line, upper), way = entry.measure_lines, entry.trajectories[0]
+    assert line.places == upper.places, "the latter covers the former"
+    marks.append((line.places[len(line.places) // 2], upper.colors[0]))
+    fastest = int(np.linalg.norm(np.diff(np.array(way.places), axis=0), axis=1).argmax())
+    marks.append((way.places[fastest], way.colors[fastest]))
+    missed: dict[str, list[object]] = {"picture": [], "view": []}
+    for place, color in marks:
+        at = entry.camera.place_in_picture(place)
+        assert at is not None
+        x, y = int(width / 2 + at[0] * height), int(height / 2 - at[1] * height)
+        for name, image in (("picture", picture), ("view", view)):
+            around = image[max(y - 3, 0) : y + 4, x - 3 : x + 4]
+            if np.abs(around - bytes_of(color)).max(axis=2).min() >= 60:
+                missed[name].append((place, f"{color:06x}"))
+    assert not missed["picture"]
+    assert len(missed["view"]) <= 1, missed  # which the plate of a value may cover
+    again = folder / "again.png"
+    command = [sys.executable, "-m", "viewer.cli", "render", "--replay", str(saved), "-o", str(again)]
+    subprocess.run(command, check=True, cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert (np.asarray(Image.open(again).convert("RGB")) == picture).all()
+
+
+def bytes_of(color: int) -> list[int]:
+    return [color >> 16, color >> 8 & 255, color & 255]
 
 
 @pytest.mark.slow
@@ -205,6 +244,7 @@ def test_curves_are_saved_and_ways_are_drawn_and_held_still(
         app.settle()
         after = screen.picture()[top : top + height, left : left + width]
         assert (before != after).any(axis=2).sum() > 100
+        check_saved_picture(app, tmp_path)
         for number in (1, 2, 3):
             app.act(PANEL, ("item_click", f"Ways of landmarks/ways/$${number}/##anchors"))
         app.act(PANEL, ("item_click", "Ways of landmarks/hold/##value"))

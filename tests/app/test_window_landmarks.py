@@ -143,9 +143,7 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         press(app, "period")
         app.see(lambda state: state.landmarks["Landmark 1"][0] == "tracked")
         start, stop = on_screen(app, points[1][34]), on_screen(app, points[1][50])
-        screen.do("mousemove", *start, "sleep", 0.2, "mousedown", 1, "sleep", 0.2, "mousemove", *stop)
-        screen.do("sleep", 0.3, "mouseup", 1)
-        dragged = app.settle()
+        dragged = app.drag(start, stop)
         keys = keys_of(dragged, "Landmark 1")
         assert is_at(keys[0], points[0][34]), "the frame before stays as it was"
         assert math.dist(keys[1], points[1][50]) < 1.25 * CLICK, "the frame that is dragged in has a key"

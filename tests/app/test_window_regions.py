@@ -44,13 +44,9 @@ def drag_round(app: RunningApp, radius: float) -> None:
     x, y = left + width // 2, top + height // 2
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -0.9))
     places = [(x + radius * a, y + radius * b) for a, b in corners]
-    app.screen.do("mousemove", *map(int, places[0]), "sleep", 0.2, "mousedown", 1, "sleep", 0.2)
-    for start, end in pairwise(places):
-        for share in np.linspace(0.1, 1, 10):
-            at = [round(a + share * (b - a)) for a, b in zip(start, end, strict=True)]
-            app.screen.do("mousemove", *at, "sleep", 0.05)
-    app.screen.do("mouseup", 1)
-    app.settle()
+    shares = np.linspace(0.2, 1, 5)
+    between = [(a + s * (c - a), b + s * (d - b)) for (a, b), (c, d) in pairwise(places) for s in shares]
+    app.drag(places[0], *between)
 
 
 def pixels_of(picture: NDArray[np.uint8], color: int) -> float:
@@ -96,8 +92,7 @@ def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
 
         app.act(PANEL, ("item_click", "###region"))
         left, top, *_ = app.view()
-        screen.do("mousemove", left + 4, top + 40, "sleep", 0.2, "mousedown", 1, "sleep", 0.1)
-        screen.do("mousemove", left + 20, top + 60, "sleep", 0.2, "mouseup", 1)
+        app.drag((left + 4, top + 40), (left + 20, top + 60))
         app.told("Go round a part of the surface")
         assert app.settle().clicking == "plotting"
         screen.do("key", "Escape")

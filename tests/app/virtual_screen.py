@@ -177,6 +177,20 @@ class RunningApp:
         self._ask()
         return self.see(lambda state: state.is_idle)
 
+    def drag(self, *places: tuple[float, float]) -> State:
+        """Press the left button at the first place of the screen, go from place to place, let go at the last.
+
+        Each is taken in before the next: a window that is slow would see several as one.
+        """
+        for number, (x, y) in enumerate(places):
+            self.screen.do("mousemove", round(x), round(y))
+            self._ask()
+            if number == 0:
+                self.screen.do("mousedown", 1)
+                self._ask()
+        self.screen.do("mouseup", 1)
+        return self.settle()
+
     def act(self, window: str, *actions: tuple[object, ...]) -> None:
         """Act on a window's widgets by their names, when all events so far were taken in.
 

@@ -29,6 +29,7 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
 from viewer.output.marks import LINE_COLOR, Marks
+from viewer.output.overlays import DrawnLandmark, DrawnPath
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan import formats
@@ -141,6 +142,34 @@ def test_measurements_are_drawn_again_follow_their_points_and_stand_in_anonymous
         assert lines[0].sum() > 100
         assert np.array_equal(*lines)
         assert Recording.load(Path(f"p{number}.png")).entries[0].measurements == shown.measurements
+
+
+def test_landmarks_and_their_lines_stand_in_anonymous_pictures_where_they_are(run: Run) -> None:
+    away = np.array([5000.0, -300.0, 20.0])
+    formats.write(Path("away.npz"), PointCloud.from_arrays(sphere(2000).world() + away))
+    camera = Camera.orbit(sphere(2000).bounds(), 0, 0, aspect=1.5).moved(away)
+    top, side = (vector(away + place) for place in ((0.0, 0.8, 1.2), (0.8, 0.0, 1.2)))
+    turn = Rigid(np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])).in_frame(-away)
+    shown = entry(
+        scan="away.npz", camera=camera, size=(1200, 800), look=Look(), at=0.0,
+        marks=Marks(landmarks=True, trajectories=True, measure_lines=True),
+        landmarks=(DrawnLandmark(side, "jane", False, 0.1),), held=matrix_of(turn),
+        trajectories=(DrawnPath((top, side), (0xFF0000, 0xFF0000)),),
+        measure_lines=(DrawnPath((top, side), (0x00FF00,), False, "doe", "1 mm"),),
+    )  # fmt: skip
+    Recording((shown,)).save(Path("a.json"))
+    assert run("render", "--replay", "a.json", "-o", "p.png").code == 0
+    assert run("render", "--replay", "a.json", "--anonymous", "-o", "q.png").code == 0
+    assert not any(word in read_description(Path("q.png")) for word in ("jane", "doe", "away", "5000"))
+    for color in ((242, 193, 78), (255, 0, 0), (0, 255, 0)):
+        named, anonymous = (
+            np.abs(picture(Path(name)).astype(int)[..., :3] - color).max(axis=2) < 60
+            for name in ("p.png", "q.png")
+        )
+        assert named.sum() > 5, color
+        assert (named & anonymous).sum() > 0.8 * named.sum(), color
+    assert run("render", "--replay", "a.json", "--marks", "landmarks", "-o", "r.png").code == 0
+    assert not (np.abs(picture(Path("r.png")).astype(int)[..., :3] - (255, 0, 0)).max(axis=2) < 60).any()
 
 
 def test_every_entry_of_a_recording_is_drawn_at_its_size(run: Run) -> None:

@@ -21,6 +21,7 @@ from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import write_png
 from viewer.output.marks import Marks
+from viewer.output.overlays import Drawn, DrawnLandmark, DrawnPath
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers
 from viewer.scan.open import open_scan
@@ -134,6 +135,37 @@ def test_notes_are_shown_in_their_frame_and_left_out_of_anonymous_pictures(tmp_p
     assert legend.notes == ("on it", "always")
     assert [(line.ends[0], line.text) for line in legend.lines] == [((1.0, 0.0, 0.0), "at it")]
     assert shown.without_names().notes == ()
+
+
+def test_landmarks_and_lines_are_kept_where_marks_show_them_and_lose_their_names() -> None:
+    path = DrawnPath(((1.0, 0.0, 0.0), (2.0, 0.0, 0.0)), (0xFF0000,), name="jane", value="1 mm")
+    held = Rigid(np.array([[0.0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
+    landmark = DrawnLandmark((1.0, 2.0, 3.0), "doe", True, 0.5, 0.1)
+    drawn = Drawn((landmark,), (replace(path, name="", value=""),), held, (path,))
+    request = Request(POSE, FIRST.camera, "points", FIRST.params, Look())
+
+    def entry(**marks: bool) -> Entry:
+        return Entry.of(request, "knot", None, (96, 64), "mm", Marks(**marks), drawn=drawn)
+
+    assert entry(notes=True) == replace(entry(), marks=Marks(notes=True))
+    assert (entry(landmarks=True).landmarks, entry(landmarks=True).trajectories) == ((landmark,), ())
+    shown = entry(landmarks=True, trajectories=True, measure_lines=True)
+    again = Recording.from_json(json.loads(shown.description()), Path("a.json")).entries
+    assert again == (shown,)
+    with open_scan("demo") as timeline:
+        overlay = shown.legend(timeline, POSE).overlay
+        assert entry().legend(timeline, POSE).overlay is None
+    assert overlay is not None
+    assert overlay.places.tolist() == [[1, 2, 3], [5, 1, 0], [5, 2, 0], [1, 0, 0], [2, 0, 0]]
+    moved = shown.drawn_from(np.array([1.0, 0.0, 0.0]))
+    assert (moved.landmarks[0].place, moved.measure_lines[0].places[1]) == ((0.0, 2.0, 3.0), (1.0, 0.0, 0.0))
+    with open_scan("demo") as timeline:
+        there = moved.legend(timeline, POSE).overlay
+    assert there is not None
+    np.testing.assert_allclose(there.places + np.array([1, 0, 0]), overlay.places)
+    told = shown.without_names().description()
+    assert not any(name in told for name in ("jane", "doe"))
+    assert "1 mm" in told
 
 
 def test_an_anonymous_description_tells_neither_scan_nor_a_unit_of_its_own() -> None:

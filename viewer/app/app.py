@@ -163,12 +163,12 @@ class App:
         self.welcome: Welcome = Welcome(self.session, remembered.welcomed)
         self.capture: Capture = Capture(
             self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
-            lambda *film: self.exporting.film(*film), self.ranging.words,
+            lambda *film: self.exporting.film(*film), self.ranging.words, self.tools.drawn,
         )  # fmt: skip
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(
             self.session, self.playback, self.viewport, self.note, self.capture.shown,
-            remembered.export, remembered.export_marks,
+            remembered.export, remembered.export_marks, self.tools.drawn,
         )  # fmt: skip
         self.tasks: Tasks = Tasks(
             self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting,

@@ -312,7 +312,7 @@ _VIEW: Menu[App] = Menu("View", (
     (
         _mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C"),
         Command(
-            "marks_in_files", "Save pictures with these, measurements and notes",
+            "marks_in_files", "Save pictures with these, and with what tools draw",
             lambda app: app.marks.toggle_in_files(), is_on=lambda app: app.marks.in_files,
         ),
     ),

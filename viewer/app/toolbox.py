@@ -16,6 +16,7 @@ from ..document.part import Part
 from ..document.schema import usable
 from ..errors import InputError
 from ..geometry import Vector
+from ..output.overlays import NOTHING_DRAWN, Drawn
 from ..rigid import STILL, Rigid
 from ..scan.layers import Layers
 from ..scan.pose import Pose
@@ -211,6 +212,13 @@ class Toolbox:
         canvas = Canvas(view, self.viewport.image)
         for slot in self._slots.values():
             self._call(slot, "overlay", canvas, view)
+
+    def drawn(self, frame: int) -> Drawn:
+        """Find what the tools draw over a frame in pictures that are saved."""
+        found = NOTHING_DRAWN
+        for slot in self._slots.values():
+            found = found.with_more(self._call(slot, "drawn", frame) or NOTHING_DRAWN)
+        return found
 
     def draw_dialogs(self) -> None:
         """Have the tools declare windows of their own."""

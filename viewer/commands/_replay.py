@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ..document.anonymous import anonymous_measurements, anonymous_pose, anonymous_request
+from ..document.anonymous import anonymous_measurements, anonymous_pose, anonymous_request, middle_of
 from ..document.recording import (
     Entry,
     Recording,
@@ -152,12 +152,11 @@ def _completed(
         return shown
     time = float(request.pose.time)
     place = matrix_of(request.layers.place)
-    if entry.anonymous:
-        measurements = entry.measurements
-    else:
-        measurements = anonymous_measurements(
-            entry.measurements, timeline.pose(entry.pose), timeline.times[0]
-        )
+    measurements = entry.measurements
+    if not entry.anonymous:
+        pose = timeline.pose(entry.pose)
+        measurements = anonymous_measurements(measurements, pose, timeline.times[0])
+        shown = shown.drawn_from(middle_of(pose))
     return replace(
         shown, time=time, camera=request.camera, look=request.look, measurements=measurements, place=place
     ).without_names()

@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
 from ..analysis.measure import Measurement, distance_in_words, reading_of
@@ -42,6 +43,7 @@ from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
 from ..output.marks import Legend, Marks, MeasuredLine
+from ..output.overlays import LINE_SLACK, NOTHING_DRAWN, Drawn, DrawnLandmark, DrawnPath, Overlay
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import is_demo, searches_folders
@@ -113,6 +115,10 @@ class Entry:
     place: Matrix | None = None
     anonymous: bool = False
     notes: tuple[Note, ...] = ()
+    landmarks: tuple[DrawnLandmark, ...] = ()
+    trajectories: tuple[DrawnPath, ...] = ()
+    held: Matrix | None = None
+    measure_lines: tuple[DrawnPath, ...] = ()
     at: Stamp = field(default=0.0, compare=False)
 
     @classmethod
@@ -127,10 +133,11 @@ class Entry:
         measurements: tuple[Measurement, ...] = (),
         shown_unit: str | None = None,
         notes: tuple[Note, ...] = (),
+        drawn: Drawn = NOTHING_DRAWN,
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
-        measurements, notes: kept where the marks show them.
+        measurements, notes, drawn: kept where the marks show them.
 
         Raises InputError where its colours come from a layer: these numbers are in no file.
         """
@@ -140,12 +147,24 @@ class Entry:
         if source in layers.scalars:
             what = f"the colours come from '{source}', which is computed and not in the scan's files"
             raise InputError(what, hint="It can be drawn again in other colours")
-        return cls(
+        entry = cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
             measurements if marks.measurements else (), shown_unit, matrix_of(layers.place),
             notes=notes if marks.notes else (),
         )  # fmt: skip
+        return entry.with_drawn(drawn)
+
+    def with_drawn(self, drawn: Drawn) -> Entry:
+        """The entry with what tools draw over its frame, as far as the marks show it."""
+        marks = self.marks
+        return replace(
+            self,
+            landmarks=drawn.landmarks if marks.landmarks else (),
+            trajectories=drawn.trajectories if marks.trajectories else (),
+            held=matrix_of(drawn.held) if marks.trajectories else None,
+            measure_lines=drawn.measure_lines if marks.measure_lines else (),
+        )
 
     def request(self, pose: Pose) -> Request:
         """The picture to draw. pose: number `self.pose` of the scan."""
@@ -170,7 +189,39 @@ class Entry:
         pinned, on_frame = pinned_notes(notes, pose, self.motion)
         return Legend(
             self.marks, self.camera, self.look, scale.unit, self.pose, len(timeline), self.time,
-            lines=(*lines, *pinned), notes=on_frame, factor=scale.factor,
+            lines=(*lines, *pinned), notes=on_frame, factor=scale.factor, overlay=self._overlay(pose),
+        )  # fmt: skip
+
+    def _overlay(self, pose: Pose) -> Overlay | None:
+        """Landmarks and lines where the scan is moved to; None where the marks show none."""
+        marks, radius, motion = self.marks, pose.bounds.radius, self.motion
+        landmarks = [
+            (
+                one,
+                vector(motion.points(np.array(one.place))),
+                float(slack_before(one.spacing, one.sure, radius)),
+            )
+            for one in (self.landmarks if marks.landmarks else ())
+        ]
+        of_ways = motion if self.held is None else motion.after(Rigid(np.array(self.held)))
+        ways = [(path, of_ways) for path in (self.trajectories if marks.trajectories else ())]
+        lines = [(path, motion) for path in (self.measure_lines if marks.measure_lines else ())]
+        paths = [(path, moved.points(np.array(path.places))) for path, moved in (*ways, *lines)]
+        return Overlay.of(landmarks, paths, LINE_SLACK * radius) if landmarks or paths else None
+
+    def drawn_from(self, origin: NDArray[np.float64]) -> Entry:
+        """The entry whose landmarks and lines count from an origin, (3,)."""
+
+        def moved(paths: tuple[DrawnPath, ...]) -> tuple[DrawnPath, ...]:
+            return tuple(
+                replace(one, places=tuple(map(vector, np.array(one.places) - origin))) for one in paths
+            )
+
+        landmarks = tuple(replace(one, place=vector(np.array(one.place) - origin)) for one in self.landmarks)
+        held = None if self.held is None else matrix_of(Rigid(np.array(self.held)).in_frame(origin))
+        return replace(
+            self, landmarks=landmarks, trajectories=moved(self.trajectories), held=held,
+            measure_lines=moved(self.measure_lines),
         )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
@@ -194,11 +245,15 @@ class Entry:
 
     def without_names(self) -> Entry:
         """The entry as an anonymous picture tells it, of a scan that is as `anonymous_request` has it; notes
-        may tell anything, and are left out."""
+        and names of landmarks and measures may tell anything, and are left out."""
         unit, shown = (
             None if name is None else anonymous_unit(name) for name in (self.unit, self.shown_unit)
         )
-        return replace(self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=())
+        return replace(
+            self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(),
+            landmarks=tuple(replace(one, name="") for one in self.landmarks),
+            measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
+        )  # fmt: skip
 
     def description(self) -> str:
         """The JSON text that a picture carries."""

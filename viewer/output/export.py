@@ -144,14 +144,18 @@ def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
 
 
 def with_hidden(legend: Legend, surface: Surface) -> Legend:
-    """The legend whose lines tell what the surface hides of them."""
-    from ..analysis.pick import is_seen  # here, as commands that draw nothing know this module, and no OpenGL
+    """The legend whose lines and landmarks tell what the surface hides of them."""
+    from ..analysis.pick import (
+        are_seen,
+        is_seen,
+    )  # here, as commands that draw nothing know this module, and no OpenGL
 
     lines = (
         replace(line, hidden=not all(map(partial(is_seen, surface), line.ends, line.slack)))
         for line in legend.lines
     )
-    return replace(legend, lines=tuple(lines))
+    overlay = None if legend.overlay is None else legend.overlay.with_seen(partial(are_seen, surface))
+    return replace(legend, lines=tuple(lines), overlay=overlay)
 
 
 def read_description(path: Path) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
 from ..scan.times import frame_in_words
+from .overlays import Overlay, draw_overlay
 
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 Box = tuple[float, float, float, float]  # left, top, right, bottom; pixels from the upper left corner
@@ -58,9 +59,12 @@ class Marks:
     stamp: bool = param(False, "Number of the frame, and its time")
     measurements: bool = param(False, "Measured distances, as they stand in the frame")
     notes: bool = param(False, "Notes that are pinned to places and to the frame")
+    landmarks: bool = param(False, "Landmarks, as they stand in the frame")
+    trajectories: bool = param(False, "Ways of landmarks through all frames, those that the view shows")
+    measure_lines: bool = param(False, "What measures measure in the frame, with their values")
 
     def __bool__(self) -> bool:
-        return any((self.scale_bar, self.color_bar, self.stamp, self.measurements, self.notes))
+        return any(getattr(self, field.name) for field in fields(self))
 
 
 MARKS = tuple(parameter.name for parameter in describe(Marks))
@@ -91,7 +95,7 @@ class Legend:
 
     unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
     says of its numbers. lines: that were measured, and notes at places. notes: on the frame. factor: how many
-    of `unit` one unit of the scan is.
+    of `unit` one unit of the scan is. overlay: landmarks and lines of them, None where none are drawn.
     """
 
     marks: Marks
@@ -105,6 +109,7 @@ class Legend:
     lines: tuple[MeasuredLine, ...] = ()
     notes: tuple[str, ...] = ()
     factor: float = 1.0
+    overlay: Overlay | None = None
 
 
 class MarkPainter(Protocol):
@@ -324,9 +329,11 @@ def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequenc
 
 
 def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend) -> None:
-    """Draw the measured lines, each with its text on a plate beside it, off the plates before; what has an
-    end behind the eye is left out."""
-    drawn = [(line, places) for line in legend.lines if (places := _places(line, legend.camera, size))]
+    """Draw landmarks and their lines, and the measured lines; each with its text on a plate beside it, off
+    the plates before; what has an end behind the eye is left out."""
+    told = [] if legend.overlay is None else draw_overlay(painter, size, legend.camera, legend.overlay)
+    lines = legend.lines if legend.marks.measurements or legend.marks.notes else ()
+    drawn = [(line, places) for line in lines if (places := _places(line, legend.camera, size))]
     for line, places in drawn:
         opacity = _FAINT if line.hidden else 1.0
         for color, more in ((0, 0, 0, 0.6 * opacity), 2), ((*rgba(LINE_COLOR)[:3], opacity), 0):
@@ -334,8 +341,9 @@ def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend) ->
             for place in places:
                 painter.stroke(place, place, 2 * _END * painter.em + more, color)
     taken: list[Box] = []
-    for line, places in drawn:
-        text = _shortened(painter, line.text, size[0] - 2 * _PAD * painter.em)
+    texts = [(line.text, places) for line, places in drawn] + [(text, (a, b)) for a, b, text in told]
+    for words, places in texts:
+        text = _shortened(painter, words, size[0] - 2 * _PAD * painter.em)
         taken.append(_free_box(painter, text, places, size, taken))
         painter.box(taken[-1], PLATE)
         painter.text(taken[-1][0] + _PAD * painter.em, taken[-1][1] + _PAD * painter.em, text)
@@ -397,8 +405,7 @@ def marked(
         return image
     below = Image.fromarray(image)
     painter = _Overlay(below.size)
-    if legend.marks.measurements or legend.marks.notes:
-        _draw_lines(painter, below.size, legend)
+    _draw_lines(painter, below.size, legend)
     draw(painter, below.size, legend, values, kind)
     return np.asarray(Image.alpha_composite(below, painter.image))
 
@@ -426,24 +433,59 @@ class _Overlay:
     def stroke(self, start: Spot, stop: Spot, width: float, color: tuple[float, float, float, float]) -> None:
         """Draw a line with round ends, smooth at its edges; a disc where it has no length. color: bytes, and
         opacity from 0 to 1."""
-        from PIL import Image
-
-        reach = width / 2 + 1
         reach, wide, high = width / 2 + 1, *self.image.size
         left, right = _pixels(start[0], stop[0], reach, wide)
         top, bottom = _pixels(start[1], stop[1], reach, high)
+        if left < right and top < bottom:
+            pixels = np.zeros((bottom - top, right - left, 4), np.uint8)
+            corner = np.array([left, top])
+            _stroke_on(pixels, np.array(start) - corner, np.array(stop) - corner, width, color)
+            self._lay(pixels, (left, top))
+
+    def polyline(
+        self,
+        places: NDArray[np.float64],
+        width: float,
+        colors: Sequence[int],
+        opacities: NDArray[np.float64],
+        dots: NDArray[np.bool_],
+        dot: float,
+    ) -> None:
+        wide, high = self.image.size
+        reach = max(width, dot) / 2 + 1
+        there = np.logical_and.reduce(np.isfinite(places), axis=1)
+        if not there.any():
+            return
+        (low_x, low_y), (high_x, high_y) = places[there].min(axis=0), places[there].max(axis=0)
+        left, right = _pixels(low_x, high_x, reach, wide)
+        top, bottom = _pixels(low_y, high_y, reach, high)
         if left >= right or top >= bottom:
             return
-        x = np.arange(left, right, dtype=np.float32) + 0.5 - start[0]
-        y = np.arange(top, bottom, dtype=np.float32)[:, None] + 0.5 - start[1]
-        across, down = stop[0] - start[0], stop[1] - start[1]
-        along = np.clip((x * across + y * down) / max(across**2 + down**2, 1e-9), 0, 1)  # share of its length
-        away = np.hypot(x - along * across, y - along * down)
-        covered = np.clip(width / 2 + 0.5 - away, 0, 1)
-        pixels = np.empty((*covered.shape, 4), np.uint8)
-        pixels[...] = (*color[:3], 0)
-        pixels[..., 3] = np.round(255 * color[3] * covered)
-        self.image.alpha_composite(Image.fromarray(pixels), (left, top))
+        pixels = np.zeros((bottom - top, right - left, 4), np.uint8)
+        ends = [(at, at + 1, width) for at in np.flatnonzero(there[:-1] & there[1:]).tolist()]
+        ends += [(at, at, dot) for at in np.flatnonzero(dots & there).tolist()]
+        for first, last, thick in ends:
+            color = (*rgba(f"#{colors[first]:06x}")[:3], float(opacities[first]))
+            _stroke_on(pixels, places[first] - (left, top), places[last] - (left, top), thick, color)
+        self._lay(pixels, (left, top))
+
+    def ring(self, place: Spot, radius: float, width: float, color: int, opacity: float) -> None:
+        count = max(12, min(round(2 * radius), 360))
+        turns = 2 * np.pi * np.arange(count + 1) / count
+        circle = radius * np.stack([np.cos(turns), np.sin(turns)], axis=1) + place
+        none = np.zeros(count + 1, bool)
+        self.polyline(circle, width, [color] * (count + 1), np.full(count + 1, opacity), none, 0.0)
+
+    def shaded_text(self, left: float, top: float, text: str, opacity: float) -> None:
+        for off, ink in ((1, (0, 0, 0)), (0, INK[:3])):
+            place = round(left) + off, round(top + 0.855 * self.em) + off
+            self._draw.text(place, text, (*ink, round(255 * opacity)), self._font, anchor="ls")
+
+    def _lay(self, pixels: NDArray[np.uint8], place: tuple[int, int]) -> None:
+        """Lay pixels, (H, W, 4), over what is there, with their upper left corner at a place."""
+        from PIL import Image
+
+        self.image.alpha_composite(Image.fromarray(pixels), place)
 
     def box(self, box: Box, color: Color) -> None:
         left, top, right, bottom = map(round, box)
@@ -464,3 +506,29 @@ class _Overlay:
 def _pixels(one: float, other: float, reach: float, extent: int) -> tuple[int, int]:
     """The first pixel and the one after the last of a stroke from one place to another, in a picture."""
     return max(0, math.floor(min(one, other) - reach)), min(extent, math.ceil(max(one, other) + reach))
+
+
+def _stroke_on(
+    pixels: NDArray[np.uint8],
+    start: NDArray[np.float64],
+    stop: NDArray[np.float64],
+    width: float,
+    color: tuple[float, float, float, float],
+) -> None:
+    """Draw a line with round ends onto transparent pixels, (H, W, 4), where it covers more than what is
+    there. color: as for `_Overlay.stroke`."""
+    high, wide = pixels.shape[:2]
+    left, right = _pixels(start[0], stop[0], width / 2 + 1, wide)
+    top, bottom = _pixels(start[1], stop[1], width / 2 + 1, high)
+    if left >= right or top >= bottom:
+        return
+    (first_x, first_y), (across, down) = start.tolist(), (stop - start).tolist()
+    x = np.arange(left, right, dtype=np.float32) + 0.5 - first_x
+    y = np.arange(top, bottom, dtype=np.float32)[:, None] + 0.5 - first_y
+    along = np.clip((x * across + y * down) / max(across**2 + down**2, 1e-9), 0, 1)  # share of its length
+    away = np.hypot(x - along * across, y - along * down)
+    opacity = np.round(255 * color[3] * np.clip(width / 2 + 0.5 - away, 0, 1)).astype(np.uint8)
+    there = pixels[top:bottom, left:right]
+    is_more = opacity > there[..., 3]
+    there[is_more, :3] = np.array(color[:3], np.uint8)
+    there[is_more, 3] = opacity[is_more]

@@ -22,6 +22,7 @@ from ...files import free_file, working_folder
 from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.marks import Legend, Marks, marked
+from ...output.overlays import NOTHING_DRAWN, Drawn
 from ...task import Task, in_background
 from ..failures import failure_in_words
 from ..notices import Offer, Problem
@@ -48,10 +49,12 @@ class Capture:
         marks: Callable[[], Marks],
         film: Callable[[Recording, Path], object],
         range_note: Callable[[], str] = str,
+        drawn: Callable[[int], Drawn] = lambda _: NOTHING_DRAWN,
     ) -> None:
         """marks: brings those that what is saved has. film: makes one of a recording, under this name.
-        range_note: brings what the colour bar of the view says."""
-        self._marks, self._film, self._range_note = marks, film, range_note
+        range_note: brings what the colour bar of the view says. drawn: brings what tools draw over a
+        frame."""
+        self._marks, self._film, self._range_note, self._drawn = marks, film, range_note, drawn
         self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
         self.last: Path | None = None
@@ -74,6 +77,7 @@ class Capture:
             request, session.scan, session.hash, viewport.size, self._playback.unit,
             self._marks() if marks is None else marks, session.document.part(Measurements).all,
             session.document.shown_unit, session.document.part(Landmarks).notes,
+            self._drawn(request.pose.index),
         )  # fmt: skip
 
     def screenshot(self) -> None:

@@ -26,6 +26,9 @@ _MARKS = {
     "stamp": "Frame and time",
     "measurements": "Measurements",
     "notes": "Notes",
+    "landmarks": "Landmarks",
+    "trajectories": "Ways of landmarks",
+    "measure_lines": "What measures measure",
 }
 _FIRST_MARKS = 0.55  # of a row of boxes, for the first one
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}

@@ -17,6 +17,7 @@ from ...geometry import Vector
 from ...look import SAMPLES
 from ...output.export import FRAME_RATES, numbered
 from ...output.marks import Marks
+from ...output.overlays import NOTHING_DRAWN, Drawn
 from ...params import describe, param
 from ...rigid import Rigid
 from ...scan.times import DEFAULT_FPS, typical_rate
@@ -141,10 +142,12 @@ def recording(
     times: NDArray[np.float64],
     pivot: Vector | None,
     place: Callable[[int], Rigid],
+    drawn: Callable[[int], Drawn] = lambda _: NOTHING_DRAWN,
 ) -> Recording:
     """The pictures to make. shown: what the view shows. times: (T,) of the scan's frames, seconds.
 
     pivot: what a turntable turns about; None: the camera's target. place: that frames are moved to, by index.
+    drawn: what tools draw over a frame, likewise.
     """
     look = shown.look if choices.quality == AS_SHOWN else replace(shown.look, quality=choices.quality)
     base = replace(shown, size=choices.size, marks=marks, look=look)
@@ -153,7 +156,7 @@ def recording(
         entries = [replace(base, camera=_turned(base.camera, angle, pivot)) for angle in angles]
     elif choices.what == FRAMES:
         entries = [
-            replace(base, pose=i, time=float(times[i]), place=matrix_of(place(i)))
+            replace(base, pose=i, time=float(times[i]), place=matrix_of(place(i))).with_drawn(drawn(i))
             for i in choices.indices(len(times))
         ]
     else:

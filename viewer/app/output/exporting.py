@@ -15,6 +15,7 @@ from ...document.render_job import Made, make
 from ...errors import InputError
 from ...files import working_folder
 from ...output.marks import Marks
+from ...output.overlays import NOTHING_DRAWN, Drawn
 from ...scan.inputs import found_among, scan_inputs
 from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
@@ -48,8 +49,11 @@ class Exporting:
         shown: Callable[[Marks], Entry | None],
         choices: Choices,
         marks: Marks,
+        drawn: Callable[[int], Drawn] = lambda _: NOTHING_DRAWN,
     ) -> None:
-        """shown: brings what the picture shows, with these marks."""
+        """shown: brings what the picture shows, with these marks. drawn: brings what tools draw over a
+        frame."""
+        self._drawn = drawn
         self._session, self._playback, self._viewport = session, playback, viewport
         self._note, self._shown = note, shown
         self.choices = choices
@@ -137,7 +141,9 @@ class Exporting:
             return
         self.is_open, self.replaced = False, []
         pivot, place = self._session.document.pivot, self._session.laid.place
-        recording = export_plan.recording(choices, shown, self.marks, timeline.times, pivot, place)
+        recording = export_plan.recording(
+            choices, shown, self.marks, timeline.times, pivot, place, self._drawn
+        )
         rate, numbers = self.rate, choices.numbers(self.count)
         self._begin(choices.name, recording, choices.out(), rate, choices.anonymous, numbers, replaced=there)
 

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from ...camera import Camera
 from ...geometry import Vector
+from ...output.overlays import DOT_RADIUS, DOT_ROOM, LINE_THICK, MARK_RADIUS, dotted
 from .. import theme
 from .labels import Box, Line, free_place, usual_place
 
 _CROSS = _INK = 0xFFFFFF
 _OUTLINE = 0x000000  # so that what is light is seen on any surface
-_POINT, _THICK = 0.28, 0.11  # radius, thickness; in heights of the font
-_DOT, _DOT_ROOM = 0.16, 0.4  # radius of dots, and how far apart they are at least
-_MARK = 0.22  # radius of one of many marks
+_POINT = 0.28  # radius, in heights of the font
 _GAP = 0.5  # between a line and its label
 _HEAD = 2.6  # of the view's head, where the prompt is
 _LOUPE, _LOUPE_AWAY = 4.5, 1.2  # half its side, and how far from its middle it is; the latter in sides
@@ -115,7 +114,7 @@ class Canvas:
 
     def line(self, start: ImVec2, stop: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A line between two places on the screen."""
-        draw_list, thick = imgui.get_window_draw_list(), _THICK * self.em
+        draw_list, thick = imgui.get_window_draw_list(), LINE_THICK * self.em
         draw_list.add_line(start, stop, theme.packed(_OUTLINE, 0.6 * alpha), thick + 2)
         draw_list.add_line(start, stop, theme.packed(color, alpha), thick)
 
@@ -128,7 +127,7 @@ class Canvas:
 
     def ring(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A ring round a place on the screen."""
-        draw_list, radius, thick = imgui.get_window_draw_list(), _POINT * self.em, _THICK * self.em
+        draw_list, radius, thick = imgui.get_window_draw_list(), _POINT * self.em, LINE_THICK * self.em
         draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
         draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
         self._take(place)
@@ -151,7 +150,7 @@ class Canvas:
         asked = list(zip(colors, alphas.tolist(), strict=True))
         of_ink = {ink: theme.packed(*ink) for ink in set(asked)}
         inks = [of_ink[ink] for ink in asked]
-        draw_list, thick = imgui.get_window_draw_list(), _THICK * self.em
+        draw_list, thick = imgui.get_window_draw_list(), LINE_THICK * self.em
         for start, stop in _like_runs(joined, alphas.tolist()):
             color = theme.packed(_OUTLINE, 0.6 * float(alphas[start]))
             draw_list.add_polyline(points[start : stop + 1], color, thick + 2, 0)
@@ -159,12 +158,8 @@ class Canvas:
             draw_list.add_polyline(points[start : stop + 1], inks[start], thick, 0)
         if not dots:
             return
-        steps = np.hypot(*np.diff(places, axis=0)[joined].T)
-        if len(steps) and np.median(steps) < _DOT_ROOM * self.em:
-            there[:-1] &= ~joined  # those that no line joins to the next
-            there[1:] &= ~joined
-        for at in np.flatnonzero(there):
-            draw_list.add_circle_filled(points[at], _DOT * self.em, inks[at])
+        for at in np.flatnonzero(dotted(places, DOT_ROOM * self.em)):
+            draw_list.add_circle_filled(points[at], DOT_RADIUS * self.em, inks[at])
 
     def marks(
         self,
@@ -175,7 +170,11 @@ class Canvas:
     ) -> None:
         """Discs at many places on the screen, (N, 2), of opacity (N,), each in a ring of a radius (N,) where
         that is wider than the disc. Labels do not keep off them."""
-        draw_list, radius, thick = imgui.get_window_draw_list(), _MARK * self.em, 0.6 * _THICK * self.em
+        draw_list, radius, thick = (
+            imgui.get_window_draw_list(),
+            MARK_RADIUS * self.em,
+            0.6 * LINE_THICK * self.em,
+        )
         colors = {alpha: theme.packed(color, alpha) for alpha in set(alphas.tolist())}
         outlines = {alpha: theme.packed(_OUTLINE, 0.7 * alpha) for alpha in colors}
         for (x, y), alpha, reach in zip(places.tolist(), alphas.tolist(), reaches.tolist(), strict=True):
@@ -189,7 +188,7 @@ class Canvas:
         """Texts at the right of places on the screen, (N, 2), of opacity (N,): the first ones, and of the
         others those that cover no text before them."""
         draw_list, line = imgui.get_window_draw_list(), imgui.get_text_line_height()
-        corners = (places + np.array([1.6 * _MARK * self.em, -line / 2])).tolist()
+        corners = (places + np.array([1.6 * MARK_RADIUS * self.em, -line / 2])).tolist()
         inks = {
             alpha: (theme.packed(_OUTLINE, alpha), theme.packed(_INK, alpha))
             for alpha in set(alphas.tolist())
@@ -221,7 +220,7 @@ class Canvas:
         at, reach = (place - view.corner) / view.size, ImVec2(half, half) / _MAGNIFIED / view.size
         draw_list = imgui.get_window_draw_list()
         draw_list.add_image(imgui.ImTextureRef(self._image), low, high, at - reach, at + reach)
-        draw_list.add_rect(low, high, imgui.get_color_u32(imgui.Col_.border), thickness=_THICK * self.em)
+        draw_list.add_rect(low, high, imgui.get_color_u32(imgui.Col_.border), thickness=LINE_THICK * self.em)
         for arm in (ImVec2(half, 0), ImVec2(0, half)):
             for thick, color in ((3.0, theme.packed(_OUTLINE, 0.5)), (1.0, theme.packed(_CROSS))):
                 for side in (1, -1):

@@ -17,6 +17,7 @@ from .steering import Steering
 from .viewport import Viewport
 
 SHOWN_FIRST = Marks(scale_bar=True, color_bar=True)  # until the user chooses
+_OF_TOOLS = ("measurements", "notes", "landmarks", "trajectories", "measure_lines")  # as the tools draw them
 _STEPS = 32  # of a colour bar; colours between them are blended
 
 
@@ -44,7 +45,8 @@ class ViewMarks:
     @property
     def of_files(self) -> Marks:
         """The marks of saved pictures and recordings: as the view has them, or none."""
-        return replace(self.shown, measurements=True, notes=True) if self.in_files else Marks()
+        of_tools = dict.fromkeys(_OF_TOOLS, True)
+        return replace(self.shown, **of_tools) if self.in_files else Marks()
 
     def toggle_in_files(self) -> None:
         """Have pictures saved with the marks of the view, or bare."""

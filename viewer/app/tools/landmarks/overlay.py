@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from ....analysis.track import Known
 from ....geometry import vector
+from ....output.overlays import DIM_LANDMARK, PLACED_COLOR, TRACKED_COLOR
 from ...scene.canvas import Canvas, Label, ViewPlace
 
 if TYPE_CHECKING:
     from . import Tool
 
-_PLACED, _TRACKED, _CHOSEN, _GHOST = 0x8DE36B, 0xF2C14E, 0xFFFFFF, 0xC9B8FF
-_DIM = 0.35  # opacity where one is not seen
+_CHOSEN, _GHOST = 0xFFFFFF, 0xC9B8FF
 
 
 def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlace) -> None:
@@ -26,9 +26,9 @@ def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlac
     with np.errstate(invalid="ignore"):  # NaN is not in the view
         inside = ((places >= (low.x, low.y)) & (places <= (high.x, high.y))).all(axis=1)
     drawn = np.flatnonzero(shown.is_there & inside)
-    alphas = np.where(tool.seen, 1.0, _DIM)
+    alphas = np.where(tool.seen, 1.0, DIM_LANDMARK)
     reaches = shown.sure * view.lengths_on_screen(tool.positions)
-    for color, known in ((_PLACED, Known.PLACED), (_TRACKED, Known.TRACKED)):
+    for color, known in ((PLACED_COLOR, Known.PLACED), (TRACKED_COLOR, Known.TRACKED)):
         at = drawn[shown.known[drawn] == known]
         rings = np.nan_to_num(reaches[at]) if known is Known.TRACKED else np.zeros(len(at))
         canvas.marks(places[at], color, alphas[at], rings)

@@ -12,6 +12,8 @@ from ....analysis.landmarks import Landmark
 from ....analysis.pick import SURE
 from ....analysis.spot import Spot
 from ....analysis.track import Known, Track
+from ....geometry import vector
+from ....output.overlays import DrawnLandmark
 
 MISSING = "missing in this frame"
 _UNKNOWN = (np.nan,) * 6
@@ -88,6 +90,20 @@ class ShownLandmarks:
             reason = self.reasons.get(number, "")
             return f"gap: {reason}" if reason else "gap"
         return {Known.PENDING: "not tracked yet", Known.TRACKED: "tracked", Known.PLACED: "placed"}[known]
+
+
+def drawn_landmarks(shown: ShownLandmarks, has_names: bool) -> tuple[DrawnLandmark, ...]:
+    """Those that are there, for pictures that are saved."""
+    return tuple(
+        DrawnLandmark(
+            vector(shown.positions[number]),
+            shown.landmarks[number].name if has_names else "",
+            bool(shown.known[number] == Known.PLACED),
+            float(np.nan_to_num(shown.sure[number])),
+            float(shown.spacings[number]),
+        )
+        for number in np.flatnonzero(shown.is_there).tolist()
+    )
 
 
 def _largest(spreads: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from ....csv_text import to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....files import free_file, working_folder
+from ....output.overlays import NOTHING_DRAWN, Drawn
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
 from ...commands import Command, Menu
@@ -203,6 +204,18 @@ class Tool:
         if self.settings.lines:
             self.lines.draw(self.landmarks.measures, self.choices.hidden, self.pointed, canvas, view)
         self.lasso.draw(canvas, view)
+
+    def drawn(self, frame: int) -> Drawn:
+        """The ways of landmarks and what is measured over a frame, for pictures that are saved."""
+        pose = self.desk.pose
+        if pose is None:
+            return NOTHING_DRAWN
+        radius = self.desk.viewport.bounds(pose).radius
+        found = self.ways.drawn(self.settings, self.choices, frame, radius)
+        if not self.settings.lines:
+            return found
+        lines = self.lines.drawn(self.landmarks.measures, self.choices.hidden, frame, radius)
+        return replace(found, measure_lines=lines)
 
     def advance(self, budget: float) -> bool:
         """Measure what is left to be measured, and have the scan held still by its anchors where that is

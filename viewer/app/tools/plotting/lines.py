@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from imgui_bundle import ImVec2
@@ -12,12 +13,13 @@ from ....analysis.measures import Measure, Series
 from ....analysis.measures.curves import power_of, unit_of
 from ....analysis.measures.series import lines_of
 from ....mesh.geodesic import length_of, steps_along
+from ....output.overlays import DIM_LINE, DrawnPath, rounded
 from ....output.plots import PLOT_COLORS
 from ....scan.pose import Pose
 from ....scan.units import Scale
 from ...desk import Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
-from .seen import DIM, seen_in_view
+from .seen import seen_in_view
 from .shown import Kept
 from .words import with_spread
 
@@ -55,25 +57,54 @@ class MeasureLines:
         self, measures: tuple[Measure, ...], hidden: tuple[str, ...], pose: Pose
     ) -> tuple[ShownLine, ...]:
         desk = self._desk
-        series, tracks, motion = desk.followed.series, desk.followed.tracks, desk.motion(pose)
+        motion = desk.motion(pose)
+        found = [
+            (name, color, motion.points(places))
+            for name, color, places in self._in_frame(measures, hidden, pose.index)
+        ]
+        if not found:
+            return ()
+        seen = seen_in_view(desk, np.concatenate([places for *_, places in found]))
+        parts = np.split(seen, np.cumsum([len(places) for *_, places in found])[:-1])
+        return tuple(ShownLine(*one, part) for one, part in zip(found, parts, strict=True))
+
+    def _in_frame(
+        self, measures: tuple[Measure, ...], hidden: tuple[str, ...], frame: int
+    ) -> Iterator[tuple[str, int, NDArray[np.float64]]]:
+        """The lines of measures but for hidden ones in a frame: the measure, its colour, and places (P, 3) as
+        the scan has them."""
+        series, tracks = self._desk.followed.series, self._desk.followed.tracks
         numbers = {name: number for number, name in enumerate(series)}
-        found: list[tuple[str, int, NDArray[np.float64]]] = []
         for measure in measures:
             if measure.name in hidden or measure.name not in series:
                 continue
             if not all(name in tracks for name in measure.landmarks):
                 continue
             color = PLOT_COLORS[numbers[measure.name] % len(PLOT_COLORS)]
-            for line in lines_of(measure, series[measure.name], tracks, pose.index):
+            for line in lines_of(measure, series[measure.name], tracks, frame):
                 pieces = (
                     line if len(line) > _PIECES else steps_along(line, max(length_of(line) / _PIECES, 1e-300))
                 )
-                found.append((measure.name, color, motion.points(pieces)))
-        if not found:
-            return ()
-        seen = seen_in_view(desk, np.concatenate([places for *_, places in found]))
-        parts = np.split(seen, np.cumsum([len(places) for *_, places in found])[:-1])
-        return tuple(ShownLine(*one, part) for one, part in zip(found, parts, strict=True))
+                yield measure.name, color, pieces
+
+    def drawn(
+        self, measures: tuple[Measure, ...], hidden: tuple[str, ...], frame: int, radius: float
+    ) -> tuple[DrawnPath, ...]:
+        """The lines in a frame, for pictures that are saved, with the values of a few. radius: of the
+        scan."""
+        found = list(self._in_frame(measures, hidden, frame))
+        untold = {name for name, *_ in found}
+        if len(untold) > _MOST_LABELS:
+            untold.clear()
+        drawn = []
+        for name, color, places in found:
+            path = DrawnPath(rounded(places, radius), (color,))
+            if name in untold:
+                untold.discard(name)
+                value = value_in_words(self._desk.followed.series[name], frame, self._desk.scale)
+                path = replace(path, name=name, value=value)
+            drawn.append(path)
+        return tuple(drawn)
 
     def draw(
         self,
@@ -91,7 +122,7 @@ class MeasureLines:
             told &= {pointed}
         for line in shown:
             on_screen = view.all_on_screen(line.places)
-            alphas = np.where(line.seen, 1.0, DIM)
+            alphas = np.where(line.seen, 1.0, DIM_LINE)
             canvas.path(on_screen, [line.color] * len(alphas), alphas, dots=False)
             if line.measure in told and pose is not None and np.isfinite(on_screen).all():
                 told.discard(line.measure)

@@ -1,4 +1,4 @@
-"""What of the lines over the picture is seen, and how faint the rest is."""
+"""What of the lines over the picture is seen."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis.pick import are_seen
+from ....output.overlays import LINE_SLACK
 from ...desk import Desk
-
-DIM = 0.3  # opacity where a line is behind a surface
-_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that it lies on
 
 
 def seen_in_view(desk: Desk, places: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -18,5 +16,5 @@ def seen_in_view(desk: Desk, places: NDArray[np.float64]) -> NDArray[np.bool_]:
     viewport, pose = desk.viewport, desk.pose
     if viewport.surface is None or pose is None or not viewport.is_there:
         return np.ones(len(places), bool)
-    slack = _SLACK * viewport.bounds(pose).radius
+    slack = LINE_SLACK * viewport.bounds(pose).radius
     return are_seen(viewport.surface, places, np.full(len(places), slack))

@@ -13,11 +13,12 @@ from ....analysis.track import Track
 from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
 from ....errors import InputError
 from ....look import color_table
+from ....output.overlays import DIM_LINE, NOTHING_DRAWN, Drawn, DrawnPath, rounded, runs_of
 from ....rigid import STILL, Rigid
 from ...desk import Desk
 from ...scene.canvas import Canvas, ViewPlace
 from .choices import ANCHORS, CurveChoices, Settings
-from .seen import DIM, seen_in_view
+from .seen import seen_in_view
 from .shown import Kept, color_of_way
 
 Still = tuple[Rigid | None, ...]
@@ -33,7 +34,7 @@ class Ways:
         self.problem = ""
         self.fastest = 0.0
         self._desk = desk
-        self._kept = Kept()
+        self._kept, self._drawn = Kept(), Kept()
         self._laid: object = None
         self._seen: tuple[object, dict[str, NDArray[np.bool_]]] = None, {}
 
@@ -87,21 +88,50 @@ class Ways:
         found = self.trajectories(settings, choices)
         if not found:
             return
-        motion = desk.motion(pose)
-        if settings.coordinates == ANCHORS and (still := self.still(choices)) is not None:
-            now = still[pose.index] if pose.index < len(still) else None
-            if now is None:  # nobody knows how the anchors lie in this frame
-                return
-            motion = motion.after(now.inverse)
+        held = self._held(settings, choices, pose.index)
+        if held is None:
+            return
+        motion = desk.motion(pose).after(held)
         shown = desk.viewport.request if desk.viewport.is_there else None
         places = {name: motion.points(one.positions) for name, one in found.items()}
         if places and self._seen[0] != (shown, tuple(found.values())):
             seen = np.split(seen_in_view(desk, np.concatenate([*places.values()])), len(places))
             self._seen = (shown, tuple(found.values())), dict(zip(places, seen, strict=True))
         for number, (name, one) in enumerate(found.items()):
-            alphas = np.where(self._seen[1][name], 1.0, DIM)
+            alphas = np.where(self._seen[1][name], 1.0, DIM_LINE)
             colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(alphas)
             canvas.path(view.all_on_screen(places[name]), colors, alphas)
+
+    def _held(self, settings: Settings, choices: CurveChoices, frame: int) -> Rigid | None:
+        """The motion of ways to where they lie about a frame; None where nobody knows how the anchors lie in
+        it."""
+        still = self.still(choices) if settings.coordinates == ANCHORS else None
+        if still is None:
+            return STILL
+        now = still[frame] if frame < len(still) else None
+        return None if now is None else now.inverse
+
+    def drawn(self, settings: Settings, choices: CurveChoices, frame: int, radius: float) -> Drawn:
+        """The ways about a frame, for pictures that are saved. radius: of the scan."""
+        found = self.trajectories(settings, choices) if settings.trajectories else {}
+        held = self._held(settings, choices, frame)
+        if not found or held is None:
+            return NOTHING_DRAWN
+        inputs = *found.values(), settings, radius
+        paths = self._drawn.of(len(found), inputs, lambda: self._paths(found, settings, radius))
+        return Drawn(trajectories=paths, held=held)
+
+    def _paths(
+        self, found: Mapping[str, Trajectory], settings: Settings, radius: float
+    ) -> tuple[DrawnPath, ...]:
+        paths = []
+        for number, one in enumerate(found.values()):
+            colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(one.positions)
+            paths += [
+                DrawnPath(rounded(one.positions[run], radius), tuple(colors[run]), has_dots=True)
+                for run in runs_of(one.positions)
+            ]
+        return tuple(paths)
 
     def _colors(self, one: Trajectory) -> list[int]:
         """The colours of a way by its speed, 0xRRGGBB; that of rest where the speed is not known."""

@@ -1,0 +1,137 @@
+"""Landmarks and lines in pictures: where they belong, faint where hidden, named where there is room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from viewer.camera import Camera
+from viewer.geometry import Vector
+from viewer.look import Look
+from viewer.output.marks import Legend, Marks, marked, text_height
+from viewer.output.overlays import (
+    MARK_RADIUS,
+    PLACED_COLOR,
+    TRACKED_COLOR,
+    DrawnLandmark,
+    DrawnPath,
+    Overlay,
+    dotted,
+    rounded,
+    runs_of,
+)
+
+SIZE = (2560, 1440)
+UNIT = 144  # pixels
+LEGEND = Legend(
+    Marks(landmarks=True), Camera(projection="orthographic", height=10.0), Look(), "mm", 0, 1, 0.0
+)
+EM = text_height(SIZE)
+
+
+def picture(
+    *landmarks: DrawnLandmark, paths: tuple[DrawnPath, ...] = (), seen: bool = True
+) -> NDArray[np.int64]:
+    told = [(one, one.place, 0.0) for one in landmarks]
+    overlay = Overlay.of(told, [(path, np.array(path.places)) for path in paths], 0.0)
+    overlay = overlay.with_seen(lambda places, _: np.full(len(places), seen))
+    blank = np.full((SIZE[1], SIZE[0], 4), (90, 90, 90, 255), np.uint8)
+    return marked(blank, replace(LEGEND, overlay=overlay), None)[..., :3].astype(int)
+
+
+def bytes_of(color: int) -> list[int]:
+    return [color >> 16, color >> 8 & 255, color & 255]
+
+
+def at(x: float, y: float) -> tuple[int, int]:
+    """Row and column of a place."""
+    return round(SIZE[1] / 2 - UNIT * y), round(SIZE[0] / 2 + UNIT * x)
+
+
+def changed(image: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return np.asarray((image != 90).any(axis=2))
+
+
+def test_landmarks_are_discs_where_they_are_in_the_colour_of_their_state() -> None:
+    image = picture(DrawnLandmark((2.0, 1.0, 0.0), "", True), DrawnLandmark((-3.0, 0.0, 0.0), "", False))
+    assert image[at(2, 1)].tolist() == bytes_of(PLACED_COLOR)
+    assert image[at(-3, 0)].tolist() == bytes_of(TRACKED_COLOR)
+    rows, columns = np.nonzero(changed(image)[:, SIZE[0] // 2 :])
+    middle = rows.mean(), columns.mean() + SIZE[0] // 2
+    assert middle == pytest.approx(at(2, 1), abs=1.1)
+    assert len(rows) == pytest.approx(np.pi * (MARK_RADIUS * EM + 1) ** 2, rel=0.4)
+
+
+def test_a_ring_tells_how_sure_a_tracked_one_is() -> None:
+    image = picture(DrawnLandmark((0.0, 0.0, 0.0), "", False, sure=2.0))
+    row, column = at(0, 0)
+    for radius, is_drawn in ((1.0, False), (2.0, True), (2.5, False)):
+        for turn in np.linspace(0, 2 * np.pi, 7):
+            place = round(row + UNIT * radius * np.sin(turn)), round(column + UNIT * radius * np.cos(turn))
+            assert changed(image)[place] == is_drawn, (radius, turn)
+    assert changed(picture(DrawnLandmark((0.0, 0.0, 0.0), "", True, sure=2.0))).sum() < 500, (
+        "set, not tracked"
+    )
+
+
+def test_what_is_hidden_is_faint() -> None:
+    one = DrawnLandmark((0.0, 0.0, 0.0), "", True)
+    line = DrawnPath(((-4.0, 2.0, 0.0), (4.0, 2.0, 0.0)), (0xFF0000,))
+    bright, faint = picture(one, paths=(line,)), picture(one, paths=(line,), seen=False)
+    for place in (at(0, 0), at(1, 2)):
+        assert 0 < np.abs(faint[place] - 90).max() < 0.5 * np.abs(bright[place] - 90).max()
+
+
+def test_a_line_runs_through_its_places_and_is_no_more_opaque_where_it_crosses_itself() -> None:
+    bow: tuple[Vector, ...] = ((-4.0, -2.0, 0.0), (4.0, 2.0, 0.0), (4.0, -2.0, 0.0), (-4.0, 2.0, 0.0))
+    image = picture(paths=(DrawnPath(bow, (0xFF0000,)),), seen=False)
+    for x, y in ((-2, -1), (4, 0), (2, -1)):
+        assert image[at(x, y)][0] > 100 > image[at(x, y)][1], "red over gray"
+    crossing, alone = image[at(0, 0)], image[at(-2, -1)]
+    assert np.abs(crossing - alone).max() < 12
+
+
+def test_the_colours_of_a_path_are_those_of_its_places_and_dots_need_room() -> None:
+    places = tuple((float(x), 0.0, 0.0) for x in range(-4, 5))
+    colors = tuple(0xFF0000 if x < 0 else 0x0000FF for x in range(-4, 5))
+    image = picture(paths=(DrawnPath(places, colors, has_dots=True),))
+    assert image[at(-2.5, 0)].tolist() == [255, 0, 0]
+    assert image[at(2.5, 0)].tolist() == [0, 0, 255]
+    thick = changed(image).sum(axis=0)
+    assert thick[at(2, 0)[1]] > thick[at(2.5, 0)[1]], "a dot at each place"
+    near = np.stack([np.linspace(0, 20, 30), np.zeros(30)], axis=1)
+    assert not dotted(near, 5.0).any()
+    near[10] = near[12] = np.nan
+    assert np.flatnonzero(dotted(near, 5.0)).tolist() == [11], "what no line joins has a dot"
+
+
+def test_names_keep_off_each_other_and_values_stand_beside_lines() -> None:
+    two = [DrawnLandmark((0.0, 0.02 * y, 0.0), "pronasale", True) for y in range(2)]
+    assert (picture(*two) == picture(two[0], replace(two[1], name=""))).all()
+    far = replace(two[1], place=(0.0, 2.0, 0.0))
+    assert (picture(two[0], far) != picture(two[0], replace(far, name=""))).any()
+    line = DrawnPath(((-3.0, 0.0, 0.0), (3.0, 0.0, 0.0)), (0xFF0000,))
+    plated = changed(picture(paths=(replace(line, name="width", value="6 mm"),)))
+    assert plated.sum() > changed(picture(paths=(line,))).sum() + 5 * EM
+
+
+def test_what_is_behind_the_eye_or_out_of_the_picture_is_left_out() -> None:
+    legend = replace(LEGEND, camera=Camera(eye=(0, 0, 5.0)))
+    behind = DrawnLandmark((0.0, 0.0, 9.0), "behind", True)
+    path = DrawnPath(((0.0, 0.0, 9.0), (0.0, 0.0, 8.0)), (0xFF0000,), True, "behind", "1")
+    overlay = Overlay.of([(behind, behind.place, 0.0)], [(path, np.array(path.places))], 0.0)
+    blank = np.full((SIZE[1], SIZE[0], 4), 90, np.uint8)
+    assert (marked(blank, replace(legend, overlay=overlay), None) == blank).all()
+    assert not changed(picture(DrawnLandmark((99.0, 0.0, 0.0), "", True))).any()
+
+
+def test_places_are_rounded_to_what_tells_them_apart_and_gaps_part_them() -> None:
+    far = np.array([[1e7 + 1 / 3, 0.0, 1 / 3]])
+    assert rounded(far, 100.0) == ((10000000.3333, 0.0, 0.3333),)
+    assert np.abs(np.array(rounded(far * 1e-9, 1e-7)) - far * 1e-9).max() < 1e-12
+    places = np.zeros((6, 3))
+    places[[0, 3]] = np.nan
+    assert runs_of(places) == [slice(1, 3), slice(4, 6)]

@@ -1,0 +1,239 @@
+"""Landmarks and lines over a picture: what tools draw in a frame, as plain values, and images of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..geometry import Vector
+from ..rigid import STILL, Rigid
+
+PLACED_COLOR, TRACKED_COLOR = 0x8DE36B, 0xF2C14E  # of landmarks, in the window as well
+LINE_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that a line lies on
+DIM_LINE, DIM_LANDMARK = 0.3, 0.35  # opacity where something is hidden
+_DIGITS = 6  # of places, in the radius of the scan
+
+# In heights of the text:
+LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.11, 0.16, 0.22
+DOT_ROOM = 0.4  # how far apart dots are at least
+_RING_THICK = 0.066
+_NAME_GAP = 0.35
+
+
+# --- as values ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class DrawnLandmark:
+    """A landmark in a frame. place: scan units. name: "" where none is shown. is_placed: whether it was set
+    there, not tracked. sure: how far off it is at most with 95 %, and spacing: of the points around it, scan
+    units; 0 where not known."""
+
+    place: Vector
+    name: str
+    is_placed: bool
+    sure: float = 0.0
+    spacing: float = 0.0
+
+
+@dataclass(frozen=True)
+class DrawnPath:
+    """A line through places without a gap. places: scan units, at least one. colors: 0xRRGGBB, of the line
+    from each place on, or one for all. has_dots: whether there is a dot at each place where there is room.
+    name, value: that stand beside it, "" for nothing."""
+
+    places: tuple[Vector, ...]
+    colors: tuple[int, ...]
+    has_dots: bool = False
+    name: str = ""
+    value: str = ""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What tools draw over a frame, in the scan's coordinates.
+
+    held: the motion that brings the trajectories to where they are about this frame.
+    """
+
+    landmarks: tuple[DrawnLandmark, ...] = ()
+    trajectories: tuple[DrawnPath, ...] = ()
+    held: Rigid = STILL
+    measure_lines: tuple[DrawnPath, ...] = ()
+
+    def with_more(self, other: Drawn) -> Drawn:
+        """What is drawn with what another tool draws."""
+        return Drawn(
+            (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
+            other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
+        )  # fmt: skip
+
+
+NOTHING_DRAWN = Drawn()
+
+
+def rounded(places: NDArray[np.float64], radius: float) -> tuple[Vector, ...]:
+    """Places (N, 3) with no more digits than tell them apart in a scan of this radius."""
+    decimals = _DIGITS - math.ceil(math.log10(radius)) if radius > 0 else _DIGITS
+    return tuple((x, y, z) for x, y, z in np.round(places, max(decimals, 0)).tolist())
+
+
+def runs_of(places: NDArray[np.float64]) -> list[slice]:
+    """The runs of places (N, 3) without a gap, which NaN is."""
+    there = np.concatenate([[False], np.isfinite(places).all(axis=1), [False]])
+    starts, stops = (np.flatnonzero(there[1:] & ~there[:-1]), np.flatnonzero(~there[1:] & there[:-1]))
+    return [slice(start, stop) for start, stop in zip(starts.tolist(), stops.tolist(), strict=True)]
+
+
+# --- in a picture ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """Places of a picture's landmarks and lines, where the scan is moved to.
+
+    places: (N, 3), those of all landmarks, then of all paths. slacks: (N,), how far before each the surface
+    may be that is its own. seen: (N,), which have nothing before them.
+    """
+
+    landmarks: tuple[DrawnLandmark, ...]
+    paths: tuple[DrawnPath, ...]
+    places: NDArray[np.float64]
+    slacks: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        landmarks: Sequence[tuple[DrawnLandmark, Vector, float]],
+        paths: Sequence[tuple[DrawnPath, NDArray[np.float64]]],
+        slack: float,
+    ) -> Overlay:
+        """landmarks: each with its place and slack. paths: each with its places, which have this slack."""
+        lines = [places for _, places in paths]
+        places = np.concatenate([np.array([place for _, place, _ in landmarks]).reshape(-1, 3), *lines])
+        of_landmarks = np.array([own for *_, own in landmarks], float)
+        slacks = np.concatenate([of_landmarks, np.full(len(places) - len(landmarks), slack)])
+        named, drawn = tuple(one for one, *_ in landmarks), tuple(one for one, _ in paths)
+        return cls(named, drawn, places, slacks, np.ones(len(places), bool))
+
+    def with_seen(
+        self, find: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
+    ) -> Overlay:
+        """The same, with what `find` tells of places and slacks as what is seen."""
+        return replace(self, seen=find(self.places, self.slacks)) if len(self.places) else self
+
+
+class OverlayPainter(Protocol):
+    """An image that lines are drawn on. em: the height of text, pixels. Colours are 0xRRGGBB."""
+
+    em: float
+
+    def width(self, text: str) -> float:
+        """Width of a text, pixels."""
+
+    def shaded_text(self, left: float, top: float, text: str, opacity: float) -> None:
+        """Write without a plate, so that it is read on any picture."""
+
+    def polyline(
+        self,
+        places: NDArray[np.float64],
+        width: float,
+        colors: Sequence[int],
+        opacities: NDArray[np.float64],
+        dots: NDArray[np.bool_],
+        dot: float,
+    ) -> None:
+        """Draw a line through pixels (N, 2), with discs of a width at those of `dots`; NaN: a gap. Where it
+        covers itself, it is no more opaque."""
+
+    def ring(
+        self, place: tuple[float, float], radius: float, width: float, color: int, opacity: float
+    ) -> None:
+        """Draw a circle."""
+
+
+def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
+    """Which places of a path in a picture, (N, 2), NaN for a gap, have a dot: all where half of the steps
+    are as wide as this room, else those that no line joins to another."""
+    there = np.logical_and.reduce(np.isfinite(places), axis=1)
+    joined = there[:-1] & there[1:]
+    steps = np.hypot(*np.diff(places, axis=0)[joined].T)
+    if len(steps) and np.median(steps) < room:
+        there[:-1] &= ~joined
+        there[1:] &= ~joined
+    return there
+
+
+def draw_overlay(
+    painter: OverlayPainter, size: tuple[float, float], camera: Camera, overlay: Overlay
+) -> list[tuple[tuple[float, float], tuple[float, float], str]]:
+    """Draw lines and landmarks; returns the texts that are to stand beside lines, with both ends of each.
+
+    size: (width, height), pixels.
+    """
+    width, height = size
+    pixels = camera.places_in_picture(overlay.places) * (height, -height) + (width / 2, height / 2)
+    told, start = [], len(overlay.landmarks)
+    for path in overlay.paths:
+        part = slice(start, start + len(path.places))
+        start = part.stop
+        _draw_path(painter, path, pixels[part], overlay.seen[part])
+        words = ": ".join(text for text in (path.name, path.value) if text)
+        ends = pixels[[part.start, part.stop - 1]]
+        if words and np.isfinite(ends).all():
+            (x, y), (other_x, other_y) = ends.tolist()
+            told.append(((x, y), (other_x, other_y), words))
+    count = len(overlay.landmarks)
+    lengths = height / camera.heights_at(overlay.places[:count]) if count else np.empty(0)
+    _draw_landmarks(painter, overlay.landmarks, pixels[:count], lengths, overlay.seen[:count])
+    return told
+
+
+def _draw_path(
+    painter: OverlayPainter, path: DrawnPath, pixels: NDArray[np.float64], seen: NDArray[np.bool_]
+) -> None:
+    em, count = painter.em, len(pixels)
+    opacities = np.where(seen, 1.0, DIM_LINE)
+    dots = dotted(pixels, DOT_ROOM * em) if path.has_dots else np.zeros(count, bool)
+    colors = path.colors if len(path.colors) == count else path.colors[:1] * count
+    none = np.zeros(count, bool)
+    painter.polyline(pixels, LINE_THICK * em + 2, [0] * count, 0.6 * opacities, none, 0.0)
+    painter.polyline(pixels, LINE_THICK * em, colors, opacities, dots, 2 * DOT_RADIUS * em)
+
+
+def _draw_landmarks(
+    painter: OverlayPainter,
+    landmarks: Sequence[DrawnLandmark],
+    pixels: NDArray[np.float64],
+    lengths: NDArray[np.float64],
+    seen: NDArray[np.bool_],
+) -> None:
+    """Draw discs, each in a ring of its uncertainty where that is wider and it was tracked, and names that
+    cover no name before them. lengths: of a scan unit at each, pixels, (N,)."""
+    em = painter.em
+    taken: list[tuple[float, float, float]] = []  # left, right and top of names
+    for one, place, length, is_seen in zip(
+        landmarks, pixels.tolist(), lengths.tolist(), seen.tolist(), strict=True
+    ):
+        if not all(map(math.isfinite, place)):
+            continue
+        opacity = 1.0 if is_seen else DIM_LANDMARK
+        color = PLACED_COLOR if one.is_placed else TRACKED_COLOR
+        at, here = np.array([place]), np.ones(1, bool)
+        for ink, diameter, share in ((0, 2 * MARK_RADIUS * em + 2, 0.7), (color, 2 * MARK_RADIUS * em, 1.0)):
+            painter.polyline(at, 0.0, [ink], np.array([share * opacity]), here, diameter)
+        if not one.is_placed and one.sure * length > MARK_RADIUS * em:
+            painter.ring((place[0], place[1]), one.sure * length, max(_RING_THICK * em, 1.0), color, opacity)
+        left, top = place[0] + (MARK_RADIUS + _NAME_GAP) * em, place[1] - 0.5 * em
+        right = left + painter.width(one.name)
+        is_free = all(right <= low or high <= left or abs(at_top - top) >= em for low, high, at_top in taken)
+        if one.name and is_free:
+            taken.append((left, right, top))
+            painter.shaded_text(left, top, one.name, opacity)
