@@ -161,6 +161,14 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
         for field, seconds in (("peak", PEAK), ("onset", PEAK - reach), ("duration", 2 * reach)):
             assert float(numbers[f"{field} [s]"]) == pytest.approx(seconds, abs=0.02), field
 
+        app.act(PANEL, ("item_click", "$$0/\uf044"))
+        screen.do("type", "--delay", 40, "mouth")
+        screen.do("key", "Return")
+        app.settle()
+        ctrl(screen, "c")
+        app.told("Copied 1 curves")
+        assert any(column.startswith("mouth [") for column in pasted(screen)[0])
+
         before = playhead(app)
         x = screen.picture().shape[1] // 4
         screen.do("mousemove", x, before[1], "sleep", 0.2, "click", 1)
@@ -170,8 +178,9 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
         assert abs(column - x) < 12, "the line is where it was clicked"
         dragged = app.drag((column, row), (column - 60, row)).frame
         assert 0 < dragged < clicked - 3
-        ctrl(screen, "z")
-        app.settle()
+        for _ in range(2):
+            ctrl(screen, "z")
+            app.settle()
         assert not app.state.document["parts"]["landmarks"]["measures"]
         assert "Traceback" not in app.log()
 

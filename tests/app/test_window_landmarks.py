@@ -17,7 +17,7 @@ from virtual_screen import PANEL, RunningApp, Screen, State, kept_of, running_ap
 from viewer.analysis.landmarks import Landmark, Template
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
-from viewer.analysis.landmarks.templates import save_template, templates
+from viewer.analysis.landmarks.templates import read_template, save_template, templates
 from viewer.camera import Camera
 from viewer.document.landmarks import Landmarks
 
@@ -195,6 +195,37 @@ def test_own_template_with_a_skipped_one_and_a_mirrored_one(
         assert is_at(keys_of(state, "left")[0], points[70]), "the mirrored place is taken"
         state = press(app, "ctrl+z", "x")
         assert state.landmarks["left"][0] == "skipped"
+        assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_present_landmarks_become_a_template(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    with running_app(screen, tmp_path, scan) as app:
+        press(app, "k")
+        for number in (60, 74):
+            click(app, grid(1)[number])
+        app.choose(PANEL, "##partner", "###partner Landmark 1")
+        press(app, "d")
+        app.choose(PANEL, "##template", "###save template")
+        app.settle()
+        press(app, "ctrl+a")
+        screen.do("type", "--delay", 40, "pair")
+        screen.do("key", "Return")
+        app.told("Saved .*pair.json, 2 landmarks and 1 measures")
+        saved = read_template(tmp_path / "pair.json")
+        assert [(one.name, one.partner) for one in saved.landmarks] == [
+            ("Landmark 1", "Landmark 2"), ("Landmark 2", "Landmark 1"),
+        ]  # fmt: skip
+        assert [measure.kind for measure in saved.measures] == ["distance"]
+    with running_app(screen, tmp_path, "demo", home=tmp_path / "other") as app:
+        app.choose(PANEL, "##template", "###template file")
+        app.settle()
+        screen.do("type", "--delay", 40, "pair.json")
+        screen.do("key", "Return")
+        app.see(clicking="landmarks")
+        state = app.settle()
+        assert [one[0] for one in state.landmarks.values()] == ["to place", "to place"]
+        assert part(state)["template"] == "pair"
         assert "Traceback" not in app.log()
 
 

@@ -35,6 +35,23 @@ def test_landmarks_are_placed_in_turn_but_those_that_are_not_there() -> None:
     assert following(0) is None
 
 
+def test_two_are_paired_and_part_from_those_before() -> None:
+    part = Landmarks(tuple(Landmark(name) for name in "abc"))
+
+    def partners(now: Landmarks) -> list[str]:
+        return [one.partner for one in now.all]
+
+    assert partners(part.paired("a", "b")) == ["b", "a", ""]
+    assert partners(part.paired("a", "b").paired("b", "c")) == ["", "c", "b"]
+    assert partners(part.paired("a", "b").paired("b", "")) == ["", "", ""]
+
+
+def test_a_measure_is_renamed_alone() -> None:
+    others = (WIDTH, replace(WIDTH, name="other"))
+    renamed = Landmarks(PAIR.landmarks, measures=others).with_measure_renamed("width", "mouth")
+    assert renamed == Landmarks(PAIR.landmarks, measures=(replace(WIDTH, name="mouth"), others[1]))
+
+
 def test_a_template_keeps_what_was_set() -> None:
     part = Landmarks(
         (Landmark("other", keys=(spot(0),)), Landmark("right", keys=(spot(2),)), Landmark("idle"))

@@ -73,6 +73,22 @@ class Landmarks(Part, name="landmarks"):
             measures=tuple(replace(one, landmarks=tuple(map(now, one.landmarks))) for one in self.measures),
         )
 
+    def with_measure_renamed(self, old: str, new: str) -> Landmarks:
+        """The landmarks with another name for a measure."""
+        measures = (replace(one, name=new) if one.name == old else one for one in self.measures)
+        return replace(self, measures=tuple(measures))
+
+    def paired(self, name: str, partner: str) -> Landmarks:
+        """The landmarks with two that are each other's mirror image, and no one else's. partner: "" for
+        none."""
+
+        def now(one: Landmark) -> str:
+            if one.name in (name, partner):
+                return partner if one.name == name else name
+            return "" if one.partner in (name, partner) else one.partner
+
+        return replace(self, all=tuple(replace(one, partner=now(one)) for one in self.all))
+
     def begun_with(self, template: Template) -> Landmarks:
         """The landmarks in the order of a template, as far as they are set; others that are set come after
         them. Its measures come to those that are there."""

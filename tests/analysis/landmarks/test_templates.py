@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.mirroring import partners_of
-from viewer.analysis.landmarks.templates import is_template_file, read_template, save_template, templates
+from viewer.analysis.landmarks.templates import (
+    is_template_file,
+    read_template,
+    save_template,
+    template_of,
+    templates,
+)
+from viewer.analysis.measures import Measure
+from viewer.analysis.spot import Spot
 from viewer.errors import InputError
 
 
@@ -49,6 +59,25 @@ def own(**changes: Any) -> dict[str, Any]:
         "measures": [{"name": "w", "kind": "distance", "landmarks": ["aL", "aR"]}],
     }
     return data | changes
+
+
+def test_a_template_of_present_landmarks_is_read_again(tmp_path: Path) -> None:
+    spot = Spot(0, 0.0, (1.0, 2.0, 3.0), "surface", None, None, 0)
+    landmarks = (
+        Landmark("left", (spot,), partner="right", about="the left one"), Landmark("right", partner="left"),
+        Landmark("alone", partner="left", skipped=True), Landmark("lost", partner="nobody"),
+    )  # fmt: skip
+    width = Measure("width", "distance", ("left", "right"))
+    odd = (replace(width, name="gone", landmarks=("left", "gone")), replace(width, name="?", kind="?"))
+    template = template_of("own", landmarks, (width, *odd))
+    assert [(one.name, one.partner, one.keys) for one in template.landmarks] == [
+        ("left", "right", ()), ("right", "left", ()), ("alone", "", ()), ("lost", "", ()),
+    ]  # fmt: skip
+    assert template.measures == (width,)
+    save_template(tmp_path / "own.json", template)
+    assert read_template(tmp_path / "own.json") == template
+    with pytest.raises(InputError, match="no landmarks"):
+        template_of("own", (), ())
 
 
 def test_a_template_of_a_user(tmp_path: Path) -> None:

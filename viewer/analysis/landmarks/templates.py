@@ -8,7 +8,7 @@ there are any its `partner` in the mirror and `about`, how it is found) and `mea
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -145,6 +145,32 @@ def _check_names(names: list[str], what: str) -> None:
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"the {what} '{shortened(twice)}' is there twice")
+
+
+def template_of(name: str, landmarks: Sequence[Landmark], measures: Sequence[Measure]) -> Template:
+    """The template of landmarks that are there, wherever they are set, and of the measures of them.
+
+    Partners that do not name each other are left out, and measures of a kind that is not known. Raises
+    InputError where there is no landmark.
+    """
+    if not landmarks:
+        raise InputError("There are no landmarks to make a template of.")
+    partners = {one.name: one.partner for one in landmarks}
+    listed = tuple(
+        Landmark(
+            one.name, partner=one.partner if partners.get(one.partner) == one.name else "", about=one.about
+        )
+        for one in landmarks
+    )
+    return Template(name, name, listed, tuple(one for one in measures if _is_usable(one, partners)))
+
+
+def _is_usable(measure: Measure, names: Collection[str]) -> bool:
+    try:
+        kind_of(measure)
+    except InputError:
+        return False
+    return all(name in names for name in measure.landmarks)
 
 
 def save_template(path: Path | str, template: Template) -> None:

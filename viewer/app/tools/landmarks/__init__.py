@@ -321,6 +321,10 @@ class Tool:
         self.desk.change("Rename landmark", self.made.renamed(self.selected, name))
         self.selected = name
 
+    def pair(self, partner: str) -> None:
+        """Have the selected one and another be mirror images of each other; "": of none."""
+        self.desk.change("Pair landmarks", self.made.paired(self.selected, partner))
+
     def delete(self) -> None:
         """Delete the selected one."""
         if self.made.named(self.selected) is not None:
@@ -431,6 +435,14 @@ COMMANDS = {
             ),
             (
                 Command("read_landmarks", "Read...", lambda tool: tool.exchange.ask_to_read()),
+                Command(
+                    "choose_template", "Template of your own...",
+                    lambda tool: tool.exchange.ask_for_template(),
+                ),
+                Command(
+                    "save_template", "Save as template...",
+                    lambda tool: tool.exchange.ask_to_save_template(), can=lambda tool: bool(tool.made.all),
+                ),
                 Command(
                     "save_landmarks", "Save...", lambda tool: tool.exchange.ask_to_save(),
                     can=lambda tool: any(one.keys for one in tool.made.all),

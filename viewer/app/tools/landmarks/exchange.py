@@ -15,7 +15,13 @@ from ....analysis.landmarks.files import (
 )
 from ....analysis.landmarks.landmark_set import LandmarkSet, told_apart
 from ....analysis.landmarks.placed import landmarks_of, told_beside
-from ....analysis.landmarks.templates import is_template_file, read_template, templates
+from ....analysis.landmarks.templates import (
+    is_template_file,
+    read_template,
+    save_template,
+    template_of,
+    templates,
+)
 from ....analysis.track import Track
 from ....bounds import Bounds
 from ....document.landmarks import Landmarks
@@ -44,12 +50,16 @@ class Exchange:
         self._saving = SaveDialog("Save landmarks", about, _USUAL, self._save, written)
         about = "A file of landmarks, or a template of your own"
         self._reading = ReadDialog("Read landmarks", about, ".json", self._read, landmark_suffixes())
+        about = "Names, pairs and measures of the landmarks, for other scans"
+        self._template_saving = SaveDialog("Save template", about, ".json", self._save_template)
+        about = "Your own, as 'Save as template...' writes it"
+        self._template_reading = ReadDialog("Choose template", about, ".json", self._read_template)
         self._doubted: Path | None = None  # file whose landmarks seem to be of another scan
 
     def draw(self) -> None:
         """Declare the dialogs that name a file, while one is open."""
-        self._saving.draw()
-        self._reading.draw()
+        for dialog in (self._saving, self._reading, self._template_saving, self._template_reading):
+            dialog.draw()
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
@@ -58,6 +68,14 @@ class Exchange:
     def ask_to_read(self) -> None:
         """Open the dialog that reads landmarks or a template."""
         self._reading.ask(working_folder())
+
+    def ask_to_save_template(self) -> None:
+        """Open the dialog that saves the present landmarks as a template."""
+        self._template_saving.ask(working_folder() / "template.json")
+
+    def ask_for_template(self) -> None:
+        """Open the dialog that chooses the file of a template."""
+        self._template_reading.ask(working_folder())
 
     def take(self, path: Path) -> bool:
         """Read a file that was opened or dropped; whether it holds landmarks or a template."""
@@ -77,6 +95,15 @@ class Exchange:
         template = read_template(path)
         self.templates[template.name] = template
         self._begin(template)
+
+    def _save_template(self, file: Path) -> None:
+        refuse_input(file, self._desk.timeline)
+        made = self._desk.document.part(Landmarks)
+        template = template_of(file.name.removesuffix(".json"), made.all, made.measures)
+        save_template(file, template)
+        self.templates[template.name] = template
+        told = f"{len(template.landmarks)} landmarks and {len(template.measures)} measures"
+        self._desk.note(f"Saved {file}, {told}.")
 
     def _read_landmarks(self, path: Path) -> None:
         """Have a file read beside the window. One that seems to be of another scan is taken at the second

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 
+from ....analysis.landmarks import Landmark
 from ....analysis.track import Known
 from ....files import printable
 from ... import widgets
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 _ROWS = 6  # of the list that are shown at once
 _COLORS = {Known.PLACED: 0x8DE36B, Known.TRACKED: 0xF2C14E, Known.GAP: 0xE0A03E, Known.PENDING: 0x969CA6}
-_FREE = "Free names"
+_FREE, _NONE = "Free names", "None"
 
 
 def draw(tool: Tool, ui: Ui) -> None:
@@ -72,6 +73,11 @@ def _draw_template(tool: Tool) -> None:
             label = f"{widgets.unhidden(title)}###template {widgets.unhidden(name)}"
             if imgui.selectable(label, name == chosen)[0] and name != chosen:
                 tool.begin(known.get(name))
+        imgui.separator()
+        if imgui.selectable("From a file...###template file", False)[0]:
+            tool.exchange.ask_for_template()
+        if tool.made.all and imgui.selectable("Save as template...###save template", False)[0]:
+            tool.exchange.ask_to_save_template()
         imgui.end_combo()
 
 
@@ -125,6 +131,7 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     imgui.set_next_item_width(-1)
     entered, name = imgui.input_text("##name", landmark.name, imgui.InputTextFlags_.enter_returns_true.value)
     widgets.tooltip("Its name; Enter changes it")
+    _draw_partner(tool, landmark)
     imgui.begin_disabled(not tool.has_key())
     if imgui.button("Take back here", ui.button_size(2)):
         tool.take_key_away()
@@ -136,6 +143,17 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     ui.tooltip("Delete it, with its measures; undo brings it back", "delete_landmark")
     if entered:
         tool.rename(name)
+
+
+def _draw_partner(tool: Tool, landmark: Landmark) -> None:
+    """Declare the choice of the landmark that is another's mirror image."""
+    widgets.label("Mirrored", "The landmark that is its mirror image, left and right")
+    if imgui.begin_combo("##partner", widgets.unhidden(landmark.partner or _NONE)):
+        for name in ("", *(one.name for one in tool.made.all if one.name != landmark.name)):
+            label = f"{widgets.unhidden(name or _NONE)}###partner {widgets.unhidden(name)}"
+            if imgui.selectable(label, name == landmark.partner)[0] and name != landmark.partner:
+                tool.pair(name)
+        imgui.end_combo()
 
 
 def _draw_following(tool: Tool) -> None:

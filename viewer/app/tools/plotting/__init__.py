@@ -32,6 +32,7 @@ from .choices import CurveChoices, Settings
 from .lasso import Lasso
 from .lines import MeasureLines
 from .measurer import Measurer
+from .renaming import Renaming
 from .shown import Curve, Kept, Shown
 from .ways import Ways
 from .words import numbers_in_words
@@ -56,6 +57,7 @@ class Tool:
         self.lasso = Lasso(desk)
         self.measurer = Measurer(desk)
         self.pointed: str | None = None
+        self.renaming = Renaming()
         self.saving = SaveDialog(
             "Save curves", "What is plotted: a table (.csv) or a picture (.png, .svg)",
             PLOT_SUFFIXES[0], self._save, PLOT_SUFFIXES[1:],
@@ -153,6 +155,16 @@ class Tool:
         """Take away a measure."""
         measures = tuple(one for one in self.landmarks.measures if one.name != name)
         self.desk.change("Delete measure", replace(self.landmarks, measures=measures))
+
+    def rename(self, old: str, new: str) -> None:
+        """Give a measure another name. Raises InputError for one that is taken."""
+        new = new.strip()
+        if not new or new == old:
+            return
+        if any(one.name == new for one in self.landmarks.measures):
+            raise InputError(f"There is a measure '{new}' already.")
+        made = self.landmarks.with_measure_renamed(old, new)
+        self.desk.change("Rename measure", made, self.choices.with_measure_renamed(old, new))
 
     def measure_distance(self) -> None:
         """Measure the distance of the two landmarks that stand last among those that are placed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ....analysis.curves import ORDERS, Smoothing
 from ....document.part import Part
@@ -31,6 +31,15 @@ class CurveChoices(Part, name="curves"):
     traced: tuple[str, ...] = ()
     anchors: tuple[str, ...] = ()
     noise: float = 0.0
+
+    def with_measure_renamed(self, old: str, new: str) -> CurveChoices:
+        """The same choices where a measure has another name."""
+
+        def now(name: str) -> str:
+            return new if name == old else name
+
+        hidden = tuple(map(now, self.hidden))
+        return replace(self, hidden=hidden, abscissa=now(self.abscissa), aligned=now(self.aligned))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ....analysis.measures import Measure, Series
 from ....analysis.measures.kinds import kind_of
@@ -63,6 +63,7 @@ class Measurer:
         """
         ends = time.perf_counter() + budget / 1e3
         wanted = self._wanted(self._desk.document.part(Landmarks).measures, noise)
+        self._take_over(wanted)
         missing = [one for name, one in wanted.items() if not one.is_like(self._inputs(name))]
         quick = [one for one in missing if not kind_of(one.measure).needs_surface]
         while quick and time.perf_counter() < ends:
@@ -82,6 +83,17 @@ class Measurer:
     def _inputs(self, name: str) -> Inputs | None:
         known = self._found.get(name)
         return None if known is None else known[0]
+
+    def _take_over(self, wanted: Mapping[str, Inputs]) -> None:
+        """Let measures that were given another name have what was found of them before."""
+        for name, one in wanted.items():
+            if name in self._found:
+                continue
+            for known, series in list(self._found.values()):
+                if (known.measure.kind, known.measure.landmarks) == (one.measure.kind, one.measure.landmarks):
+                    renamed = replace(known, measure=replace(known.measure, name=name))
+                    if one.is_like(renamed):
+                        self._found[name] = one, replace(series, name=name)
 
     def _wanted(self, measures: Sequence[Measure], noise: float) -> dict[str, Inputs]:
         """The measures whose landmarks are all placed, with their tracks; what is no measure is told once."""

@@ -62,10 +62,16 @@ def _draw_measures(tool: Tool) -> None:
             others = tuple(name for name in choices.hidden if name != measure.name)
             tool.choose("Show curve", hidden=others if is_shown else (*others, measure.name))
         imgui.same_line()
-        imgui.text(
-            widgets.fitted(measure.name, right - imgui.get_cursor_pos_x() - 1.6 * imgui.get_frame_height())
-        )
-        widgets.tooltip(f"{measure.name}: {measure.kind} of {', '.join(measure.landmarks)}")
+        room = right - imgui.get_cursor_pos_x() - 3 * imgui.get_frame_height()
+        if tool.renaming.name == measure.name:
+            if (name := tool.renaming.draw(room)) is not None:
+                tool.rename(measure.name, name)
+        else:
+            imgui.text(widgets.fitted(measure.name, room))
+            widgets.tooltip(f"{measure.name}: {measure.kind} of {', '.join(measure.landmarks)}")
+        imgui.same_line(right - 2.7 * imgui.get_frame_height())
+        if widgets.icon_button(icons.ICON_FA_PEN_TO_SQUARE, "Rename"):
+            tool.renaming.begin(measure.name)
         imgui.same_line(right - 1.3 * imgui.get_frame_height())
         if widgets.icon_button(icons.ICON_FA_TRASH, "Delete"):
             tool.delete(measure.name)
