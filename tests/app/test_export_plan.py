@@ -15,7 +15,7 @@ from viewer.camera import Camera
 from viewer.document.recording import Entry
 from viewer.look import Look
 from viewer.output.marks import Marks
-from viewer.output.overlays import Drawn, DrawnLandmark
+from viewer.output.overlays import DrawnLandmark, DrawnMarks
 from viewer.rigid import STILL, Rigid
 
 TIMES: NDArray[np.float64] = np.arange(10, dtype=np.float64) * 0.04
@@ -67,8 +67,8 @@ def test_each_frame_is_where_it_is_moved_to() -> None:
 
 
 def test_each_frame_has_what_tools_draw_over_it() -> None:
-    def drawn(index: int) -> Drawn:
-        return Drawn((DrawnLandmark((float(index), 0.0, 0.0), "a", True),))
+    def drawn(index: int) -> DrawnMarks:
+        return DrawnMarks((DrawnLandmark((float(index), 0.0, 0.0), "a", True),))
 
     choices = replace(VIEW, what="frames", first=2, last=3)
     frames = recording(choices, SHOWN, Marks(landmarks=True), TIMES, None, lambda _: STILL, drawn).entries

@@ -21,7 +21,7 @@ from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import write_png
 from viewer.output.marks import Marks
-from viewer.output.overlays import Drawn, DrawnLandmark, DrawnPath
+from viewer.output.overlays import DrawnLandmark, DrawnMarks, DrawnPath
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers
 from viewer.scan.open import open_scan
@@ -141,7 +141,7 @@ def test_landmarks_and_lines_are_kept_where_marks_show_them_and_lose_their_names
     path = DrawnPath(((1.0, 0.0, 0.0), (2.0, 0.0, 0.0)), (0xFF0000,), name="jane", value="1 mm")
     held = Rigid(np.array([[0.0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
     landmark = DrawnLandmark((1.0, 2.0, 3.0), "doe", True, 0.5, 0.1)
-    drawn = Drawn((landmark,), (replace(path, name="", value=""),), held, (path,))
+    drawn = DrawnMarks((landmark,), (replace(path, name="", value=""),), held, (path,))
     request = Request(POSE, FIRST.camera, "points", FIRST.params, Look())
 
     def entry(**marks: bool) -> Entry:

@@ -16,7 +16,7 @@ from ..document.part import Part
 from ..document.schema import usable
 from ..errors import InputError
 from ..geometry import Vector
-from ..output.overlays import NOTHING_DRAWN, Drawn
+from ..output.overlays import NOTHING_DRAWN, DrawnMarks
 from ..rigid import STILL, Rigid
 from ..scan.layers import Layers
 from ..scan.pose import Pose
@@ -213,7 +213,7 @@ class Toolbox:
         for slot in self._slots.values():
             self._call(slot, "overlay", canvas, view)
 
-    def drawn(self, frame: int) -> Drawn:
+    def drawn(self, frame: int) -> DrawnMarks:
         """Find what the tools draw over a frame in pictures that are saved."""
         found = NOTHING_DRAWN
         for slot in self._slots.values():

@@ -43,7 +43,7 @@ from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
 from ..output.marks import Legend, Marks, MeasuredLine
-from ..output.overlays import LINE_SLACK, NOTHING_DRAWN, Drawn, DrawnLandmark, DrawnPath, Overlay
+from ..output.overlays import LINE_SLACK, NOTHING_DRAWN, DrawnLandmark, DrawnMarks, DrawnPath, Overlay
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import is_demo, searches_folders
@@ -133,7 +133,7 @@ class Entry:
         measurements: tuple[Measurement, ...] = (),
         shown_unit: str | None = None,
         notes: tuple[Note, ...] = (),
-        drawn: Drawn = NOTHING_DRAWN,
+        drawn: DrawnMarks = NOTHING_DRAWN,
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
@@ -155,7 +155,7 @@ class Entry:
         )  # fmt: skip
         return entry.with_drawn(drawn)
 
-    def with_drawn(self, drawn: Drawn) -> Entry:
+    def with_drawn(self, drawn: DrawnMarks) -> Entry:
         """The entry with what tools draw over its frame, as far as the marks show it."""
         marks = self.marks
         return replace(

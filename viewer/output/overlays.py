@@ -56,8 +56,8 @@ class DrawnPath:
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """What tools draw over a frame, in the scan's coordinates.
+class DrawnMarks:
+    """Landmarks and lines that tools draw over a frame, in the scan's coordinates.
 
     held: the motion that brings the trajectories to where they are about this frame.
     """
@@ -67,15 +67,15 @@ class Drawn:
     held: Rigid = STILL
     measure_lines: tuple[DrawnPath, ...] = ()
 
-    def with_more(self, other: Drawn) -> Drawn:
-        """What is drawn with what another tool draws."""
-        return Drawn(
+    def with_more(self, other: DrawnMarks) -> DrawnMarks:
+        """Both these and those of another tool."""
+        return DrawnMarks(
             (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
             other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
         )  # fmt: skip
 
 
-NOTHING_DRAWN = Drawn()
+NOTHING_DRAWN = DrawnMarks()
 
 
 def rounded(places: NDArray[np.float64], radius: float) -> tuple[Vector, ...]:
@@ -126,7 +126,7 @@ class Overlay:
     def with_seen(
         self, find: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
     ) -> Overlay:
-        """The same, with what `find` tells of places and slacks as what is seen."""
+        """The overlay with what `find` tells of places and slacks as what is seen."""
         return replace(self, seen=find(self.places, self.slacks)) if len(self.places) else self
 
 
@@ -160,8 +160,8 @@ class OverlayPainter(Protocol):
 
 
 def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
-    """Which places of a path in a picture, (N, 2), NaN for a gap, have a dot: all where half of the steps
-    are as wide as this room, else those that no line joins to another."""
+    """Find which places of a path in a picture, (N, 2), NaN for a gap, have a dot: all where half of the
+    steps are as wide as this room, else those that no line joins to another."""
     there = np.logical_and.reduce(np.isfinite(places), axis=1)
     joined = there[:-1] & there[1:]
     steps = np.hypot(*np.diff(places, axis=0)[joined].T)

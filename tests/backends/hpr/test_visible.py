@@ -159,7 +159,7 @@ def test_what_makes_no_sense_is_refused(seen: Seen) -> None:
         seen(points, mode="x-ray")
 
 
-class Drawn:
+class DrawnMarks:
     """Pictures of one surface, and of new ones, in one mode."""
 
     def __init__(self, renderer: Renderer, mode: str = MODES[0]) -> None:
@@ -196,7 +196,7 @@ def test_nothing_is_found_again_while_pose_and_eye_stand_still(
     renderer: Renderer, mode: str, eye: tuple[float, float, float]
 ) -> None:
     """Other looks, and other directions from the same eye."""
-    drawn, camera = Drawn(renderer, mode), Camera(eye, (0.1, 0.2, -1.0))
+    drawn, camera = DrawnMarks(renderer, mode), Camera(eye, (0.1, 0.2, -1.0))
     drawn.check(camera, skipped=False)
     drawn.check(camera, skipped=True)
     drawn.check(camera, skipped=True, look=Look(light="head"))
@@ -209,7 +209,7 @@ def test_nothing_is_found_again_while_pose_and_eye_stand_still(
 
 
 def test_fewer_sectors_while_it_moves_and_all_at_rest(renderer: Renderer) -> None:
-    drawn, camera = Drawn(renderer, HULL), Camera((0.0, 0, 4))
+    drawn, camera = DrawnMarks(renderer, HULL), Camera((0.0, 0, 4))
 
     def sectors(**how: object) -> int:
         return drawn.draw(camera, **how).stats.counted["points"]()["sectors"]
@@ -229,7 +229,7 @@ def test_while_it_moves_only_the_field_of_view_is_looked_at(
 ) -> None:
     """Of points all around, and in the picture as many are seen."""
     camera = Camera((0.2, 0.1, away), (0.1, 0.2, -1.0), fov_y=40, projection=projection, height=0.5)
-    moving, still = Drawn(renderer), Drawn(renderer)
+    moving, still = DrawnMarks(renderer), DrawnMarks(renderer)
     moving.draw(camera, moving=True)
     still.draw(camera)
     counts = [each.surface.stats.counted["points"]()["visible"] for each in (moving, still)]
@@ -240,7 +240,7 @@ def test_while_it_moves_only_the_field_of_view_is_looked_at(
 
 
 def test_statistics_tell_what_was_looked_at(renderer: Renderer) -> None:
-    drawn = Drawn(renderer, HULL)
+    drawn = DrawnMarks(renderer, HULL)
     stats = drawn.draw(Camera((0.0, 0, 4))).stats
     found = stats.counted["points"]()
     assert found["in"] == 6000
@@ -251,7 +251,7 @@ def test_statistics_tell_what_was_looked_at(renderer: Renderer) -> None:
 
 def test_points_before_the_near_plane_hide_nothing(renderer: Renderer) -> None:
     """As if they were not there."""
-    drawn = Drawn(renderer)
+    drawn = DrawnMarks(renderer)
     camera = Camera((0.0, 0, 4), near=4.0)
     cut = drawn.draw(camera)
     points = bumpy()

@@ -22,7 +22,7 @@ from ...files import free_file, working_folder
 from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.marks import Legend, Marks, marked
-from ...output.overlays import NOTHING_DRAWN, Drawn
+from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...task import Task, in_background
 from ..failures import failure_in_words
 from ..notices import Offer, Problem
@@ -49,7 +49,7 @@ class Capture:
         marks: Callable[[], Marks],
         film: Callable[[Recording, Path], object],
         range_note: Callable[[], str] = str,
-        drawn: Callable[[int], Drawn] = lambda _: NOTHING_DRAWN,
+        drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
     ) -> None:
         """marks: brings those that what is saved has. film: makes one of a recording, under this name.
         range_note: brings what the colour bar of the view says. drawn: brings what tools draw over a

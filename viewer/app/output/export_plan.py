@@ -17,7 +17,7 @@ from ...geometry import Vector
 from ...look import SAMPLES
 from ...output.export import FRAME_RATES, numbered
 from ...output.marks import Marks
-from ...output.overlays import NOTHING_DRAWN, Drawn
+from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...params import describe, param
 from ...rigid import Rigid
 from ...scan.times import DEFAULT_FPS, typical_rate
@@ -142,7 +142,7 @@ def recording(
     times: NDArray[np.float64],
     pivot: Vector | None,
     place: Callable[[int], Rigid],
-    drawn: Callable[[int], Drawn] = lambda _: NOTHING_DRAWN,
+    drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
 ) -> Recording:
     """The pictures to make. shown: what the view shows. times: (T,) of the scan's frames, seconds.
 

@@ -15,7 +15,7 @@ from ...document.render_job import Made, make
 from ...errors import InputError
 from ...files import working_folder
 from ...output.marks import Marks
-from ...output.overlays import NOTHING_DRAWN, Drawn
+from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...scan.inputs import found_among, scan_inputs
 from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
@@ -49,7 +49,7 @@ class Exporting:
         shown: Callable[[Marks], Entry | None],
         choices: Choices,
         marks: Marks,
-        drawn: Callable[[int], Drawn] = lambda _: NOTHING_DRAWN,
+        drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
     ) -> None:
         """shown: brings what the picture shows, with these marks. drawn: brings what tools draw over a
         frame."""

@@ -18,8 +18,8 @@ The Tool has any of
 
     panel(ui)               declares its section of the panel
     overlay(canvas, view)   draws over the picture
-    drawn(frame)            the `Drawn` that it has over a frame, by its index, in pictures that are saved: as
-                            its overlay shows it there
+    drawn(frame)            the `DrawnMarks` over a frame, by its index, of pictures that are saved: as its
+                            overlay shows it there
     below(ui)               declares what it shows under the timeline, while `is_below()` is true
     dialog()                declares windows of its own, over everything
     prompt()                what to say at the top of the view while it has the clicks

@@ -18,7 +18,7 @@ from ....analysis.spot import Spot, moved_spot, slack_before
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
-from ....output.overlays import Drawn
+from ....output.overlays import DrawnMarks
 from ....params import param
 from ....scan.times import frame_in_words
 from ...commands import Command, Menu
@@ -358,12 +358,12 @@ class Tool:
         overlay.draw(self, self._on_screen, canvas, view)
         self.notebook.draw_over(self.shown.frame, canvas, view)
 
-    def drawn(self, frame: int) -> Drawn:
+    def drawn(self, frame: int) -> DrawnMarks:
         """The landmarks over a frame of pictures that are saved."""
         is_now = frame == self.frame
         shown = self.shown if is_now else ShownLandmarks.of(self.made.all, self.desk.followed.tracks, frame)
         has_names: bool = self.desk.settings.names
-        return Drawn(drawn_landmarks(shown, has_names))
+        return DrawnMarks(drawn_landmarks(shown, has_names))
 
     def spans(self) -> list[FrameSpan]:
         """The gaps, for the timeline."""

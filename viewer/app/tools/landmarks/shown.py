@@ -93,7 +93,7 @@ class ShownLandmarks:
 
 
 def drawn_landmarks(shown: ShownLandmarks, has_names: bool) -> tuple[DrawnLandmark, ...]:
-    """Those that are there, for pictures that are saved."""
+    """Give those that are there to pictures that are saved."""
     return tuple(
         DrawnLandmark(
             vector(shown.positions[number]),

@@ -18,7 +18,7 @@ from ....csv_text import to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....files import free_file, working_folder
-from ....output.overlays import NOTHING_DRAWN, Drawn
+from ....output.overlays import NOTHING_DRAWN, DrawnMarks
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
 from ...commands import Command, Menu
@@ -217,7 +217,7 @@ class Tool:
             self.lines.draw(self.landmarks.measures, self.choices.hidden, self.pointed, canvas, view)
         self.lasso.draw(canvas, view)
 
-    def drawn(self, frame: int) -> Drawn:
+    def drawn(self, frame: int) -> DrawnMarks:
         """The ways of landmarks and what is measured over a frame, for pictures that are saved."""
         pose = self.desk.pose
         if pose is None:

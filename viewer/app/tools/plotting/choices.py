@@ -33,7 +33,7 @@ class CurveChoices(Part, name="curves"):
     noise: float = 0.0
 
     def with_measure_renamed(self, old: str, new: str) -> CurveChoices:
-        """The same choices where a measure has another name."""
+        """Choices that call a measure by another name."""
 
         def now(name: str) -> str:
             return new if name == old else name

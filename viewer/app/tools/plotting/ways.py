@@ -13,7 +13,7 @@ from ....analysis.track import Track
 from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
 from ....errors import InputError
 from ....look import color_table
-from ....output.overlays import DIM_LINE, NOTHING_DRAWN, Drawn, DrawnPath, rounded, runs_of
+from ....output.overlays import DIM_LINE, NOTHING_DRAWN, DrawnMarks, DrawnPath, rounded, runs_of
 from ....rigid import STILL, Rigid
 from ...desk import Desk
 from ...scene.canvas import Canvas, ViewPlace
@@ -111,7 +111,7 @@ class Ways:
         now = still[frame] if frame < len(still) else None
         return None if now is None else now.inverse
 
-    def drawn(self, settings: Settings, choices: CurveChoices, frame: int, radius: float) -> Drawn:
+    def drawn(self, settings: Settings, choices: CurveChoices, frame: int, radius: float) -> DrawnMarks:
         """The ways about a frame, for pictures that are saved. radius: of the scan."""
         found = self.trajectories(settings, choices) if settings.trajectories else {}
         held = self._held(settings, choices, frame)
@@ -119,7 +119,7 @@ class Ways:
             return NOTHING_DRAWN
         inputs = *found.values(), settings, radius
         paths = self._drawn.of(len(found), inputs, lambda: self._paths(found, settings, radius))
-        return Drawn(trajectories=paths, held=held)
+        return DrawnMarks(trajectories=paths, held=held)
 
     def _paths(
         self, found: Mapping[str, Trajectory], settings: Settings, radius: float
