@@ -68,7 +68,7 @@ class DrawnMarks:
     measure_lines: tuple[DrawnPath, ...] = ()
 
     def with_more(self, other: DrawnMarks) -> DrawnMarks:
-        """Both these and those of another tool."""
+        """Add the marks of another tool."""
         return DrawnMarks(
             (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
             other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
