@@ -82,6 +82,11 @@ class CurvePlot:
         """The lines for whose unit there is an axis."""
         return tuple(line for line in self.lines if line.unit in self.units)
 
+    @property
+    def is_known(self) -> bool:
+        """Whether any line has a value."""
+        return any(np.isfinite(line.values).any() for line in self.lines)
+
     def rows(self) -> list[list[object]]:
         """A table: a row for each x, a column for each line and for its band where it has one. Cells are
         empty where a value is not known; frames are told from 1."""

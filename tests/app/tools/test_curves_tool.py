@@ -125,6 +125,9 @@ def test_a_scan_of_one_frame_and_one_that_nothing_is_known_of_are_plotted() -> N
                 )
                 assert numbers_in_words(shown.curves[0])[1] == "-"
                 assert number_rows(shown.curves)[0][0] == measure.name
+                if shown.plot is not None:
+                    is_told = measure is one and order == "value"
+                    assert shown.plot.is_known == is_told, "else the window says why there is no line"
 
 
 def test_numbers_are_told_with_how_sure_they_are() -> None:

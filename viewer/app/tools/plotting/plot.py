@@ -44,7 +44,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     _draw_bar(tool, ui)
     tool.update()
     plot = tool.shown.plot
-    if plot is None:
+    if plot is None or not plot.is_known:
         widgets.faint(_why_none(tool))
         return
     room, em = imgui.get_content_region_avail(), imgui.get_font_size()
@@ -56,7 +56,14 @@ def draw(tool: Tool, ui: Ui) -> None:
 
 
 def _why_none(tool: Tool) -> str:
-    mode = tool.settings.mode
+    settings, mode = tool.settings, tool.settings.mode
+    if tool.shown.plot is not None:
+        if tool.desk.followed.is_busy:
+            return "The measures are being found."
+        if not settings.derivative:
+            return "No measure is known in any frame."
+        words, count = ORDER_WORDS[settings.order], settings.smoothing.degree + 1
+        return f"{words} takes {count} frames in a row in which a measure is known."
     if not tool.landmarks.measures:
         return "No measures yet: add one under Curves in the panel, such as the distance of two landmarks."
     if not tool.desk.followed.series:
@@ -67,6 +74,8 @@ def _why_none(tool: Tool) -> str:
         )
     if not tool.shown.curves:
         return "All measures are hidden: tick some under Curves in the panel."
+    if mode == REPEATS and len(tool.times) == 1:
+        return "Nothing repeats in a single frame."
     return "This takes two measures." if mode == AGAINST else "No peak stands out: lower how much one has to."
 
 
@@ -96,7 +105,9 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
     imgui.same_line()
     imgui.set_next_item_width(_SLIDER * em)
     points = (
-        f", {settings.smoothing.wide_enough(tool.times).points(tool.times)} frames" if len(tool.times) else ""
+        f", {settings.smoothing.wide_enough(tool.times).points(tool.times)} frames"
+        if len(tool.times) > 1
+        else ""
     )
     low, logarithmic = 0.02, imgui.SliderFlags_.logarithmic.value
     seconds = imgui.slider_float(
