@@ -265,7 +265,7 @@ def are_seen(
     seen = surface.view.contains(unmoved)
     pixels, depths = surface.view.project(unmoved[seen])
     across, down = pixels.astype(np.intp).T
-    before = (surface.depth - surface.view.base)[down, across]
+    before = surface.depth[down, across] - surface.view.base
     seen[seen] = before >= depths - slacks[seen]
     return seen
 

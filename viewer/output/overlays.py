@@ -165,7 +165,7 @@ def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
     there = np.logical_and.reduce(np.isfinite(places), axis=1)
     joined = there[:-1] & there[1:]
     steps = np.hypot(*np.diff(places, axis=0)[joined].T)
-    if len(steps) and np.median(steps) < room:
+    if 2 * np.count_nonzero(steps < room) > len(steps):
         there[:-1] &= ~joined
         there[1:] &= ~joined
     return there

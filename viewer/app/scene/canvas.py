@@ -147,10 +147,15 @@ class Canvas:
         """
         there = np.logical_and.reduce(np.isfinite(places), axis=1)
         joined, points = there[:-1] & there[1:], places.tolist()
+        draw_list, thick = imgui.get_window_draw_list(), LINE_THICK * self.em
+        if not dots and there.all() and len(set(colors)) == 1 and (alphas == alphas[0]).all():
+            for color, alpha, more in ((_OUTLINE, 0.6, 2), (colors[0], 1.0, 0)):
+                ink = theme.packed(color, alpha * float(alphas[0]))
+                draw_list.add_polyline(points, ink, thick + more, 0)
+            return
         asked = list(zip(colors, alphas.tolist(), strict=True))
         of_ink = {ink: theme.packed(*ink) for ink in set(asked)}
         inks = [of_ink[ink] for ink in asked]
-        draw_list, thick = imgui.get_window_draw_list(), LINE_THICK * self.em
         for start, stop in _like_runs(joined, alphas.tolist()):
             color = theme.packed(_OUTLINE, 0.6 * float(alphas[start]))
             draw_list.add_polyline(points[start : stop + 1], color, thick + 2, 0)

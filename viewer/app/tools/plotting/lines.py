@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from ....analysis.measures.series import lines_of
 from ....mesh.geodesic import length_of, steps_along
 from ....output.overlays import DIM_LINE, DrawnPath, rounded
 from ....output.plots import PLOT_COLORS
-from ....scan.pose import Pose
+from ....rigid import Rigid
 from ....scan.units import Scale
 from ...desk import Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
@@ -50,23 +50,24 @@ class MeasureLines:
         if pose is None:
             return ()
         request = desk.viewport.request if desk.viewport.is_there else None
-        inputs = measures, hidden, desk.followed.series, desk.followed.tracks, pose, request
-        return self._kept.of("lines", inputs, lambda: self._lines(measures, hidden, pose))
-
-    def _lines(
-        self, measures: tuple[Measure, ...], hidden: tuple[str, ...], pose: Pose
-    ) -> tuple[ShownLine, ...]:
-        desk = self._desk
         motion = desk.motion(pose)
-        found = [
-            (name, color, motion.points(places))
-            for name, color, places in self._in_frame(measures, hidden, pose.index)
-        ]
-        if not found:
+        inputs = measures, hidden, desk.followed.series, desk.followed.tracks, pose, motion
+        placed = self._kept.of("placed", inputs, lambda: self._placed(measures, hidden, pose.index, motion))
+        return self._kept.of("lines", (placed, request), lambda: self._with_seen(placed))
+
+    def _placed(
+        self, measures: tuple[Measure, ...], hidden: tuple[str, ...], frame: int, motion: Rigid
+    ) -> list[tuple[str, int, NDArray[np.float64]]]:
+        """The lines in a frame as `_in_frame` has them, where they are shown."""
+        found = self._in_frame(measures, hidden, frame)
+        return [(name, color, motion.points(places)) for name, color, places in found]
+
+    def _with_seen(self, placed: Sequence[tuple[str, int, NDArray[np.float64]]]) -> tuple[ShownLine, ...]:
+        if not placed:
             return ()
-        seen = seen_in_view(desk, np.concatenate([places for *_, places in found]))
-        parts = np.split(seen, np.cumsum([len(places) for *_, places in found])[:-1])
-        return tuple(ShownLine(*one, part) for one, part in zip(found, parts, strict=True))
+        seen = seen_in_view(self._desk, np.concatenate([places for *_, places in placed]))
+        parts = np.split(seen, ends_of([places for *_, places in placed]))
+        return tuple(ShownLine(*one, part) for one, part in zip(placed, parts, strict=True))
 
     def _in_frame(
         self, measures: tuple[Measure, ...], hidden: tuple[str, ...], frame: int
@@ -117,11 +118,14 @@ class MeasureLines:
         """Draw the lines, and the values of a few. pointed: the measure that the mouse points at, by name."""
         pose, labels = self._desk.pose, []
         shown = self.shown(measures, hidden)
+        if not shown:
+            return
         told = set(dict.fromkeys(line.measure for line in shown))
         if len(told) > _MOST_LABELS:
             told &= {pointed}
-        for line in shown:
-            on_screen = view.all_on_screen(line.places)
+        places = [line.places for line in shown]
+        all_on_screen = view.all_on_screen(np.concatenate(places))
+        for line, on_screen in zip(shown, np.split(all_on_screen, ends_of(places)), strict=True):
             alphas = np.where(line.seen, 1.0, DIM_LINE)
             canvas.path(on_screen, [line.color] * len(alphas), alphas, dots=False)
             if line.measure in told and pose is not None and np.isfinite(on_screen).all():
@@ -133,6 +137,11 @@ class MeasureLines:
                     text = f"{line.measure}: {value_in_words(series, pose.index, scale)}"
                     labels.append(Label([text], inside, faint=not line.seen.any()))
         canvas.labels(labels)
+
+
+def ends_of(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.intp]:
+    """Where arrays end that are joined, but for the last of them."""
+    return np.cumsum([len(each) for each in parts], dtype=np.intp)[:-1]
 
 
 def value_in_words(series: Series, frame: int, scale: Scale) -> str:

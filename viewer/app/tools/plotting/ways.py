@@ -34,9 +34,12 @@ class Ways:
         self.problem = ""
         self.fastest = 0.0
         self._desk = desk
-        self._kept, self._drawn = Kept(), Kept()
+        self._kept = Kept()
+        self._all: tuple[Trajectory, ...] = ()  # that were asked for last, with what is found of them:
+        self._by_speed: list[list[int]] | None = None  # colours
+        self._drawn: tuple[object, tuple[DrawnPath, ...]] | None = None
         self._laid: object = None
-        self._seen: tuple[object, dict[str, NDArray[np.bool_]]] = None, {}
+        self._seen: tuple[object, NDArray[np.bool_]] = None, np.empty(0, bool)
 
     def still(self, choices: CurveChoices) -> Still | None:
         """The motion of each frame that holds the scan still; None where the anchors do not tell one."""
@@ -76,8 +79,10 @@ class Ways:
                     (name, smoothing), (track, still), partial(_way_of, track, smoothing, still)
                 )
         self._kept.forget_others({("still", self._anchors(choices)), *((name, smoothing) for name in found)})
-        speeds = [np.nanmax(one.speeds) for one in found.values() if np.isfinite(one.speeds).any()]
-        self.fastest = float(max(speeds, default=0.0))
+        if (now := tuple(found.values())) != self._all:
+            self._all, self._by_speed, self._drawn = now, None, None
+            speeds = [np.nanmax(one.speeds) for one in now if np.isfinite(one.speeds).any()]
+            self.fastest = float(max(speeds, default=0.0))
         return found
 
     def draw(self, settings: Settings, choices: CurveChoices, canvas: Canvas, view: ViewPlace) -> None:
@@ -93,14 +98,13 @@ class Ways:
             return
         motion = desk.motion(pose).after(held)
         shown = desk.viewport.request if desk.viewport.is_there else None
-        places = {name: motion.points(one.positions) for name, one in found.items()}
-        if places and self._seen[0] != (shown, tuple(found.values())):
-            seen = np.split(seen_in_view(desk, np.concatenate([*places.values()])), len(places))
-            self._seen = (shown, tuple(found.values())), dict(zip(places, seen, strict=True))
-        for number, (name, one) in enumerate(found.items()):
-            alphas = np.where(self._seen[1][name], 1.0, DIM_LINE)
-            colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(alphas)
-            canvas.path(view.all_on_screen(places[name]), colors, alphas)
+        places = motion.points(np.concatenate([one.positions for one in self._all]))
+        if self._seen[0] != (shown, self._all):
+            self._seen = (shown, self._all), seen_in_view(desk, places)
+        alphas = np.split(np.where(self._seen[1], 1.0, DIM_LINE), len(found))
+        on_screen = np.split(view.all_on_screen(places), len(found))
+        for each in zip(on_screen, self._colors(settings), alphas, strict=True):
+            canvas.path(*each)
 
     def _held(self, settings: Settings, choices: CurveChoices, frame: int) -> Rigid | None:
         """The motion of ways to where they lie about a frame; None where nobody knows how the anchors lie in
@@ -117,23 +121,24 @@ class Ways:
         held = self._held(settings, choices, frame)
         if not found or held is None:
             return NOTHING_DRAWN
-        inputs = *found.values(), settings, radius
-        paths = self._drawn.of(len(found), inputs, lambda: self._paths(found, settings, radius))
-        return DrawnMarks(trajectories=paths, held=held)
-
-    def _paths(
-        self, found: Mapping[str, Trajectory], settings: Settings, radius: float
-    ) -> tuple[DrawnPath, ...]:
-        paths = []
-        for number, one in enumerate(found.values()):
-            colors = self._colors(one) if settings.by_speed else [color_of_way(number)] * len(one.positions)
-            paths += [
+        if self._drawn is None or self._drawn[0] != (settings.by_speed, radius):
+            paths = (
                 DrawnPath(rounded(one.positions[run], radius), tuple(colors[run]), has_dots=True)
+                for one, colors in zip(self._all, self._colors(settings), strict=True)
                 for run in runs_of(one.positions)
-            ]
-        return tuple(paths)
+            )
+            self._drawn = (settings.by_speed, radius), tuple(paths)
+        return DrawnMarks(trajectories=self._drawn[1], held=held)
 
-    def _colors(self, one: Trajectory) -> list[int]:
+    def _colors(self, settings: Settings) -> list[list[int]]:
+        """The colours of the ways in each frame, 0xRRGGBB."""
+        if not settings.by_speed:
+            return [[color_of_way(number)] * len(one.positions) for number, one in enumerate(self._all)]
+        if self._by_speed is None:
+            self._by_speed = [self._speed_colors(one) for one in self._all]
+        return self._by_speed
+
+    def _speed_colors(self, one: Trajectory) -> list[int]:
         """The colours of a way by its speed, 0xRRGGBB; that of rest where the speed is not known."""
         share = np.nan_to_num(one.speeds) / self.fastest if self.fastest else np.zeros(len(one.speeds))
         levels = np.round(np.clip(share, 0, 1) * (_LEVELS - 1)) / (_LEVELS - 1)

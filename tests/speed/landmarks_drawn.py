@@ -1,0 +1,89 @@
+"""What the window's own drawing takes with many landmarks and measures of a long scan. Prints a table.
+
+    python tests/speed/landmarks_drawn.py [--landmarks 500] [--measures 30] [--frames 200]
+
+The window runs under Xvfb, as in the tests, at 1280x720, with curves under the timeline, the section of
+landmarks in the panel and half a dozen ways. It plays the scan with every frame, stands while the mouse moves
+over it, and orbits. Milliseconds of processor time of the window's thread a turn of its loop, without the
+picture of the scan and what the graphics driver takes: declaring all widgets and marks, and work beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "app"))
+from many_landmarks import left_open
+from virtual_screen import RunningApp, running_app, virtual_screen
+
+_TURN = re.compile(r"turn of [\d.]+ ms: (.*)")
+_OWN = ("advance", "widgets")
+_TIMED = """
+import time, types
+from viewer.app import turns
+turns._WORTH_LOGGING = 0.0
+turns.time = types.SimpleNamespace(perf_counter=time.thread_time)
+turns.Turns.end = lambda self: (
+    turns.log.debug("turn of 0 ms: %s", ", ".join(f"{k} {v:.3f}" for k, v in self._parts.items())),
+    self._parts.clear(),
+)
+"""
+
+
+def own_ms(app: RunningApp, skipped: int) -> list[float]:
+    """What each turn took in which widgets were declared, after the first lines of the log."""
+    taken = []
+    for line in app.log().splitlines()[skipped:]:
+        if (found := _TURN.search(line)) and "widgets" in found[1]:
+            parts = dict(part.rsplit(" ", 1) for part in found[1].split(", "))
+            taken.append(sum(float(parts.get(name, 0)) for name in _OWN))
+    return taken
+
+
+def lines(app: RunningApp) -> int:
+    return len(app.log().splitlines())
+
+
+def main() -> None:
+    """Make the scan, run the window, and print what its turns took."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--landmarks", type=int, default=500)
+    parser.add_argument("--measures", type=int, default=30)
+    parser.add_argument("--frames", type=int, default=200)
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name, virtual_screen(Path(name), (1280, 720)) as screen:
+        folder = Path(name)
+        scan = left_open(folder, args.frames, args.landmarks, args.measures)
+        with running_app(screen, folder, scan, before=_TIMED) as app:
+            state = app.settle()
+            assert len(state.followed) == args.landmarks
+            assert len(state.measured) == args.measures
+            print(f"{args.landmarks} landmarks, {args.measures} measures, {args.frames} frames")
+            print("step                      turns   median   95 %")
+            left, top, width, height = app.view()
+            for step in ("plays", "mouse moves", "orbits"):
+                start = lines(app)
+                if step == "plays":
+                    screen.do("key", "e", "key", "space", "sleep", 12, "key", "space")
+                else:
+                    screen.do("mousemove", left + width // 2, top + height // 2, "sleep", 0.3)
+                    if step == "orbits":
+                        screen.do("mousedown", 1)
+                    for number in range(60):
+                        x = left + width // 2 + number
+                        screen.do("mousemove", x, top + height // 2 + number % 7, "sleep", 0.05)
+                    screen.do("mouseup", 1)
+                app.settle()
+                taken = own_ms(app, start)
+                middle, high = np.percentile(taken, (50, 95))
+                print(f"{step:24} {len(taken):6} {middle:8.1f} {high:6.1f}")
+
+
+if __name__ == "__main__":
+    main()
