@@ -77,7 +77,7 @@ def passes(
     image = gpu.ctx.texture((width, height), 1, view.depth.tobytes(), dtype="f4")
     image.filter = (moderngl.NEAREST, moderngl.NEAREST)
     sums = gpu.ctx.buffer(reserve=4 * width * height)
-    samples.bind(View((1680, 1050), np.eye(3), np.zeros(3), 1000.0, 0.1, 1e3, 1e3, True))
+    samples.bind(View((1680, 1050), np.zeros(3), np.eye(3), np.zeros(3), 1000.0, 0.1, 1e3, 1e3, True))
     for (number, name), run in ((work, run) for work in enumerate(WORK) for run in RUNS):
         program = gpu.compute(PASS, {**samples.defines, "WORK": number})
         image.use(Texture.PICTURE)
