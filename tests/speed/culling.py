@@ -3,9 +3,9 @@
     python tests/speed/culling.py [--counts 1000000 10000000] [--size 1920x1280] [--rounds 7]
 
 A sphere whole in view, a close-up of it, beside the picture, and five spheres in one another, all in random
-order, once the points are in an order of their own; `points` with pixels and with squares that touch. Each with
-and without, by turns, on one surface: least processor time of all threads, and in brackets least wall time, the
-picture read back. Drawn: the share of the points in chunks that were not left out.
+order, once the points are in an order of their own; `points` with pixels and with squares that touch. Each
+with and without, by turns, on one surface: least processor time of all threads, and in brackets least wall
+time, the picture read back. Drawn: the share of the points in chunks that were not left out.
 """
 
 from __future__ import annotations
