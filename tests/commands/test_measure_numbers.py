@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_line import Run
 
-from viewer.analysis.measures.curves import NUMBER_COLUMNS
+from viewer.analysis.measures.curves import NUMBER_COLUMNS, REPEAT_COLUMNS
 
 FPS, HEIGHT, OWN, NOISE = 30, 4.0, 0.03, 0.04
 TIMES = np.arange(FPS + 1) / FPS
@@ -140,12 +140,49 @@ def test_chosen_frames_are_a_curve_of_their_own_and_too_few_are_told(run: Run) -
     assert set(table("numbers.csv")[0].values()) == {"way", "mm", ""}
 
 
+def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
+    times, peaks, heights = np.arange(121) / FPS, (0.8, 2.0, 3.2), (4.0, 5.0, 6.0)
+    bumps = [h * np.exp(-0.5 * ((times - at) / 0.15) ** 2) for at, h in zip(peaks, heights, strict=True)]
+    rows: list[tuple[object, ...]] = [("frame", "name", "x", "y", "z", "sigma")]
+    for number, length in enumerate(10 + np.sum(bumps, axis=0), 1):
+        np.save(f"seq/f{number:03d}.npy", np.array([[0, 0, 0], [0, length, 0], [0, 0, length]]))
+        places = {"a": (0, 0, 0), "b": (0, length, 0), "c": (0, 0, length)}
+        rows += [(number, name, *place, OWN) for name, place in places.items()]
+    for old in Path("seq").glob("f??.npy"):
+        old.unlink()
+    write_table(Path("landmarks.csv"), rows)
+    done = run(*WORDS, "--repeats", "repeats.csv", "--aligned", "way")
+    assert done.code == 0, done.err
+    assert "3 repeats, aligned by the peaks of 'way'" in done.err + done.out
+    found = [row for row in table("repeats.csv") if row["measure"] == "way"]
+    assert tuple(found[0]) == REPEAT_COLUMNS
+    at_peak = {row["repeat"]: row for row in found if float(row["time [s]"]) == 0}
+    for repeat, at, height in zip("123", peaks, heights, strict=True):
+        assert float(at_peak[repeat]["event [s]"]) == pytest.approx(at, abs=0.005)
+        assert float(at_peak[repeat]["value"]) == pytest.approx(10 + height, abs=0.02)
+        assert at_peak[repeat]["deviation"] == ""
+    mean = at_peak["mean"]
+    assert (mean["event [s]"], mean["unit"]) == ("", "mm")
+    assert float(mean["value"]) == pytest.approx(15, abs=0.02)
+    assert float(mean["deviation"]) == pytest.approx(1, abs=0.02)
+    assert {float(row["time [s]"]) for row in found} == {float(f"{k / FPS:.6g}") for k in range(-18, 19)}
+    assert {row["measure"] for row in table("repeats.csv")} == {"way", "still"}
+    still = run(*WORDS, "--repeats", "repeats.csv", "--aligned", "still", "--force")
+    assert still.code == 0
+    assert "'still' has no peak that stands out by 50 % of its range: no repeats" in still.err
+    assert table("repeats.csv") == []
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
         (("--numbers", "numbers.txt"), "numbers.txt: cannot write '.txt' files. Known: .csv, .json"),
         (("--numbers", "no/numbers.csv"), "there is no folder 'no'"),
-        (("--numbers", "seq/../out.csv"), "is the file of the long table"),
+        (("--numbers", "seq/../out.csv"), "is the file of another table"),
+        (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is the file of another table"),
+        (("--repeats", "a.csv", "--aligned", "weg"), "unknown measure 'weg'. Known: still, way"),
+        (("--repeats", "a.csv", "--least", "1.5"), "'1.5' is no share above 0, up to 1"),
+        (("--aligned", "way"), "--aligned: is of repeats, and none are asked for. Add --repeats FILE"),
         (("--numbers", "measures.json"), "is read by this command, and is not replaced"),
         (("--order", "jerk"), "jerk"),
         (("--smoothing", "0", "--order", "speed"), "'0' is no time above 0, in seconds"),
@@ -161,7 +198,9 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
     assert not Path("out.csv").exists()
 
 
-@pytest.mark.parametrize("words", [("--numbers", "numbers.csv"), ("--order", "speed")])
+@pytest.mark.parametrize(
+    "words", [("--numbers", "numbers.csv"), ("--repeats", "repeats.csv"), ("--order", "speed")]
+)
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
     assert done.code == 2

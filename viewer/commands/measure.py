@@ -2,7 +2,7 @@
 
 The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
 the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
-The numbers of the measures' movements are another table.
+The numbers of the measures' movements are another table, their repeats over one another a third.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ from ..analysis.measures import Measure, Quantity, Series
 from ..analysis.measures.curves import (
     NUMBER_COLUMNS,
     PER_ORDER,
+    REPEAT_COLUMNS,
     MeasureCurve,
     number_rows,
     power_of,
+    repeat_rows,
+    repeats_by_peaks,
     unit_of,
 )
 from ..analysis.measures.definitions import read_measures
@@ -37,7 +40,7 @@ from ..analysis.measures.series import all_series, surface_of
 from ..analysis.track import Known, Track
 from ..analysis.tracking import track_landmarks
 from ..csv_text import save_rows
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from ..files import absolute, whole_file
 from ..output.export import check_output
 from ..scan.inputs import scan_inputs
@@ -54,6 +57,7 @@ _SUFFIXES = (".csv", ".json")
 _STEPS = 200  # of a progress bar
 _NAMED = 3  # landmarks that a message names
 _LONGEST = 1e15  # scan units
+_LEAST = 0.5  # of a curve's range, that a peak stands out by
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -73,6 +77,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--numbers", type=Path, metavar="FILE",
         help=f"the largest movement of each measure: amplitude, onset, peak, ...; {' or '.join(_SUFFIXES)}",
     )  # fmt: skip
+    parser.add_argument(
+        "--repeats", type=Path, metavar="FILE",
+        help=f"the measures around each peak of one, over one another; {' or '.join(_SUFFIXES)}",
+    )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
     how = parser.add_argument_group("how")
@@ -88,6 +96,13 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--smoothing", type=_time, metavar="SECONDS",
         help="width of the window in which curves are smoothed for speed, acceleration and numbers; "
         f"default {Smoothing().seconds}",
+    )  # fmt: skip
+    how.add_argument(
+        "--aligned", metavar="MEASURE", help="whose peaks repeats are aligned by; default: the first measure"
+    )
+    how.add_argument(
+        "--least", type=_share, metavar="SHARE",
+        help=f"how much of its range a peak stands out by to count as a repeat; default {_LEAST}",
     )  # fmt: skip
     how.add_argument(
         "--placed-in", type=int, metavar="I",
@@ -120,12 +135,14 @@ def run(args: Namespace) -> int:
             found_series = all_series(measures, tracks, timeline, frames=indices)
         series = [_in_frames(each, indices) for each in found_series.values()]
         order = ORDERS.index(args.order)
-        curves = _curves(args, series, timeline) if order or args.numbers else []
+        curves = _curves(args, series, timeline) if order or args.numbers or args.repeats else []
         if order:
             series = [_changes(*each, order) for each in zip(series, curves, strict=True)]
         _write(args.out, timeline, LONG_COLUMNS, _rows(tracks, series, timeline, indices, order))
         if args.numbers:
             _write(args.numbers, timeline, NUMBER_COLUMNS, number_rows(curves))
+        if args.repeats:
+            _write(args.repeats, timeline, REPEAT_COLUMNS, _repeats(args, curves, order))
         _tell_gaps(tracks, series, indices, order)
     for path in outputs:
         tell(path)
@@ -137,6 +154,13 @@ def _length(text: str) -> float:
     if not 0 <= length <= _LONGEST:
         raise ArgumentTypeError(f"'{text}' is no length of 0 or more, up to {_LONGEST:g}")
     return length
+
+
+def _share(text: str) -> float:
+    share = _number(text)
+    if not 0 < share <= 1:
+        raise ArgumentTypeError(f"'{text}' is no share above 0, up to 1")
+    return share
 
 
 def _time(text: str) -> float:
@@ -155,17 +179,22 @@ def _number(text: str) -> float:
 
 def _outputs(args: Namespace) -> list[Path]:
     """The files to write. Raises InputError, before any work, where one cannot be, or a flag does nothing."""
-    outputs = [args.out, *([args.numbers] if args.numbers else [])]
+    outputs = [args.out, *filter(None, (args.numbers, args.repeats))]
     for path in outputs:
         check_output(path, _SUFFIXES, several=False)
     if len({os.path.realpath(absolute(path)) for path in outputs}) < len(outputs):
-        raise InputError("is the file of the long table", args.numbers, "Write --numbers to another file")
-    asked = [*(["--numbers"] if args.numbers else []), *(["--order"] if args.order != ORDERS[0] else [])]
+        hint = f"Write {'--numbers' if args.numbers else '--repeats'} to another file"
+        raise InputError("is the file of another table", outputs[-1], hint)
+    tables = [flag for flag, path in (("--numbers", args.numbers), ("--repeats", args.repeats)) if path]
+    asked = [*tables, *(["--order"] if args.order != ORDERS[0] else [])]
     if asked and args.measures is None:
         raise InputError("is of measures, and there are none", asked[0], "Tell them by --measures")
     if args.smoothing is not None and not asked:
-        hint = f"Use it with --numbers, or --order {' or '.join(ORDERS[1:])}"
+        hint = f"Use it with --numbers, --repeats, or --order {' or '.join(ORDERS[1:])}"
         raise InputError("smooths nothing that is asked for", "--smoothing", hint)
+    if not args.repeats and (args.aligned is not None or args.least is not None):
+        flag = "--least" if args.aligned is None else "--aligned"
+        raise InputError("is of repeats, and none are asked for", flag, "Add --repeats FILE")
     return outputs
 
 
@@ -185,6 +214,8 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
     if not kept:
         hint = f"It has {', '.join(found.names[:_NAMED])}{', ...' if len(found.names) > _NAMED else ''}"
         raise InputError(f"has the landmarks of no measure in {args.measures}", args.landmarks, hint)
+    if args.aligned is not None and args.aligned not in [measure.name for measure in kept]:
+        raise unknown_name("measure", args.aligned, [measure.name for measure in kept])
     return kept
 
 
@@ -264,6 +295,19 @@ def _changes(series: Series, curve: MeasureCurve, order: int) -> Series:
     values, sigmas = curve.derivative(order)
     known = np.where(np.isfinite(values), series.known, np.minimum(series.known, Known.GAP))
     return replace(series, values=values, sigmas=sigmas, known=known.astype(np.uint8))
+
+
+def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> list[list[object]]:
+    """The rows of the repeats, aligned by the peaks of one of the curves; none where it has no peak, which is
+    told."""
+    aligned_by = next(curve for curve in curves if args.aligned in (None, curve.name))
+    least = _LEAST if args.least is None else args.least
+    aligned = repeats_by_peaks(aligned_by, least)
+    if aligned is None:
+        warn(f"'{aligned_by.name}' has no peak that stands out by {100 * least:g} % of its range: no repeats")
+        return []
+    tell(f"{len(aligned.events)} repeats, aligned by the peaks of '{aligned_by.name}'")
+    return repeat_rows(curves, aligned, order)
 
 
 def _rows(

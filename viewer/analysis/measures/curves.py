@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scan.units import Scale
-from ..curves import Movement, Smoothing, movement_of, smoothed
+from ..curves import Movement, Repeats, Smoothing, movement_of, peaks_of, repeats_of, smoothed
 from . import Series
+
+_Array = NDArray[np.float64]
 
 BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
 PER_ORDER = ("", "/s", "/s²")  # what derivatives add to a unit, by their order
@@ -20,6 +22,7 @@ NUMBER_COLUMNS = (
     "measure", "unit", "rest", "amplitude", "amplitude ±", "onset [s]", "onset ± [s]", "peak [s]",
     "end [s]", "end ± [s]", "duration [s]", "duration ± [s]", "fastest per s",
 )  # fmt: skip
+REPEAT_COLUMNS = ("measure", "repeat", "event [s]", "time [s]", "value", "deviation", "unit")
 _POWERS = {"length": 1, "area": 2, "volume": 3}
 _RAISED = {1: "", 2: "²", 3: "³"}
 _DIGITS = 6  # of a number in a table
@@ -79,6 +82,39 @@ def number_rows(curves: Iterable[MeasureCurve]) -> list[list[object]]:
     """The numbers of the movements, a row for each curve below NUMBER_COLUMNS; None for what is not known.
     Each ± is two standard deviations."""
     return [[curve.name, curve.unit, *map(_rounded, _numbers(curve))] for curve in curves]
+
+
+def repeats_by_peaks(curve: MeasureCurve, least: float) -> Repeats | None:
+    """The pieces of a curve around its peaks over one another; None where it has no peak. least: as of
+    `peaks_of`."""
+    events = peaks_of(curve.times, curve.values, curve.smoothing, least)
+    return repeats_of(curve.times, curve.values, events) if len(events) else None
+
+
+def repeats_beside(aligned: Repeats, times: _Array, values: _Array) -> Repeats:
+    """Other values, (T,) at times (T,), cut around the events of repeats, as long as these."""
+    before, after = -float(aligned.times[0]), float(aligned.times[-1])
+    return repeats_of(times, values, aligned.events, before, after)
+
+
+def repeat_rows(curves: Iterable[MeasureCurve], aligned: Repeats, order: int = 0) -> list[list[object]]:
+    """The repeats of curves over one another, below REPEAT_COLUMNS: a row for each curve, repeat and time,
+    then such for their mean, whose `repeat` is "mean" and which have a standard deviation. aligned: whose
+    events they are cut around. order: of the derivative. None for what is not known."""
+    rows: list[list[object]] = []
+    for curve in curves:
+        cut = repeats_beside(aligned, curve.times, curve.derivative(order)[0])
+        unit, none = curve.unit + PER_ORDER[order], np.full(len(cut.times), np.nan)
+        pieces = [
+            (number, event, piece, none)
+            for number, (event, piece) in enumerate(zip(cut.events.tolist(), cut.curves, strict=True), 1)
+        ]
+        for repeat, event, values, deviations in (*pieces, ("mean", np.nan, cut.mean, cut.deviation)):
+            rows += [
+                [curve.name, repeat, _rounded(event), *map(_rounded, numbers), unit]
+                for numbers in zip(cut.times.tolist(), values.tolist(), deviations.tolist(), strict=True)
+            ]
+    return rows
 
 
 def _numbers(curve: MeasureCurve) -> list[float]:

@@ -140,7 +140,7 @@ class MeasureLines:
 
 
 def ends_of(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.intp]:
-    """Where arrays end that are joined, but for the last of them."""
+    """Find where arrays end that are joined, but for the last of them."""
     return np.cumsum([len(each) for each in parts], dtype=np.intp)[:-1]
 
 

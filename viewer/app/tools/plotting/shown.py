@@ -11,9 +11,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis.curves import Repeats, Smoothing, correlation, peaks_of, repeats_of
+from ....analysis.curves import Repeats, Smoothing, correlation
 from ....analysis.measures import Series
-from ....analysis.measures.curves import BAND_SIGMAS, PER_ORDER, MeasureCurve
+from ....analysis.measures.curves import (
+    BAND_SIGMAS,
+    PER_ORDER,
+    MeasureCurve,
+    repeats_beside,
+    repeats_by_peaks,
+)
 from ....analysis.trajectories import Trajectory
 from ....output.plots import PLOT_COLORS, CurvePlot, PlotLine
 from ....scan.units import Scale
@@ -147,17 +153,14 @@ def chosen_of(curves: Sequence[Curve], name: str) -> Curve:
 
 def repeats_in(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) -> Repeats | None:
     """The repeats of the curve that others are aligned by; None where it has no peak."""
-    curve = chosen_of(curves, choices.aligned)
-    events = peaks_of(curve.times, curve.values, curve.smoothing, settings.least)
-    return repeats_of(curve.times, curve.values, events) if len(events) else None
+    return repeats_by_peaks(chosen_of(curves, choices.aligned), settings.least)
 
 
 def _plot_of_repeats(curves: Sequence[Curve], lines: Sequence[PlotLine], aligned: Repeats) -> CurvePlot:
     """Each curve's repeats, thin, and their mean with a band of one standard deviation."""
     drawn: list[PlotLine] = []
-    before, after = -float(aligned.times[0]), float(aligned.times[-1])
     for curve, line in zip(curves, lines, strict=True):
-        cut = repeats_of(curve.times, line.values, aligned.events, before, after)
+        cut = repeats_beside(aligned, curve.times, line.values)
         none = np.full(len(cut.times), np.nan)
         drawn += [
             PlotLine(f"{line.label} {number}", line.unit, one, none, line.color, is_thin=True)
