@@ -28,7 +28,7 @@ _MARKS = {
     "notes": "Notes",
     "landmarks": "Landmarks",
     "trajectories": "Ways of landmarks",
-    "measure_lines": "What measures measure",
+    "measure_lines": "Measures",
 }
 _FIRST_MARKS = 0.55  # of a row of boxes, for the first one
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
