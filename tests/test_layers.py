@@ -18,7 +18,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 LAYERS = (
     {
         "errors", "csv_text", "files", "folders", "geometry", "bounds", "params", "resources", "rigid",
-        "srgb", "camera", "look", "view", "task", "helper", "native", "signals", "unfinished",
+        "imports", "srgb", "camera", "look", "view", "task", "helper", "native", "signals", "unfinished",
     },
     {"scan"},
     {"mesh", "codewords"},
@@ -33,7 +33,7 @@ LAYERS = (
 )  # fmt: skip
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}
 
-WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
+WINDOW = {"imgui_bundle", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
 COMPILED = ("_kernels", "compiled")  # how the names of modules end that are compiled by numba, or by which
 SLOW = WINDOW | {

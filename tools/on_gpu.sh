@@ -11,8 +11,8 @@
 # the folder of real scans for the tables. Needs bash, coreutils, tar with xz, and python3; no network.
 #
 # The second form makes the archive for such machines, DIR/environment.tar.xz, where there is a network: what
-# drawing, the tests and tests/speed need, less than 60 MB. --all: what the benchmark needs too, 250 MB: without
-# it steps that measure errors are left out. --python: the machine's version; else that of python3 here.
+# drawing, the tests and tests/speed need, less than 60 MB. --all: what the benchmark needs too, several times
+# that: without it the benchmark and the tables are left out. --python: the machine's version; else that of python3 here.
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 
@@ -147,9 +147,9 @@ if [ $quick = yes ]; then
     speed points 120 --counts 10000 --size 320x240 --rounds 1
     speed splats 300 --counts 2000 --size 320x240 --rounds 1
     speed range_samples 300 --size 300x200 --rounds 1
-    speed instancing 300 --counts 2000 --size 320x240 --rounds 1 --data "$out/data"
+    speed instancing 300 --counts 20000 --size 640x480 --rounds 3 --data "$out/data"
     speed bandwidth 120 --counts 10000 100000 --size 320x240 --rounds 1 --megabytes 16 --data "$out/data"
-    table benchmark 300 none --quick --scene torus --views 1 --size 96x64
+    table benchmark 300 none --quick --scene torus --backend points --views 1 --size 96x64
     table table-two 600 table-two --suite slomp --quick --views 1 --size 96x64
     table octree-tables 600 octree-tables --suite octrees --quick --views 1 --size 96x64
 else

@@ -39,6 +39,7 @@ def run(
     """
     from ..errors import NoOpenGLError
     from ..geometry import up_vector
+    from ..imports import uncollected
     from ..scan.listing import named_scans
     from ..scan.open import DEMO, open_scan
 
@@ -50,14 +51,15 @@ def run(
     from .closing import Signals
 
     with Signals() as signals:
-        from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
-        from ..task import Task, in_background
-        from ..unfinished import remove_leftovers
-        from . import settings
-        from .app import App
-        from .files.keeping import take_over
-        from .loop import Loop
-        from .window import Window
+        with uncollected():
+            from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
+            from ..task import Task, in_background
+            from ..unfinished import remove_leftovers
+            from . import settings
+            from .app import App
+            from .files.keeping import take_over
+            from .loop import Loop
+            from .window import Window
 
         remembered, notes = settings.load(user_folder() / settings.FILE)
         take_over(remembered.places.values())
@@ -68,7 +70,8 @@ def run(
                 raise problems[0] from error
             raise
         try:
-            app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up, session=session)
+            with uncollected():  # tools are imported
+                app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up, session=session)
             try:
                 for note in notes:
                     app.note(note)

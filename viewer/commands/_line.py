@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 
 from ..errors import InputError, Scan4DError
+from ..imports import uncollected
 from ..signals import ending_as_interrupts, ignore_from_now_on
 from ..task import listening
 from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, escaped, quietly
@@ -43,7 +44,8 @@ def run(words: Sequence[str], then_ends: bool = False) -> int:
 
 def _run(words: Sequence[str]) -> int:
     try:
-        args = parsed(words)
+        with uncollected():
+            args = parsed(words)
         with quietly(args.quiet), _logged(args.debug), listening(Delays()), ending_as_interrupts():
             return args.run(args)
     except SystemExit as stop:  # --help, --version
