@@ -198,9 +198,7 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
 
         before = app.settle()
         start = pixel_of(app, points, 34)
-        screen.do("mousemove", *start, "mousedown", 1, "sleep", 0.2, "mousemove", start[0] + 90, start[1])
-        screen.do("sleep", 0.2, "mouseup", 1)
-        after = app.settle()
+        after = app.drag(start, (start[0] + 90, start[1]))
         assert after.camera != before.camera
         assert (after.is_under_way, len(after.measurements)) == (False, 1), (
             "a drag turns the view and sets no end"
