@@ -30,9 +30,9 @@ def test_errors_are_within_what_is_told(face: Judgement) -> None:
     assert 0.8 <= face.within <= 0.98
 
 
-@pytest.mark.xfail(strict=True, reason="some fast limbs are taken for others: 2 spacings of the horse")
 @pytest.mark.parametrize("name", ["crane_175", "horse_gallop_48"])
 def test_errors_of_bodies_are_a_spacing(data_dir: Path, name: str) -> None:
     """95 % <= 1 point spacing away from fast self-contact."""
     found = judge_tracking(resampled_mesh(find_source(data_dir / "sequences" / name), name), track_landmarks)
     assert found.p95 <= found.spacing
+    assert 0.8 <= found.within <= 0.98

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..spot import Spot
+from .body import DeformableBody, Grip
 from .registration import PatchLevel, Placement, best_registered, patch_of, registered
 from .settings import TrackingSettings
 from .surface import MomentSurface
@@ -36,6 +37,9 @@ _MIDDLE = 0.5  # of the points next to the place, that have to be matched
 # How far a patch may be off the surface, standard deviation: times the noise, and spacings besides.
 _OFF_WIDE = 3.0, 0.12
 _OFF_FINE = 2.5, 0.12
+_ASIDE = 2.0  # distances of a body's nodes that it may be off where the body carries it
+_BY_BODY = 0.1  # of the way from where the body carries it: its share in the standard deviation
+_UNSURE = 0.7  # spacings: standard deviation from which on a place of a body is not told
 _CROP = 1.6  # wide radii of the surface that is kept of the frame in which it was set
 _NOISE = 1.2  # factor of variances of registration: residuals are not independent
 _FLOOR = 0.04  # spacings: what sampling leaves at least, standard deviation
@@ -84,24 +88,45 @@ class Follower:
         self._found = self._fine_found = self._region = Placement(self._place)
         self._velocity = np.zeros(3)
         self._is_lost = False
+        self._body: DeformableBody | None = None
+        self._grip: Grip | None = None
+        self._gripped_turn = np.eye(3)
+
+    @property
+    def place(self) -> Float | None:
+        """The place where it was found last, (3,) relative to the origin; None while it is lost."""
+        return None if self._is_lost else self._found.place
+
+    def hold_on(self, body: DeformableBody) -> None:
+        """Go along with a body, which is in the frame that was looked at last, from where it is found."""
+        if body is not self._body:
+            self._body, self._grip = body, None
+        if self._grip is None and not self._is_lost:
+            self._grip, self._gripped_turn = body.gripped(self._found.place), self._found.turn
 
     def step(self, surface: MomentSurface, before: MomentSurface) -> Sighting:
         """Look for it in the next frame. before: the surface of the frame that it was looked for in
-        last."""
+        last. A body that it holds on to has been moved on."""
         if self._wide is None or self._fine is None:
             return Sighting.gap("there is no surface where it was set")
         loose = (_LOOSE * self.spacing) ** 2 * np.eye(3)
-        reason = "the region around it was not found"
-        for start in self._guesses(surface, before):
+        carried = self._carried()
+        reason, fits = "the region around it was not found", []
+        for start in self._guesses(surface, before, carried):
             wide = registered(self._wide, surface, start, _WIDE, loose)
             if wide is None or wide.kept < self._settings.least_kept:
                 reason = "too little of the surface around it was found"
             elif wide.deviation > self._limit(_OFF_WIDE):
                 reason = "the surface around it has another shape"
             else:
-                break
-        else:
+                fits.append(wide)
+                if carried is None:
+                    break
+        if not fits:
             return self._lose(reason)
+        wide = fits[0]
+        if any(np.linalg.norm(other.place - wide.place) > self._bound for other in fits[1:]):
+            return self._lose("it fits in two places")
         slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
         fine = registered(
             self._fine, surface, Placement(wide.place, wide.turn, self._fine_found.bent), _FINE, slack
@@ -119,23 +144,39 @@ class Follower:
         if back.deviation > self._limit(_OFF_WIDE):
             return self._lose("the surface around it had another shape")
         returned = wide.turn @ (back.place - self._place)
-        apart, bound = float(np.linalg.norm(returned)), self._settings.bound_at(self.spacing)
-        if apart > bound:
+        apart = float(np.linalg.norm(returned))
+        if apart > self._bound:
             return self._lose(f"forward and backward are {apart:.3g} apart")
-        self._velocity = np.zeros(3) if self._is_lost else fine.place - self._found.place
-        self._found, self._fine_found, self._is_lost = wide.at(fine.place), fine, False
-        self._region = Placement(fine.place, wide.turn)
         between = fine.place - wide.place
+        aside = np.zeros(3) if carried is None else fine.place - carried.place
+        if self._body is not None and np.linalg.norm(aside) > _ASIDE * self._body.distance:
+            return self._lose("the body around it went elsewhere")
         covariance = (
             _NOISE * fine.covariance
             + _APART**2 * (np.outer(returned, returned) + np.outer(between, between))
             + (_FLOOR * self.spacing) ** 2 * np.eye(3)
             + wide.turn @ self._spread @ wide.turn.T
         )
+        if carried is not None:
+            covariance += wide.deviation**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
+        self._velocity = np.zeros(3) if self._is_lost else fine.place - self._found.place
+        self._found, self._fine_found, self._is_lost = wide.at(fine.place), fine, False
+        self._region = Placement(fine.place, wide.turn)
+        if carried is not None and np.linalg.eigvalsh(covariance)[-1] > (_UNSURE * self.spacing) ** 2:
+            return Sighting.gap("its place along the surface is not sure")
         return Sighting(fine.place + self._origin, covariance)
 
-    def _guesses(self, surface: MomentSurface, before: MomentSurface) -> Iterator[Placement]:
-        """About where it may be in a frame, the likelier first."""
+    def _carried(self) -> Placement | None:
+        """The placement to which the body has carried it, None where it holds on to none."""
+        if self._body is None or self._grip is None:
+            return None
+        place, turn = self._body.carried(self._grip)
+        return Placement(place, turn @ self._gripped_turn, self._found.bent)
+
+    def _guesses(
+        self, surface: MomentSurface, before: MomentSurface, carried: Placement | None
+    ) -> Iterator[Placement]:
+        """About where it may be in a frame, the likelier first. carried: by the body."""
         free = (_FREE * self.spacing) ** 2 * np.eye(3)
         if not self._is_lost:
             patch = patch_of(before, self._found.place, self._wide_radius, _NEXT[0].points)
@@ -146,11 +187,21 @@ class Follower:
                 moved = best_registered(patch, surface, starts, _NEXT, free, enough)
                 if moved is not None and moved.kept >= _WRONG:
                     yield Placement(moved.place, moved.turn @ self._found.turn, self._found.bent)
-        if self._far is not None:
+        if carried is not None:
+            assert self._wide is not None
+            moved = best_registered(self._wide, surface, [carried], _NEXT, free)
+            if moved is not None:
+                yield moved
+        elif self._far is not None:
             region = best_registered(self._far, surface, [self._region], [_FAR], free)
             if region is not None:
                 self._region = Placement(region.place, region.turn)
                 yield region
+
+    @property
+    def _bound(self) -> float:
+        """How far apart may be what should be one place, scan units."""
+        return self._settings.bound_at(self.spacing)
 
     def _limit(self, off: tuple[float, float]) -> float:
         """How far a patch may be off the surface, scan units."""

@@ -6,6 +6,7 @@ import os
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,11 +20,13 @@ from ..landmarks import Landmark
 from ..spot import Spot, followed
 from ..track import Track
 from .blending import track_of
+from .body import DeformableBody
 from .follower import Follower, Sighting
 from .settings import TrackingSettings
 from .surface import MomentSurface
 
 _MOMENTS = 5  # that are held: two in each direction, and one in which landmarks were set
+_APART = 0.04, 3.0  # of the scan's size, and spacings: changes of distances that ask for a body
 _THREADS = max(1, min(4, os.cpu_count() or 1))
 
 
@@ -76,6 +79,10 @@ class _Pass:
         return 0 < (frame - self.at) * self.direction <= self.left
 
 
+# A pass, and the moments of its key where that is needed, of the frame before, and of the one to look at.
+_Followed = tuple[_Pass, _Moment | None, _Moment, _Moment]
+
+
 class Tracker:
     """Landmarks of a scan, followed from where they were set through all frames.
 
@@ -102,6 +109,7 @@ class Tracker:
         self._spacing: float = old._spacing if old else 1.0
         self._moments: OrderedDict[int, _Moment] = old._moments if old else OrderedDict()
         self._passes: dict[tuple[Spot, int], _Pass] = {}
+        self._bodies: dict[int, tuple[int, DeformableBody]] = {}  # by direction: in which frame, and which
         for landmark in self._landmarks:
             for part in _passes_of(landmark, len(timeline)):
                 name = part.spot, part.direction
@@ -172,6 +180,7 @@ class Tracker:
         for part in self._passes.values():
             part.follower = None if not part.left else part.follower
         self._moments.clear()
+        self._bodies.clear()
 
     def _next_step(self) -> tuple[int, int, list[_Pass]] | None:
         """The direction and frame to be looked at next, and the passes that do; None: nothing is left.
@@ -189,7 +198,7 @@ class Tracker:
 
     def _look(self, frame: int, parts: Sequence[_Pass], pool: ThreadPoolExecutor) -> None:
         """Have passes look at a frame."""
-        to_follow = []
+        to_follow: list[_Followed] = []
         for part in parts:
             try:
                 moment, key = self._moment(frame), None
@@ -208,28 +217,48 @@ class Tracker:
             except InputError:
                 before = moment
             to_follow.append((part, key, before, moment))
-        shares = [to_follow[thread::_THREADS] for thread in range(_THREADS)]
+        if to_follow:
+            self._follow(to_follow, frame, pool)
+        for part in parts:
+            part.at = frame
+
+    def _follow(self, parts: Sequence[_Followed], frame: int, pool: ThreadPoolExecutor) -> None:
+        """Have passes that are at one frame look at the next one, along with a body where they need it."""
+        shares = [parts[thread::_THREADS] for thread in range(_THREADS)]
         for thread, share in enumerate(shares):  # made here: what a thread makes, another one must not
             for _, *moments in share:
                 for each in moments:
                     if each is not None:
                         each.surface(thread)
-        for done in [pool.submit(self._follow, *share, frame) for share in enumerate(shares)]:
+        for done in [pool.submit(self._begin, share, thread) for thread, share in enumerate(shares)]:
             done.result()
-        for part in parts:
-            part.at = frame
+        followers = [part.follower for part, *_ in parts if part.follower is not None]
+        first, _, before, moment = parts[0]
+        here, there = before.surface(0), moment.surface(0)
+        where, body = self._bodies.get(first.direction, (first.at, None))
+        body = body if where == first.at else None
+        unmoved = [copy(follower) for follower in followers]
+        while True:
+            if body is not None:
+                for follower in followers:
+                    follower.hold_on(body)
+                body.move_to(there.held.points)
+            for done in [pool.submit(_step, share, thread, frame) for thread, share in enumerate(shares)]:
+                done.result()
+            if body is not None or not _move_apart(unmoved, followers, there):
+                break
+            body = DeformableBody(here.held.points, here.spacing)
+            for follower, was in zip(followers, unmoved, strict=True):
+                vars(follower).update(vars(was))
+        if body is not None:
+            self._bodies[first.direction] = frame, body
 
-    def _follow(
-        self, thread: int, share: Sequence[tuple[_Pass, _Moment | None, _Moment, _Moment]], frame: int
-    ) -> None:
-        """Have some passes, each with the moments of its key, of the frame before and of this one, look at
-        it."""
+    def _begin(self, share: Sequence[_Followed], thread: int) -> None:
+        """Make the followers of some passes, in a thread of its own."""
         assert self._origin is not None
-        for part, key, before, moment in share:
+        for part, key, *_ in share:
             if part.follower is None and key is not None:
                 part.follower = Follower(part.spot, key.surface(thread), self._origin, self.settings)
-            assert part.follower is not None
-            part.seen[frame] = part.follower.step(moment.surface(thread), before.surface(thread))
 
     def _moment(self, frame: int) -> _Moment:
         """A frame as it is held, or read now. Raises InputError."""
@@ -279,6 +308,24 @@ class Tracker:
         for name in ((key, 1), (key, -1)):
             if name in self._passes:
                 yield name, self._passes[name]
+
+
+def _step(share: Sequence[_Followed], thread: int, frame: int) -> None:
+    """Have some passes look at a frame, in a thread of its own."""
+    for part, _, before, moment in share:
+        assert part.follower is not None
+        part.seen[frame] = part.follower.step(moment.surface(thread), before.surface(thread))
+
+
+def _move_apart(before: Sequence[Follower], after: Sequence[Follower], surface: MomentSurface) -> bool:
+    """Whether landmarks move so much against each other, from a frame to the next, as limbs do."""
+    both = [(one.place, other.place) for one, other in zip(before, after, strict=True)]
+    places = np.array([(one, other) for one, other in both if one is not None and other is not None])
+    if not len(places):
+        return False
+    distances = np.linalg.norm(places[:, None] - places[None], axis=-1)  # (n, n, 2)
+    change = np.abs(distances[..., 1] - distances[..., 0]).max()
+    return bool(change > max(_APART[0] * surface.size, _APART[1] * surface.spacing))
 
 
 def _passes_of(landmark: Landmark, count: int) -> Iterator[_Pass]:
