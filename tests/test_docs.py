@@ -20,7 +20,7 @@ from viewer.bench.papers.machado_2014 import hpr
 from viewer.bench.papers.marsik_2010 import codeword
 from viewer.bench.papers.preiner_2012 import preiner
 from viewer.bench.papers.slomp_2014 import octree_tables, table_two
-from viewer.bench.report import defaults_page, scene_table
+from viewer.bench.report import choices, defaults_page, scene_table
 from viewer.bench.report.measurement import put_tables
 from viewer.look import Look, ValueKind
 from viewer.params import Parameter, describe
@@ -92,7 +92,9 @@ def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: boo
 
 
 @pytest.mark.parametrize(
-    "made", [scene_table, defaults_page, measuring, hpr, laplacian, codeword], ids=lambda made: made.NAME
+    "made",
+    [scene_table, defaults_page, measuring, choices, hpr, laplacian, codeword],
+    ids=lambda made: made.NAME,
 )
 def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
     page = ROOT / "docs" / made.PAGE
@@ -109,7 +111,7 @@ def test_each_place_of_a_table_has_what_makes_it() -> None:
     """A suite of the benchmark, or a script of docs/tables; and none of them makes one without a place."""
     made = [
         (suite.PAGE, key)
-        for suite in (scene_table, defaults_page, measuring, hpr, laplacian, codeword)
+        for suite in (scene_table, defaults_page, measuring, choices, hpr, laplacian, codeword)
         for key in suite.tables(
             [suite.read_measurement(next((ROOT / "docs" / "data").glob(f"{suite.NAME}*")))]
         )

@@ -24,7 +24,7 @@ LAYERS = (
     {"mesh", "codewords"},
     {"simulate", "gpu"},
     {"backends"},
-    {"renderer", "frame", "timing"},
+    {"renderer", "frame", "timing", "choice"},
     {"analysis"},
     {"output"},
     {"document", "__init__"},

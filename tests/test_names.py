@@ -21,7 +21,7 @@ BY_PROTOCOL = {"Params", "Tool", "Settings"}  # each backend, and each tool, dec
 FUNCTIONS_BY_PROTOCOL = {
     "add_arguments", "find", "run", "draw", "needs", "suits", "check", "frame_count", "read", "read_faces",
     "read_times", "read_unit", "write", "write_poses", "render", "digest", "read_measurement", "tables",
-    "lacks", "owns",
+    "lacks", "owns", "offers",
 }  # fmt: skip
 PAPERS = "bench/papers/"  # whose modules are made alike, each with the same few functions
 

@@ -212,6 +212,11 @@ class _Samples:
         self.mean.release()
 
 
+def scaled_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """The size, pixels, that a picture is drawn at on a scale of its width and height."""
+    return max(1, round(size[0] * scale)), max(1, round(size[1] * scale))
+
+
 def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms: float) -> bool:
     """Upload what the backend reads of the pose for a picture of this size, pixels, for as long as that;
     whether all of it is there. Points of range views are merged by a worker before.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections import Counter
@@ -49,6 +50,23 @@ def call_ms(
         times.append((time.perf_counter() - start) * 1e3)
         tick()
     return times
+
+
+def undisturbed_ms(renderer: Renderer, request: Request, surface: Surface, repeat: int) -> float:
+    """Milliseconds that a draw takes with the picture read back, as on a machine that does nothing else: the
+    least of `repeat`.
+
+    Of a driver that draws in software, that is by processor time: this thread's, which waits for the others,
+    and theirs, spread over all processors. Else wall time.
+    """
+    times = []
+    for _ in range(repeat):
+        process, thread = time.process_time(), time.thread_time()
+        (wall,) = call_ms(renderer, request, surface, 1)
+        own = (time.thread_time() - thread) * 1e3
+        others = (time.process_time() - process) * 1e3 - own
+        times.append(own + others / (os.cpu_count() or 1) if renderer.gpu.software else wall)
+    return min(times)
 
 
 def pass_ms(renderer: Renderer, request: Request, surface: Surface, repeat: int) -> list[Counter[str]]:

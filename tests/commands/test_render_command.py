@@ -303,7 +303,8 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
     assert done.code == 0
     stats = json.loads((tmp_path / "stats.json").read_text())
     assert list(stats) == [
-        "device", "timer", "backend", "params", "size", "frames", "bytes_gpu", "peak_rss",
+        "device", "timer", "backend", "params", "automatic", "size", "drawn_size", "frames", "bytes_gpu",
+        "peak_rss",
     ]  # fmt: skip
     assert stats["device"] == renderer.gpu.device
     assert stats["timer"] in ("query", "finish")
@@ -312,6 +313,7 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
         {"point_size": 2, "hide_hidden": False},
         [96, 64],
     )
+    assert (stats["automatic"], stats["drawn_size"]) == (None, [96, 64])
     assert stats["bytes_gpu"] > 2000 * 12
     assert stats["peak_rss"] > 10e6
     assert [f["pose"] for f in stats["frames"]] == [1, 2]

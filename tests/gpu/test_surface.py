@@ -270,3 +270,21 @@ def test_normals_are_shown_in_the_fake_colour_of_the_paper(draw: Draw) -> None:
     covered = surface.row != NOTHING
     expected = fake_color(CLOUD.normals)[surface.row[covered]].astype(int)
     assert np.abs(surface.image()[covered].astype(int) - expected).max() <= 1
+
+
+@pytest.mark.parametrize(("few", "many"), [((3, 2), (9, 6)), ((3, 2), (7, 5)), ((10, 7), (14, 10))])
+def test_a_surface_of_few_pixels_is_read_as_one_of_many(
+    renderer: Renderer, few: tuple[int, int], many: tuple[int, int]
+) -> None:
+    pose = Pose(0, 0.0, "ball", sphere(500))
+    request = Request(pose, Camera.orbit(pose.bounds, 30, 20), "surfels")
+    small, large = Surface(renderer.gpu, few), Surface(renderer.gpu, few, many)
+    for surface in (small, large):
+        render_frame(renderer, request, surface)
+    columns, rows = ([int((i + 0.5) * n / m) for i in range(m)] for n, m in zip(few, many, strict=True))
+    assert np.array_equal(large.image(), small.image()[rows][:, columns])
+    for name, channel in large.arrays().items():
+        assert np.array_equal(
+            channel, small.arrays()[name][rows][:, columns], equal_nan=channel.dtype.kind == "f"
+        )
+    assert np.array_equal(large.depth, small.depth)

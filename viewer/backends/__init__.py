@@ -30,6 +30,9 @@ It may declare
     VALUES               numbers that it finds for the rows that it draws, for looks to colour by:
                          name -> `ValueKind`; see `Surface.wanted`
     suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
+    offers(pose) -> several   values in place of its defaults, by name, with each of which it draws the scan
+                         from what is stored, nothing being prepared: what is chosen automatically for a time
+                         or an error (viewer/choice) is one of these
     KEPT                 parameter -> why its default stays where a benchmark finds a value that beats it
     LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`, or several
 
@@ -180,6 +183,10 @@ class Backend:
     def suits(self, pose: Pose) -> Suited | None:
         """How well it does as the default for a scan, None where it does not."""
         return self.module.suits(pose) if hasattr(self.module, "suits") else None
+
+    def offers(self, pose: Pose) -> tuple[Mapping[str, object], ...]:
+        """Values in place of its defaults, each a way to draw a scan that may be chosen for time or error."""
+        return self.module.offers(pose) if hasattr(self.module, "offers") else ()
 
     @property
     def limits(self) -> Mapping[str, tuple[Limit, ...]]:

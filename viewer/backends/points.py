@@ -51,6 +51,11 @@ def suits(pose: Pose) -> Suited:
     return Suited(0, {"point_size": 0})
 
 
+def offers(pose: Pose) -> tuple[dict[str, object], ...]:
+    """Squares that touch, and pixels; of range views, the points would have to be merged."""
+    return () if pose.views else ({"point_size": 0}, {})
+
+
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter the points; complete where all shall be drawn."""
     params: Params = frame.params

@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from ..backends import backends
+from .choosing import SCENES as CHOICE_SCENES
+from .choosing import measure_choices
 from .defaults import SCENES as DEFAULT_SCENES
 from .defaults import default_groups
 from .measuring import NAME as MEASURING
@@ -46,11 +48,14 @@ from .papers.slomp_2014.octree_tables import write_octree_tables
 from .papers.slomp_2014.table_two import NAME as TABLE_TWO
 from .papers.slomp_2014.table_two import write_table_two
 from .plan import Group, plan
+from .report.choices import NAME as CHOICE
+from .report.choices import write_choices
 from .report.defaults_page import NAME as DEFAULTS
 from .report.defaults_page import write_defaults
 from .report.results import (
     ALONE,
     BAND_TIMES,
+    CHOICES,
     DISTANCES,
     FITS,
     GROWTH,
@@ -127,6 +132,14 @@ PAGE_SUITES: Mapping[str, PageSuite] = {
         MEASURED_SCENES,
         others={DISTANCES: measure_distances},
         usual=BenchSettings(size=(400, 300), views=8, frames=0),
+    ),
+    "choice": PageSuite(
+        write_choices,
+        CHOICE,
+        CHOICE_SCENES,
+        others={CHOICES: measure_choices},
+        usual=BenchSettings(views=10, repeat=2, frames=0, seed=1),  # other views than models are fitted to
+        quick=(("torus", "sheets-bare"), 2),
     ),
     "hpr": PageSuite(
         write_hpr,

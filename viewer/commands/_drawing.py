@@ -6,6 +6,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from .. import frame
@@ -146,26 +147,29 @@ def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> 
     return typical_rate(timeline.times[list(indices)])
 
 
+@cache
 def renderer(device: int | None) -> Renderer:
-    """A headless renderer on this device; None: the one that `viewer.render` uses."""
+    """The headless renderer on this device; None: the one that `viewer.render` uses."""
     return frame.shared_renderer() if device is None else Renderer(headless(device))
 
 
 @contextmanager
 def canvases(
     device: int | None, size: tuple[int, int]
-) -> Iterator[tuple[Renderer, Callable[[tuple[int, int]], Surface]]]:
-    """A headless renderer, and a function that gives the surface of a size; it holds one at a time.
+) -> Iterator[tuple[Renderer, Callable[[tuple[int, int], float], Surface]]]:
+    """A headless renderer, and a function that gives the surface of a size, drawn on a scale of it; it
+    holds one at a time.
 
     size: of the first one. Raises InputError where that cannot be drawn.
     """
     its_renderer = renderer(device)
     held = [Surface(its_renderer.gpu, size)]
 
-    def surface_of(size: tuple[int, int]) -> Surface:
-        if held[-1].size != size:
+    def surface_of(size: tuple[int, int], scale: float) -> Surface:
+        drawn = frame.scaled_size(size, scale)
+        if (held[-1].size, held[-1].shown) != (drawn, size):
             held.pop().release()
-            held.append(Surface(its_renderer.gpu, size))
+            held.append(Surface(its_renderer.gpu, drawn, size))
         return held[-1]
 
     try:
@@ -179,4 +183,4 @@ def canvases(
 def canvas(device: int | None, size: tuple[int, int]) -> Iterator[tuple[Renderer, Surface]]:
     """A headless renderer and a surface to draw to."""
     with canvases(device, size) as (its_renderer, surface_of):
-        yield its_renderer, surface_of(size)
+        yield its_renderer, surface_of(size, 1.0)

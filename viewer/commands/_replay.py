@@ -35,6 +35,7 @@ from ._outputs import claim
 # What the recording tells, by the names of arguments.
 _TOLD = (
     "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
+    "budget", "error",
 )  # fmt: skip
 
 

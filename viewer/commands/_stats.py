@@ -7,6 +7,7 @@ from dataclasses import asdict
 from statistics import median
 from typing import Any
 
+from ..choice.choose import Automatic
 from ..frame import Request
 from ..gpu.surface import Surface
 from ..renderer import Renderer
@@ -56,15 +57,22 @@ def _points(surface: Surface) -> dict[str, Any]:
 
 
 def summary(
-    renderer: Renderer, surface: Surface, request: Request, frames: list[dict[str, Any]]
+    renderer: Renderer,
+    surface: Surface,
+    request: Request,
+    frames: list[dict[str, Any]],
+    automatic: Automatic | None,
 ) -> dict[str, Any]:
-    """The whole of --stats. request: one of those that were drawn."""
+    """The whole of --stats. request: one of those that were drawn. automatic: what its backend was chosen
+    for, if it was."""
     return {
         "device": renderer.gpu.device,
         "timer": renderer.gpu.timers.kind,
         "backend": str(request.backend),
         "params": asdict(request.params),
-        "size": list(surface.size),
+        "automatic": None if automatic is None else asdict(automatic),
+        "size": list(surface.shown),
+        "drawn_size": list(surface.size),
         "frames": frames,
         "bytes_gpu": renderer.nbytes + surface.nbytes,
         "peak_rss": peak_rss(),

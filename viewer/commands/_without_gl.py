@@ -36,7 +36,7 @@ BACKEND = "codeword"
 _SUFFIXES = (".png", ".npz", FILM_SUFFIX, SUFFIX)
 _SIZE = (1920, 1280)
 # Arguments of `scan4d render` that are for OpenGL's pictures alone, and those that a stream has settled.
-_NEED_GL = ("marks", "stats", "repeat", "replay", "anonymous", "quality")
+_NEED_GL = ("marks", "stats", "repeat", "replay", "anonymous", "quality", "budget", "error")
 _SETTLED = ("size", "set", "look", "camera", "orbit", "turntable", "pose", "time", "poses", "all")
 
 

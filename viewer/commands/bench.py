@@ -19,6 +19,7 @@ from pathlib import Path
 
 from ..backends import backend, backends
 from ..bench import numerics
+from ..bench.choosing import SCENES, laws_of, measure_ways
 from ..bench.forecast import forecast
 from ..bench.plan import Group, plan
 from ..bench.report.page import PAGE, write_report
@@ -27,6 +28,7 @@ from ..bench.report.results import (
     NOTES,
     NUMERICS,
     RESULTS,
+    WAYS,
     Row,
     compare,
     read_rows,
@@ -35,6 +37,7 @@ from ..bench.report.results import (
 from ..bench.run import Bench, BenchSettings
 from ..bench.scenes import catalog
 from ..bench.suites import PAGE_SUITES
+from ..choice.known import keep_model
 from ..errors import InputError, explained
 from ..files import whole_file
 from ..signals import held_interrupts
@@ -51,6 +54,8 @@ _QUICK = BenchSettings(size=(384, 256), views=4, repeat=1, frames=3)
 _QUICK_SCENES = ("torus", "bunny", "demo", "torus-simulated")
 _QUICK_COUNTS = (10_000, 1_000_000)
 _QUICK_NOISES = (2.0,)
+_CALIBRATION = BenchSettings(views=4, repeat=2, frames=0)
+_QUICK_CALIBRATION = ("torus", "box", "sheets-bare", "torus-simulated")
 _LEAST = 32  # pixels of a picture's edge, for metrics that look at windows
 
 
@@ -82,6 +87,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--suite", choices=_SUITES, help="only this part; default: scenes and numerics")
     parser.add_argument(
+        "--calibrate", action="store_true",
+        help="measure what the automatic choice goes by on this device, and keep it for this user",
+    )  # fmt: skip
+    parser.add_argument(
         "--quick", action="store_true", help="few scenes, few views, small pictures: two minutes"
     )
     parser.add_argument(
@@ -106,6 +115,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Measure, report, compare, or only report. 1 where Ctrl-C stopped it."""
     _check_libraries(args.suite)
+    if args.calibrate:
+        return _calibrate(args)
     if args.report:
         if args.compare or args.backend or args.scene:
             hint = "Leave out --compare, --backend and --scene"
@@ -156,6 +167,30 @@ def run(args: Namespace) -> int:
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
     return int(bench.stopped)
+
+
+def _calibrate(args: Namespace) -> int:
+    """Measure each way of drawing that may be chosen, unless `--report` says that the rows are there, and
+    keep the model of them. 1 where Ctrl-C stopped it: nothing is kept then."""
+    if args.suite or args.backend or args.compare:
+        hint = "Leave out --suite, --backend and --compare"
+        raise InputError("has its own pictures and renderers", "--calibrate", hint)
+    usual = replace(_CALIBRATION, views=2) if args.quick else _CALIBRATION
+    settings = _settings(args, usual)
+    renderer = drawing.renderer(args.device)
+    if not args.report:
+        claim([args.out / WAYS, args.out / NOTES], [*map(Path, args.scene or ())], args.force)
+        _make_folder(args.out)
+        bench = Bench(renderer, settings)
+        scenes = args.scene or (_QUICK_CALIBRATION if args.quick else SCENES)
+        with held_interrupts() as bench.interrupts:
+            _write(args.out / WAYS, bench, 0, bench.until_stopped(measure_ways(bench, scenes)))
+        _write_notes(args.out, bench.notes)
+        if bench.stopped:
+            warn(f"{args.out}: the rows are kept. With --report, --calibrate learns from them")
+            return 1
+    tell(keep_model(renderer.gpu, laws_of(read_rows(args.out / WAYS))))
+    return 0
 
 
 def _report(args: Namespace) -> None:
@@ -259,8 +294,8 @@ def _foretell(bench: Bench, groups: Sequence[Group], tested: Sequence[str], othe
         tell(f"{_lines(tested)} rows of the stability suite: some seconds a backend")
 
 
-def _settings(args: Namespace) -> BenchSettings:
-    """How to measure; `--quick`, and what was said."""
+def _settings(args: Namespace, calibration: BenchSettings | None = None) -> BenchSettings:
+    """How to measure; `--quick`, and what was said. calibration: what is usual for it."""
     beside = str(_BESIDE) if _BESIDE.is_dir() else None
     data = args.data or os.environ.get("SCAN4D_DATA") or beside
     if data is not None and not Path(data).is_dir():
@@ -272,7 +307,9 @@ def _settings(args: Namespace) -> BenchSettings:
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
     usual = PAGE_SUITES[args.suite].usual if args.suite in PAGE_SUITES else BenchSettings()
-    if args.quick:
+    if calibration is not None:
+        usual = calibration
+    elif args.quick:
         quick = PAGE_SUITES[args.suite].quick if args.suite in PAGE_SUITES else None
         usual = replace(
             _QUICK, frames=min(_QUICK.frames, usual.frames), views=quick[1] if quick else _QUICK.views

@@ -20,6 +20,8 @@ from typing import Any
 
 from ..backends import backend as find_backend
 from ..camera import Camera
+from ..choice.choose import Choice
+from ..choice.goal import Goal
 from ..document.anonymous import anonymous_request
 from ..document.recording import Entry, fingerprint, new_salt
 from ..errors import InputError
@@ -39,6 +41,7 @@ from . import _drawing as drawing
 from . import _replay as replay
 from . import _stats as stats
 from . import _without_gl as without_gl
+from ._choosing import AUTO, add_goal_arguments, choice_of, goal_of
 from ._console import progress, say, tell, warn
 from ._drawing import Plan, Shot
 from ._outputs import add_force_argument, claim
@@ -77,9 +80,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_pose_arguments(parser)
     picture = parser.add_argument_group("the picture")
     picture.add_argument("--size", type=arguments.size, metavar="WxH", help="default 1920x1280")
-    picture.add_argument(
-        "--backend", metavar="NAME", help="default: surfels where normals are stored, else points"
-    )
+    picture.add_argument("--backend", metavar="NAME", help="default: auto, what suits what the scan stores")
+    add_goal_arguments(picture)
     picture.add_argument(
         "--no-gl", action="store_true", help="without OpenGL, which needs not be there: --backend codeword"
     )
@@ -144,9 +146,10 @@ def run(args: Namespace) -> int:
 @contextmanager
 def _planned(args: Namespace) -> Iterator[Plan]:
     """The pictures that the arguments describe."""
-    look, values = parse(Look, dict(args.look), "look"), dict(args.set)
-    if args.backend:
-        find_backend(args.backend).params(values)  # wrong names are told before anything is read
+    look, values, goal = parse(Look, dict(args.look), "look"), dict(args.set), goal_of(args)
+    name = None if args.backend == AUTO else args.backend
+    if name:
+        find_backend(name).params(values)  # wrong names are told before anything is read
     camera = Camera.load(args.camera) if args.camera else None
     scan, size = args.scan or DEMO, args.size or _SIZE
     with open_timeline(args, scan) as timeline:
@@ -157,9 +160,9 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         upright = told_upright(args, timeline, indices)
         if "up" not in dict(args.look):
             look = replace(look, up=upright.up)
-        look = replace(look, quality=args.quality or look.quality)
+        look = replace(look, quality="fast" if goal else args.quality or look.quality)
         claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
-        drawing.check_color_source(look, timeline, indices, args.backend)
+        drawing.check_color_source(look, timeline, indices, name)
         look = drawing.ranged(look, timeline, indices)
         fps = drawing.film_rate(timeline, indices, args.fps)
         salt = new_salt() if args.anonymous else None
@@ -167,10 +170,11 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         marks = marks_of(args.marks)
 
         def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
-            for shot, request in _requests(args, timeline, shots, size, look, values, camera, upright):
+            drawn = _requests(args, timeline, shots, size, look, values, camera, upright, name, goal)
+            for shot, request, choice in drawn:
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
-                entry = Entry.of(request, scan, hash, size, timeline.unit, marks)
+                entry = Entry.of(request, scan, hash, size, timeline.unit, marks, choice=choice)
                 entry = entry.without_names() if args.anonymous else entry
                 yield shot.number, request, entry, entry.legend(timeline, request.pose)
 
@@ -188,7 +192,7 @@ def _draw(plan: Plan, args: Namespace) -> None:
         if args.progress:
             say(device=renderer.gpu.device)
         for number, request, entry, legend in plan.pictures:
-            surface = surface_of(entry.size)
+            surface = surface_of(entry.size, entry.scale)
             if request is not drawn and args.stats:
                 frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
             elif request is not drawn:
@@ -200,7 +204,7 @@ def _draw(plan: Plan, args: Namespace) -> None:
             drawn = request
             put(surface, number, entry.description(), legend)
         if args.stats:
-            _write_json(stats.summary(renderer, surface, request, frames), args.stats)
+            _write_json(stats.summary(renderer, surface, request, frames, entry.automatic), args.stats)
 
 
 def _write_json(data: dict[str, Any], path: Path) -> None:
@@ -217,23 +221,30 @@ def _requests(
     values: dict[str, object],
     camera: Camera | None,
     upright: Upright,
-) -> Iterator[tuple[Shot, Request]]:
-    """Requests for each shot. The first pose settles the backend, several the camera if there is none.
+    backend: str | None,
+    goal: Goal | None,
+) -> Iterator[tuple[Shot, Request, Choice | None]]:
+    """Requests for each shot, and how backend and parameters were chosen, where they were for a goal. The
+    first pose settles the backend, several the camera if there is none.
 
     A pose without the number that the look colours by is reported, and has colours of its own choice.
     """
-    chosen = None
+    chosen, choice = None, None
     camera_of = None if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
-        chosen = chosen or backend_for(pose, args.backend, values)
         camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
+        if chosen is None and goal is not None:
+            first = next(shot for shot in shots if shot.pose == pose.index)
+            choice = choice_of(pose, camera_of(first), size, goal, timeline.unit, args.device)
+            chosen = choice.way.backend, choice.way.params
+        chosen = chosen or backend_for(pose, backend, values)
         own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
         if own is not look:
             title = frame_title(timeline, pose.index)
             warn(f"{timeline.name}: {title} has no '{look.color_by}', and is drawn in other colours")
         for shot in shots:
             if shot.pose == pose.index:
-                yield shot, Request(pose, camera_of(shot), *chosen, own)
+                yield shot, Request(pose, camera_of(shot), *chosen, own), choice
 
 
 def _assignment(text: str) -> tuple[str, str]:

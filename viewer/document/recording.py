@@ -36,6 +36,7 @@ from ..analysis.measure import Measurement, distance_in_words, reading_of
 from ..analysis.spot import slack_before, spot_slack
 from ..backends import backend as find_backend
 from ..camera import Camera
+from ..choice.choose import Automatic, Choice
 from ..errors import InputError, shortened
 from ..files import open_plain, whole_file
 from ..frame import Request
@@ -82,6 +83,7 @@ def _is_place(rows: tuple[_Row, ...]) -> bool:
     return is_rigid(np.array(rows), _EXACT)
 
 
+DrawnScale = Annotated[float, Kind("a scale of at most 1", lambda scale: 0 < scale <= 1)]
 Matrix = Annotated[tuple[_Row, _Row, _Row, _Row], Kind("a rotation and a translation, 4 x 4", _is_place)]
 
 
@@ -95,8 +97,9 @@ class Entry:
     own. measurements: to draw over it, as they were made. shown_unit: that marks tell lengths in, None for
     `unit`. place: the matrix that the scan is moved by, None where it is not. anonymous: whether camera,
     time, look, measurements and place are those of the scan as `anonymous_request` has it. notes: of the
-    scan, where the marks show them. at: seconds since the recording began; entries that differ in it alone
-    are equal.
+    scan, where the marks show them. scale: of width and height, at which it was drawn. automatic: what the
+    renderer was chosen for and expected to take, None where a user or the scan says which it is. at: seconds
+    since the recording began; entries that differ in it alone are equal.
     """
 
     scan: ScanName | None
@@ -119,6 +122,8 @@ class Entry:
     trajectories: tuple[DrawnPath, ...] = ()
     held: Matrix | None = None
     measure_lines: tuple[DrawnPath, ...] = ()
+    scale: DrawnScale = 1.0
+    automatic: Automatic | None = None
     at: Stamp = field(default=0.0, compare=False)
 
     @classmethod
@@ -134,10 +139,12 @@ class Entry:
         shown_unit: str | None = None,
         notes: tuple[Note, ...] = (),
         drawn: DrawnMarks = NOTHING_DRAWN,
+        choice: Choice | None = None,
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
-        measurements, notes, drawn: kept where the marks show them.
+        measurements, notes, drawn: kept where the marks show them. choice: that backend and parameters come
+        from.
 
         Raises InputError where its colours come from a layer: these numbers are in no file.
         """
@@ -152,6 +159,8 @@ class Entry:
             request.camera, str(request.backend), request.params, request.look, marks, unit,
             measurements if marks.measurements else (), shown_unit, matrix_of(layers.place),
             notes=notes if marks.notes else (),
+            scale=1.0 if choice is None else choice.way.scale,
+            automatic=None if choice is None else choice.told,
         )  # fmt: skip
         return entry.with_drawn(drawn)
 
@@ -250,7 +259,7 @@ class Entry:
             None if name is None else anonymous_unit(name) for name in (self.unit, self.shown_unit)
         )
         return replace(
-            self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(),
+            self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(), automatic=None,
             landmarks=tuple(replace(one, name="") for one in self.landmarks),
             measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
         )  # fmt: skip

@@ -23,7 +23,7 @@ from .pose import GpuPose
 _CHUNKS = 1 << 12  # about as many as a pose has: fewer hide less, more take longer to test
 _CHUNK = 1 << 8  # points at least
 LEAST = 1 << 18  # points of a pose, below which looking at all of them takes next to no time
-_MOST = 0.5  # share of the points from which on all are looked at, as that needs no list
+MOST = 0.5  # share of the points from which on all are looked at, as that needs no list
 # Mean size of the boxes, in that of the pose: from where on another order is worth a second of a thread,
 # and from where on an order is of no use.
 _LOOSE, _SCATTERED = 0.15, 0.5
@@ -131,7 +131,7 @@ class Chunks:
         found_for = (order, view.key, margin, reach)
         if self._found[0] != found_for:
             shown = self.shown_in(order, view, margin, reach)
-            few = len(shown) <= _MOST * len(order.low)
+            few = len(shown) <= MOST * len(order.low)
             self._found = found_for, order.rows_of(shown, len(cloud)) if few else None
         return self._found[1]
 

@@ -30,11 +30,13 @@ class Texel(NamedTuple):
 
 
 class Surface(RenderTarget):
-    """A picture's pixels as readers have them; properties copy them to the CPU. shaded_by: what shaded
-    it last, None before."""
+    """A picture's pixels as readers have them; properties copy them to the CPU. shown: the size, pixels, of
+    the whole picture where it is drawn at less and each pixel shown on several: `image` and `arrays` have it,
+    all else is of the pixels that were drawn. shaded_by: what shaded it last, None before."""
 
-    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+    def __init__(self, gpu: Gpu, size: tuple[int, int], shown: tuple[int, int] | None = None) -> None:
         super().__init__(gpu, size)
+        self.shown = shown or size
         self.shaded_by: Callable[[Surface, Look], None] | None = None
 
     @property
@@ -163,12 +165,25 @@ class Surface(RenderTarget):
                 raise RuntimeError("this surface was not shaded yet")
             self.gpu.activate()
             self.shaded_by(self, look)
-        return self._read(self.picture, np.uint8).reshape(*self.size[::-1], 4)
+        words = self.enlarged(self._read(self.picture, np.uint32))
+        return words.view(np.uint8).reshape(*self.shown[::-1], 4)
 
     def arrays(self) -> dict[str, NDArray]:
         """All channels by name, as `.npz` files hold them; "octant" where octants are drawn."""
         names = ("color", "normal", "depth", "coverage", "value", "id", "level", "octant")
-        return {name: channel for name in names if (channel := getattr(self, name)) is not None}
+        channels = {name: channel for name in names if (channel := getattr(self, name)) is not None}
+        return {name: self.enlarged(channel) for name, channel in channels.items()}
+
+    def enlarged(self, channel: NDArray) -> NDArray:
+        """Values of the pixels that were drawn, (H, W, ...), for each of the whole picture: those of the
+        pixel in which its middle lies."""
+        if self.shown == self.size:
+            return channel
+        columns, rows = (
+            (np.arange(many) * 2 + 1) * few // (2 * many)
+            for few, many in zip(self.size, self.shown, strict=True)
+        )
+        return channel.take(columns, axis=1).take(rows, axis=0)
 
     def point_counts(self) -> dict[str, int]:
         """Counts of what became of the points of the file; see `count_points`."""

@@ -11,7 +11,7 @@ from ..bounds import Bounds
 from .points import PointCloud, strided
 from .range_points import RangePoints
 from .range_view import RangeView
-from .spacing import ENOUGH, typical_spacing
+from .spacing import ENOUGH, roughness, typical_spacing
 from .upright import Upright, guess_up
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
@@ -102,6 +102,11 @@ class Pose:
     def spacing(self) -> float:
         """The typical distance between neighbouring points, scan units, see `typical_spacing`."""
         return typical_spacing(self.points) if isinstance(self.points, PointCloud) else self.points.spacing
+
+    @property
+    def roughness(self) -> float:
+        """How far points lie off the planes through their neighbours, scan units, see `spacing.roughness`."""
+        return roughness(self.points) if isinstance(self.points, PointCloud) else self.points.roughness
 
     def around(self, place: NDArray[np.float64], least: int = ENOUGH) -> PointCloud:
         """A cloud that has at least so many of the points nearest to a place, (3,) scan units: all, or those

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .colors import srgb8
 from .points import PointCloud, stride
 from .range_view import RangeView, merge, merge_some
-from .spacing import ENOUGH, spacing_at
+from .spacing import ENOUGH, PLANE, plane_residual, spacing_at
 
 _WINDOW = 8  # pixels round a place that are looked at first
 _ROUGH = 8  # pixels that a calibration beside measured x and y may be off
@@ -163,6 +163,18 @@ class RangePoints:
             ) is not None:
                 found.append(apart)
         return float(np.median(found)) if found else 1.0
+
+    @cached_property
+    def roughness(self) -> float:
+        """How far points lie off the planes through their neighbours, scan units, as `spacing.roughness` has
+        it; found without merging."""
+        overview, found = self.overview, []
+        for row in np.linspace(0, len(overview) - 1, _PLACES).astype(int):
+            place = overview.positions[row] + overview.origin
+            near = self.around(place, PLANE)
+            away = np.linalg.norm(near.positions + (near.origin - place), axis=1)
+            found.append(plane_residual(near.positions[np.argsort(away)[:PLANE]]))
+        return float(np.median(found))
 
     # --- others made of them ----------------------------------------------------------
 

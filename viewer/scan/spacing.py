@@ -12,6 +12,8 @@ from ..task import checkpoint
 from .points import PointCloud
 
 ENOUGH = 24  # nearest points, of which some may be copies of others, that tell a spacing
+PLANE = 12  # nearest points, itself among them, whose plane tells how rough a surface is
+_FLAT = 4  # points, of which fewer lie in a plane
 _DISTANCES = 2_000_000  # point-to-point distances looked at
 _NEAREST = (128, 8192)  # of these: six neighbours, each with twenty copies or with a thousand
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
@@ -45,6 +47,19 @@ def spacings(cloud: PointCloud) -> NDArray[np.float64]:
     return cloud.remember(_spacings)
 
 
+def roughness(cloud: PointCloud) -> float:
+    """How far points lie off the planes through their neighbours, root mean square, scan units: by noise, or
+    as the surface bends between them. The median over the places of `spacings`; 0 of fewer than four points.
+    Found once for each cloud."""
+    return cloud.remember(_roughness)
+
+
+def plane_residual(points: NDArray[np.floating]) -> float:
+    """The root mean square distance of points (K, 3) from the plane that fits them best."""
+    offsets = points - points.mean(axis=0, dtype=np.float64)
+    return float(np.linalg.svd(offsets, compute_uv=False)[-1] / math.sqrt(max(len(points), 1)))
+
+
 def spacing_at(cloud: PointCloud, row: int) -> float | None:
     """The distance between neighbours around one point, scan units; None where all points are
     copies of it.
@@ -74,9 +89,20 @@ def _spacings(cloud: PointCloud) -> NDArray[np.float64]:
     count = len(cloud)
     if count < 2:
         return np.ones(1)
-    rows = np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int)
-    found = [spacing for spacing in _spacings_at(cloud.positions, rows.tolist()) if spacing is not None]
+    found = [spacing for spacing in _spacings_at(cloud.positions, _places(count)) if spacing is not None]
     return np.array(found or [1.0])
+
+
+def _places(count: int) -> list[int]:
+    """Rows of some points, of so many, at which neighbours are looked at."""
+    return np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int).tolist()
+
+
+def _roughness(cloud: PointCloud) -> float:
+    if len(cloud) < _FLAT:
+        return 0.0
+    nearest = _nearest(cloud.positions, _places(len(cloud)), PLANE)
+    return float(np.median([plane_residual(cloud.positions[rows]) for rows in nearest]))
 
 
 def _spacings_at(points: NDArray[np.float32], rows: Sequence[int]) -> list[float | None]:

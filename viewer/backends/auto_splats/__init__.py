@@ -131,6 +131,11 @@ def suits(pose: Pose) -> Suited | None:
     return Suited(1) if is_bare else None
 
 
+def offers(pose: Pose) -> tuple[dict[str, object], ...]:
+    """Two passes, and one, of bare points; with normals, surfels draw about the same in less time."""
+    return () if pose.views or suits(pose) is None else ({}, {"passes": "one"})
+
+
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
     params: Params = frame.params

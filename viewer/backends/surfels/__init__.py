@@ -143,6 +143,11 @@ def suits(pose: Pose) -> Suited | None:
     return None if pose.overview.normals is None else Suited(1)
 
 
+def offers(pose: Pose) -> tuple[dict[str, object], ...]:
+    """Two passes, and one, where normals are stored."""
+    return () if pose.views or pose.overview.normals is None else ({}, {"passes": "one"})
+
+
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Splat in as many passes as are asked for; complete where all points shall be drawn in their size."""
     params: Params = frame.params

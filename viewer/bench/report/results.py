@@ -21,6 +21,7 @@ OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
 LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
 SEARCHES, FITS = "searches.jsonl", "fits.jsonl"
 DISTANCES = "distances.jsonl"
+WAYS, CHOICES = "ways.jsonl", "choices.jsonl"
 SEAMS, ALONE, PICTURE_SIZES, BAND_TIMES = (
     "seams.jsonl", "alone.jsonl", "picture-sizes.jsonl", "band-times.jsonl",
 )  # fmt: skip
@@ -42,6 +43,8 @@ _NEEDED: dict[str, dict[str, Any]] = {
     PLAYING: {"scene": str, "poses": int, "primitive": str, "reading": dict, "playing": dict},
     SEARCHES: {"scene": str, "n": int, "visible": int, "params": dict, "first": dict, "later": dict},
     DISTANCES: {"scene": str, "backend": str, "zoom": int | float, "pairs": int, "covered": int | float},
+    WAYS: {"scene": str, "key": str, "scale": int | float, "ms": int | float, "seen": dict},
+    CHOICES: {"scene": str, "view": int, "key": str, "ms": int | float, "error": int | float, "chosen": list},
     VISIBILITY: {"scene": str, "n": int, "noise": int | float, "method": str, "radius": str, "by_view": list},
     GROWTH: {"scene": str, "n": int, "method": str, "visible": int, "error": int | float},
     SPEEDS: {"scene": str, "n": int, "sectors": int, "busy_ms": dict, "wall_ms": dict},

@@ -1,0 +1,153 @@
+"""The benchmark of automatic choices: the error of a picture, and how choices are judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import Run
+
+from viewer.backends import backend
+from viewer.bench import choosing
+from viewer.bench.choosing import GOALS, Truth, laws_of, measure_ways, with_choices
+from viewer.bench.report.choices import judged, read_measurement, tables, write_choices
+from viewer.bench.report.results import CHOICES, WAYS, read_rows, write_row
+from viewer.bench.run import Bench, BenchSettings
+from viewer.bench.scenes import catalog
+from viewer.camera import Camera
+from viewer.choice import known
+from viewer.choice.model import CAP
+from viewer.choice.ways import SCALES
+from viewer.frame import Request, scaled_size
+from viewer.gpu.surface import Surface
+from viewer.renderer import Renderer
+from viewer.timing import draw
+
+SIZE = (240, 160)
+CAMERA = Camera(eye=(0.5, 0.4, 4.0), fov_y=35)
+
+
+def surface_of(renderer: Renderer, scene: str, name: str, scale: float = 1.0, **values: Any) -> Surface:
+    pose = catalog.subject(scene, None).moment(0).pose
+    request = Request(pose, CAMERA, name, backend(name).params(values))
+    surface = Surface(renderer.gpu, scaled_size(SIZE, scale), SIZE)
+    draw(renderer, request, surface)
+    return surface
+
+
+def truth_of(scene: str) -> Truth:
+    return Truth.of(catalog.subject(scene, None).moment(0).truth, CAMERA, SIZE)
+
+
+def test_the_error_is_what_is_off_and_at_most_what_is_missing(renderer: Renderer) -> None:
+    truth, surface = truth_of("sphere"), surface_of(renderer, "sphere", "surfels")
+    assert 0 < truth.error(surface) < 0.3
+    empty = Truth(truth.pixels, np.full(len(truth.pixels), np.inf), truth.footprint)
+    assert empty.error(surface) == CAP  # all that is drawn is wrong
+    there = np.isfinite(truth.depth)
+    moved = replace(truth, depth=truth.depth + np.where(there, truth.footprint, 0.0))
+    assert moved.error(surface) == pytest.approx(1.0, abs=0.25)
+    nowhere = surface_of(renderer, "sphere", "points", point_size=1)
+    nowhere.clear()
+    assert truth.error(nowhere) == CAP
+
+
+def test_larger_pixels_are_off_by_how_far_their_middles_are(renderer: Renderer) -> None:
+    truth = truth_of("plane")  # that faces the eye nearly: depths hardly differ
+    errors = [truth.error(surface_of(renderer, "plane", "surfels", scale)) for scale in SCALES]
+    assert errors == sorted(errors)
+    half = dict(zip(SCALES, errors, strict=True))[0.5]
+    assert half == pytest.approx(
+        np.sqrt(0.5), abs=0.2
+    )  # each pixel's middle is half a pixel off on each axis
+
+
+def test_ways_are_measured_and_chosen(renderer: Renderer) -> None:
+    bench = Bench(renderer, BenchSettings(size=SIZE, views=3, repeat=1, frames=0))
+    rows = list(measure_ways(bench, ["sphere", "no-such-scene"]))
+    assert any("no-such-scene" in note for note in bench.notes)
+    assert len({(row["view"], row["key"], row["scale"]) for row in rows}) == len(rows) == 3 * 4 * len(SCALES)
+    assert all(row["ms"] > 0 and 0 <= row["error"] <= CAP for row in rows)
+    model = laws_of(rows)
+    assert model.keys() == {row["key"] for row in rows}
+    view = [row for row in rows if row["view"] == 0]
+    told = with_choices(view, model)
+    assert [{**row, "chosen": []} for row in told] == [{**row, "chosen": []} for row in view]
+    chosen = [name for row in told for name in row["chosen"]]
+    assert sorted(chosen) == sorted(map(str, GOALS))
+
+
+def row(view: int, key: str, ms: float, error: float, *chosen: str) -> dict[str, Any]:
+    return {
+        "scene": "ball", "seed": 0, "view": view, "key": key, "scale": 1.0, "ms": ms, "error": error,
+        "chosen": list(chosen),
+    }  # fmt: skip
+
+
+ROWS = [
+    *(row(0, "slow", 60.0, 0.5), row(0, "good", 40.0, 1.0, "50 ms"), row(0, "fast", 10.0, 3.0)),
+    *(row(1, "slow", 45.0, 0.5), row(1, "good", 40.0, 1.0, "50 ms"), row(1, "fast", 10.0, 3.0)),
+    *(row(2, "slow", 70.0, 0.5), row(2, "good", 55.0, 1.0, "50 ms"), row(2, "fast", 10.0, 3.0)),
+    *(row(3, "slow", 90.0, 0.5), row(3, "good", 80.0, 1.0), row(3, "fast", 51.0, 3.0, "50 ms")),
+]  # the best of those in time; another one was better; late; nothing is in time
+
+
+def test_choices_are_judged_by_what_could_have_been_chosen() -> None:
+    found = judged(ROWS, "time", 50.0, "50 ms")
+    assert found == {
+        "goal": "50 ms", "kind": "time", "views": 4, "possible": 3, "kept": 2, "near": 1, "ratio": 1.5,
+        "mean_ratio": round(2**0.5, 4),
+    }  # fmt: skip
+    assert judged(ROWS, "time", 20.0, "20 ms") is None
+
+
+def test_an_error_is_judged_by_time() -> None:
+    rows = [row(0, "slow", 60.0, 0.2, "1 px"), row(0, "fast", 30.0, 0.9)]
+    found = judged(rows, "error", 1.0, "1 px")
+    assert found is not None
+    assert (found["kept"], found["ratio"]) == (1, 2.0)
+
+
+def test_the_page_of_choices(tmp_path: Path) -> None:
+    where = {
+        "device": "a", "driver": "b", "processors": 2, "timer": "finish", "version": "0", "date": "now",
+        "size": [9, 9], "repeat": 1,
+    }  # fmt: skip
+    with open(tmp_path / CHOICES, "w", encoding="utf-8") as stream:
+        for each in ROWS:
+            write_row(stream, {**each, **where})
+    page = write_choices(tmp_path).read_text()
+    assert "| 50 ms | 4 | 3 | 66.7 | 50.0 | 1.50 |" in page
+    assert tables([read_measurement(tmp_path / "choice.json")])["choices"] in page
+
+
+@pytest.mark.slow
+def test_a_device_is_calibrated_and_chosen_for(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: Renderer
+) -> None:
+    monkeypatch.setattr(known, "user_folder", lambda: tmp_path / "settings")
+    scene = ("--scene", "torus", "--views", "2", "--size", "120x80")
+    small = (*scene, "-o", tmp_path / "out")
+    done = run("bench", "--calibrate", *small)
+    assert done.code == 0, done.err
+    file = tmp_path / "settings" / known.FILE
+    assert str(file) in done.out
+    assert known.model_of(renderer.gpu) == laws_of(read_rows(tmp_path / "out" / WAYS))
+    assert run("bench", "--calibrate", *small).code == 2  # the rows are there
+    assert run("bench", "--calibrate", "--report", *small).code == 0
+    done = run("bench", "--suite", "choice", *scene, "-o", tmp_path / "judged")
+    assert done.code == 0, done.err
+    assert "| 50 ms | 2 | 2 |" in (tmp_path / "judged" / "choice.md").read_text()
+
+
+@pytest.mark.parametrize("other", [["--suite", "choice"], ["--backend", "points"], ["--compare", "."]])
+def test_calibrating_is_all_that_is_done(run: Run, tmp_path: Path, other: list[str]) -> None:
+    done = run("bench", "--calibrate", "-o", tmp_path / "out", *other)
+    assert (done.code, "--calibrate" in done.err) == (2, True)
+
+
+def test_scenes_are_known() -> None:
+    assert set(choosing.SCENES) <= set(catalog.scene_names(None))

@@ -1,0 +1,110 @@
+"""The choice of a way: bounds are kept where they can be, and a looser one is never answered by worse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import sphere
+from test_model import seen, true_law
+
+from viewer.backends import backends
+from viewer.camera import Camera
+from viewer.choice.choose import best, choose_way
+from viewer.choice.goal import PIXELS, Goal
+from viewer.choice.model import Law, Model
+from viewer.choice.seen import ScanInView
+from viewer.choice.ways import SCALES, DrawingWay, ways
+from viewer.frame import Request, view_of
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.view import View
+
+BUDGETS = np.geomspace(0.5, 500, 40)
+ERRORS = np.geomspace(0.01, 20, 40)
+
+
+def known(rng: np.random.Generator) -> tuple[list[DrawingWay], Model]:
+    """Four ways by chance, at all scales, and their laws."""
+    law = true_law()
+    model = {
+        f"way{number}": Law(
+            tuple(np.array(law.time) * rng.uniform(0.2, 3)), tuple(np.array(law.error) * rng.uniform(0.1, 3)),
+            rng.uniform(1, 1.5), rng.uniform(1, 2),
+        )
+        for number in range(4)
+    }  # fmt: skip
+    return [DrawingWay(name, {}, scale) for name in model for scale in SCALES], model
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_larger_budget_never_has_a_larger_expected_error(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    (all_ways, model), view = known(rng), seen(rng)
+    choices = [best(all_ways, view, Goal("time", ms), model) for ms in BUDGETS]
+    keeping = [choice for choice in choices if choice.keeps]
+    assert [choice.keeps for choice in choices] == sorted(choice.keeps for choice in choices)
+    errors = [choice.expected.error for choice in keeping]
+    assert errors == sorted(errors, reverse=True)
+    for choice in keeping:
+        assert model[choice.way.key].most_ms(choice.expected) <= choice.goal.bound
+
+
+@pytest.mark.parametrize("unit", [PIXELS, "mm"])
+@pytest.mark.parametrize("seed", range(10))
+def test_a_larger_error_never_takes_longer(unit: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    (all_ways, model), view = known(rng), seen(rng)
+    choices = [best(all_ways, view, Goal("error", error, unit), model) for error in ERRORS]
+    times = [choice.expected.ms for choice in choices if choice.keeps]
+    assert len(times) > 5
+    assert times == sorted(times, reverse=True)
+
+
+def test_the_best_is_the_best_of_all() -> None:
+    rng = np.random.default_rng(3)
+    (all_ways, model), view = known(rng), seen(rng)
+    for ms in BUDGETS:
+        goal = Goal("time", ms)
+        tried = [(model[way.key].late, model[way.key].expect(view, way.scale)) for way in all_ways]
+        kept = [one.error for late, one in tried if one.ms * late <= ms]
+        choice = best(all_ways, view, goal, model)
+        assert choice.keeps == bool(kept)
+        if kept:
+            assert choice.expected.error == min(kept)
+        else:
+            nearest = min(one.ms * late for late, one in tried)
+            assert choice.expected.ms * model[choice.way.key].late == nearest
+
+
+def pose_of(cloud: PointCloud) -> tuple[Pose, View]:
+    pose = Pose(0, 0.0, "ball", cloud)
+    camera = Camera.orbit(pose.bounds, 20, 10)
+    return pose, view_of(Request(pose, camera), (200, 200))
+
+
+def test_a_scan_is_chosen_a_way_that_draws_it_from_what_is_stored() -> None:
+    law = true_law()
+    for cloud in (sphere(5000), PointCloud.from_arrays(sphere(5000).positions)):
+        pose, view = pose_of(cloud)
+        for way in ways(pose):
+            needs = backends()[way.backend].needs(pose, way.params)
+            assert all(getattr(pose.overview, name) is not None for name in needs)
+            assert backends()[way.backend].derive is None
+        model = {way.key: law for way in ways(pose)}
+        choice = choose_way(pose, view, Goal("time", 1e6), model)
+        assert choice is not None
+        assert choice.keeps
+        assert choice.way.scale == 1.0
+        assert str(choice).startswith("expected ")
+        assert choice.told.bound == 1e6
+    assert choose_way(pose, view, Goal("time", 1e6), {}) is None
+
+
+def test_a_way_of_another_scale_sees_smaller_pixels() -> None:
+    pose, view = pose_of(sphere(5000))
+    found = ScanInView.of(pose, view)
+    half = found.at(0.5)
+    assert half.pixels == found.pixels / 4
+    assert half.spacing == found.spacing / 2
+    assert half.footprint == 2 * found.footprint
+    assert half.in_view == found.in_view
