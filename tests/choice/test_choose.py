@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from range_scenes import sphere_view
 from scenes import sphere
 from test_model import seen, true_law
 
@@ -108,3 +109,15 @@ def test_a_way_of_another_scale_sees_smaller_pixels() -> None:
     assert half.spacing == found.spacing / 2
     assert half.footprint == 2 * found.footprint
     assert half.in_view == found.in_view
+
+
+def test_range_views_are_drawn_without_merging_their_points() -> None:
+    pose = Pose.of(0, 0.0, "pod", (sphere_view((0, 0, 4)),))
+    camera = Camera.orbit(pose.bounds, 20, 10)
+    found = ScanInView.of(pose, view_of(Request(pose, camera), (200, 200)))
+    assert 0 < found.in_view <= found.points == pose.count
+    assert 0 < found.rough < found.spacing
+    assert found.covered > 0
+    assert {way.backend for way in ways(pose)} == {"pyramidal"}
+    assert all(backends()[way.backend].draws_samples(pose, way.params) for way in ways(pose))
+    assert not pose.is_merged

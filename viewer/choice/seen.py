@@ -44,7 +44,7 @@ class ScanInView:
 
     @classmethod
     def of(cls, pose: Pose, view: View) -> ScanInView:
-        """A pose in a view, in about a millisecond; what it tells of the scan itself is found once, in some
+        """A pose in a view, in some milliseconds; what it tells of the scan itself is found once, in some
         more."""
         positions, steps = pose.overview.remember(_sample)
         is_cloud = isinstance(pose.points, PointCloud)
