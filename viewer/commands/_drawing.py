@@ -147,10 +147,14 @@ def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> 
     return typical_rate(timeline.times[list(indices)])
 
 
-@cache
 def renderer(device: int | None) -> Renderer:
     """The headless renderer on this device; None: the one that `viewer.render` uses."""
-    return frame.shared_renderer() if device is None else Renderer(headless(device))
+    return frame.shared_renderer() if device is None else _renderer_on(device)
+
+
+@cache
+def _renderer_on(device: int) -> Renderer:
+    return Renderer(headless(device))
 
 
 @contextmanager
