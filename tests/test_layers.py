@@ -33,7 +33,7 @@ LAYERS = (
 )  # fmt: skip
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}
 
-WINDOW = {"imgui_bundle", "glfw"}
+WINDOW = {"imgui_bundle", "moderngl_window", "pyglet", "glfw"}
 GL = {"moderngl", "glcontext", "OpenGL"} | WINDOW
 COMPILED = ("_kernels", "compiled")  # how the names of modules end that are compiled by numba, or by which
 SLOW = WINDOW | {

@@ -1,7 +1,7 @@
 """The window: an OpenGL context, ImGui in it, and waiting for events.
 
-glfw makes the window; ImGui's own C++ backends, which imgui-bundle carries, take in its events and draw the
-widgets. The loop is the app's.
+moderngl-window makes the window; ImGui's own C++ backends, which imgui-bundle carries, take
+in its events and draw the widgets. The loop is the app's, since theirs draw all the time.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from functools import partial
 from typing import Any
 
 import glfw
-import moderngl
 from imgui_bundle import imgui, implot
+from moderngl_window.context.glfw.window import Window as GlfwWindow
 
 from ..errors import NoOpenGLError
 from ..gpu import gl
-from ..gpu.context import REQUIRED_VERSION, obstacle
+from ..gpu.context import obstacle
 from ..gpu.shader_cache import shader_cache
 from . import theme
 from .place import Place, reachable
 
+_GL = (4, 3)
 _SIZE = (1600, 1000)
 _LEAST = (640, 420)  # times the display's scale; in less, menus and timeline are cut
 _SCREEN_SHARE = 0.9  # that a window takes at most
@@ -39,11 +40,8 @@ _UNUSED_KEY = imgui.Key.f24
 _ENDS_ALT = (imgui.backends.glfw_mouse_button_callback, imgui.backends.glfw_window_focus_callback)
 
 
-class Window:
-    """Opens at once. Raises NoOpenGLError where there is no display or no OpenGL for it.
-
-    ctx: its context. width, height: in ImGui's coordinates. buffer_size: of its framebuffer, pixels.
-    """
+class Window(GlfwWindow):
+    """Opens at once. Raises NoOpenGLError where there is no display or no OpenGL for it."""
 
     def __init__(self, title: str, place: Place | None = None) -> None:
         """place: where it was before; the usual one where that is None, or on no screen any more."""
@@ -60,9 +58,8 @@ class Window:
             if not glfw.init():
                 raise ValueError("no display")
             shader_cache()
-            self._window = _hidden_window(title, _initial_size())
-            self.ctx = moderngl.create_context(require=REQUIRED_VERSION)
-        except Exception as error:  # moderngl raises bare Exceptions
+            super().__init__(title=title, gl_version=_GL, size=_initial_size(), vsync=True, visible=False)
+        except Exception as error:  # moderngl and moderngl-window raise bare Exceptions
             glfw.terminate()
             problems += filter(None, (str(error), obstacle()))
             raise NoOpenGLError(
@@ -71,12 +68,12 @@ class Window:
                 "'scan4d doctor' tells more",
             ) from error
         self.dropped: list[str] = []
-        self._title, self._is_fullscreen = title, False
         self._restore(place)
-        self.buffer_size: tuple[int, int] = glfw.get_framebuffer_size(self._window)
-        self.width, self.height = glfw.get_window_size(self._window)
+        # On a scaled display it is larger than asked for, which moderngl-window does not notice.
+        self._width, self._height = glfw.get_window_size(self._window)
         width, height = (round(side * self._display_scale) for side in _LEAST)
         glfw.set_window_size_limits(self._window, width, height, glfw.DONT_CARE, glfw.DONT_CARE)
+        self.exit_key = self.fullscreen_key = None
         glfw.set_window_attrib(self._window, glfw.AUTO_ICONIFY, False)  # a full screen beside others stays
         self.text_scale = 1.0
         self._scale = 0.0  # of text and widgets in ImGui's coordinates, as it is set
@@ -101,8 +98,8 @@ class Window:
             attach(self._window, partial(self._take_event, forward))
         glfw.set_key_callback(self._window, self._take_key)
         glfw.set_window_refresh_callback(self._window, self._note_event)
-        glfw.set_window_size_callback(self._window, self._note_size)
         glfw.set_drop_callback(self._window, self._note_drop)  # type: ignore[arg-type]  # its stub is wrong
+        self.resize_func = self._note_event
 
     def _take_event(self, forward: Callable[..., None], window: Any, *event: Any) -> None:
         self._note_event()
@@ -113,11 +110,6 @@ class Window:
     def _note_event(self, *_: Any) -> None:
         self.touch()
         self._tooltips_at = time.monotonic() + _TOOLTIP_DELAY
-
-    def _note_size(self, _: Any, width: int, height: int) -> None:
-        self.width, self.height = width, height
-        self.buffer_size = glfw.get_framebuffer_size(self._window)
-        self._note_event()
 
     def _take_key(self, window: Any, key: int, *event: int) -> None:
         """Pass a key on to ImGui.
@@ -161,7 +153,7 @@ class Window:
             if found.maximised:
                 glfw.maximize_window(self._window)
         self._last_place = found or None
-        glfw.show_window(self._window)
+        self.visible = True
 
     @property
     def place(self) -> Place | None:
@@ -268,7 +260,7 @@ class Window:
     @property
     def pixel_ratio(self) -> float:
         """Pixels of the framebuffer for one of ImGui's; a minimised window has no size."""
-        return self.buffer_size[0] / self.width if self.width else 1.0
+        return self.buffer_width / self.width if self.width else 1.0
 
     @property
     def refresh_ms(self) -> float:
@@ -280,39 +272,10 @@ class Window:
     def to_pixels(self, left: float, top: float, width: float, height: float) -> tuple[int, int, int, int]:
         """Convert ImGui's coordinates to the framebuffer's: (left, bottom, width, height) in pixels."""
         x, y, w, h = (round(v * self.pixel_ratio) for v in (left, top, width, height))
-        return x, self.buffer_size[1] - y - h, w, h
+        return x, self.buffer_height - y - h, w, h
 
-    @property
-    def title(self) -> str:
-        """The words that the system shows over it."""
-        return self._title
-
-    @title.setter
-    def title(self, value: str) -> None:
-        glfw.set_window_title(self._window, value)
-        self._title = value
-
-    @property
-    def is_closing(self) -> bool:
-        """Whether it was asked to close, by the user or by `close`."""
-        return bool(glfw.window_should_close(self._window))
-
-    @is_closing.setter
-    def is_closing(self, value: bool) -> None:
-        glfw.set_window_should_close(self._window, value)
-
-    def close(self) -> None:
-        """Ask it to close."""
-        self.is_closing = True
-
-    @property
-    def fullscreen(self) -> bool:
-        """Whether it fills the monitor that it is on."""
-        return self._is_fullscreen
-
-    @fullscreen.setter
-    def fullscreen(self, value: bool) -> None:
-        self._is_fullscreen = value
+    def _set_fullscreen(self, value: bool) -> None:
+        """Fill the monitor that the window is on, or no more; moderngl-window takes the primary one."""
         if value:
             self._place = *glfw.get_window_pos(self._window), *glfw.get_window_size(self._window)
             monitor = _monitor_at(self._place)
@@ -332,24 +295,7 @@ class Window:
         imgui.backends.glfw_shutdown()
         implot.destroy_context()
         imgui.destroy_context()
-        glfw.terminate()
-
-
-def _hidden_window(title: str, size: tuple[int, int]) -> Any:
-    """A window that is not shown yet, whose context is current. Raises ValueError where there is none."""
-    major, minor = divmod(REQUIRED_VERSION // 10, 10)
-    for hint, value in (
-        (glfw.CONTEXT_VERSION_MAJOR, major), (glfw.CONTEXT_VERSION_MINOR, minor),
-        (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE), (glfw.OPENGL_FORWARD_COMPAT, True),
-        (glfw.VISIBLE, False), (glfw.SCALE_TO_MONITOR, True),
-    ):  # fmt: skip
-        glfw.window_hint(hint, value)
-    window = glfw.create_window(*size, title, None, None)
-    if not window:
-        raise ValueError("no window")
-    glfw.make_context_current(window)
-    glfw.swap_interval(1)  # as often as the screen shows one
-    return window
+        super().destroy()
 
 
 def _initial_size() -> tuple[int, int]:
