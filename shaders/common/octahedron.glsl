@@ -18,4 +18,7 @@ uint pack_normal(vec3 normal) {
     return normal == vec3(0.0) ? 0u : word == 0u ? 1u : word;
 }
 
-vec3 unpack_normal(uint word) { return word == 0u ? vec3(0.0) : unfolded(unpackSnorm2x16(word)); }
+vec3 unpack_normal(uint word) {
+    vec3 normal = unfolded(unpackSnorm2x16(word));
+    return word == 0u ? vec3(0.0) : normal;
+}

@@ -1,5 +1,8 @@
 // The camera (viewer/gpu/view.py), and from space to pixels and back.
 #include <view>
+#ifdef PERSPECTIVE  // a program for such views, or for orthographic ones, alone
+#define view_perspective (PERSPECTIVE != 0)
+#endif
 
 // Several programs compute the same point's depth and pixel, and compare: without `precise`
 // each compiler run may contract or reorder as it likes, and they differ in the last bit.

@@ -7,7 +7,8 @@
 
 // Scan units. Below the least one a splat can fall between pixel centres, and a far scan would flicker away.
 float splat_radius(float stored, float depth) {
-    float radius = stored > 0.0 && stored < UNKNOWN ? stored : uniform_radius;
+    float radius = uniform_radius;
+    radius = stored > 0.0 && stored < UNKNOWN ? stored : radius;
     return max(radius * radius_scale * enlarged, least_radius / scale_at(max(depth, view_near)));
 }
 

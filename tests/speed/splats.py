@@ -1,7 +1,7 @@
 """How long each way from points to splats takes, in one run. Prints a table.
 
     python tests/speed/splats.py [--counts 100000 1000000] [--size 1920x1280] [--rounds 5] [--away 1]
-                                 [--set key=value]
+                                 [--ways tiles ...] [--set key=value]
 
 A sphere that fills half of the picture (--away 1) with radii of 1.5 times the spacing, in random order and
 in that of a scanner; ways take turns, so that a change of the machine's speed hits all alike. Least wall
@@ -44,12 +44,14 @@ def sphere(count: int, order: str) -> PointCloud:
     return PointCloud.from_arrays(points, normals=points, radii=np.full(count, 1.5 * spacing))
 
 
-def turns(pose: GpuPose, surface: Surface, settings: dict[str, str], rounds: int) -> dict[str, list[float]]:
+def turns(
+    pose: GpuPose, surface: Surface, ways: list[str], settings: dict[str, str], rounds: int
+) -> dict[str, list[float]]:
     """(wall, processor / 2) milliseconds of each way, the least of some rounds after a warm-up."""
     gpu = surface.gpu
-    times: dict[str, list[list[float]]] = {way: [] for way in WAYS}
+    times: dict[str, list[list[float]]] = {way: [] for way in ways}
     for turn in range(rounds + 1):
-        for way in WAYS:
+        for way in ways:
             frame = FrameView(surface.view, SURFELS.params({**settings, "instancing": way}))
             gpu.ctx.finish()
             wall, cpu = time.perf_counter(), time.process_time()
@@ -66,6 +68,7 @@ def main() -> None:
     arguments.add_argument("--size", default="1920x1280")
     arguments.add_argument("--rounds", type=int, default=5)
     arguments.add_argument("--away", type=float, default=1.0, help="factor on the camera's distance")
+    arguments.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS)
     arguments.add_argument("--set", action="append", default=[], metavar="key=value")
     options = arguments.parse_args()
     width, height = (int(n) for n in options.size.split("x"))
@@ -74,14 +77,14 @@ def main() -> None:
     gpu = Renderer().gpu
     surface = Surface(gpu, (width, height))
     print(f"{gpu.device}, {width}x{height}, least of {options.rounds}: wall ms (processor ms / 2)")
-    print(f"{'points':>10} {'order':8}" + "".join(f"{way:>16}" for way in WAYS))
+    print(f"{'points':>10} {'order':8}" + "".join(f"{way:>16}" for way in options.ways))
     for count in options.counts:
         for order in ORDERS:
             pose = GpuPose(gpu, Pose(0, 0.0, "sphere", sphere(count, order)))
             eye = options.away * np.array([0.3, 0.5, 2.6])
             camera = Camera(eye=tuple(eye), target=(0, 0, 0), fov_y=46)
             surface.start(pose, View.of(camera, surface.size, pose.cloud.origin, pose.bounds))
-            result = turns(pose, surface, settings, options.rounds)
+            result = turns(pose, surface, options.ways, settings, options.rounds)
             cells = (f"{wall:9.0f} ({cpu:4.0f})" for wall, cpu in result.values())
             print(f"{count:10,} {order:8}" + "".join(cells), flush=True)
 

@@ -65,6 +65,8 @@ class Texture(IntEnum):
     AWAY = auto()  # discs that face away
     AWAY_STARTS = auto()  # of discs that face away
     AWAY_LISTED = auto()
+    NUMBERS = auto()  # of the discs of points
+    DISC_LOOKS = auto()
     DISCS = auto()  # of each row of a pose
     # Chunks of points.
     BOXES = auto()
@@ -155,7 +157,9 @@ class Storage(IntEnum):
     PLACES = 2
     FORMS = 3
     REACH = 4
+    DISC_LOOKS = 4
     LARGE = 5
+    NUMBERS = 5
     AGAIN = 6
     AWAY = 6
     FARTHEST = 7

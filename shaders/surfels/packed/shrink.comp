@@ -5,6 +5,7 @@
 
 layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float new_radii[]; };
 #if TILES
+layout(binding = TEXTURE_NUMBERS) uniform usamplerBuffer numbers;  // of discs
 layout(std430, binding = STORAGE_FORMS) buffer Forms { vec4 forms[]; };
 layout(std430, binding = STORAGE_DISCS) writeonly buffer Discs { uint discs[]; };
 #endif
@@ -19,9 +20,10 @@ void main() {
     if (is_hidden(row, at, shown)) share = min(shown / reach, 1.0);
     new_radii[row] = point.radius * share;
 #if TILES
-    discs[row] = i;
-    if (share == 1.0) return;
+    uint disc = texelFetch(numbers, int(i)).r;
+    discs[row] = disc;
+    if (share == 1.0 || disc == NOTHING) return;
     share = max(share, least_radius / scale_at(-at.z) / reach);
-    forms[i].yzw /= share * share;
+    forms[disc].yzw /= share * share;
 #endif
 }

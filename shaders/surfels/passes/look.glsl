@@ -23,3 +23,14 @@ vec3 normal_of(uvec2 look) { return roundEven(unpack_normal(look.y) * NORMAL_STE
 // The weight of a normal. A scan's normals need not agree in sign, and would cancel: they count as turned
 // like the visible splat's.
 float turned(float weight, vec3 normal, vec3 visible) { return dot(normal, visible) < 0.0 ? -weight : weight; }
+
+// Both as whole numbers in three words, which take less to unpack.
+uvec3 packed_look(vec3 light, vec3 normal) {
+    uvec3 low = uvec3(light), high = uvec3(ivec3(normal));
+    return low | high << 16;
+}
+
+void unpack_look(uvec3 words, out vec3 light, out vec3 normal) {
+    light = vec3(words & 0xFFFFu);
+    normal = vec3(ivec3(words) >> 16);
+}

@@ -10,12 +10,12 @@ void main() {
     int tile = this_tile();
     if (tile < 0) return;
     bool changes = false;
-    for (int k = 0; k < ROWS; ++k) {
+    for (int k = 0; k < PIXELS; ++k) {
         uint row = in_picture(k) ? rows[index_of(k)] : NOTHING;
         if (row == NOTHING) continue;
-        Column c = column_of(texelFetch(discs, int(row)).r);
-        float y = down_at(c, k);
-        changes = changes || !is_inside(form_at(c, y), key_at(c, y));
+        begin_columns(texelFetch(discs, int(row)).r);
+        float y = down_at(k);
+        changes = changes || !is_inside(form_at(k, y), key_at(k, y));
     }
     if (!changes || atomicExchange(flags[tile], 1u) == 1u) return;
     uint at = atomicAdd(again_count, 1u), groups = (at + uint(TILES)) / uint(TILES);

@@ -10,43 +10,49 @@
 
 // A float holds the sums of so many discs exactly, an integer those of a whole list (TileLists): the order of a
 // tile's list, which changes from frame to frame, does not show.
-const int BLOCK = 132;
+const int BLOCK = 128;
 
+layout(binding = TEXTURE_DISC_LOOKS) uniform usamplerBuffer disc_looks;
 #if LARGE
 layout(binding = TEXTURE_COLOR_SUMS) uniform sampler2D color_sums;  // and weight
 layout(binding = TEXTURE_NORMAL_SUMS) uniform sampler2D normal_sums;
 #endif
 
-float limit[ROWS];
-int total[ROWS];
-uvec3 light[ROWS];
-ivec3 normal[ROWS];
-vec3 visible[ROWS];  // normals
+float limit[PIXELS];
+int total[PIXELS];
+uvec3 light[PIXELS];
+ivec3 normal[PIXELS];
+vec3 visible[PIXELS];  // normals
+float mask_scale;
 
 void blend_block(usamplerBuffer list, int first, int last) {
-    float weight_sum[ROWS];
-    vec3 light_sum[ROWS], normal_sum[ROWS];
-    for (int k = 0; k < ROWS; ++k) {
+    float weight_sum[PIXELS];
+    vec3 light_sum[PIXELS], normal_sum[PIXELS];
+    for (int k = 0; k < PIXELS; ++k) {
         weight_sum[k] = 0.0;
         light_sum[k] = normal_sum[k] = vec3(0.0);
     }
-    for (int i = first; i < last; ++i) {
-        uint disc = texelFetch(list, i).r;
-        Column c = column_of(disc);
-        uvec2 look = texelFetch(looks, int(row_of(disc))).xy;
-        vec3 rgb = light_of(look), n = normal_of(look);
-        for (int k = 0; k < ROWS; ++k) {
-            float y = down_at(c, k), here = key_at(c, y), form = form_at(c, y);
-            float edge = PERSPECTIVE != 0 ? here * here : 1.0;
-            bool counts = form <= edge && here >= limit[k];
-            // Rounding takes the form of a disc that is seen edge on below zero, where the mask has no bound.
-            float weight = counts ? weight_at(max(0.25 * falloff * form / edge, 0.0)) : 0.0;
-            weight_sum[k] += weight;
-            light_sum[k] += weight * rgb;
-            normal_sum[k] += turned(weight, n, visible[k]) * n;
-        }
-    }
-    for (int k = 0; k < ROWS; ++k) {
+    do {
+        uvec4 found = reaching(list, first, last);
+        do {
+            bool is_there = found != uvec4(0u);
+            uint number = take_disc(list, first, found);
+            begin_columns(number);
+            vec3 rgb, n;
+            unpack_look(texelFetch(disc_looks, int(number)).xyz, rgb, n);
+            for (int k = 0; k < PIXELS; ++k) {
+                float y = down_at(k), here = key_at(k, y), form = form_at(k, y), edge = edge_of(here);
+                bool counts = form <= edge && here >= limit[k] && is_there;
+                // Rounding takes the form of a disc that is seen edge on below zero, where the mask has no bound.
+                float full = weight_at(max(mask_scale * form / edge, 0.0)), weight = counts ? full : 0.0;
+                weight_sum[k] += weight;
+                light_sum[k] += weight * rgb;
+                normal_sum[k] += turned(weight, n, visible[k]) * n;
+            }
+        } while (found != uvec4(0u));
+        first += RUN;
+    } while (first < last);
+    for (int k = 0; k < PIXELS; ++k) {
         total[k] += int(weight_sum[k]);
         light[k] += uvec3(light_sum[k]);
         normal[k] += ivec3(normal_sum[k]);
@@ -54,7 +60,11 @@ void blend_block(usamplerBuffer list, int first, int last) {
 }
 
 void blend(usamplerBuffer list, ivec2 part) {
-    for (int first = part.x; first < part.y; first += BLOCK) blend_block(list, first, min(first + BLOCK, part.y));
+    int first = part.x;
+    do {
+        blend_block(list, first, min(first + BLOCK, part.y));
+        first += BLOCK;
+    } while (first < part.y);
 }
 
 void main() {
@@ -66,36 +76,37 @@ void main() {
 #if TAKE
     begin_pixels();
 #if TAKE == 1
-    take_nearest(listed, part);
+    take_nearest(listed, part, points_in_list());
 #else
-    take_nearest(away_listed, away_part);
+    take_nearest(away_listed, away_part, points_in_away_list());
 #endif
     if (tile >= 0)
-        for (int k = 0; k < ROWS; ++k)
+        for (int k = 0; k < PIXELS; ++k)
             if (in_picture(k)) store_pixel(k);
 #endif
-    for (int k = 0; k < ROWS; ++k) {
-        limit[k] = 1.0;
-        visible[k] = vec3(0.0);
+    mask_scale = 0.25 * falloff;
+    // Without branches, in each of which Mesa would read the parameters anew.
+    for (int k = 0; k < PIXELS; ++k) {
         total[k] = 0;
         light[k] = uvec3(0u);
         normal[k] = ivec3(0);
 #if TAKE
-        if (!in_picture(k)) shown[k] = NOTHING;
+        shown[k] = in_picture(k) ? shown[k] : NOTHING;
         float depth = uintBitsToFloat(depth_bits(k));
 #else
         shown[k] = in_picture(k) ? rows[index_of(k)] : NOTHING;
         float depth = in_picture(k) ? abs(uintBitsToFloat(depths[index_of(k)])) : 0.0;
 #endif
-        if (shown[k] != NOTHING) {
-            limit[k] = limit_behind(depth, shown[k]);
-            visible[k] = normal_of(texelFetch(looks, int(shown[k])).xy);
-        }
+        bool is_shown = shown[k] != NOTHING;
+        uint row = is_shown ? shown[k] : 0u;
+        float behind = limit_behind(depth, row);
+        limit[k] = is_shown ? behind : 1.0;
+        visible[k] = normal_of(texelFetch(looks, int(row)).xy);
 #if LARGE
-        vec4 rgb = texelFetch(color_sums, pixel + ivec2(0, k), 0);
+        vec4 rgb = texelFetch(color_sums, pixel + off(k), 0);
         total[k] = int(rgb.a);
         light[k] = uvec3(rgb.rgb);
-        normal[k] = ivec3(texelFetch(normal_sums, pixel + ivec2(0, k), 0).xyz);
+        normal[k] = ivec3(texelFetch(normal_sums, pixel + off(k), 0).xyz);
 #endif
     }
     blend(listed, part);
@@ -103,10 +114,10 @@ void main() {
     blend(away_listed, away_part);
 #endif
     if (tile < 0) return;
-    for (int k = 0; k < ROWS; ++k)
+    for (int k = 0; k < PIXELS; ++k)
         if (shown[k] != NOTHING) {
             uint count = uint(max(total[k], 1));
             vec3 mean_light = means_of(light[k], count), mean_normal = means_of(normal[k], count);
-            store_mean(index_of(k), mean_light, mean_normal, total[k] > 0, 1.0, shown[k]);
+            store_mean(index_of(k), mean_light, mean_normal, total[k] > 0, 1.0, shown[k], visible[k]);
         }
 }

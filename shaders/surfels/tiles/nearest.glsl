@@ -1,15 +1,17 @@
-// The invocations of listed tiles: each keeps ROWS pixels, one below another, and looks at the tile's discs.
-// No atomics: the best depth and the lowest row at that depth stay in registers.
+// The invocations of listed tiles: each keeps the pixels of a part, and looks at the tile's discs. No atomics: the best
+// depth and the lowest row at that depth stay in registers.
+// MASKED: an entry of a list says which parts of the tile its disc reaches, and invocations pass over the others.
 #include "surfels/tiles/grid.glsl"
 
-layout(local_size_x = TILE, local_size_y = COLUMNS, local_size_z = TILES) in;
+// Mesa runs eight invocations at once that are neighbors along x.
+layout(local_size_x = ALL_PARTS, local_size_y = TILES) in;
 
 layout(binding = TEXTURE_PLACES) uniform samplerBuffer places;  // centre, pixels; key there; its step right
 layout(binding = TEXTURE_FORMS) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;  // of each tile's part of the list
-layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // discs, in the order of the points drawn
+layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // discs, in any order; then their points
 #if AWAY
-// Of those that face away, which a second filling listed.
+// Of those that face away, which a second filling listed and whose numbers follow.
 layout(binding = TEXTURE_AWAY_STARTS) uniform usamplerBuffer away_starts;
 layout(binding = TEXTURE_AWAY_LISTED) uniform usamplerBuffer away_listed;
 #endif
@@ -24,19 +26,31 @@ layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
 // Mesa's Zink cannot read one (docs/surfels.md).
 #define CLOSED uintBitsToFloat(NO_DEPTH)
 
-float best[ROWS];  // reversed depth-buffer values
-uint shown[ROWS];
-ivec2 pixel;       // the first of this invocation's
+const int PIXELS = PART_WIDTH * PART_HEIGHT;
+
+float best[PIXELS];  // reversed depth-buffer values
+uint shown[PIXELS];
+ivec2 pixel;         // the first of this invocation's
 
 // -1: none, at the end of the last work group; its pixels are outside the picture.
 int this_tile() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    uint at = group * TILES + gl_LocalInvocationID.z;
+    uint at = group * TILES + gl_LocalInvocationID.y;
     int tile = at < texelFetch(work, 3).r ? int(texelFetch(work, int(at) + 4).r) : -1;
-    pixel = (tile < 0 ? tiles : ivec2(tile % tiles.x, tile / tiles.x)) * TILE;
-    pixel += ivec2(gl_LocalInvocationID.x, gl_LocalInvocationID.y * ROWS);
+    ivec2 part = ivec2(gl_LocalInvocationID.x % COLUMNS, gl_LocalInvocationID.x / COLUMNS);
+    pixel = (tile < 0 ? tiles : ivec2(tile % tiles.x, tile / tiles.x)) * TILE + part * PART;
     return tile;
 }
+
+// Where the point of disc 0 stands, or would stand, in a list.
+int points_in_list() { return int(texelFetch(starts, tiles.x * tiles.y).r); }
+
+#if AWAY
+int points_in_away_list() {
+    int count = tiles.x * tiles.y, discs = int(texelFetch(starts, 2 * count).r) - points_in_list();
+    return int(texelFetch(away_starts, count).r) - discs;
+}
+#endif
 
 // A tile's part of the list: first, and the one after the last.
 ivec2 part_of(usamplerBuffer begins, int tile) {
@@ -44,61 +58,121 @@ ivec2 part_of(usamplerBuffer begins, int tile) {
     return ivec2(texelFetch(begins, tile).r, texelFetch(begins, tile + 1).r);
 }
 
-uint row_of(uint disc) {
-#if SAMPLED
-    return texelFetch(drawn_rows, int(disc)).r;
+// Lists are gone through in runs of entries: which of them reach this invocation's pixels, a bit each. Loops end with
+// their condition, as Mesa runs through a loop once more where it stands first.
+#if MASKED
+const int RUN = 128, AT_ONCE = 8;
+
+uvec4 reaching(usamplerBuffer list, int first, int last) {
+    uint part = gl_LocalInvocationID.x + uint(DISC_BITS);
+    uvec4 found = uvec4(0u);
+    int i = 0, count = min(last - first, RUN);
+    do {
+        uint bits = 0u;
+        for (int j = 0; j < AT_ONCE; ++j) bits |= (texelFetch(list, first + i + j).r >> part & 1u) << j;
+        bits = count - i < AT_ONCE ? bits & (1u << max(count - i, 0)) - 1u : bits;
+        found |= -uvec4(equal(ivec4(i >> 5), ivec4(0, 1, 2, 3))) & bits << (i & 31);
+        i += AT_ONCE;
+    } while (i < count);
+    return found;
+}
+
+// The first disc that was found in a run, which it takes out of these.
+uint take_disc(usamplerBuffer list, int first, inout uvec4 found) {
+    bvec4 has = notEqual(found, uvec4(0u));
+    uint word = has.x ? found.x : has.y ? found.y : has.z ? found.z : found.w, rest = word & (word - 1u);
+    int at = first + (has.x ? 0 : has.y ? 32 : has.z ? 64 : 96) + findLSB(word);
+    found.w = has.x || has.y || has.z ? found.w : rest;
+    found.z = has.x || has.y || !has.z ? found.z : rest;
+    found.y = has.x || !has.y ? found.y : rest;
+    found.x = has.x ? rest : 0u;
+    return texelFetch(list, at).r & (1u << DISC_BITS) - 1u;
+}
 #else
-    return disc;
+const int RUN = 1;
+
+uvec4 reaching(usamplerBuffer list, int first, int last) { return uvec4(first < last ? 1u : 0u, 0u, 0u, 0u); }
+
+uint take_disc(usamplerBuffer list, int first, inout uvec4 found) {
+    found = uvec4(0u);
+    return texelFetch(list, first).r;
+}
 #endif
-}
 
-struct Column { float center_y, key, key_step, form, skew, curve; };
-
-// What a disc is along this invocation's column of pixels.
-Column column_of(uint disc) {
-    vec4 a = texelFetch(places, int(disc)), b = texelFetch(forms, int(disc));
-    precise float x = float(pixel.x) + 0.5 - a.x;
-    precise float key = a.z + a.w * x;
-    precise float form = b.y * x * x;
-    return Column(a.y, key, b.x, form, 2.0 * b.z * x, b.w);
-}
-
-// From the disc's centre to a pixel of the column.
-float down_at(Column c, int k) {
-    precise float y = (float(pixel.y) + (0.5 + float(k))) - c.center_y;
-    return y;
+// at: where a disc's point stands in a list.
+uint row_of(usamplerBuffer list, int at) {
+    uint i = texelFetch(list, at).r;
+#if SAMPLED
+    i = texelFetch(drawn_rows, int(i)).r;
+#endif
+    return i;
 }
 
 // A disc's key and form at a pixel are the same numbers however pixels are shared out: `precise`.
-float key_at(Column c, float y) {
-    precise float key = c.key + c.key_step * y;
-    return key;
-}
+struct Disc { float center_y, key_step, curve; };
 
-float form_at(Column c, float y) {
-    precise float form = c.form + y * (c.skew + c.curve * y);
-    return form;
-}
+Disc disc;
+float column_key[PART_WIDTH], column_form[PART_WIDTH], column_skew[PART_WIDTH];  // along each column of pixels
 
-bool is_inside(float form, float key) { return form <= (PERSPECTIVE != 0 ? key * key : 1.0); }
-
-// No `continue` in a loop over pixels: Mesa would not unroll it, arrays would go to memory, and each loop be slower.
-void take_nearest(usamplerBuffer list, ivec2 part) {
-    for (int i = part.x; i < part.y; ++i) {
-        uint disc = texelFetch(list, i).r, row = row_of(disc);
-        Column c = column_of(disc);
-        for (int k = 0; k < ROWS; ++k) {
-            float y = down_at(c, k), here = key_at(c, y);
-            bool better = is_inside(form_at(c, y), here) && (here > best[k] || (here == best[k] && row < shown[k]));
-            best[k] = better ? here : best[k];
-            shown[k] = better ? row : shown[k];
-        }
+void begin_columns(uint number) {
+    vec4 a = texelFetch(places, int(number)), b = texelFetch(forms, int(number));
+    disc = Disc(a.y, b.x, b.w);
+    for (int k = 0; k < PART_WIDTH; ++k) {
+        precise float x = float(pixel.x) + (0.5 + float(k)) - a.x;
+        precise float key = a.z + a.w * x;
+        precise float form = b.y * x * x;
+        column_key[k] = key;
+        column_form[k] = form;
+        column_skew[k] = 2.0 * b.z * x;
     }
 }
 
-bool in_picture(int k) { return pixel.x < view_size.x && pixel.y + k < view_size.y; }
+ivec2 off(int k) { return ivec2(k % PART_WIDTH, k / PART_WIDTH); }
 
-int index_of(int k) { return (pixel.y + k) * view_size.x + pixel.x; }
+// From the disc's centre down to a pixel.
+float down_at(int k) {
+    precise float y = (float(pixel.y) + (0.5 + float(off(k).y))) - disc.center_y;
+    return y;
+}
+
+float key_at(int k, float y) {
+    precise float key = column_key[off(k).x] + disc.key_step * y;
+    return key;
+}
+
+float form_at(int k, float y) {
+    precise float form = column_form[off(k).x] + y * (column_skew[off(k).x] + disc.curve * y);
+    return form;
+}
+
+// What a form is at the border.
+float edge_of(float key) { return view_perspective ? key * key : 1.0; }
+
+bool is_inside(float form, float key) { return form <= edge_of(key); }
+
+// No `continue` in a loop over pixels: Mesa would not unroll it, arrays would go to memory, and each loop be slower.
+void take_nearest(usamplerBuffer list, ivec2 part, int points_at) {
+    int first = part.x;
+    do {
+        uvec4 found = reaching(list, first, part.y);
+        do {
+            bool is_there = found != uvec4(0u);
+            uint number = take_disc(list, first, found), row = row_of(list, points_at + int(number));
+            begin_columns(number);
+            for (int k = 0; k < PIXELS; ++k) {
+                float y = down_at(k), here = key_at(k, y);
+                bool better = is_inside(form_at(k, y), here) && (here > best[k] || (here == best[k] && row < shown[k]));
+                best[k] = better && is_there ? here : best[k];
+                shown[k] = better && is_there ? row : shown[k];
+            }
+        } while (found != uvec4(0u));
+        first += RUN;
+    } while (first < part.y);
+}
+
+bool in_picture(int k) { return all(lessThan(pixel + off(k), view_size)); }
+
+int index_of(int k) { return (pixel.y + off(k).y) * view_size.x + pixel.x + off(k).x; }
 
 #if FILL && LARGE
 layout(binding = TEXTURE_LARGE_ROWS) uniform usampler2D large_rows;
@@ -106,22 +180,27 @@ layout(binding = TEXTURE_LARGE_DEPTHS) uniform sampler2D large_depths;  // negat
 #endif
 
 // FOUND: the Surface holds something already. FILL: only where it does not, this is to change; LARGE: the
-// rasteriser filled some of that.
+// rasteriser filled some of that. Without branches, in each of which Mesa would read the view anew.
 void begin_pixels() {
-    for (int k = 0; k < ROWS; ++k) {
-        best[k] = view_perspective ? view_near / view_far : 0.0;
+    float farthest_key = view_perspective ? view_near / view_far : 0.0;
+    for (int k = 0; k < PIXELS; ++k) {
+        best[k] = farthest_key;
         shown[k] = NOTHING;
 #if FILL
-        if (!in_picture(k)) best[k] = CLOSED;
+        best[k] = in_picture(k) ? farthest_key : CLOSED;
 #endif
 #if FOUND
-        if (in_picture(k) && rows[index_of(k)] != NOTHING) {
-            shown[k] = rows[index_of(k)];
-            best[k] = FILL != 0 ? CLOSED : stored_depth(uintBitsToFloat(depths[index_of(k)]));
-        }
+        shown[k] = in_picture(k) ? rows[index_of(k)] : NOTHING;
+        bool is_found = shown[k] != NOTHING;
+#if FILL
+        best[k] = is_found ? CLOSED : best[k];
+#else
+        float found = stored_depth(is_found ? uintBitsToFloat(depths[index_of(k)]) : view_near);
+        best[k] = is_found ? found : best[k];
+#endif
 #endif
 #if FILL && LARGE
-        ivec2 at = pixel + ivec2(0, k);
+        ivec2 at = pixel + off(k);
         if (best[k] != CLOSED && texelFetch(large_rows, at, 0).r != NOTHING) {
             shown[k] = texelFetch(large_rows, at, 0).r;
             best[k] = stored_depth(-texelFetch(large_depths, at, 0).r);
@@ -132,7 +211,8 @@ void begin_pixels() {
 
 // Of the depth that is shown; +inf where nothing is.
 uint depth_bits(int k) {
-    return shown[k] == NOTHING ? NO_DEPTH : floatBitsToUint(linear_depth(best[k]));
+    float depth = linear_depth(best[k]);
+    return shown[k] == NOTHING ? NO_DEPTH : floatBitsToUint(depth);
 }
 
 void store_pixel(int k) {

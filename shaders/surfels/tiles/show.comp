@@ -23,34 +23,33 @@ void main() {
 #endif
 #if FILL
     bool all_closed = true;
-    for (int k = 0; k < ROWS; ++k) all_closed = all_closed && best[k] == CLOSED;
+    for (int k = 0; k < PIXELS; ++k) all_closed = all_closed && best[k] == CLOSED;
     if (all_closed) part = ivec2(0);
 #endif
 #if AWAY
-    take_nearest(away_listed, part);
+    take_nearest(away_listed, part, points_in_away_list());
 #else
-    take_nearest(listed, part);
+    take_nearest(listed, part, points_in_list());
 #endif
     if (tile < 0) return;
 #if FILL
-    for (int k = 0; k < ROWS; ++k)
+    for (int k = 0; k < PIXELS; ++k)
         if (best[k] != CLOSED && shown[k] != NOTHING) {
             depths[index_of(k)] = floatBitsToUint(-linear_depth(best[k]));
             rows[index_of(k)] = shown[k];
             list[reserve(1u)] = uint(index_of(k));
         }
 #else
-    for (int k = 0; k < ROWS; ++k)
+    for (int k = 0; k < PIXELS; ++k)
         if (in_picture(k)) store_pixel(k);
 #endif
 #if FARTHEST
     uint most = 0u;
-    for (int k = 0; k < ROWS; ++k) {
+    for (int k = 0; k < PIXELS; ++k) {
         uint bits = depth_bits(k);
 #if FARTHEST == 2
-        float depth = uintBitsToFloat(bits);
         bool is_shown = shown[k] != NOTHING;
-        float behind = depth + epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
+        float depth = uintBitsToFloat(bits), behind = depth + epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
         bits = is_shown ? floatBitsToUint(behind) : bits;
 #endif
         most = max(most, in_picture(k) ? bits : 0u);

@@ -1,36 +1,44 @@
 // Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where some discs, which reach
-// anywhere, are rasterised or were sent to their pixels. SECOND: of a second filling; BOTH: those that discs of the
-// first one reach, too.
+// anywhere, are rasterised or were sent to their pixels. SECOND: of a second filling. REST: those that discs of the first
+// one alone reach, once the others are listed.
 layout(std430, binding = STORAGE_STARTS) readonly buffer Starts { uint starts[]; };
-layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, sent, large[]; };
+layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, sent, discs, large[]; };
 layout(std430, binding = STORAGE_WORK) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
 layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { uint farthest[]; };
 
-#if BOTH
+#if REST
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer first_starts;
+
+bool has_first(uint tile) {
+    return texelFetch(first_starts, int(tile) + 1).r > texelFetch(first_starts, int(tile)).r;
+}
 #endif
 
-uint entries_of(uint tile) {
-    uint entries = starts[tile + 1u] - starts[tile];
-#if BOTH
-    entries += texelFetch(first_starts, int(tile) + 1).r - texelFetch(first_starts, int(tile)).r;
+uint entries_of(uint tile) { return starts[tile + 1u] - starts[tile]; }
+
+uint word_of(uint tile) {
+    bool is_reached = entries_of(tile) > 0u || large_count > 0u || sent > 0u;
+#if REST
+    is_reached = !is_reached && has_first(tile);
 #endif
-    return entries;
+    return is_reached ? 1u : 0u;
 }
 
-uint word_of(uint tile) { return entries_of(tile) > 0u || large_count > 0u || sent > 0u ? 1u : 0u; }
-
 void take_sum(uint tile, uint sum) {
-    uint entries = entries_of(tile), is_worked = word_of(tile);
+    uint is_worked = word_of(tile);
     if (is_worked > 0u) work[sum] = tile;
+#if !REST
+    uint entries = entries_of(tile);
 #if SECOND
     if (entries > 0u) farthest[tile] = 0u;  // is shown again
 #else
     farthest[tile] = is_worked > 0u ? 0u : NO_DEPTH;  // through such a tile everything is seen
 #endif
     if (entries > longest) atomicMax(longest, entries);
+#endif
     if (tile + 1u < word_count) return;
     list_length = starts[word_count];
+    discs = starts[2u * word_count] - list_length;
     uint listed = sum + is_worked, groups = (listed + TILES - 1u) / TILES;
     work_count = listed;
     groups_x = min(groups, 1024u);

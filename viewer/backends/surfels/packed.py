@@ -71,7 +71,9 @@ def _splats(radius_scale: float, epsilon: float) -> Splats:
 
 
 def _draw(points: Points, surface: Surface, splats: Splats, way: str, two: bool, refine: bool) -> None:
-    lists = tile_lists(points, surface, splats) if way == "tiles" else None
+    lists = None
+    if way == "tiles":
+        lists = tile_lists(points, surface, splats, looks=two, numbered=refine)
     if lists is not None:
         _draw_by_tiles(points, surface, lists, splats, two, refine)
         return

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from ...gpu import gl
 from ...gpu.amplify import Points, draw_shapes, told_feed
@@ -20,10 +19,9 @@ from ...gpu.bindings import Texture
 from ...gpu.constants import BEHIND
 from ...gpu.context import Gpu
 from ...gpu.surface import Surface
-from ...scan.points import PointCloud
 from ...scan.ranges import robust_range
-from ...srgb import roots_from_bytes
 from .. import FrameView
+from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import (
     ALL,
@@ -41,7 +39,6 @@ from .tiles import (
 )
 
 FIRST, SECOND = 1, 2  # of which lists the nearest are found as they are blended: TAKE of blend.comp
-_CHUNK = 1 << 20  # points packed at a time
 
 
 def blends(frame: FrameView, surface: Surface) -> bool:
@@ -161,7 +158,7 @@ def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
 def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
     """Draw both passes by the same lists, at once where no disc is large. False where the rasteriser has to
     do it all."""
-    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS)
+    lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS, looks=True)
     if lists is None:
         return False
     if not lists.away and not lists.large:
@@ -169,7 +166,7 @@ def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
         blend_by_tiles(points, surface, lists, None, splats, take=FIRST)
         return True
     large = show_all(points, surface, lists, splats, LIMIT if lists.away else 0)
-    if lists.away and not fill_away(points, surface, lists, splats, both=True):
+    if lists.away and not fill_away(points, surface, lists, splats, blends=True):
         return False
     if lists.away and large is not None:
         show(points, surface, lists, splats, found=True, away=True)
@@ -184,7 +181,7 @@ def _enlarged_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool
     larger = splats.larger(points)
     if not splat_first(points, surface, splats, LIMIT):
         return False
-    lists = tile_lists(larger, surface, splats, NOT_HIDDEN)
+    lists = tile_lists(larger, surface, splats, NOT_HIDDEN, looks=True)
     if lists is None:
         return False
     large = lists.large_points(larger) if lists.large else None
@@ -212,9 +209,13 @@ def blend_by_tiles(
         sums = _add(points, large, surface, FALLBACK, splats)
         sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)
     defines = {
-        **{"FOUND": int(take != FIRST), "FILL": 0, "LARGE": int(large is not None), "TAKE": take},
-        **{"AWAY": int(away), **points.defines, **bind_looks(points, surface)},
+        **{"FILL": 0, "LARGE": int(large is not None), **points.defines},
+        **bind_looks(points, surface),
     }
+    if away and large is None:
+        alone = {**defines, "FOUND": 1, "TAKE": 0, "AWAY": 0}
+        run("blend", surface, lists, alone, points, splats, work="rest")
+    defines |= {"FOUND": int(take != FIRST), "TAKE": take, "AWAY": int(away)}
     run("blend", surface, lists, defines, points, splats)
 
 
@@ -304,38 +305,8 @@ def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:
 def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     """Bind what surfels/passes/look.glsl reads and store.glsl writes; the defines that say so."""
     cloud = points.pose.cloud
-    looks = points.buffers.get("looks") or points.pose.packed(_pack_looks, texel_format=gl.RG32UI)
-    looks.bind(Texture.LOOKS)
+    looks_of(points).bind(Texture.LOOKS)
     if cloud.colors is not None:
         surface.bind_own("color")
     surface.bind_own("normal")
     return {"HAS_COLORS": int(cloud.colors is not None)}
-
-
-def _pack_looks(cloud: PointCloud) -> NDArray[np.uint32]:
-    """Colour and normal of each point in two words, (N, 2): square roots of linear light, 3 x 10 bits, and
-    what common/octahedron.glsl makes of normals."""
-    looks = np.zeros((len(cloud), 2), np.uint32)
-    for first in range(0, len(cloud), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        if cloud.colors is not None:
-            roots = roots_from_bytes(cloud.colors[part, :3]).astype(np.uint32)
-            looks[part, 0] = np.bitwise_or.reduce(roots << np.array([0, 10, 20], np.uint32), axis=1)
-        if cloud.normals is not None:
-            looks[part, 1] = _folded(cloud.normals[part])
-    return looks
-
-
-def _folded(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Words of normals of any length, (N, 3), as common/octahedron.glsl has them; 0 where one is missing."""
-    with np.errstate(all="ignore"):
-        # Of its largest, so that no sum of the three is beyond float32.
-        normals = normals / np.abs(normals).max(axis=1, keepdims=True)
-        normals /= np.abs(normals).sum(axis=1, keepdims=True)
-        usable = np.isfinite(normals.sum(axis=1))
-        x, y, z = np.where(usable[:, None], normals, 0).T
-    under = z < 0
-    turned_x, turned_y = (np.copysign(1 - np.abs(b), a) for a, b in ((x, y), (y, x)))
-    net = np.stack([np.where(under, turned_x, x), np.where(under, turned_y, y)], axis=1)
-    words = np.rint(net * 32767).astype("<i2").view("<u4")[:, 0].astype(np.uint32)
-    return np.where(usable, np.maximum(words, 1), np.uint32(0))

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -30,21 +30,22 @@ from ...gpu.compact import scan_words
 from ...gpu.context import Gpu, Program
 from ...gpu.scatter import Visits, take_items
 from ...gpu.surface import Surface
+from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
-TILE = 8  # pixels of a tile's edge
-_MOST_TILES = 2048  # along an edge of the picture: what cells.glsl's words have bits for
+_MOST_PIXELS = (1 << 16) - 1  # along an edge of the picture: what cells.glsl's words have bits for
+_DISC_BITS = 24  # of an entry, beside which it says which parts of a tile its disc reaches
 _DISC_BYTES = 16  # of a point in each of two buffers
 _FEW = 4  # pixels of the box of a disc that is sent to them: a square that the smallest discs fit into
-_SENT = f"{1 << 27}u"  # what cells.glsl says in place of the tiles that such a disc reaches: none, one high
+_SENT = "0xFFFFFFFFu"  # what cells.glsl says in place of the parts that such a disc reaches
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
 # Entries of one tile's list: of more, sums of light could exceed 32 bits (31 x 4095 each); llvmpipe ends all
-# loops of an invocation after 65 535 turns, and a pass may go over its list twice; on hardware a pixel alone
-# with so many would be slow.
-_LONGEST = 30_000
+# loops of an invocation after 65 535 turns, and a pass may go over its list twice, with 73 turns for 64
+# entries; on hardware a pixel alone with so many would be slow.
+_LONGEST = 28_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
-_LARGE_HEAD = 20  # bytes before the rows of large discs
+_LARGE_HEAD = 24  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
 DEPTH, LIMIT = 1, 2  # what is kept of each tile: FARTHEST of show.comp
@@ -55,21 +56,23 @@ FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 class TileLists:
     """The discs that reach each tile of a picture, made anew for each frame (shaders/surfels/tiles/).
 
-    Discs are numbered in the order of the points that are drawn. length: entries of all lists. large: how
-    many discs are left to the rasteriser. away: whether some that face away from the eye were left to a
-    second filling. sent: how many were sent to pixels in place of lists.
+    Discs are numbered by tiles, so that those of one lie together in memory whatever the order of the points.
+    length: entries of all lists. discs: how many are in lists. large: how many are left to the rasteriser.
+    away: whether some that face away from the eye were left to a second filling. sent: how many were sent to
+    pixels in place of lists.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._gpu = gpu
-        self.tiles = (-(-size[0] // TILE), -(-size[1] // TILE))
-        self.length = self.large = self.sent = 0
+        self.grid = grid = _grid(gpu)
+        self.tiles = (-(-size[0] // grid.tile[0]), -(-size[1] // grid.tile[1]))
+        self.length = self.discs = self.large = self.sent = 0
         self.away = False
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
-        self._bins, self._away_bins = Bins(gpu, words), Bins(gpu, words)
+        self._bins, self._away_bins = Bins(gpu, 2 * words), Bins(gpu, 2 * words)
         self._textures = {"farthest": self._texture(4 * words, gl.R32UI)}
-        for name in ("work", "again"):
+        for name in ("work", "rest", "again"):
             self._textures[name] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
         self._large_rows: gl.BufferTexture | None = None
         self._rows: gl.BufferTexture | None = None
@@ -84,49 +87,77 @@ class TileLists:
     def fill(
         self,
         points: Points,
+        surface: Surface,
         splats: Splats,
         side: int = ALL,
+        *,
         both: bool = False,
-        few_to: Surface | None = None,
+        sends: bool = False,
+        looks: bool = False,
+        numbered: bool = False,
     ) -> bool:
-        """List the discs of points for the bound view; False where the lists would grow too long.
+        """List the discs of points for the surface's view; False where the lists would grow too long.
 
         side: ALL; TOWARDS, those that face the eye; AWAY, the others that it found, in lists beside, unless
         they are hidden by what `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large
-        ones are counted but for AWAY. both: whether `run` goes over the tiles of both lists. few_to: an empty
-        surface, which takes the depths of discs of a few pixels; None: they are listed.
+        ones are counted but for AWAY. both: whether `run` goes over the first lists, too: "work" is then all
+        tiles where there are large discs, and "rest" those that have first lists alone. sends: whether discs
+        of a few pixels are in none, but their depths on the surface, which is empty. looks: whether what they
+        look like is wanted, for blending. numbered: whether it is kept which disc each point has.
         """
         gpu, second = self._gpu, side == AWAY
         bins = self._away_bins if second else self._bins
         if not second:
             self._reserve(max(points.count, 1))
             self._rows = points.rows
-        self._buffer("large").write(struct.pack("5I", self.large if both else 0, 0, 0, 0, 0))
+        self._buffer("large").write(struct.pack("6I", self.large if both else 0, *[0] * 5))
+        first_disc = self.discs if second else 0
 
         def bind(program: Program) -> None:
-            if not second:
-                points.bind(program)
-                self._bind_storage("places", "forms", "reach", "large")
-            self._textures["farthest"].bind(Texture.FARTHEST)
-            for name in ("reach", "away"):
+            points.bind(program)
+            for name in ("farthest", "reach", "away"):
                 self._textures[name].bind(Texture[name.upper()])
-            self._bind_storage("away")
-            if few_to is not None:
-                few_to.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
+            self._bind_storage("reach", "large", "away")
+            if sends:
+                surface.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
 
-        given = {} if second else points.defines
-        defines = {"SIDE": side, "TILE": TILE, "FEW": 0 if few_to is None else _FEW, "SENT": _SENT, **given}
-        visits = Visits("surfels/tiles/cells.glsl", points.count, bind, defines, splats)
+        given = {
+            **{"PERSPECTIVE": int(surface.view.perspective), **self.grid.defines, **points.defines},
+            **{"SIDE": side, "FEW": _FEW if sends else 0, "SENT": _SENT},
+        }
+        visits = Visits("surfels/tiles/cells.glsl", points.count, bind, given, splats)
         bins.count(visits)
         with gpu.timers.measure("work"):
-            self._find_work(bins, second, both)
+            self._find_work(bins, "work", second)
+            if both:
+                self._find_work(bins, "rest", second)
             words = self._buffer("large").read(_LARGE_HEAD)
-            large, self.length, away, longest, sent = struct.unpack("5I", words)
+            large, self.length, away, longest, sent, discs = struct.unpack("6I", words)
             if not second:
-                self.large, self.away, self.sent = large, bool(away), sent
-        if self.length > gpu.max_storage_bytes // 4 or longest > _LONGEST:
+                self.large, self.away, self.sent, self.discs = large, bool(away), sent, discs
+        entries = self.length + discs
+        if entries > gpu.max_storage_bytes // 4 or longest > _LONGEST:
             return False
-        bins.fill(visits, self.length)
+
+        def bind_homes(program: Program) -> None:
+            gpu.set(program, first_disc=first_disc, first_home=self.length)
+            for name in ("reach", "away"):
+                self._textures[name].bind(Texture[name.upper()])
+            self._bind_storage("numbers")
+
+        def bind_discs(program: Program) -> None:
+            points.bind(program)
+            gpu.set(program, first_disc=first_disc, first_home=self.length)
+            self._textures["reach"].bind(Texture.REACH)
+            bins.items.bind(Texture.LISTED)
+            if looks:
+                looks_of(points).bind(Texture.LOOKS)
+            self._bind_storage("places", "forms", "disc_looks")
+
+        homes = {**given, "NUMBERED": int(numbered)}
+        bins.fill(Visits("surfels/tiles/homes.glsl", points.count, bind_homes, homes), entries)
+        listed = {**given, "LOOKS": int(looks)}
+        bins.fill(Visits("surfels/tiles/discs.glsl", discs, bind_discs, listed, splats), entries)
         return True
 
     def take_sent(self, points: Points, surface: Surface, splats: Splats) -> None:
@@ -140,16 +171,17 @@ class TileLists:
         visits = Visits("surfels/scatter.glsl", points.count, bind, defines, splats)
         take_items(self._gpu, visits, surface.depths, surface.rows)
 
-    def _find_work(self, bins: Bins, second: bool, both: bool) -> None:
-        """List the tiles that discs reach."""
+    def _find_work(self, bins: Bins, work: str, second: bool) -> None:
+        """List the tiles that discs reach: "work", those of these lists; "rest", those of the first alone."""
 
         def bind(_: Program) -> None:
             bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
             self._bins.starts.bind(Texture.STARTS)
-            self._bind_storage("large", "work", "farthest")
+            self._bind_storage("large", "farthest")
+            self._buffer(work).bind_to_storage_buffer(Storage.WORK)
 
-        defines = {"TILES": f"{_mapping(self._gpu)[1]}u", "SECOND": int(second), "BOTH": int(both)}
-        scan_words(self._gpu, "surfels/tiles/work.glsl", bins.cells, bind, defines)
+        defines = {"TILES": f"{self.grid.tiles}u", "SECOND": int(second), "REST": int(work == "rest")}
+        scan_words(self._gpu, "surfels/tiles/work.glsl", self.tiles[0] * self.tiles[1], bind, defines)
 
     def large_points(self, points: Points) -> Points:
         """The points that are left to the rasteriser."""
@@ -159,11 +191,13 @@ class TileLists:
         self._large_rows = gl.BufferTexture(self._gpu.ctx.buffer(np.sort(rows)), gl.R32UI)
         return replace(points, rows=self._large_rows, count=self.large)
 
-    def run(self, program: moderngl.ComputeShader, again: bool = False) -> None:
-        """Run a program that includes surfels/tiles/nearest.glsl on the tiles that discs reach. again: on
-        those of them that are to be shown again."""
-        work = "again" if again else "work"
-        for name in ("places", "forms"):
+    def run(self, program: moderngl.ComputeShader, work: str = "work") -> None:
+        """Run a program that includes surfels/tiles/nearest.glsl.
+
+        work: on which tiles: "work", those that discs of the last filling reach; "rest", those that discs of
+        the first alone do; "again", those that are to be shown again.
+        """
+        for name in ("places", "forms", "disc_looks"):
             self._textures[name].bind(Texture[name.upper()])
         self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
@@ -176,8 +210,9 @@ class TileLists:
         self._gpu.dispatch_indirect(program, self._buffer(work))
 
     def bind_forms(self) -> None:
-        """Bind the forms of discs for shaders to change them."""
+        """Bind the forms of discs for shaders to change them, and which disc each point has."""
         self._bind_storage("forms")
+        self._textures["numbers"].bind(Texture.NUMBERS)
 
     def start_again(self) -> None:
         """Empty, and bind, the list of tiles that are to be shown again."""
@@ -199,7 +234,7 @@ class TileLists:
     @property
     def defines(self) -> dict[str, object]:
         """Macros for shaders that include surfels/tiles/nearest.glsl."""
-        return {"SAMPLED": int(self._rows is not None)}
+        return {"SAMPLED": int(self._rows is not None), **self.grid.defines}
 
     @property
     def farthest(self) -> moderngl.Buffer:
@@ -213,7 +248,9 @@ class TileLists:
         self._room = count
         self._replace("places", _DISC_BYTES * count, gl.RGBA32F)
         self._replace("forms", _DISC_BYTES * count, gl.RGBA32F)
-        self._replace("reach", 4 * count, gl.R32UI)
+        self._replace("disc_looks", 12 * count, gl.RGB32UI)
+        self._replace("numbers", 4 * count, gl.R32UI)
+        self._replace("reach", 8 * count, gl.RG32UI)
         self._replace("away", 4 * count, gl.R32UI)
         self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
         self._bins.reserve(_ROOM * count)
@@ -260,29 +297,38 @@ def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int)
     return True
 
 
-def fill_away(points: Points, surface: Surface, lists: TileLists, splats: Splats, both: bool = False) -> bool:
-    """List what faces away; False where the rasteriser has to do it all. both: as in `TileLists.fill`."""
-    fits = lists.fill(points, splats, AWAY, both)
+def fill_away(
+    points: Points, surface: Surface, lists: TileLists, splats: Splats, blends: bool = False
+) -> bool:
+    """List what faces away; False where the rasteriser has to do it all. blends: whether all lists are gone
+    over next, to blend what they hold."""
+    fits = lists.fill(points, surface, splats, AWAY, both=blends, looks=blends)
     if not fits:
         surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"
     return fits
 
 
 def tile_lists(
-    points: Points, surface: Surface, splats: Splats, side: int = ALL, sends: bool = False
+    points: Points,
+    surface: Surface,
+    splats: Splats,
+    side: int = ALL,
+    sends: bool = False,
+    looks: bool = False,
+    numbered: bool = False,
 ) -> TileLists | None:
     """The surface's lists, filled; None where the rasteriser has to do it all, or does it sooner.
 
     sends: where they are too long, discs of a few pixels are in none, but on the surface, which nothing else
-    is on then.
+    is on then. looks, numbered: as in `TileLists.fill`.
     """
     reason = _unfit(points, surface)
     if not reason:
         lists = surface.keep(TileLists)
-        fits = lists.fill(points, splats, side)
+        fits = lists.fill(points, surface, splats, side, looks=looks, numbered=numbered)
         if sends and not fits:
             surface.clear()
-            fits = lists.fill(points, splats, side, few_to=surface)
+            fits = lists.fill(points, surface, splats, side, sends=True)
         if not fits:
             reason = f"too long lists, {lists.length:,} entries"
         elif lists.large * _LARGE_COST > lists.length + lists.sent:
@@ -355,21 +401,19 @@ def run(
     defines: Mapping[str, object],
     first: Points | None = None,
     splats: Splats | None = None,
-    again: bool = False,
+    work: str = "work",
 ) -> None:
     """Run surfels/tiles/NAME.comp on the tiles that have lists. first: the points of the first pass, where it
-    reads their radii, and splats: how they were drawn. again: only on tiles that are to be shown again."""
+    reads their radii, and splats: how they were drawn. work: on which tiles, as `TileLists.run` has them."""
     gpu = surface.gpu
-    rows, tiles = _mapping(gpu)
-    perspective = int(surface.view.perspective)
-    layout = {"TILE": TILE, "ROWS": rows, "COLUMNS": TILE // rows, "TILES": tiles, "PERSPECTIVE": perspective}
+    layout = {"TILES": lists.grid.tiles, "PERSPECTIVE": int(surface.view.perspective)}
     with gpu.timers.measure(name):
         given = {**defines, **layout, **lists.defines}
         program = gpu.compute(f"surfels/tiles/{name}.comp", given, params=splats)
         if first is not None:
             bind_visible(first, program)
         surface.bind_storage()
-        lists.run(program, again)
+        lists.run(program, work)
 
 
 def show_smaller(surface: Surface, lists: TileLists, splats: Splats) -> None:
@@ -377,21 +421,54 @@ def show_smaller(surface: Surface, lists: TileLists, splats: Splats) -> None:
     become smaller. `Texture.DISCS` is bound to the number of each row's."""
     lists.start_again()
     run("again", surface, lists, {"AWAY": 0})
-    run("show", surface, lists, _SHOWN, splats=splats, again=True)
+    run("show", surface, lists, _SHOWN, splats=splats, work="again")
 
 
-def _mapping(gpu: Gpu) -> tuple[int, int]:
-    """Pixels of an invocation and tiles of a work group.
+@dataclass(frozen=True)
+class TileGrid:
+    """How pixels are shared out.
 
-    A software driver's lanes are the pixels of a row: one reads a disc for a whole tile. On hardware
-    each pixel has its invocation, and two tiles fill a work group.
+    part: those of an invocation, width and height. parts: of a tile, which has a list, along both. tiles: of
+    a work group. masked: whether entries of lists say which parts their disc reaches.
     """
-    return (TILE, 8) if gpu.software else (1, 2)
+
+    part: tuple[int, int]
+    parts: tuple[int, int]
+    tiles: int
+    masked: bool
+
+    @property
+    def tile(self) -> tuple[int, int]:
+        """Pixels of a tile, width and height."""
+        return self.part[0] * self.parts[0], self.part[1] * self.parts[1]
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """Macros for shaders that include surfels/tiles/grid.glsl."""
+        (width, height), (columns, lines) = self.part, self.parts
+        sizes = {
+            "PART_WIDTH": width,
+            "PART_HEIGHT": height,
+            "COLUMNS": columns,
+            "LINES": lines,
+            "ALL_PARTS": columns * lines,
+        }
+        return {**sizes, "MASKED": int(self.masked), "DISC_BITS": _DISC_BITS}
+
+
+SOFTWARE_GRID = TileGrid((4, 4), (4, 2), 16, masked=True)
+HARDWARE_GRID = TileGrid((1, 1), (8, 8), 2, masked=False)
+
+
+def _grid(gpu: Gpu) -> TileGrid:
+    """The sharing out that suits the device: a processor's eight lanes are the parts of a tile, and each takes
+    its discs from the list; on hardware each pixel has its invocation, and two tiles fill a work group."""
+    return SOFTWARE_GRID if gpu.software else HARDWARE_GRID
 
 
 def _unfit(points: Points, surface: Surface) -> str:
     """Why such a pose or picture has no lists; empty where it has."""
-    if max(surface.size) > _MOST_TILES * TILE:
-        return f"more than {_MOST_TILES * TILE} pixels along an edge"
-    most = surface.gpu.max_storage_bytes // _DISC_BYTES
+    if max(surface.size) > _MOST_PIXELS:
+        return f"more than {_MOST_PIXELS} pixels along an edge"
+    most = min(surface.gpu.max_storage_bytes // _DISC_BYTES, 1 << _DISC_BITS)
     return f"more than {most:,} points" if points.count > most else ""
