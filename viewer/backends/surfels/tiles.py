@@ -461,7 +461,7 @@ HARDWARE_GRID = TileGrid((1, 1), (8, 8), 2, masked=False)
 
 
 def _grid(gpu: Gpu) -> TileGrid:
-    """The sharing out that suits the device: a processor's eight lanes are the parts of a tile, and each takes
+    """The grid that suits the device: a processor's eight lanes are the parts of a tile, and each takes
     its discs from the list; on hardware each pixel has its invocation, and two tiles fill a work group."""
     return SOFTWARE_GRID if gpu.software else HARDWARE_GRID
 
