@@ -1,7 +1,8 @@
 // The best visit of each cell, by an order-preserving uint key. PASS 0 keeps the least key, PASS 1 the lowest
-// item among those that have it, PASS 2 lists the cells that were hit, each at a place of the item that has it: SLOTS
-// for each, so that no counter is shared. Two 32-bit passes: 64-bit atomics are not everywhere.
-#if PASS == 2 || LISTED
+// item among those that have it. Two 32-bit passes: 64-bit atomics are not everywhere.
+// LISTS: the cells that were hit are listed, in slots that each item has for its visits: they need no counter that all
+// share. A cell is listed more than once where several items have its key.
+#if LISTED
 #include "common/list.glsl"
 #endif
 
@@ -9,26 +10,25 @@
 layout(std430, binding = STORAGE_KEYS) buffer Keys { uint keys[]; };
 #else
 layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;
-#endif
-#if PASS == 1
 layout(std430, binding = STORAGE_BEST) buffer Best { uint best[]; };
-#elif PASS == 2
-layout(binding = TEXTURE_BEST) uniform usamplerBuffer best;
-uint next_slot = item() * uint(SLOTS);
+#if LISTS
+layout(std430, binding = STORAGE_HITS) writeonly buffer Hits { uint hits[]; };
+uniform uint slots;  // of each item
+uint next_slot = item() * slots;
+#endif
 #endif
 
 void visit(uint cell, uint key, uint item_id) {
 #if PASS == 0
     atomicMin(keys[cell], key);
 #else
-#if PASS == 2
+#if LISTS
     uint slot = next_slot++;
 #endif
     if (texelFetch(keys, int(cell)).r != key) return;
-#if PASS == 1
     atomicMin(best[cell], item_id);
-#else
-    if (texelFetch(best, int(cell)).r == item_id) list[slot] = cell;
+#if LISTS
+    hits[slot] = cell;
 #endif
 #endif
 }

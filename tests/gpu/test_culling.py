@@ -86,6 +86,25 @@ def test_pictures_are_the_same_to_the_bit(renderer: Renderer, order: str, size: 
     assert tested >= len(views), "most of them, in both turns"
 
 
+@pytest.mark.parametrize("order", ["bands", "chance"])
+def test_close_ups_list_the_pixels_of_chunks_in_view(renderer: Renderer, order: str) -> None:
+    cloud = shells(order)
+    surface, fresh = (Surface(renderer.gpu, (500, 330)) for _ in range(2))
+    request = request_of(cloud, looking(cloud, 0), 1)
+    in_order(renderer, request, surface)
+    for azimuth in (0, 3, 50):
+        near = replace(request, camera=looking(cloud, azimuth, fov_y=3.0))
+        render_frame(renderer, near, surface)
+        assert {"pixels", "points"} <= surface.stats.skipped.keys()
+        fresh.drawn = {}
+        render_frame(renderer, near, fresh)
+        assert "pixels" not in fresh.stats.skipped
+        for name in ("depth", "id", "color"):
+            np.testing.assert_array_equal(getattr(surface, name), getattr(fresh, name))
+        np.testing.assert_array_equal(surface.image(), fresh.image())
+        assert (surface.id != 0xFFFFFFFF).sum() > 1000
+
+
 def test_what_is_hidden_or_beside_the_picture_is_not_drawn(renderer: Renderer) -> None:
     cloud = shells("bands")
     surface = Surface(renderer.gpu, (600, 400))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,24 +53,31 @@ class Visits:
             self.listed.run(program)
 
 
+class Hits(NamedTuple):
+    """A list to be filled with the cells that were hit, some of them more than once, and slots that are none.
+    slots: how many cells an item visits at most."""
+
+    cells: IndexList
+    slots: int
+
+
 def scatter(
     gpu: Gpu,
     visits: Visits,
     keys: gl.BufferTexture,
     best: gl.BufferTexture,
-    *,
-    cleared: bool = False,
+    hits: Hits | None = None,
 ) -> None:
     """Keep the least key of those that visit a cell, then the lowest item that has it.
 
     visits: their keys are below +inf bits. keys, best: one R32UI texel a cell; +inf bits and 0xFFFFFFFF where
-    nothing went. cleared: whether all of them hold that already.
+    nothing went. hits: is filled with the cells that were hit; all of them are clear then.
     """
-    if not cleared:
+    if hits is None:
         gl.clear_words(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
         gl.clear_words(best.buffer, NOTHING)
     take_keys(gpu, visits, keys)
-    take_items(gpu, visits, keys, best)
+    take_items(gpu, visits, keys, best, hits)
 
 
 def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:
@@ -79,40 +87,26 @@ def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:
         keys.buffer.bind_to_storage_buffer(Storage.KEYS)
 
     with gpu.timers.measure("depth"):
-        visits.send(gpu, "scatter/best.glsl", bind, PASS=0)
+        visits.send(gpu, "scatter/best.glsl", bind, PASS=0, LISTS=0)
 
 
-def take_items(gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.BufferTexture) -> None:
+def take_items(
+    gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.BufferTexture, hits: Hits | None = None
+) -> None:
     """The second step of `scatter`: where keys hold the least ones already, keep the lowest item that has its
     cell's."""
 
-    def bind(_: Program) -> None:
+    def bind(program: Program) -> None:
         keys.bind(Texture.KEYS)
         best.buffer.bind_to_storage_buffer(Storage.BEST)
+        if hits is not None:
+            gpu.set(program, slots=hits.slots)
+            hits.cells.texels.buffer.bind_to_storage_buffer(Storage.HITS)
 
+    if hits is not None:
+        hits.cells.clear_slots(hits.slots * visits.count)
     with gpu.timers.measure("id"):
-        visits.send(gpu, "scatter/best.glsl", bind, PASS=1)
-
-
-def list_hits(
-    gpu: Gpu,
-    visits: Visits,
-    keys: gl.BufferTexture,
-    best: gl.BufferTexture,
-    listed: IndexList,
-    slots: int,
-) -> None:
-    """List the cells that were hit, after `scatter`, in slots of the list; those that are not needed hold
-    0xFFFFFFFF. slots: how many cells an item visits at most."""
-    listed.clear_slots(slots * visits.count)
-
-    def bind(_: Program) -> None:
-        keys.bind(Texture.KEYS)
-        best.bind(Texture.BEST)
-        listed.bind()
-
-    with gpu.timers.measure("list"):
-        visits.send(gpu, "scatter/best.glsl", bind, PASS=2, SLOTS=slots)
+        visits.send(gpu, "scatter/best.glsl", bind, PASS=1, LISTS=int(hits is not None))
 
 
 @dataclass(frozen=True)

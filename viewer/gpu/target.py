@@ -161,7 +161,7 @@ class RenderTarget:
 
     def start_listed(self) -> IndexList:
         """Clear the picture, depths and rows, for a backend that lists the pixels that it covers at less than
-        the cost of looking at every pixel; that list, whose slots may be no pixel, 0xFFFFFFFF.
+        the cost of looking at every pixel; that list, whose slots may be no pixel, 0xFFFFFFFF, or the same.
 
         Where the picture before was listed as well, its pixels alone are cleared.
         """
