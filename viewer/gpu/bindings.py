@@ -127,7 +127,7 @@ class Storage(IntEnum):
     # Scatter, beside a list; what says which cells are visited has those from 4 on.
     KEYS = 0
     BEST = 1
-    HITS = 4  # cells that were hit
+    HITS = 7  # cells that were hit
     # Chunks of points, beside a list.
     FARTHEST_TILES = 0
     SEEN = 4
