@@ -188,6 +188,7 @@ def test_the_theme_changes_the_panels_and_what_is_behind_the_scan(app: RunningAp
         assert np.median(light[part]) > 230
     screen.do("key", "t")
     app.settle()
+    app.see(counted=True)
     assert (screen.picture() == dark).all()
 
 

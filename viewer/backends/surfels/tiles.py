@@ -40,9 +40,9 @@ _FEW = 4  # pixels of the box of a disc that is sent to them: a square that the 
 _SENT = "0xFFFFFFFFu"  # what cells.glsl says in place of the parts that such a disc reaches
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
-# Entries of one tile's list: of more, sums of light could exceed 32 bits (31 x 4095 each); llvmpipe ends all
-# loops of an invocation after 65 535 turns, and a pass may go over its list twice, with 73 turns for 64
-# entries; on hardware a pixel alone with so many would be slow.
+# Entries of one tile's list, or of both where they are blended together: of more, sums of light could exceed 32
+# bits (31 x 4095 each); llvmpipe ends all loops of an invocation after 65 535 turns, and a pass may go over its
+# list twice, with 73 turns for 64 entries; on hardware a pixel alone with so many would be slow.
 _LONGEST = 28_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
 _LARGE_HEAD = 24  # bytes before the rows of large discs
@@ -66,7 +66,7 @@ class TileLists:
         self._gpu = gpu
         self.grid = grid = _grid(gpu)
         self.tiles = (-(-size[0] // grid.tile[0]), -(-size[1] // grid.tile[1]))
-        self.length = self.discs = self.large = self.sent = 0
+        self.length = self.discs = self.large = self.sent = self._longest = 0
         self.away = False
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
@@ -135,8 +135,9 @@ class TileLists:
             large, self.length, away, longest, sent, discs = struct.unpack("6I", words)
             if not second:
                 self.large, self.away, self.sent, self.discs = large, bool(away), sent, discs
+                self._longest = longest
         entries = self.length + discs
-        if entries > gpu.max_storage_bytes // 4 or longest > _LONGEST:
+        if entries > gpu.max_storage_bytes // 4 or longest + both * self._longest > _LONGEST:
             return False
 
         def bind_homes(program: Program) -> None:
