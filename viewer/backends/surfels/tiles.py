@@ -40,9 +40,9 @@ _FEW = 4  # pixels of the box of a disc that is sent to them: a square that the 
 _SENT = "0xFFFFFFFFu"  # what cells.glsl says in place of the parts that such a disc reaches
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
 _ROOM = 4  # entries of the list for each point, to begin with
-# Entries of one tile's list, or of both where they are blended together: of more, sums of light could exceed 32
-# bits (31 x 4095 each); llvmpipe ends all loops of an invocation after 65 535 turns, and a pass may go over its
-# list twice, with 73 turns for 64 entries; on hardware a pixel alone with so many would be slow.
+# Entries of one tile's list, or of both where they are blended together: of more, sums of light could exceed
+# 32 bits (31 x 4095 each); llvmpipe ends all loops of an invocation after 65 535 turns, and a pass may go
+# over its list twice, with 73 turns for 64 entries; on hardware a pixel alone with so many would be slow.
 _LONGEST = 28_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
 _LARGE_HEAD = 24  # bytes before the rows of large discs
