@@ -150,6 +150,28 @@ def test_a_scan_of_one_frame_is_measured(run: Run) -> None:
     assert [row["state"] for row in table(Path("out.csv"))] == 3 * ["placed"]
 
 
+def test_previews_are_told_and_not_measured(run: Run) -> None:
+    def write(*states: str) -> None:
+        points = [
+            {"label": name, "position": [0, 0, 10.3], "positionStatus": status}
+            for name, status in zip("ab", states, strict=True)
+        ]
+        markup = {"type": "Fiducial", "coordinateSystem": "LPS", "controlPoints": points}
+        Path("m.mrk.json").write_text(json.dumps({"markups": [markup]}))
+
+    write("preview", "defined")
+    done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "out.csv")
+    assert done.code == 0, done.err
+    assert "m.mrk.json: 1 is a preview, which nobody has confirmed, such as 'a'" in done.err
+    assert {row["name"] for row in table(Path("out.csv")) if row["state"]} == {"b"}
+    write("preview", "preview")
+    done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "none.csv")
+    assert done.code == 2
+    assert "2 are previews, which nobody has confirmed" in done.err
+    assert "has no landmark that is placed" in done.err
+    assert not Path("none.csv").exists()
+
+
 def test_measures_are_read_as_toml_and_those_without_landmarks_are_left_out(run: Run) -> None:
     Path("m.toml").write_text(
         '[[measures]]\nname = "there"\nkind = "curve"\nlandmarks = ["a", "Ж", "c"]\n'

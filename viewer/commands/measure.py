@@ -221,7 +221,7 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
 
 def _check_place(args: Namespace, found: LandmarkSet, timeline: Timeline) -> None:
     """Raise InputError where landmarks are not of this scan, or there are none."""
-    if not found.is_defined.any() and not np.isfinite(found.positions).any():
+    if not found.is_defined.any():
         raise InputError("has no landmark that is placed", args.landmarks, "Place some in the window first")
     last = int(found.frames[-1])
     if found.is_framed and last >= len(timeline):
@@ -240,7 +240,7 @@ def _on_surface(args: Namespace, found: LandmarkSet, timeline: Timeline, frame: 
     frames = found.frames if found.is_framed or len(found) > 1 else np.array([frame])
     positions, moves, astray = found.positions.copy(), [0.0], []
     for row, index in enumerate(frames.tolist()):
-        columns = np.flatnonzero(np.isfinite(positions[row]).all(axis=1))
+        columns = np.flatnonzero(found.is_defined[row])
         if index >= len(timeline) or not len(columns):
             continue
         surface = surface_of(timeline, timeline.visit(index))

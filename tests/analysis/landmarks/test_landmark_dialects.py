@@ -85,7 +85,10 @@ def test_states_of_markups(tmp_path: Path) -> None:
     placed, pending = Known.PLACED, Known.PENDING
     np.testing.assert_array_equal(found.known[0], [placed, pending, pending, pending, placed, pending])
     np.testing.assert_array_equal(found.positions[0, 1], [1, 2, 3])  # a preview
-    assert found.told == ("2 are said to be defined without a position, such as 'd'",)
+    assert found.told == (
+        "2 are said to be defined without a position, such as 'd'",
+        "1 is a preview, which nobody has confirmed, such as 'b'",
+    )
 
 
 def test_several_markups_in_one_file(tmp_path: Path) -> None:

@@ -69,6 +69,15 @@ def test_landmarks_of_another_scan_are_told(factor: float, words: str | None) ->
         assert words in told
 
 
+def test_landmarks_that_any_unit_would_shrink_into_the_scan_tell_none() -> None:
+    """A scan about the origin has room for landmarks of any other, made small enough."""
+    about_the_origin = Bounds(np.full(3, -50.0), np.full(3, 50.0))
+    points = 1000.0 + 20 * np.random.default_rng(2).random((1, 9, 3))
+    told = told_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, unit="mm"), about_the_origin)
+    assert told is not None
+    assert told.endswith("they are of another scan")
+
+
 def test_one_place_that_is_off_is_told() -> None:
     points = np.full((1, 9, 3), 100.0) + np.array([0, 0, 450])
     points[0, 3] += 400

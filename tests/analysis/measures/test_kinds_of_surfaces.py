@@ -135,6 +135,23 @@ def test_noise_is_smoothed_away() -> None:
     assert path.value == pytest.approx(2 * R * CAP, rel=5e-3)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("noise", "most"), [(0.0, 2e-3), (0.2, 5e-3)])
+def test_paths_on_a_sphere_of_100_mm_of_40_000_points_are_as_long_as_great_circles(
+    noise: float, most: float
+) -> None:
+    """Ends by chance, 35 to 120 mm apart. noise: mm."""
+    surface = PoseSurface(pose_of(sphere_points(40_000, 100.0, noise, seed=2)))
+    rng = np.random.default_rng(3)
+    for turn in (0.35, 0.7, 1.2):
+        one, other = np.linalg.qr(rng.standard_normal((3, 2)))[0].T
+        ends = 100 * np.array([one, np.cos(turn) * one + np.sin(turn) * other])
+        path = found(surface, "path", ends)
+        assert path is not None
+        assert path.value == pytest.approx(100 * turn, rel=most)
+        assert abs(path.value - 100 * turn) < 3 * path.deviation
+
+
 def box_of_faces(count: int) -> tuple[np.ndarray, np.ndarray]:
     """An open box of edge 10, its five sides of count x count squares."""
     quads: list[list[int]] = []

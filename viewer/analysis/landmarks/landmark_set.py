@@ -19,6 +19,9 @@ _TURNED = np.array([-1.0, -1.0, 1.0])  # from RAS to LPS, and back
 _FACTORS = (1000.0, 0.001, 10.0, 0.1, 25.4, 1 / 25.4)  # between units that people mix up
 _MOST_CELLS = 1 << 22  # landmarks times frames
 _ALL = 0.8  # of the landmarks, for which a reason may be told
+_WIDE = (
+    0.2  # of a scan's radius, that landmarks span at least: shrunk enough, any lie in a box about the origin
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +243,9 @@ def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
         return None
     if fits(points * _TURNED):
         return "with x and y turned they lie on it, so that one of the two is in RAS and the other in LPS"
+    span = float(np.linalg.norm(np.ptp(points, axis=0)))
     for factor in _FACTORS:
-        if fits(points * factor):
+        if factor * span >= _WIDE * bounds.radius and fits(points * factor):
             return f"{factor:.4g} times as large they lie on it, so that they are in another unit"
     return None
 

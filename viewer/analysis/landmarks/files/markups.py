@@ -86,7 +86,7 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
     count = len(points)
     positions = np.full((count, 3), np.nan)
     known, sigmas = np.full(count, Known.PENDING, np.uint8), np.full(count, np.nan)
-    names, about, lost = [], [], []
+    names, about, lost, previews = [], [], [], []
     for row, point in enumerate(points):
         at = f"{where}, control point {row + 1}"
         if not isinstance(point, dict):
@@ -109,9 +109,14 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
         if status == "defined" and not np.isfinite(positions[row]).all():
             known[row] = Known.PENDING
             lost.append(names[-1])
+        if known[row] == Known.PENDING and np.isfinite(positions[row]).all():
+            previews.append(names[-1])
     told = []
     if lost:
-        told = [f"{len(lost)} are said to be defined without a position, such as '{shortened(lost[0])}'"]
+        told.append(f"{len(lost)} are said to be defined without a position, such as '{shortened(lost[0])}'")
+    if previews:
+        are = "is a preview" if len(previews) == 1 else "are previews"
+        told.append(f"{len(previews)} {are}, which nobody has confirmed, such as '{shortened(previews[0])}'")
     name = _word(markup.get("name"))
     if len(points) == 1 and not names[0]:
         names[0] = name
