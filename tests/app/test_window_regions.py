@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from virtual_screen import PANEL, RunningApp, Screen, State, running_app
 
-from viewer.app.tools.plotting.lasso import FEWEST, MOST, corners_of
+from viewer.app.tools.plotting.lasso import FEWEST, MOST, corners_of, without_overlap
 from viewer.output.plots import PLOT_COLORS
 
 SIDE, HEIGHT, STEP = 41, 30.0, 2.0  # points along a side, between two sheets, between points; scan units
@@ -39,13 +39,15 @@ def scan(tmp_path: Path) -> Path:
 
 
 def drag_round(app: RunningApp, radius: float) -> None:
-    """Drag a square round the middle of the view. radius: half its side, pixels."""
+    """Drag a square round the middle of the view, to the pixel where it began. radius: half its side,
+    pixels."""
     left, top, width, height = app.view()
     x, y = left + width // 2, top + height // 2
-    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -0.9))
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
     places = [(x + radius * a, y + radius * b) for a, b in corners]
     shares = np.linspace(0.2, 1, 5)
     between = [(a + s * (c - a), b + s * (d - b)) for (a, b), (c, d) in pairwise(places) for s in shares]
+    app.screen.do("mousemove", x, y)  # where it was already, it would not move: actions by name take it away
     app.drag(places[0], *between)
 
 
@@ -123,4 +125,8 @@ def test_corners_tell_the_form_of_an_outline() -> None:
     )
     assert {0, 50, 100, 150} <= set(corners_of(square).tolist())
     assert corners_of(circle[:2]).tolist() == [0, 1]
+    again = np.concatenate([circle, circle[:1] + 1e-3, circle[:1]])
+    np.testing.assert_array_equal(without_overlap(again), circle[:-1])
+    assert len(without_overlap(np.zeros((9, 3)))) == 1
+    assert len(without_overlap(np.zeros((0, 3)))) == 0
     assert len(corners_of(np.zeros((9, 3)))) <= MOST

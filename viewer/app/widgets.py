@@ -270,6 +270,13 @@ def unhidden(text: str) -> str:
     return text.replace("#", "#\u200b")
 
 
+def is_click() -> bool:
+    """Whether the mouse has hardly been moved since the left button was pressed; not so of a drag that has
+    come back to where it began."""
+    io = imgui.get_io()
+    return bool(io.mouse_drag_max_distance_sqr[0] < io.mouse_drag_threshold**2)
+
+
 def fitted(text: str, width: float) -> str:
     """Shorten a text to what there is room for, with an ellipsis where it is not all."""
     if imgui.calc_text_size(text).x <= width:

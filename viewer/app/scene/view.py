@@ -11,7 +11,7 @@ from ...camera import Camera
 from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
-from .. import notices, theme
+from .. import notices, theme, widgets
 from . import cube, navigation, up_menu
 from .canvas import ViewPlace
 
@@ -87,7 +87,7 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
             app.tools.press(imgui.get_mouse_pos())
         app.steering.gesture = None if app.tools.is_dragging else _gesture(io)
         app.steering.turntable.stop()
-    elif gesture == "orbit" and app.tools.clicking and _is_click():
+    elif gesture == "orbit" and app.tools.clicking and widgets.is_click():
         pass  # so that a click does not turn the view
     elif gesture:
         # The move that ends with the release counts as well, that of the press does not.
@@ -100,22 +100,16 @@ def _take_drag(app: App, size: ImVec2, radius: float) -> None:
 def _serve_tools(app: App, size: ImVec2) -> None:
     """Let tools have their clicks, and draw over the picture."""
     is_hovered = imgui.is_item_hovered()
-    if app.tools.is_dragging and not _is_click():
+    if app.tools.is_dragging and not widgets.is_click():
         app.tools.drag(_pixel(app), ends=imgui.is_item_deactivated())
     elif app.tools.clicking and is_hovered:
         imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
         is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
         is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click
-        if is_released and is_first and _is_click() and not imgui.get_io().key_shift:
+        if is_released and is_first and widgets.is_click() and not imgui.get_io().key_shift:
             app.tools.click(_pixel(app))
     if camera := app.document.camera:
         app.tools.draw_over(ViewPlace(app.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered))
-
-
-def _is_click() -> bool:
-    """Whether the left button has hardly been moved since it was pressed."""
-    moved = imgui.get_mouse_drag_delta(0)
-    return not (moved.x or moved.y)
 
 
 def _take_wheel(app: App, size: ImVec2, radius: float) -> None:

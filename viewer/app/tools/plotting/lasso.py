@@ -62,7 +62,7 @@ class Lasso:
             self._places.append(click.picked.place)
         self._desk.redraw()
         if ends:
-            places = np.array(self._places)
+            places = without_overlap(np.array(self._places).reshape(-1, 3))
             self._places.clear()
             self._add(places)
 
@@ -103,6 +103,16 @@ class Lasso:
     def prompt(self) -> str:
         """The words that say what a drag does."""
         return "Region: press on the surface, go round it, let go.  Esc ends."
+
+
+def without_overlap(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """An outline, (M, 3), without its end as far as that has come back to its beginning: to less than 3 % of
+    its width."""
+    if not len(places):
+        return places
+    away = np.linalg.norm(places - places[0], axis=1)
+    is_away = np.flatnonzero(away > _OFF * away.max())
+    return places[: is_away[-1] + 1] if len(is_away) else places[:1]
 
 
 def corners_of(places: NDArray[np.float64]) -> NDArray[np.intp]:

@@ -224,17 +224,11 @@ def _draw_playhead(tool: Tool, plot: CurvePlot) -> int | None:
     )
     is_hovered = implot.is_plot_hovered()
     at = nearest(times, implot.get_plot_mouse_pos().x)
-    is_clicked = is_hovered and imgui.is_mouse_released(0) and _is_still()
+    is_clicked = is_hovered and imgui.is_mouse_released(0) and widgets.is_click()
     wanted = nearest(times, x) if moved else at if is_clicked else index
     if wanted != desk.index:
         desk.seek(wanted)
     return at if is_hovered and not (is_over or is_held) else None
-
-
-def _is_still() -> bool:
-    """Whether the left button has hardly been moved since it was pressed."""
-    moved = imgui.get_mouse_drag_delta(0)
-    return not (moved.x or moved.y)
 
 
 def nearest(times: np.ndarray, time: float) -> int:
