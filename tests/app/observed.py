@@ -93,6 +93,7 @@ def is_idle(app: App) -> bool:
         app.window.due, playback.player.playing, playback.waiting, app.steering.turntable.is_on,
         app.glide.is_on,
         app.tasks.all, app.tools.followed.is_busy, app.scans.waits, app.browser.waits,
+        app.choosing.is_due,
         playback.pose is not None and not app.viewport.is_complete,
         playback.pose is not None and not (app.viewport.is_refined or app.steering.moves),
     )  # fmt: skip

@@ -6,12 +6,15 @@ from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from viewer.app.playing.playback import Playback
 from viewer.app.scene.rendering import Rendering
 from viewer.app.session import Session, edit_name
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.choice.goal import Goal
+from viewer.choice.ways import DrawingWay
 from viewer.document.document import Bookmark, Document
 from viewer.document.saved_session import SavedSession
 from viewer.look import Look
@@ -107,6 +110,70 @@ def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> No
             rendering.tell_missing(BARE)
     assert told == ["This Scan4D has no renderer 'gone': Points draws in its place."]
     assert session.document == document, "it comes back where the renderer is there"
+
+
+ONE_PASS = DrawingWay("surfels", {"passes": "one"})
+
+
+def test_what_is_chosen_automatically_stands_in_for_what_the_user_chose() -> None:
+    own = Document(camera=Camera(), backend="points").with_params("points", LARGE)
+    document = replace(own, goal=Goal("time", 50.0))
+    assert document.chosen(BARE) == own.chosen(BARE), "until one is chosen"
+    document = replace(document, way=ONE_PASS)
+    assert document.chosen(BARE) == ("surfels", backend("surfels").params({"passes": "one"}))
+    assert document.defaults(BARE) == ("surfels", backend("surfels").params())
+    assert document.drawn_by("points").chosen(BARE) == own.chosen(BARE)
+    assert replace(document, goal=None).chosen(BARE) == own.chosen(BARE)
+
+
+def test_a_scan_begins_with_the_goal_of_the_one_before_and_chooses_anew() -> None:
+    session = Session("one", Document(camera=Camera(), goal=Goal("time", 50.0), way=ONE_PASS))
+    session.turn_to("two")
+    assert session.document == Document(goal=Goal("time", 50.0))
+
+
+@pytest.mark.parametrize("act", ["renderer", "parameter", "switch off", "defaults"])
+def test_the_automatic_choice_ends_with_what_is_done_by_hand_and_comes_back_by_undo(act: str) -> None:
+    document = Document(camera=Camera(), backend="points").with_params("points", LARGE)
+    session = Session("demo", document)
+    with closing(open_scan("demo")) as timeline:
+        playback = Playback(timeline, session)
+        playback.pose = timeline.pose(0)
+        rendering = Rendering(session, playback, str)
+        rendering.aim(Goal("time", 50.0))
+        session.amend(way=ONE_PASS)
+        aimed = session.document
+        two = backend("surfels").params({"passes": "two"})
+        {
+            "renderer": lambda: rendering.choose("voxels"),
+            "parameter": lambda: rendering.edit_params(two),
+            "switch off": lambda: rendering.aim(None),
+            "defaults": rendering.reset,
+        }[act]()
+    expected = {
+        "renderer": document.drawn_by("voxels"),
+        "parameter": document.drawn_by("surfels").with_params("surfels", two),
+        "switch off": document,
+        "defaults": replace(document.drawn_by(None), params={}),
+    }
+    assert session.document == expected[act]
+    session.history.undo()
+    assert session.document == aimed
+    session.history.undo()
+    assert session.document == document
+    session.history.redo()
+    assert session.document == aimed
+
+
+def test_bounds_that_follow_one_another_are_one_step() -> None:
+    session = Session("demo")
+    with closing(open_scan("demo")) as timeline:
+        rendering = Rendering(session, Playback(timeline, session), str)
+        for bound in (50.0, 40.0, 30.0):
+            rendering.aim(Goal("time", bound))
+    assert session.document.goal == Goal("time", 30.0)
+    session.history.undo()
+    assert session.document.goal == Goal("time", 50.0)
 
 
 def moved(x: float) -> Rigid:

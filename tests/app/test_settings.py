@@ -23,6 +23,7 @@ from viewer.app.session import Session, known_as
 from viewer.app.settings import Settings, load, save
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.choice.goal import Goal
 from viewer.document.document import Bookmark
 from viewer.document.saved_session import SavedSession, keep, kept
 from viewer.look import Look
@@ -46,6 +47,7 @@ FULL = Settings(
     recent=("/scans/b", "demo"),
     panel=PanelChoices(30.0, {"Statistics": True}),
     drawer=22.5,
+    goal=Goal("error", 0.5, "px"),
     glide=False,
     slow_devices=("llvmpipe",),
     welcomed=True,
@@ -128,6 +130,8 @@ def changed(change: Callable[[dict[str, Any]], object]) -> Settings:
         (lambda data: data["window"].update(left=10**9), {"window": None}),
         (lambda data: data.update(text_scale=77), {"text_scale": 1.0}),
         (lambda data: data.update(backend="gone"), {"backend": None}),
+        (lambda data: data["goal"].update(bound=-1), {"goal": None}),
+        (lambda data: data["goal"].update(kind="speed"), {"goal": None}),
         (lambda data: data["params"].update(gone={"x": 1}), {}),
         (lambda data: data["params"]["points"].update(point_size="big", gone=3), {
             "params": {"points": backend("points").params()}
@@ -176,7 +180,7 @@ def test_a_scan_that_was_never_open_is_drawn_as_the_last_one() -> None:
         "Go on", camera=CAMERA, params={**session.document.params, "of a backend that is gone": {}}
     )
     kept = Settings.of(session)
-    for name in ("backend", "params", "look", "pace"):
+    for name in ("backend", "params", "goal", "look", "pace"):
         assert getattr(kept, name) == getattr(FULL, name), name
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from range_scenes import sphere_view
@@ -10,9 +12,9 @@ from test_model import seen, true_law
 
 from viewer.backends import backends
 from viewer.camera import Camera
-from viewer.choice.choose import best, choose_way
+from viewer.choice.choose import Candidate, Comparison, best, choose_way
 from viewer.choice.goal import PIXELS, Goal
-from viewer.choice.model import Law, Model
+from viewer.choice.model import Expected, Law, Model
 from viewer.choice.seen import ScanInView
 from viewer.choice.ways import SCALES, DrawingWay, ways
 from viewer.frame import Request, view_of
@@ -75,6 +77,54 @@ def test_the_best_is_the_best_of_all() -> None:
         else:
             nearest = min(one.ms * late for late, one in tried)
             assert choice.expected.ms * model[choice.way.key].late == nearest
+
+
+def compared(goal: Goal, *numbers: tuple[float, float]) -> Comparison:
+    """A comparison of ways called 0, 1 and so on. numbers: time and error of each; the goal bounds the time,
+    which is as it is expected to be."""
+    return Comparison(
+        goal, 1.0,
+        tuple(
+            Candidate(DrawingWay(str(number)), Expected(ms, error), ms, error)
+            for number, (ms, error) in enumerate(numbers)
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("present", "numbers", "settled"),
+    [
+        (None, [(20, 1.0), (30, 0.95)], 1),  # nothing is there yet: the best
+        (7, [(20, 1.0), (30, 0.95)], 1),  # what is there cannot be compared
+        (0, [(20, 1.0), (30, 0.95)], 0),  # hardly better
+        (0, [(20, 1.0), (30, 0.8)], 1),  # clearly better
+        (0, [(20, 1.0), (48, 0.5)], 0),  # clearly better, but hardly in time
+        (0, [(51, 1.0), (48, 2.0)], 1),  # late
+        (0, [(60, 1.0), (55, 2.0)], 0),  # all are late, and it hardly more than the nearest
+        (0, [(90, 1.0), (55, 2.0)], 1),  # clearly more
+        (1, [(20, 1.0), (30, 1.0)], 1),  # as good, if slower
+    ],
+)
+def test_what_is_chosen_stays_unless_another_way_is_clearly_better(
+    present: int | None, numbers: list[tuple[float, float]], settled: int
+) -> None:
+    comparison = compared(Goal("time", 50.0), *numbers)
+    way = None if present is None else DrawingWay(str(present))
+    assert comparison.settled(way).way == DrawingWay(str(settled))
+
+
+def test_a_view_that_moves_to_and_fro_keeps_its_renderer() -> None:
+    """The best way takes 49 and 51 ms in turn, of 50 that there are."""
+    views = [compared(Goal("time", 50.0), (ms, 0.5), (20, 1.0)) for ms in (49.0, 51.0) * 20]
+    best_ways = [comparison.best().way for comparison in views]
+    assert all(one != other for one, other in pairwise(best_ways)), "so the test tells something"
+    way, changes = views[0].best().way, 0
+    for comparison in views:
+        choice = comparison.settled(way)
+        assert choice.keeps
+        changes += choice.way != way
+        way = choice.way
+    assert changes == 1
 
 
 def pose_of(cloud: PointCloud) -> tuple[Pose, View]:

@@ -22,6 +22,8 @@ from viewer.analysis.measure import Measurement
 from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.choice.goal import Goal
+from viewer.choice.ways import DrawingWay
 from viewer.document import saved_session
 from viewer.document.document import Bookmark, Document
 from viewer.document.measurements import Measurements
@@ -38,6 +40,7 @@ ENDS = Spot(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), Spot(2, 0.08, (1, 2, 
 FULL = Document(
     camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
+    goal=Goal("time", 1 / 3), way=DrawingWay("surfels", {"passes": "one"}),
     unit="mm", shown_unit="cm", front=-30.0, span=(2, 7), fps=30.0, times_by_names=True,
     bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
     parts={"measurements": Measurements((Measurement(*ENDS), Measurement(*ENDS[::-1])))},
@@ -161,6 +164,10 @@ UNREADABLE = [
     (("params", "points", "point_size"), 99, "params.points"),
     (("params", "points", "blur"), 1, "params.points"),
     (("params",), [1], "params"),
+    (("goal", "bound"), 0, "goal"),
+    (("goal", "kind"), "speed", "goal"),
+    (("way", "backend"), "gone", "way"),
+    (("way", "values"), {"passes": "nine"}, "way"),
     (("unit",), " ", "unit"),
     (("bookmarks", 1, "name"), 3, "bookmarks"),
     (("bookmarks", 0, "colour"), "#ffffff", "bookmarks"),
@@ -216,7 +223,7 @@ def test_fields_of_a_session_that_are_not_known_are_kept_in_its_document() -> No
 def test_parameters_that_cannot_be_read_as_a_whole_draw_with_those_that_can() -> None:
     data = json.loads(json.dumps(SESSION.to_json()))
     data["document"]["params"]["points"] |= {"blur": 1}
-    document = SavedSession.from_json(data, "a").document
+    document = SavedSession.from_json(data, "a").document.drawn_by("points")
     pose = Pose(0, 0.0, "a", PointCloud.from_arrays(np.eye(3)))
     assert document.chosen(pose) == ("points", FULL.params["points"])
 

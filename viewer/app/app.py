@@ -53,6 +53,7 @@ from .playing.playback import Playback
 from .playing.ranging import Ranging
 from .playing.thumbnails import Thumbnails
 from .scene.bookmarks import Bookmarks
+from .scene.choosing import Choosing
 from .scene.counting import Counting
 from .scene.full_view import FullView
 from .scene.glide import Glide
@@ -77,7 +78,7 @@ class App:
     session: what the user has chosen. playback: the scan. ahead: has its poses prepared. pacing: of its
     frames. ranging: of colours, over its frames. thumbnails: of its frames, over the timeline.
     renderer: what is on the GPU. viewport: the 3D view. marks: what lies over it. rendering: which backend
-    draws it.
+    draws it. choosing: that one, automatically.
     steering: what moves its camera. glide: how the picture follows that. pointer: what the mouse points at in
     it. bookmarks: cameras to go back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
@@ -146,6 +147,7 @@ class App:
         )
         self.pointer: Pointer = Pointer(self.viewport, self.playback)
         self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
+        self.choosing: Choosing = Choosing(self.session, self.playback, self.viewport)
         self.steering: Steering = Steering(
             self.session, self.playback, self.viewport, self.pointer, remembered.cube,
             remembered.turn_seconds, up is not None, self.note,
@@ -164,6 +166,7 @@ class App:
         self.capture: Capture = Capture(
             self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
             lambda *film: self.exporting.film(*film), self.ranging.words, self.tools.drawn,
+            self.choosing.choice_of,
         )  # fmt: skip
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(

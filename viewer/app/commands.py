@@ -368,6 +368,10 @@ _TOOLS: Menu[App] = Menu("Tools", (
         Listing("Renderer", _renderers),
         Command("backend", "Next renderer", lambda app: app.rendering.step(1), "B"),
         Command("backend_before", "Renderer before", lambda app: app.rendering.step(-1), "Shift+B"),
+        Command(
+            "automatic", "Automatic renderer", lambda app: app.rendering.switch_automatic(),
+            is_on=lambda app: app.document.goal is not None, can=lambda app: not app.choosing.why_not,
+        ),
         _SWITCHES,
     ),
     (_PLAYBACK,),

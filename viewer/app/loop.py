@@ -85,6 +85,7 @@ class Loop:
             or app.browser.waits
             or app.capture.waits
             or app.thumbnails.waits
+            or app.choosing.waits
         )
         look = _AWAIT if waits else _WATCH
         changes = (
@@ -131,6 +132,7 @@ class Loop:
             ("Gliding", lambda: app.glide.is_on),
             ("Keeping the history", lambda: app.settle(now)),
             ("Advancing tools", app.tools.advance),
+            ("Choosing the renderer", lambda: app.choosing.advance(self._is_at_rest(now), now)),
             ("Counting", lambda: app.counting.advance(app.viewport, not app.moving, now)),
         ):
             with app.failures.told(name):
@@ -144,6 +146,12 @@ class Loop:
         changed |= report != self._reported
         self._reported = report
         return changed or now >= app.viewport.better_at(app.playback.player.playing)
+
+    def _is_at_rest(self, now: float) -> bool:
+        """Whether the view stays as it is."""
+        app = self._app
+        goes_on = app.moving or app.glide.is_on or app.replayer.replaying is not None
+        return app.steering.rests(now) and not goes_on
 
     def _take_dropped(self) -> None:
         app = self._app

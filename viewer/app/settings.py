@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from ..backends import backend
-from ..document.document import Document
+from ..document.document import Document, KeptGoal
 from ..document.saved_session import SavedSession
 from ..document.schema import (
     BackendName,
@@ -79,10 +79,10 @@ class Settings:
     """The choices that outlive the window.
 
     window: None until it was open once. backend: None for the scan's own default. params: backend ->
-    its `Params`. marks: over the view. marks_in_files: whether saved pictures have them. cube: whether the
-    orientation cube is shown. turn_seconds: of the turntable. export, export_marks: of the export dialog.
-    recent: the scans opened last, newest first. places: what earlier versions kept here of each scan, whose
-    documents have files of their own now.
+    its `Params`. goal: that it is chosen for automatically. marks: over the view. marks_in_files: whether
+    saved pictures have them. cube: whether the orientation cube is shown. turn_seconds: of the turntable.
+    export, export_marks: of the export dialog. recent: the scans opened last, newest first. places: what
+    earlier versions kept here of each scan, whose documents have files of their own now.
     panel: its width, and which of its sections are open. drawer: its height. glide: whether views glide.
     slow_devices: those of which the user was told that they draw in software. welcomed: whether the card of
     the first start was seen.
@@ -94,6 +94,7 @@ class Settings:
     text_scale: TextScale = 1.0
     backend: BackendName | None = None
     params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
+    goal: KeptGoal = None
     look: Look = field(default_factory=Look)
     pace: Pace = field(default_factory=Pace)
     marks: Marks = legend.SHOWN_FIRST
@@ -119,13 +120,13 @@ class Settings:
             name: of for name, of in now.params.items() if is_dataclass(of)
         }  # of backends that are there
         return cls(
-            backend=now.backend, params=params, look=now.look, pace=session.pace, **others
+            backend=now.backend, params=params, goal=now.goal, look=now.look, pace=session.pace, **others
         )  # fmt: skip
 
     @property
     def document(self) -> Document:
         """The document of a scan that was never open."""
-        return Document(look=self.look, backend=self.backend, params=self.params)
+        return Document(look=self.look, backend=self.backend, params=self.params, goal=self.goal)
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object."""

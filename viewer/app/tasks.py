@@ -102,7 +102,8 @@ class Tasks:
             look = request.look
             if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
                 look = replace(look, color_by=chosen.color_by)
-            self._session.change("Cancel preparing", backend=str(request.backend), look=look)
+            before = replace(self._session.document.drawn_by(str(request.backend)), look=look)
+            self._session.history.change("Cancel preparing", before)
 
     def draw(self, place: tuple[float, float, float, float], head: float) -> None:
         """Declare the work over the top of the 3D view.

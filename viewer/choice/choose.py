@@ -12,6 +12,9 @@ from .model import Expected, Law, Model
 from .seen import ScanInView
 from .ways import SCALES, DrawingWay, ways
 
+_CLEARLY = 1.2  # times as good: what is expected is off by 10 to 25 % of what a picture takes
+_ROOM = 0.9  # of the bound, which a way keeps that takes the place of one that keeps it too
+
 
 @dataclass(frozen=True)
 class Automatic:
@@ -49,6 +52,70 @@ class Choice:
         return f"expected {self.expected.ms:.0f} ms, off by {self.expected.error:.2g} px"
 
 
+@dataclass(frozen=True)
+class Candidate:
+    """A way that may draw a view, and what it is expected to take. bounded: the number that the goal bounds,
+    as large as it may be expected to become; other: the one that it does not, where less is better."""
+
+    way: DrawingWay
+    expected: Expected
+    bounded: float
+    other: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All ways that may draw a view, at least one, beside a goal, whose unit is the scan's where it is a
+    length. footprint: as of `Choice`."""
+
+    goal: Goal
+    footprint: float
+    candidates: tuple[Candidate, ...]
+
+    @classmethod
+    def of(cls, known: Iterable[DrawingWay], seen: ScanInView, goal: Goal, model: Model) -> Comparison:
+        """The comparison of some ways, all of which the model knows."""
+        candidates = []
+        for way in known:
+            law = model[way.key]
+            expected = law.expect(seen, way.scale)
+            other = expected.error if goal.kind == "time" else expected.ms
+            candidates.append(Candidate(way, expected, _bounded(expected, law, goal, seen), other))
+        return cls(goal, seen.footprint, tuple(candidates))
+
+    def best(self) -> Choice:
+        """The choice of the best one: see `choose_way`."""
+        return self._choice(min(self.candidates, key=self._rank))
+
+    def settled(self, present: DrawingWay | None) -> Choice:
+        """The choice where one is drawn with already: that stays, unless it misses the bound or another one
+        is clearly better and keeps the bound with room to spare; where none keeps it, unless another one is
+        clearly nearer. So a view that moves to and fro is not drawn now so, now so."""
+        now = next((each for each in self.candidates if each.way == present), None)
+        if now is None:
+            return self.best()
+        best = min(self.candidates, key=self._rank)
+        if self._keeps(now):
+            roomy = [each for each in self.candidates if each.bounded <= _ROOM * self.goal.bound]
+            best = min(roomy, key=self._rank, default=now)
+            is_clear = now.other > _CLEARLY * best.other
+        else:
+            is_clear = self._keeps(best) or now.bounded > _CLEARLY * best.bounded
+        return self._choice(best if is_clear else now)
+
+    def _keeps(self, candidate: Candidate) -> bool:
+        return candidate.bounded <= self.goal.bound
+
+    def _rank(self, candidate: Candidate) -> tuple[float, ...]:
+        missed = not self._keeps(candidate)
+        first = candidate.bounded if missed else candidate.other
+        return missed, first, candidate.other, candidate.bounded
+
+    def _choice(self, candidate: Candidate) -> Choice:
+        keeps = self._keeps(candidate)
+        return Choice(self.goal, candidate.way, candidate.expected, self.footprint, keeps)
+
+
 def choose_way(
     pose: Pose, view: View, goal: Goal, model: Model, scales: tuple[float, ...] = SCALES
 ) -> Choice | None:
@@ -57,26 +124,19 @@ def choose_way(
     Within a time: the least error, of those that are late in few pictures; within an error: the least time,
     likewise. Where none keeps the bound, the one that comes nearest.
     """
-    known = [way for way in ways(pose, scales) if way.key in model]
-    if not known:
-        return None
-    return best(known, ScanInView.of(pose, view), goal, model)
+    known = known_ways(pose, model, scales)
+    return Comparison.of(known, ScanInView.of(pose, view), goal, model).best() if known else None
+
+
+def known_ways(pose: Pose, model: Model, scales: tuple[float, ...] = SCALES) -> list[DrawingWay]:
+    """The ways of drawing a pose that a model knows."""
+    return [way for way in ways(pose, scales) if way.key in model]
 
 
 def best(known: Iterable[DrawingWay], seen: ScanInView, goal: Goal, model: Model) -> Choice:
     """The best of some ways, at least one, all of which the model knows. A goal in a unit of length is in the
     scan's."""
-    tries = []
-    for way in known:
-        law = model[way.key]
-        expected = law.expect(seen, way.scale)
-        bounded = _bounded(expected, law, goal, seen)
-        other = expected.error if goal.kind == "time" else expected.ms
-        missed = bounded > goal.bound
-        rank = (missed, bounded if missed else other, other, bounded)
-        tries.append((rank, way, expected, not missed))
-    _, way, expected, keeps = min(tries, key=lambda each: each[0])
-    return Choice(goal, way, expected, seen.footprint, keeps)
+    return Comparison.of(known, seen, goal, model).best()
 
 
 def _bounded(expected: Expected, law: Law, goal: Goal, seen: ScanInView) -> float:

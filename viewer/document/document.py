@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 import numpy as np
 
-from ..backends import backends
+from ..backends import backend, backends
 from ..camera import Camera
+from ..choice.goal import Goal
+from ..choice.ways import DrawingWay
 from ..errors import InputError, shortened
 from ..frame import Request, backend_for, colorable
 from ..geometry import UP, Vector, up_vector
@@ -19,6 +22,7 @@ from ..scan.pose import Pose
 from .part import Part
 from .schema import (
     DAMAGED,
+    BackendName,
     FrameRate,
     Kind,
     PoseNumber,
@@ -77,6 +81,25 @@ def _is_unreadable(kind: type | None, value: Any) -> bool:
     return kind is not None and not isinstance(value, kind) and _read_or_raw(kind, value) is value
 
 
+def _read_goal(data: Any) -> Goal | None:
+    goal = None if data is None else structured(Goal, data)
+    if goal is None or (goal.kind in ("time", "error") and 0 < goal.bound < math.inf and goal.unit):
+        return goal
+    raise InputError(f"is no bound of a time or an error but {shortened(data)}", hint=DAMAGED)
+
+
+def _read_way(data: Any) -> DrawingWay | None:
+    if data is None:
+        return None
+    told = structured(Values, data)
+    name, values = structured(BackendName, told.get("backend")), structured(Values, told.get("values", {}))
+    backend(name).params(values)
+    return DrawingWay(name, values)
+
+
+KeptGoal = Annotated[Goal | None, ReadBy(_read_goal)]
+
+
 @dataclass(frozen=True)
 class Document:
     """Everything that a user has chosen and made for a scan.
@@ -85,14 +108,16 @@ class Document:
     the camera's target. It is not made the target, as that would shift or turn the picture; the target moves
     along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for the scan's
     default, which also stands in for one that is not there. params: backend's name -> its `Params`, kept when
-    another backend is chosen. unit: what the user calls the scan's unit of length, None where the scan tells
-    or nobody does. shown_unit: that lengths are told in, None for the scan's own. front: degrees that the
-    front of the scan is turned about what is up. span: the first and the last frame that playing keeps to,
-    None for all. fps: frames a second as the user says, None as the scan does. times_by_names: whether the
-    names of the frames tell when they are. bookmarks: cameras to go back to. parts: name -> what a tool
-    keeps (see `Part`); of a tool that is not there, what its file said. unread: fields that are not known
-    here or could not be read -> what the file said, which is written again; so is what was made anew of
-    params and parts, under names such as "parts.measurements".
+    another backend is chosen. goal: what a way of drawing is chosen for automatically, None where the user
+    says which. way: that was chosen for it, None until one is; it stands in for backend and params, which
+    stay. unit: what the user calls the scan's unit of length, None where the scan tells or nobody does.
+    shown_unit: that lengths are told in, None for the scan's own. front: degrees that the front of the scan
+    is turned about what is up. span: the first and the last frame that playing keeps to, None for all. fps:
+    frames a second as the user says, None as the scan does. times_by_names: whether the names of the frames
+    tell when they are. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a
+    tool that is not there, what its file said. unread: fields that are not known here or could not be read ->
+    what the file said, which is written again; so is what was made anew of params and parts, under names such
+    as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.
@@ -103,6 +128,8 @@ class Document:
     look: Look = field(default_factory=Look)
     backend: Word | None = None
     params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
+    goal: KeptGoal = None
+    way: Annotated[DrawingWay | None, ReadBy(_read_way)] = None
     unit: Unit | None = None
     shown_unit: Unit | None = None
     front: float = 0.0
@@ -167,6 +194,10 @@ class Document:
         parts = others if part == type(part)() else {**others, part.part_name: part}
         return replace(self, parts=parts, unread=self._left("parts", part.part_name, type(part)))
 
+    def drawn_by(self, backend: str | None) -> Document:
+        """The document that a backend draws, None for the scan's default, however it was chosen before."""
+        return replace(self, backend=backend, goal=None, way=None)
+
     def with_params(self, backend: str, params: Any) -> Document:
         """The document with other parameters of a backend."""
         left = self._left("params", backend, type(params))
@@ -191,17 +222,26 @@ class Document:
     def for_another(self, up: str = UP) -> Document:
         """The document that a scan begins with which is opened after this one: drawn alike, all else anew.
         up: its up axis."""
-        return Document(look=replace(self.look, up=up), backend=self.backend, params=self.params)
+        look = replace(self.look, up=up)
+        return Document(look=look, backend=self.backend, params=self.params, goal=self.goal)
+
+    @property
+    def _automatic(self) -> DrawingWay | None:
+        """The way that was chosen, None where the backend is the user's or the scan's."""
+        return None if self.goal is None else self.way
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and the parameters that it begins with; the pose's
         default where the one that was chosen is not there."""
         name, defaults = backend_for(pose)
-        is_own = self.backend != name and self.backend in backends()
-        return backend_for(pose, self.backend) if is_own else (name, defaults)
+        wanted = self.backend if self._automatic is None else self._automatic.backend
+        is_own = wanted != name and wanted in backends()
+        return backend_for(pose, wanted) if is_own else (name, defaults)
 
     def chosen(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and its parameters."""
+        if self._automatic is not None:
+            return self._automatic.backend, self._automatic.params
         name, defaults = self.defaults(pose)
         params = self.params.get(name, defaults)
         return name, params if isinstance(params, type(defaults)) else usable(defaults, params)

@@ -13,12 +13,14 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from ...choice.choose import Choice
 from ...document.journal import Journal, journal_folder, journals, saved, written
 from ...document.landmarks import Landmarks
 from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
 from ...errors import InputError, explained
 from ...files import free_file, working_folder
+from ...frame import Request
 from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.marks import Legend, Marks, marked
@@ -50,11 +52,13 @@ class Capture:
         film: Callable[[Recording, Path], object],
         range_note: Callable[[], str] = str,
         drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
+        choice: Callable[[Request], Choice | None] = lambda _: None,
     ) -> None:
         """marks: brings those that what is saved has. film: makes one of a recording, under this name.
         range_note: brings what the colour bar of the view says. drawn: brings what tools draw over a
-        frame."""
+        frame. choice: brings the one that a picture was drawn by."""
         self._marks, self._film, self._range_note, self._drawn = marks, film, range_note, drawn
+        self._choice = choice
         self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
         self.last: Path | None = None
@@ -77,7 +81,7 @@ class Capture:
             request, session.scan, session.hash, viewport.size, self._playback.unit,
             self._marks() if marks is None else marks, session.document.part(Measurements).all,
             session.document.shown_unit, session.document.part(Landmarks).notes,
-            self._drawn(request.pose.index),
+            self._drawn(request.pose.index), self._choice(request),
         )  # fmt: skip
 
     def screenshot(self) -> None:

@@ -165,7 +165,8 @@ class Exporting:
     def _entry(self) -> Entry | None:
         """The entry of what the picture shows; where that cannot be drawn again, the user is told why."""
         try:
-            return self._shown(self.marks)
+            shown = self._shown(self.marks)
+            return shown and replace(shown, automatic=None)  # it was expected of this size and view
         except InputError as error:
             self._note(Problem(f"Cannot export: {error}"))
         return None

@@ -115,7 +115,7 @@ def _show(app: App, entry: Entry, pose: Pose) -> None:
         place = place.in_frame(-middle_of(pose))
     app.seek(entry.pose)
     app.session.laid.replay(entry.pose, place)
-    shown = replace(app.document, camera=camera, pivot=None, look=look, backend=entry.backend)
+    shown = replace(app.document.drawn_by(entry.backend), camera=camera, pivot=None, look=look)
     shown = shown.with_params(entry.backend, entry.params)
     app.session.history.change("Replay", shown, merge="replay")
     app.viewport.rest()

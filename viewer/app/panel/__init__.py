@@ -76,7 +76,10 @@ class Panel:
                 lambda: appearance.draw(app.session, app.rendering, viewport, scale, pose, ui),
             )
             self._section("Views", lambda: views.draw(app.steering, app.document.camera, app.bookmarks, ui))
-            self._section("Renderer", lambda: renderer.draw(app.session, app.rendering, pose))
+            self._section(
+                "Renderer",
+                lambda: renderer.draw(app.session, app.rendering, app.choosing, scale, pose),
+            )
             self._section("Statistics", lambda: self._draw_statistics(app), is_open=False)
         imgui.end_child()
 

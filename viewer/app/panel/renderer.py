@@ -1,4 +1,4 @@
-"""The panel's section on the renderer: which one draws, and how."""
+"""The panel's section on the renderer: which one draws, why, and how."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ from imgui_bundle import imgui
 
 from ...backends import backend, backends
 from .. import widgets
+from . import automatic
 
 if TYPE_CHECKING:
     from ...scan.pose import Pose
+    from ...scan.units import Scale
+    from ..scene.choosing import Choosing
     from ..scene.rendering import Rendering
     from ..session import Session
 
 
-def draw(session: Session, rendering: Rendering, pose: Pose) -> None:
-    """Declare the section."""
+def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scale, pose: Pose) -> None:
+    """Declare the section. scale: how lengths are told."""
     name, _ = session.document.chosen(pose)
     imgui.set_next_item_width(-1)
     chosen = widgets.combo("backend", name, rendering.choices, {n: b.title for n, b in backends().items()})
     widgets.tooltip(f"{name}: {backend(name).help}")
     if chosen != name:
         rendering.choose(chosen)
+    automatic.draw(session, rendering, choosing, scale)
     name, params = session.document.chosen(pose)
     imgui.push_id("renderer")  # the look has parameters of the same names
     rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))

@@ -79,4 +79,4 @@ class Ahead:
 
 def _how(document: Document) -> tuple[Any, ...]:
     """The fields of a document that decide what is prepared."""
-    return document.backend, document.params, document.look
+    return document.backend, document.params, document.way, document.look

@@ -7,12 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 from ...backends import backends
+from ...choice.goal import Goal
 from ...look import Look, drawable
 from ...params import switches
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
 from ..playing.playback import Playback
 from ..session import Session, edit_name
+
+FIRST_GOAL = Goal("time", 50.0)  # ms
 
 
 class Rendering:
@@ -55,18 +58,37 @@ class Rendering:
 
     def choose(self, name: str) -> None:
         """Draw with a backend."""
-        self._session.change(f"Choose {backends()[name].title}", backend=name)
+        session = self._session
+        session.history.change(f"Choose {backends()[name].title}", session.document.drawn_by(name))
+
+    def aim(self, goal: Goal | None) -> None:
+        """Have the backend chosen automatically for a goal; None: draw with the one that was chosen before.
+        Other bounds without a pause are one step."""
+        former = self._session.document.goal
+        if goal is None:
+            document = self._session.document
+            self._session.history.change("Choose by hand", document.drawn_by(document.backend))
+        elif former is None:
+            self._session.change("Choose automatically", goal=goal)
+        elif goal != former:
+            self._session.change("Change bound", merge="Change bound", goal=goal)
+
+    def switch_automatic(self) -> None:
+        """Have the backend chosen automatically, within a time at first, or not any more."""
+        self.aim(FIRST_GOAL if self._session.document.goal is None else None)
 
     def reset(self) -> None:
         """Draw as a scan is drawn that was never open: renderer, its parameters and look."""
         look = Look(up=self._session.document.look.up)
-        self._session.change("Back to defaults", backend=None, params={}, look=look)
+        usual = replace(self._session.document.drawn_by(None), params={}, look=look)
+        self._session.history.change("Back to defaults", usual)
 
     @property
     def is_default(self) -> bool:
         """Whether all is drawn as `reset` has it."""
         document = self._session.document
-        return document.backend is None and not document.params and document.look == Look(up=document.look.up)
+        is_own = document.backend is not None or document.goal is not None or document.params
+        return not is_own and document.look == Look(up=document.look.up)
 
     @property
     def choices(self) -> list[str]:
@@ -92,6 +114,8 @@ class Rendering:
         if self.backend is not None and params != self._params:
             name = edit_name(self._params, params)
             changed = self._session.document.with_params(self.backend, params)
+            if changed.goal is not None:
+                changed = changed.drawn_by(self.backend)
             self._session.history.change(name, changed, merge=name)
 
     def edit_look(self, look: Look) -> None:
