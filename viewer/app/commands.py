@@ -370,7 +370,8 @@ _TOOLS: Menu[App] = Menu("Tools", (
         Command("backend_before", "Renderer before", lambda app: app.rendering.step(-1), "Shift+B"),
         Command(
             "automatic", "Automatic renderer", lambda app: app.rendering.switch_automatic(),
-            is_on=lambda app: app.document.goal is not None, can=lambda app: not app.choosing.why_not,
+            is_on=lambda app: app.document.goal is not None,
+            can=lambda app: not app.choosing.why_not or app.document.goal is not None,
         ),
         _SWITCHES,
     ),

@@ -38,7 +38,7 @@ _PLOT = (
 def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scale) -> None:
     """Declare the rows. scale: how lengths are told."""
     goal = session.document.goal
-    imgui.begin_disabled(bool(choosing.why_not))
+    imgui.begin_disabled(goal is None and bool(choosing.why_not))  # as of another device it can be ended
     imgui.begin_group()
     widgets.label("Automatic", "Have the renderer chosen for each view, by a bound")
     wanted = imgui.checkbox("##automatic", goal is not None)[1]
@@ -48,7 +48,7 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
         widgets.tooltip(choosing.why_not)
     if wanted != (goal is not None):
         rendering.switch_automatic()
-    elif goal is not None:
+    elif goal is not None and not choosing.why_not:
         shown = choosing.comparison
         footprint = None if shown is None else shown.footprint * scale.factor
         rendering.aim(_edit_goal(goal, scale.unit, footprint))
