@@ -77,7 +77,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         press(app, "r")
         app.see(is_recording=True)
         for key, wanted in (
-            ("Right", {"frame": 1}), ("b", {"backend": "pyramidal"}), ("o", {}), ("End", {"frame": 3}),
+            ("Right", {"frame": 1}), ("b", {"backend": "codeword"}), ("o", {}), ("End", {"frame": 3}),
         ):  # fmt: skip
             press(app, key)
             app.see(**wanted)
@@ -86,7 +86,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         assert [entry.pose for entry in first] == sorted(entry.pose for entry in first)
         press(app, "Home")
         press(app, "shift", "b")
-        app.see(frame=0, backend="points")
+        app.see(frame=0, backend="auto_splats")
         app.settle()
 
         press(app, "r")
