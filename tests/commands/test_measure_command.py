@@ -217,6 +217,22 @@ def test_points_without_faces_are_measured(run: Run) -> None:
     assert values["way"] == pytest.approx(20 * np.arcsin(straight / 20), rel=5e-3)
 
 
+def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
+    kinds = {"breite": "distance", "winkel": "angle", "fläche": "area", "raum": "volume"}
+    takes = {"distance": ["a", "c"]}
+    measures = [
+        {"name": name, "kind": kind, "landmarks": takes.get(kind, ["a", "c", "Ж"])}
+        for name, kind in kinds.items()
+    ]
+    Path("measures.json").write_text(json.dumps({"measures": measures}), encoding="utf-8")
+    words = ("measure", "seq", "--landmarks", "landmarks.csv", "--measures", "measures.json", "--unit", "mm")
+    done = run(*words, "-o", "out.csv", "--plot", "plot.svg", "--pose", "0")
+    assert done.code == 0, done.err
+    assert "'raum' is not in plot.svg: its axes are in mm, °, mm², not mm³" in done.err
+    assert run(*words, "-o", "o.csv", "--plot", "plot.csv", "--pose", "0").err.count("plot.csv") == 0
+    assert "raum [mm³]" in table(Path("plot.csv"))[0]
+
+
 @pytest.mark.parametrize(
     ("places", "words", "told"),
     [

@@ -5,13 +5,16 @@ from __future__ import annotations
 import csv
 import json
 import math
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run
+from PIL import Image
 
 from viewer.analysis.measures.curves import NUMBER_COLUMNS, REPEAT_COLUMNS
+from viewer.output.plots import PLOT_COLORS
 
 FPS, HEIGHT, OWN, NOISE = 30, 4.0, 0.03, 0.04
 TIMES = np.arange(FPS + 1) / FPS
@@ -173,9 +176,41 @@ def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
     assert table("repeats.csv") == []
 
 
+def test_plots_are_those_of_the_window(run: Run) -> None:
+    done = run(*WORDS, "--plot", "plot.csv")
+    assert done.code == 0, done.err
+    assert done.out.splitlines()[-1] == "plot.csv"
+    rows = table("plot.csv")
+    assert list(rows[0]) == ["frame", "time [s]", "way [mm]", "way ± [mm]", "still [°]", "still ± [°]"]
+    np.testing.assert_allclose([float(row["way [mm]"]) for row in rows], LENGTHS, rtol=1e-8)
+    np.testing.assert_allclose([float(row["way ± [mm]"]) for row in rows], 2 * SIGMA, rtol=1e-5)
+    done = run(*WORDS, "--plot", "plot.svg", "--order", "speed", "--force")
+    assert done.code == 0, done.err
+    words = [part.text for part in ElementTree.parse("plot.svg").iter("{http://www.w3.org/2000/svg}text")]
+    assert {"mm/s", "°/s", "time [s]", "way", "still"} <= set(words)
+    assert run(*WORDS, "--plot", "plot.png", "--force").code == 0
+    with Image.open("plot.png") as image:
+        pixels = np.array(image.convert("RGB")).reshape(-1, 3)
+    blue = np.array([(PLOT_COLORS[0] >> shift) & 255 for shift in (16, 8, 0)])
+    assert (np.abs(pixels.astype(int) - blue).max(axis=1) < 3).sum() > 500
+
+
+def test_gaps_and_chosen_frames_are_as_such_in_plots(run: Run) -> None:
+    done = run(*WORDS, "--plot", "plot.csv", "--order", "speed", "--poses", "4:7")
+    assert done.code == 0, done.err
+    assert [(row["frame"], row["way [mm/s]"]) for row in table("plot.csv")] == [
+        ("5", ""),
+        ("6", ""),
+        ("7", ""),
+    ]
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (("--plot", "plot.pdf"), "plot.pdf: cannot write '.pdf' files. Known: .csv, .png, .svg"),
+        (("--plot", "seq/../out.csv"), "is the file of another table. Write --plot to another file"),
+        (("--plot", "a.png", "--smoothing", "0.5"), "--smoothing: smooths nothing that is asked for"),
         (("--numbers", "numbers.txt"), "numbers.txt: cannot write '.txt' files. Known: .csv, .json"),
         (("--numbers", "no/numbers.csv"), "there is no folder 'no'"),
         (("--numbers", "seq/../out.csv"), "is the file of another table"),
@@ -199,7 +234,8 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
 
 
 @pytest.mark.parametrize(
-    "words", [("--numbers", "numbers.csv"), ("--repeats", "repeats.csv"), ("--order", "speed")]
+    "words",
+    [("--numbers", "numbers.csv"), ("--repeats", "repeats.csv"), ("--order", "speed"), ("--plot", "a.svg")],
 )
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)

@@ -2,7 +2,8 @@
 
 The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
 the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
-The numbers of the measures' movements are another table, their repeats over one another a third.
+The numbers of the measures' movements are another table, their repeats over one another a third; plots are as
+the window saves them.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from ..csv_text import save_rows
 from ..errors import InputError, unknown_name
 from ..files import absolute, whole_file
 from ..output.export import check_output
+from ..output.plots import PLOT_SUFFIXES, check_plot, color_of_curve, line_of_curve, plot_over_time
 from ..scan.inputs import scan_inputs
 from ..scan.points import UNKNOWN_UNIT
 from ..scan.timeline import Timeline
@@ -80,6 +82,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--repeats", type=Path, metavar="FILE",
         help=f"the measures around each peak of one, over one another; {' or '.join(_SUFFIXES)}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE",
+        help=f"the measures over time, as the window plots them; {', '.join(PLOT_SUFFIXES)}",
     )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
@@ -135,7 +141,8 @@ def run(args: Namespace) -> int:
             found_series = all_series(measures, tracks, timeline, frames=indices)
         series = [_in_frames(each, indices) for each in found_series.values()]
         order = ORDERS.index(args.order)
-        curves = _curves(args, series, timeline) if order or args.numbers or args.repeats else []
+        needs_curves = order or args.numbers or args.repeats or args.plot
+        curves = _curves(args, series, timeline) if needs_curves else []
         if order:
             series = [_changes(*each, order) for each in zip(series, curves, strict=True)]
         _write(args.out, timeline, LONG_COLUMNS, _rows(tracks, series, timeline, indices, order))
@@ -143,6 +150,8 @@ def run(args: Namespace) -> int:
             _write(args.numbers, timeline, NUMBER_COLUMNS, number_rows(curves))
         if args.repeats:
             _write(args.repeats, timeline, REPEAT_COLUMNS, _repeats(args, curves, order))
+        if args.plot:
+            _save_plot(args.plot, curves, indices, order)
         _tell_gaps(tracks, series, indices, order)
     for path in outputs:
         tell(path)
@@ -179,17 +188,22 @@ def _number(text: str) -> float:
 
 def _outputs(args: Namespace) -> list[Path]:
     """The files to write. Raises InputError, before any work, where one cannot be, or a flag does nothing."""
-    outputs = [args.out, *filter(None, (args.numbers, args.repeats))]
+    more = {"--numbers": args.numbers, "--repeats": args.repeats, "--plot": args.plot}
+    asked = {flag: path for flag, path in more.items() if path}
+    outputs = [args.out, *asked.values()]
     for path in outputs:
-        check_output(path, _SUFFIXES, several=False)
-    if len({os.path.realpath(absolute(path)) for path in outputs}) < len(outputs):
-        hint = f"Write {'--numbers' if args.numbers else '--repeats'} to another file"
-        raise InputError("is the file of another table", outputs[-1], hint)
-    tables = [flag for flag, path in (("--numbers", args.numbers), ("--repeats", args.repeats)) if path]
-    asked = [*tables, *(["--order"] if args.order != ORDERS[0] else [])]
-    if asked and args.measures is None:
-        raise InputError("is of measures, and there are none", asked[0], "Tell them by --measures")
-    if args.smoothing is not None and not asked:
+        check_output(path, PLOT_SUFFIXES if path is args.plot else _SUFFIXES, several=False)
+    taken = {os.path.realpath(absolute(args.out))}
+    for flag, path in asked.items():
+        if (place := os.path.realpath(absolute(path))) in taken:
+            raise InputError("is the file of another table", path, f"Write {flag} to another file")
+        taken.add(place)
+    if args.plot:
+        check_plot(args.plot)
+    told = [*asked, *(["--order"] if args.order != ORDERS[0] else [])]
+    if told and args.measures is None:
+        raise InputError("is of measures, and there are none", told[0], "Tell them by --measures")
+    if args.smoothing is not None and not [flag for flag in told if flag != "--plot"]:
         hint = f"Use it with --numbers, --repeats, or --order {' or '.join(ORDERS[1:])}"
         raise InputError("smooths nothing that is asked for", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
@@ -308,6 +322,16 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
         return []
     tell(f"{len(aligned.events)} repeats, aligned by the peaks of '{aligned_by.name}'")
     return repeat_rows(curves, aligned, order)
+
+
+def _save_plot(path: Path, curves: Sequence[MeasureCurve], indices: Sequence[int], order: int) -> None:
+    """Write the curves over time; those of more units than a picture has axes for are told."""
+    lines = [line_of_curve(curve, color_of_curve(number), order) for number, curve in enumerate(curves)]
+    plot = plot_over_time(curves[0].times, np.array(indices, np.intp), lines)
+    plot.save(path)
+    for line in plot.lines:
+        if line not in plot.drawn and path.suffix.lower() != ".csv":
+            warn(f"'{line.label}' is not in {path}: its axes are in {', '.join(plot.units)}, not {line.unit}")
 
 
 def _rows(

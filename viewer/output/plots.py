@@ -12,9 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.measures.curves import BAND_SIGMAS, PER_ORDER, MeasureCurve
+from ..analysis.trajectories import Trajectory
 from ..csv_text import save_rows
 from ..errors import InputError
 from ..files import whole_file
+from ..scan.units import Scale
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -113,10 +116,7 @@ class CurvePlot:
             self._save_picture(path)
 
     def _save_picture(self, path: Path) -> None:
-        if find_spec("matplotlib") is None:
-            raise InputError(
-                "pictures of plots need matplotlib", path, "Install it: pip install 'scan4d[plots]'"
-            )
+        check_plot(path)
         import matplotlib
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -152,6 +152,47 @@ class CurvePlot:
         named = [handle for handle, line in zip(handles, self.drawn, strict=True) if not line.is_thin]
         if named:
             axes.legend(handles=named, frameon=False, fontsize="small", loc="best")
+
+
+def check_plot(path: Path) -> None:
+    """Raise InputError where a picture is wanted, by the file's suffix, and matplotlib is not there."""
+    if path.suffix.lower() != ".csv" and find_spec("matplotlib") is None:
+        raise InputError("pictures of plots need matplotlib", path, "Install it: pip install 'scan4d[plots]'")
+
+
+def color_of_curve(number: int) -> int:
+    """The colour of a measure by its number among all, 0xRRGGBB."""
+    return PLOT_COLORS[number % len(PLOT_COLORS)]
+
+
+def color_of_way(number: int) -> int:
+    """The colour of a landmark by its number among those whose ways are shown, 0xRRGGBB."""
+    return PLOT_COLORS[-1 - number % len(PLOT_COLORS)]
+
+
+def line_of_curve(curve: MeasureCurve, color: int, order: int, has_band: bool = True) -> PlotLine:
+    """The line of a measure: its values, 0, speed, 1, or acceleration, 2, with two standard deviations."""
+    values, sigmas = curve.derivative(order)
+    return PlotLine(curve.name, curve.unit + PER_ORDER[order], values, _band(sigmas, has_band), color)
+
+
+def line_of_way(
+    name: str, way: Trajectory, scale: Scale, color: int, order: int, has_band: bool = True
+) -> PlotLine:
+    """The line of a landmark's speed, 1, or acceleration, 2, with two standard deviations."""
+    values, sigmas = (scale.factor * part for part in way.pace(order))
+    return PlotLine(name, scale.unit + PER_ORDER[order], values, _band(sigmas, has_band), color)
+
+
+def plot_over_time(
+    times: NDArray[np.float64], frames: NDArray[np.intp], lines: Sequence[PlotLine]
+) -> CurvePlot:
+    """Lines over the times of frames, (T,) seconds each of a frame, (T,) from 0."""
+    return CurvePlot("time", "s", times, tuple(lines), frames)
+
+
+def _band(sigmas: NDArray[np.float64], has_band: bool) -> NDArray[np.float64]:
+    return BAND_SIGMAS * sigmas if has_band else np.full(len(sigmas), np.nan)
 
 
 def _cells(values: NDArray[np.float64]) -> list[object]:

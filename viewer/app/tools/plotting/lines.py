@@ -14,7 +14,7 @@ from ....analysis.measures.curves import power_of, unit_of
 from ....analysis.measures.series import lines_of
 from ....mesh.geodesic import length_of, steps_along
 from ....output.overlays import DIM_LINE, DrawnPath, rounded
-from ....output.plots import PLOT_COLORS
+from ....output.plots import color_of_curve
 from ....rigid import Rigid
 from ....scan.units import Scale
 from ...desk import Desk
@@ -81,7 +81,7 @@ class MeasureLines:
                 continue
             if not all(name in tracks for name in measure.landmarks):
                 continue
-            color = PLOT_COLORS[numbers[measure.name] % len(PLOT_COLORS)]
+            color = color_of_curve(numbers[measure.name])
             for line in lines_of(measure, series[measure.name], tracks, frame):
                 pieces = (
                     line if len(line) > _PIECES else steps_along(line, max(length_of(line) / _PIECES, 1e-300))

@@ -9,19 +9,20 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....analysis.curves import Repeats, Smoothing, correlation
 from ....analysis.measures import Series
-from ....analysis.measures.curves import (
-    BAND_SIGMAS,
-    PER_ORDER,
-    MeasureCurve,
-    repeats_beside,
-    repeats_by_peaks,
-)
+from ....analysis.measures.curves import MeasureCurve, repeats_beside, repeats_by_peaks
 from ....analysis.trajectories import Trajectory
-from ....output.plots import PLOT_COLORS, CurvePlot, PlotLine
+from ....output.plots import (
+    CurvePlot,
+    PlotLine,
+    color_of_curve,
+    color_of_way,
+    line_of_curve,
+    line_of_way,
+    plot_over_time,
+)
 from ....scan.units import Scale
 from .choices import AGAINST, REPEATS, TIME, CurveChoices, Settings
 
@@ -80,7 +81,7 @@ class Shown:
             return
         smoothing, keys, curves = settings.smoothing, set[object](), []
         for number, (name, one) in enumerate(series.items()):
-            color = PLOT_COLORS[number % len(PLOT_COLORS)]
+            color = color_of_curve(number)
             key = name, color, smoothing, scale
             keys.add(key)
             if name not in choices.hidden and len(one.times):
@@ -89,29 +90,13 @@ class Shown:
         self._kept.forget_others(keys)
         self._asked, self.curves, self.plot = asked, tuple(curves), plot_of(curves, choices, settings)
         if settings.mode == TIME and settings.derivative and ways:
+            order, bands, times = settings.derivative, settings.bands, next(iter(ways.values())).times
             lines = [
-                _line_of_way(name, color_of_way(number), way, settings, scale)
+                line_of_way(name, way, scale, color_of_way(number), order, bands)
                 for number, (name, way) in enumerate(ways.items())
             ]
-            self.plot = _with_lines(self.plot, lines, next(iter(ways.values())).times)
-
-
-def color_of_way(number: int) -> int:
-    """The colour of a landmark by its number among those whose ways are shown, 0xRRGGBB."""
-    return PLOT_COLORS[-1 - number % len(PLOT_COLORS)]
-
-
-def _line_of_way(name: str, color: int, way: Trajectory, settings: Settings, scale: Scale) -> PlotLine:
-    """The line of a landmark's speed or acceleration."""
-    values, sigmas = (scale.factor * part for part in way.pace(settings.derivative))
-    unit = scale.unit + PER_ORDER[settings.derivative]
-    return PlotLine(name, unit, values, _band(sigmas, settings), color)
-
-
-def _with_lines(plot: CurvePlot | None, lines: Sequence[PlotLine], times: NDArray[np.float64]) -> CurvePlot:
-    """A plot over time with more lines."""
-    before = () if plot is None else plot.lines
-    return CurvePlot("time", "s", times, (*before, *lines), np.arange(len(times)))
+            before = () if self.plot is None else self.plot.lines
+            self.plot = plot_over_time(times, np.arange(len(times)), (*before, *lines))
 
 
 def curve_of(series: Series, color: int, scale: Scale, smoothing: Smoothing) -> Curve:
@@ -119,22 +104,11 @@ def curve_of(series: Series, color: int, scale: Scale, smoothing: Smoothing) -> 
     return replace(Curve.of(series, scale, smoothing), color=color)
 
 
-def line_of(curve: Curve, settings: Settings) -> PlotLine:
-    """The line of a curve: its values, speed or acceleration."""
-    values, sigmas = curve.derivative(settings.derivative)
-    unit = curve.unit + PER_ORDER[settings.derivative]
-    return PlotLine(curve.name, unit, values, _band(sigmas, settings), curve.color)
-
-
-def _band(sigmas: NDArray[np.float64], settings: Settings) -> NDArray[np.float64]:
-    return BAND_SIGMAS * sigmas if settings.bands else np.full(len(sigmas), np.nan)
-
-
 def plot_of(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) -> CurvePlot | None:
     """The plot of curves; None where there are too few for it, or no repeats."""
     if not curves:
         return None
-    lines = [line_of(curve, settings) for curve in curves]
+    lines = [line_of_curve(curve, curve.color, settings.derivative, settings.bands) for curve in curves]
     frames = np.arange(len(curves[0].times))
     if settings.mode == REPEATS:
         repeats = repeats_in(curves, choices, settings)
@@ -143,7 +117,7 @@ def plot_of(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) 
         chosen = curves.index(chosen_of(curves, choices.abscissa))
         x = lines.pop(chosen)
         return CurvePlot(x.label, x.unit, x.values, tuple(lines), frames) if lines else None
-    return CurvePlot("time", "s", curves[0].times, tuple(lines), frames)
+    return plot_over_time(curves[0].times, frames, lines)
 
 
 def chosen_of(curves: Sequence[Curve], name: str) -> Curve:

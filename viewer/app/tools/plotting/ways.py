@@ -14,12 +14,13 @@ from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
 from ....errors import InputError
 from ....look import color_table
 from ....output.overlays import DIM_LINE, NOTHING_DRAWN, DrawnMarks, DrawnPath, rounded, runs_of
+from ....output.plots import color_of_way
 from ....rigid import STILL, Rigid
 from ...desk import Desk
 from ...scene.canvas import Canvas, ViewPlace
 from .choices import ANCHORS, CurveChoices, Settings
 from .seen import seen_in_view
-from .shown import Kept, color_of_way
+from .shown import Kept
 
 Still = tuple[Rigid | None, ...]
 SPEED_MAP = "viridis"
