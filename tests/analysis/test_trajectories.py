@@ -9,7 +9,7 @@ import pytest
 
 from viewer.analysis.curves import Smoothing
 from viewer.analysis.track import Known, Track
-from viewer.analysis.trajectories import stabilising, trajectory_of
+from viewer.analysis.trajectories import held_still, stabilising, trajectory_of
 from viewer.errors import InputError
 from viewer.rigid import Rigid
 
@@ -99,6 +99,8 @@ def test_gaps_of_landmarks_and_of_anchors_are_gaps() -> None:
     gaps = [*range(15, 20), *range(50, 60)]
     assert np.flatnonzero(np.isnan(seen.positions).any(axis=1)).tolist() == gaps
     assert np.flatnonzero(np.isnan(seen.speeds)).tolist() == gaps
+    held = held_still(tracks["chin"], still)
+    assert np.flatnonzero(held.known == Known.GAP).tolist() == gaps
     assert seen.speeds[seen.speeds > 0].max() < 1e-5
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..rigid import Rigid
 from .curves import Smoothing, smoothed
-from .track import Track
+from .track import Known, Track
 
 _FLAT = 1e-6  # of the longest spread of anchors: in less across they lie on one line, round which all turns
 
@@ -52,14 +52,21 @@ def trajectory_of(
 ) -> Trajectory:
     """The way of a landmark. still: a motion for each frame that it is seen after, see `stabilising`; where
     there is none, it has a gap."""
-    positions, covariances = track.positions, track.covariances
     if still is not None:
-        nowhere = np.full((4, 4), np.nan)
-        motions = np.stack([nowhere if motion is None else motion.matrix for motion in still])
-        turns = motions[:, :3, :3]
-        positions = np.einsum("tij,tj->ti", turns, positions) + motions[:, :3, 3]
-        covariances = turns @ covariances @ turns.transpose(0, 2, 1)
-    return Trajectory(track.times, positions, covariances, smoothing)
+        track = held_still(track, still)
+    return Trajectory(track.times, track.positions, track.covariances, smoothing)
+
+
+def held_still(track: Track, still: Sequence[Rigid | None]) -> Track:
+    """A landmark as it is after a motion of each frame, see `stabilising`; where there is none, it has a
+    gap."""
+    nowhere = np.full((4, 4), np.nan)
+    motions = np.stack([nowhere if motion is None else motion.matrix for motion in still])
+    turns = motions[:, :3, :3]
+    positions = np.einsum("tij,tj->ti", turns, track.positions) + motions[:, :3, 3]
+    covariances = turns @ track.covariances @ turns.transpose(0, 2, 1)
+    known = np.where([motion is None for motion in still], np.minimum(track.known, Known.GAP), track.known)
+    return replace(track, positions=positions, covariances=covariances, known=known.astype(np.uint8))
 
 
 def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Rigid | None, ...]:

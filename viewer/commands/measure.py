@@ -2,6 +2,7 @@
 
 The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
 the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
+With speeds or accelerations, a row a landmark's trajectory and frame comes last.
 The numbers of the measures' movements are another table, their repeats over one another a third; plots are as
 the window saves them.
 """
@@ -18,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.curves import ORDERS, Smoothing
 from ..analysis.landmarks.files import AXES, landmark_suffixes, read_landmarks
@@ -40,11 +42,20 @@ from ..analysis.measures.definitions import read_measures
 from ..analysis.measures.series import all_series, surface_of
 from ..analysis.track import Known, Track
 from ..analysis.tracking import track_landmarks
+from ..analysis.trajectories import Trajectory, held_still, stabilising, trajectory_of
 from ..csv_text import save_rows
 from ..errors import InputError, unknown_name
 from ..files import absolute, whole_file
 from ..output.export import check_output
-from ..output.plots import PLOT_SUFFIXES, check_plot, color_of_curve, line_of_curve, plot_over_time
+from ..output.plots import (
+    PLOT_SUFFIXES,
+    check_plot,
+    color_of_curve,
+    color_of_way,
+    line_of_curve,
+    line_of_way,
+    plot_over_time,
+)
 from ..scan.inputs import scan_inputs
 from ..scan.points import UNKNOWN_UNIT
 from ..scan.timeline import Timeline
@@ -59,6 +70,7 @@ _SUFFIXES = (".csv", ".json")
 _STEPS = 200  # of a progress bar
 _NAMED = 3  # landmarks that a message names
 _LONGEST = 1e15  # scan units
+_LEAST_ANCHORS = 3
 _LEAST = 0.5  # of a curve's range, that a peak stands out by
 
 
@@ -96,7 +108,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     how.add_argument(
         "--order", choices=ORDERS, default=ORDERS[0],
-        help=f"what is told of measures: values, or how fast these change; default {ORDERS[0]}",
+        help="what is told of measures: values, or how fast these change, and landmarks move; "
+        f"default {ORDERS[0]}",
+    )  # fmt: skip
+    how.add_argument(
+        "--traced", type=_names, metavar="NAME,...", help="whose speed is told of landmarks; default: of all"
+    )
+    how.add_argument(
+        "--anchors", type=_names, metavar="NAME,...",
+        help="landmarks that hold the others still: the motion of these is taken off",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=_time, metavar="SECONDS",
@@ -127,6 +147,9 @@ def run(args: Namespace) -> int:
         claim(outputs, [*scan_inputs(timeline), *inputs], args.force)
         unit = None if timeline.unit == UNKNOWN_UNIT else timeline.unit
         found = read_landmarks(args.landmarks, unit, args.axes)
+        for name in (*(args.anchors or ()), *(args.traced or ())):
+            if name not in found.names:
+                raise unknown_name("landmark", name, found.names)
         measures = _measures(args, found)
         for told in found.told:
             warn(f"{args.landmarks}: {told}")
@@ -139,20 +162,28 @@ def run(args: Namespace) -> int:
             tracks = _with_noise(_tracks(found, timeline, frame), args.noise)
         with _shown(f"Measuring {timeline.name}"):
             found_series = all_series(measures, tracks, timeline, frames=indices)
+        if args.anchors:  # whose motion changes no measure
+            still = stabilising(tracks, args.anchors)
+            tracks = {name: held_still(track, still) for name, track in tracks.items()}
         series = [_in_frames(each, indices) for each in found_series.values()]
         order = ORDERS.index(args.order)
         needs_curves = order or args.numbers or args.repeats or args.plot
         curves = _curves(args, series, timeline) if needs_curves else []
         if order:
             series = [_changes(*each, order) for each in zip(series, curves, strict=True)]
-        _write(args.out, timeline, LONG_COLUMNS, _rows(tracks, series, timeline, indices, order))
+        ways = _ways(args, tracks, indices) if order else {}
+        paces = [_pace(name, way, tracks[name].known[indices], order) for name, way in ways.items()]
+        rows = _landmark_rows(tracks, timeline, indices)
+        for kind, group in (("measure", series), ("trajectory", paces)):
+            rows += _value_rows(kind, group, timeline.unit, indices, order)
+        _write(args.out, timeline, LONG_COLUMNS, rows)
         if args.numbers:
             _write(args.numbers, timeline, NUMBER_COLUMNS, number_rows(curves))
         if args.repeats:
             _write(args.repeats, timeline, REPEAT_COLUMNS, _repeats(args, curves, order))
         if args.plot:
-            _save_plot(args.plot, curves, indices, order)
-        _tell_gaps(tracks, series, indices, order)
+            _save_plot(args.plot, curves, ways, timeline, indices, order)
+        _tell_gaps(tracks, series, paces, indices, order)
     for path in outputs:
         tell(path)
     return 0
@@ -179,6 +210,10 @@ def _time(text: str) -> float:
     return seconds
 
 
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for part in text.split(",") if (name := part.strip())))
+
+
 def _number(text: str) -> float:
     try:
         return float(text)
@@ -200,10 +235,16 @@ def _outputs(args: Namespace) -> list[Path]:
         taken.add(place)
     if args.plot:
         check_plot(args.plot)
-    told = [*asked, *(["--order"] if args.order != ORDERS[0] else [])]
-    if told and args.measures is None:
-        raise InputError("is of measures, and there are none", told[0], "Tell them by --measures")
-    if args.smoothing is not None and not [flag for flag in told if flag != "--plot"]:
+    is_of_speeds = args.order != ORDERS[0]
+    lacking = [flag for flag in asked if flag != "--plot" or not is_of_speeds]
+    if lacking and args.measures is None:
+        raise InputError("is of measures, and there are none", lacking[0], "Tell them by --measures")
+    if args.traced is not None and not is_of_speeds:
+        raise InputError("is of speeds, and none are asked for", "--traced", "Add --order speed")
+    if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
+        hint = "Name landmarks that do not move against each other, with commas between"
+        raise InputError("a scan is held still by three landmarks at least", "--anchors", hint)
+    if args.smoothing is not None and not (is_of_speeds or args.numbers or args.repeats):
         hint = f"Use it with --numbers, --repeats, or --order {' or '.join(ORDERS[1:])}"
         raise InputError("smooths nothing that is asked for", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
@@ -300,15 +341,43 @@ def _in_frames(series: Series, indices: Sequence[int]) -> Series:
 
 def _curves(args: Namespace, series: Sequence[Series], timeline: Timeline) -> list[MeasureCurve]:
     """The curves of the measures, as the window has them."""
-    smoothing = Smoothing() if args.smoothing is None else Smoothing(args.smoothing)
-    return [MeasureCurve.of(each, Scale(timeline.unit), smoothing) for each in series]
+    return [MeasureCurve.of(each, Scale(timeline.unit), _smoothing(args)) for each in series]
+
+
+def _smoothing(args: Namespace) -> Smoothing:
+    return Smoothing() if args.smoothing is None else Smoothing(args.smoothing)
 
 
 def _changes(series: Series, curve: MeasureCurve, order: int) -> Series:
     """The speed or acceleration of a measure in place of its values; a gap where that is not known."""
     values, sigmas = curve.derivative(order)
-    known = np.where(np.isfinite(values), series.known, np.minimum(series.known, Known.GAP))
-    return replace(series, values=values, sigmas=sigmas, known=known.astype(np.uint8))
+    return replace(series, values=values, sigmas=sigmas, known=_known_of(values, series.known))
+
+
+def _ways(args: Namespace, tracks: Mapping[str, Track], indices: list[int]) -> dict[str, Trajectory]:
+    """The trajectories of the traced landmarks in these frames alone, as the window has them."""
+    found = {}
+    for name in args.traced or tracks:
+        track = tracks[name]
+        times, positions, covariances = (
+            whole[indices] for whole in (track.times, track.positions, track.covariances)
+        )
+        cut = replace(
+            track, times=times, positions=positions, covariances=covariances, known=track.known[indices]
+        )
+        found[name] = trajectory_of(cut, _smoothing(args).wide_enough(times))
+    return found
+
+
+def _pace(name: str, way: Trajectory, known: NDArray[np.uint8], order: int) -> Series:
+    """The speed or acceleration of a landmark. known: (T,) of its places."""
+    values, sigmas = way.pace(order)
+    return Series(name, "length", way.times, values, sigmas, _known_of(values, known))
+
+
+def _known_of(values: NDArray[np.float64], known: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """How well values, (T,), are known that are made of what is `known`, (T,): gaps where they are not."""
+    return np.where(np.isfinite(values), known, np.minimum(known, Known.GAP)).astype(np.uint8)
 
 
 def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> list[list[object]]:
@@ -324,34 +393,48 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
     return repeat_rows(curves, aligned, order)
 
 
-def _save_plot(path: Path, curves: Sequence[MeasureCurve], indices: Sequence[int], order: int) -> None:
-    """Write the curves over time; those of more units than a picture has axes for are told."""
+def _save_plot(
+    path: Path,
+    curves: Sequence[MeasureCurve],
+    ways: Mapping[str, Trajectory],
+    timeline: Timeline,
+    indices: list[int],
+    order: int,
+) -> None:
+    """Write curves over time; those of more units than a picture has axes for are told. ways: of landmarks,
+    whose speed or acceleration is plotted beside that of measures."""
     lines = [line_of_curve(curve, color_of_curve(number), order) for number, curve in enumerate(curves)]
-    plot = plot_over_time(curves[0].times, np.array(indices, np.intp), lines)
+    scale = Scale(timeline.unit)
+    for number, (name, way) in enumerate(ways.items()):
+        lines.append(line_of_way(name, way, scale, color_of_way(number), order))
+    plot = plot_over_time(timeline.times[indices], np.array(indices, np.intp), lines)
     plot.save(path)
     for line in plot.lines:
         if line not in plot.drawn and path.suffix.lower() != ".csv":
             warn(f"'{line.label}' is not in {path}: its axes are in {', '.join(plot.units)}, not {line.unit}")
 
 
-def _rows(
-    tracks: Mapping[str, Track],
-    series: Sequence[Series],
-    timeline: Timeline,
-    indices: Sequence[int],
-    order: int,
+def _landmark_rows(
+    tracks: Mapping[str, Track], timeline: Timeline, indices: Sequence[int]
 ) -> list[list[object]]:
-    """The rows of landmarks, then those of measures, frame by frame. series: in these frames. order: of the
-    derivative that they hold."""
-    landmarks = LandmarkSet.of_tracks(tracks, timeline.unit)
+    """The rows of landmarks, frame by frame."""
     wanted = {index + 1 for index in indices}
-    rows = [row for row in landmark_rows(landmarks) if row[1] in wanted]
+    landmarks = LandmarkSet.of_tracks(tracks, timeline.unit)
+    return [row for row in landmark_rows(landmarks) if row[1] in wanted]
+
+
+def _value_rows(
+    kind: str, series: Sequence[Series], unit: str, indices: Sequence[int], order: int
+) -> list[list[object]]:
+    """The rows of a kind with values, frame by frame. series: in these frames. unit: of lengths. order: of
+    the derivative that they hold."""
+    rows: list[list[object]] = []
     for row, index in enumerate(indices):
         for each in series:
             state = STATES[Known(int(each.known[row]))]
             values = cell(each.values[row]), cell(each.sigmas[row])
-            time, unit = cell(each.times[row]), _unit(each.quantity, timeline.unit, order)
-            rows.append(["measure", index + 1, time, each.name, None, None, None, state, *values, unit])
+            time, own = cell(each.times[row]), _unit(each.quantity, unit, order)
+            rows.append([kind, index + 1, time, each.name, None, None, None, state, *values, own])
     return rows
 
 
@@ -376,12 +459,17 @@ def _write(path: Path, timeline: Timeline, columns: Sequence[str], rows: Sequenc
 
 
 def _tell_gaps(
-    tracks: Mapping[str, Track], series: Sequence[Series], indices: Sequence[int], order: int
+    tracks: Mapping[str, Track],
+    series: Sequence[Series],
+    paces: Sequence[Series],
+    indices: Sequence[int],
+    order: int,
 ) -> None:
-    """Say in how many of the frames each is not known."""
+    """Say in how many of the frames each is not known. paces: speeds or accelerations of landmarks."""
     what = f"the {ORDERS[order]} of " if order else ""
     known = {f"'{name}'": each.known[list(indices)] for name, each in tracks.items()}
     known |= {f"{what}'{each.name}'": each.known for each in series}
+    known |= {f"{what}the landmark '{each.name}'": each.known for each in paces}
     for name, states in known.items():
         gaps = int((states < Known.TRACKED).sum())
         if gaps:
