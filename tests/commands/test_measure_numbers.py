@@ -205,9 +205,40 @@ def test_gaps_and_chosen_frames_are_as_such_in_plots(run: Run) -> None:
     ]
 
 
+def test_measures_go_against_one_of_them(run: Run) -> None:
+    held = json.loads(Path("measures.json").read_text())
+    for name, landmarks in (("across", "bc"), ("up", "ac")):
+        held["measures"].append({"name": name, "kind": "distance", "landmarks": list(landmarks)})
+    Path("measures.json").write_text(json.dumps(held))
+    done = run(*WORDS, "--against", "across", "--numbers", "numbers.csv", "--plot", "plot.csv")
+    assert done.code == 0, done.err
+    numbers = {row["measure"]: row for row in table("numbers.csv")}
+    assert tuple(numbers["way"]) == (*NUMBER_COLUMNS, "r")
+    assert numbers["across"]["r"] == ""
+    assert float(numbers["way"]["r"]) == pytest.approx(1, abs=1e-6)
+    rows = table("plot.csv")
+    names = ("way [mm]", "way ± [mm]", "still [°]", "still ± [°]", "up [mm]", "up ± [mm]")
+    assert tuple(rows[0]) == ("frame", "across [mm]", *names)
+    across = [float(row["across [mm]"]) for row in rows]
+    np.testing.assert_allclose(across, math.sqrt(2) * LENGTHS, rtol=1e-8)
+    assert run(*WORDS, "--against", "way", "--plot", "plot.csv", "--order", "speed", "--force").code == 0
+    assert list(table("plot.csv")[0])[:3] == ["frame", "way [mm/s]", "still [°/s]"]
+
+
+def test_the_only_measure_goes_against_nothing(run: Run) -> None:
+    held = json.loads(Path("measures.json").read_text())
+    Path("measures.json").write_text(json.dumps({"measures": held["measures"][:1]}))
+    done = run(*WORDS, "--against", "way", "--numbers", "numbers.csv")
+    assert done.code == 2
+    assert "--against: nothing goes against the only measure" in done.err
+    assert not Path("out.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (("--against", "way"), "--against: is of numbers and plots of measures. Add --numbers or --plot"),
+        (("--against", "weg", "--plot", "a.svg"), "unknown measure 'weg'. Known: still, way"),
         (("--plot", "plot.pdf"), "plot.pdf: cannot write '.pdf' files. Known: .csv, .png, .svg"),
         (("--plot", "seq/../out.csv"), "is the file of another table. Write --plot to another file"),
         (("--plot", "a.png", "--smoothing", "0.5"), "--smoothing: smooths nothing that is asked for"),

@@ -54,6 +54,7 @@ from ..output.plots import (
     color_of_way,
     line_of_curve,
     line_of_way,
+    plot_against,
     plot_over_time,
 )
 from ..scan.inputs import scan_inputs
@@ -131,6 +132,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         help=f"how much of its range a peak stands out by to count as a repeat; default {_LEAST}",
     )  # fmt: skip
     how.add_argument(
+        "--against", metavar="MEASURE",
+        help="what others are plotted over in place of time, and correlated with in the numbers",
+    )  # fmt: skip
+    how.add_argument(
         "--placed-in", type=int, metavar="I",
         help="the pose that landmarks are of where FILE tells no frame; default: the first that is measured",
     )  # fmt: skip
@@ -178,11 +183,13 @@ def run(args: Namespace) -> int:
             rows += _value_rows(kind, group, timeline.unit, indices, order)
         _write(args.out, timeline, LONG_COLUMNS, rows)
         if args.numbers:
-            _write(args.numbers, timeline, NUMBER_COLUMNS, number_rows(curves))
+            against = next((curve for curve in curves if curve.name == args.against), None)
+            columns = NUMBER_COLUMNS if against is None else (*NUMBER_COLUMNS, "r")
+            _write(args.numbers, timeline, columns, number_rows(curves, against))
         if args.repeats:
             _write(args.repeats, timeline, REPEAT_COLUMNS, _repeats(args, curves, order))
         if args.plot:
-            _save_plot(args.plot, curves, ways, timeline, indices, order)
+            _save_plot(args, curves, ways, timeline, indices)
         _tell_gaps(tracks, series, paces, indices, order)
     for path in outputs:
         tell(path)
@@ -241,6 +248,8 @@ def _outputs(args: Namespace) -> list[Path]:
         raise InputError("is of measures, and there are none", lacking[0], "Tell them by --measures")
     if args.traced is not None and not is_of_speeds:
         raise InputError("is of speeds, and none are asked for", "--traced", "Add --order speed")
+    if args.against is not None and not (args.measures and (args.numbers or args.plot)):
+        raise InputError("is of numbers and plots of measures", "--against", "Add --numbers or --plot")
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
         hint = "Name landmarks that do not move against each other, with commas between"
         raise InputError("a scan is held still by three landmarks at least", "--anchors", hint)
@@ -269,8 +278,12 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
     if not kept:
         hint = f"It has {', '.join(found.names[:_NAMED])}{', ...' if len(found.names) > _NAMED else ''}"
         raise InputError(f"has the landmarks of no measure in {args.measures}", args.landmarks, hint)
-    if args.aligned is not None and args.aligned not in [measure.name for measure in kept]:
-        raise unknown_name("measure", args.aligned, [measure.name for measure in kept])
+    names = [measure.name for measure in kept]
+    for name in (args.aligned, args.against):
+        if name is not None and name not in names:
+            raise unknown_name("measure", name, names)
+    if args.against is not None and len(kept) == 1:
+        raise InputError("nothing goes against the only measure", "--against", "Tell others by --measures")
     return kept
 
 
@@ -394,20 +407,27 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
 
 
 def _save_plot(
-    path: Path,
+    args: Namespace,
     curves: Sequence[MeasureCurve],
     ways: Mapping[str, Trajectory],
     timeline: Timeline,
     indices: list[int],
-    order: int,
 ) -> None:
-    """Write curves over time; those of more units than a picture has axes for are told. ways: of landmarks,
-    whose speed or acceleration is plotted beside that of measures."""
-    lines = [line_of_curve(curve, color_of_curve(number), order) for number, curve in enumerate(curves)]
-    scale = Scale(timeline.unit)
-    for number, (name, way) in enumerate(ways.items()):
-        lines.append(line_of_way(name, way, scale, color_of_way(number), order))
-    plot = plot_over_time(timeline.times[indices], np.array(indices, np.intp), lines)
+    """Write curves over time, or over one of them; those of more units than a picture has axes for are told.
+    ways: of landmarks, whose speed or acceleration is plotted over time beside that of measures."""
+    path, order, scale = args.plot, ORDERS.index(args.order), Scale(timeline.unit)
+    frames = np.array(indices, np.intp)
+    lines = {
+        curve.name: line_of_curve(curve, color_of_curve(number), order) for number, curve in enumerate(curves)
+    }
+    if args.against is not None:
+        plot = plot_against(lines.pop(args.against), frames, [*lines.values()])
+    else:
+        paces = [
+            line_of_way(name, way, scale, color_of_way(number), order)
+            for number, (name, way) in enumerate(ways.items())
+        ]
+        plot = plot_over_time(timeline.times[indices], frames, [*lines.values(), *paces])
     plot.save(path)
     for line in plot.lines:
         if line not in plot.drawn and path.suffix.lower() != ".csv":

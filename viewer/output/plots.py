@@ -191,6 +191,11 @@ def plot_over_time(
     return CurvePlot("time", "s", times, tuple(lines), frames)
 
 
+def plot_against(x: PlotLine, frames: NDArray[np.intp], lines: Sequence[PlotLine]) -> CurvePlot:
+    """Lines over the values of another one, in frames (T,) from 0."""
+    return CurvePlot(x.label, x.unit, x.values, tuple(lines), frames)
+
+
 def _band(sigmas: NDArray[np.float64], has_band: bool) -> NDArray[np.float64]:
     return BAND_SIGMAS * sigmas if has_band else np.full(len(sigmas), np.nan)
 

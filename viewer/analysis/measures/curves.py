@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scan.units import Scale
-from ..curves import Movement, Repeats, Smoothing, movement_of, peaks_of, repeats_of, smoothed
+from ..curves import Movement, Repeats, Smoothing, correlation, movement_of, peaks_of, repeats_of, smoothed
 from . import Series
 
 _Array = NDArray[np.float64]
@@ -78,10 +78,23 @@ class MeasureCurve:
         return values, np.sqrt(variances)
 
 
-def number_rows(curves: Iterable[MeasureCurve]) -> list[list[object]]:
+def number_rows(curves: Sequence[MeasureCurve], against: MeasureCurve | None = None) -> list[list[object]]:
     """The numbers of the movements, a row for each curve below NUMBER_COLUMNS; None for what is not known.
-    Each ± is two standard deviations."""
-    return [[curve.name, curve.unit, *map(_rounded, _numbers(curve))] for curve in curves]
+    Each ± is two standard deviations. against: one of the curves, whose correlation with the others then is
+    one more column."""
+    rows: list[list[object]] = [[curve.name, curve.unit, *map(_rounded, _numbers(curve))] for curve in curves]
+    if against is None:
+        return rows
+    found = correlations(curves, against)
+    return [
+        [*row, _rounded(found.get(curve.name, math.nan))] for row, curve in zip(rows, curves, strict=True)
+    ]
+
+
+def correlations(curves: Iterable[MeasureCurve], against: MeasureCurve) -> dict[str, float]:
+    """How the values of each curve go with those of one among them: name of each other -> Pearson's
+    correlation, NaN where not known."""
+    return {curve.name: correlation(against.values, curve.values) for curve in curves if curve is not against}
 
 
 def repeats_by_peaks(curve: MeasureCurve, least: float) -> Repeats | None:

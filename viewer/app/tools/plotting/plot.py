@@ -11,11 +11,12 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as icons
 
+from ....analysis.measures.curves import correlations
 from ....output.plots import BAND_ALPHA, CurvePlot, PlotLine
 from ... import widgets
 from ...ui import Ui
 from .choices import AGAINST, MODE_WORDS, ORDER_WORDS, REPEATS, TIME
-from .shown import Curve, chosen_of, correlations
+from .shown import Curve, chosen_of
 from .words import NUMBERS_HELP, with_spread
 
 if TYPE_CHECKING:
@@ -265,7 +266,7 @@ def _draw_table(tool: Tool, frame: int, size: ImVec2) -> None:
     """A row for each curve: its value in a frame, and its numbers; a row under the mouse marks the curve."""
     curves, is_against = tool.shown.curves, tool.settings.mode == AGAINST
     help = {"r": "Pearson's correlation with what it is plotted against"} if is_against else NUMBERS_HELP
-    related = correlations(curves, tool.choices) if is_against else {}
+    related = correlations(curves, chosen_of(curves, tool.choices.abscissa)) if is_against else {}
     tool.pointed = None
     if not imgui.begin_table("numbers", 2 + len(help), _TABLE_FLAGS, size):
         return

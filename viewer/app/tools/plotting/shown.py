@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ....analysis.curves import Repeats, Smoothing, correlation
+from ....analysis.curves import Repeats, Smoothing
 from ....analysis.measures import Series
 from ....analysis.measures.curves import MeasureCurve, repeats_beside, repeats_by_peaks
 from ....analysis.trajectories import Trajectory
@@ -21,6 +21,7 @@ from ....output.plots import (
     color_of_way,
     line_of_curve,
     line_of_way,
+    plot_against,
     plot_over_time,
 )
 from ....scan.units import Scale
@@ -116,7 +117,7 @@ def plot_of(curves: Sequence[Curve], choices: CurveChoices, settings: Settings) 
     if settings.mode == AGAINST:
         chosen = curves.index(chosen_of(curves, choices.abscissa))
         x = lines.pop(chosen)
-        return CurvePlot(x.label, x.unit, x.values, tuple(lines), frames) if lines else None
+        return plot_against(x, frames, lines) if lines else None
     return plot_over_time(curves[0].times, frames, lines)
 
 
@@ -142,9 +143,3 @@ def _plot_of_repeats(curves: Sequence[Curve], lines: Sequence[PlotLine], aligned
         ]
         drawn.append(PlotLine(f"{line.label}, mean", line.unit, cut.mean, cut.deviation, line.color))
     return CurvePlot("time from the peak", "s", aligned.times, tuple(drawn))
-
-
-def correlations(curves: Sequence[Curve], choices: CurveChoices) -> dict[str, float]:
-    """How each curve goes with the one that it is plotted against: name -> Pearson's correlation."""
-    chosen = chosen_of(curves, choices.abscissa)
-    return {curve.name: correlation(chosen.values, curve.values) for curve in curves if curve is not chosen}
