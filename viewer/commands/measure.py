@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from ..analysis.curves import ORDERS, Smoothing
 from ..analysis.landmarks.files import AXES, landmark_suffixes, read_landmarks
 from ..analysis.landmarks.files.long_table import LONG_COLUMNS, STATES, cell, landmark_rows
-from ..analysis.landmarks.landmark_set import LandmarkSet, told_apart
-from ..analysis.landmarks.placed import landmarks_of, told_beside
+from ..analysis.landmarks.landmark_set import LandmarkSet
 from ..analysis.measures import Measure, Quantity, Series
 from ..analysis.measures.curves import (
     NUMBER_COLUMNS,
@@ -39,9 +38,8 @@ from ..analysis.measures.curves import (
     unit_of,
 )
 from ..analysis.measures.definitions import read_measures
-from ..analysis.measures.series import all_series, surface_of
+from ..analysis.measures.series import all_series
 from ..analysis.track import Known, Track
-from ..analysis.tracking import track_landmarks
 from ..analysis.trajectories import Trajectory, held_still, stabilising, trajectory_of
 from ..csv_text import save_rows
 from ..errors import InputError, unknown_name
@@ -60,12 +58,12 @@ from ..output.plots import (
 from ..scan.inputs import scan_inputs
 from ..scan.points import UNKNOWN_UNIT
 from ..scan.timeline import Timeline
-from ..scan.times import frame_in_words
 from ..scan.units import Scale
 from ..task import Task
 from ._console import progress, tell, warn
+from ._followed import check_place, put_on_surface, tracks_in_frames, with_noise
 from ._outputs import add_force_argument, claim
-from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, framing, open_timeline
+from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline
 
 _SUFFIXES = (".csv", ".json")
 _STEPS = 200  # of a progress bar
@@ -160,11 +158,11 @@ def run(args: Namespace) -> int:
             warn(f"{args.landmarks}: {told}")
         frame = indices[0] if args.placed_in is None else args.placed_in
         timeline.label(frame)  # raises where there is none
-        _check_place(args, found, timeline)
+        check_place(args.landmarks, found, timeline)
         with _shown(f"Measuring {timeline.name}"):
             if not args.no_snap:
-                found = _on_surface(args, found, timeline, frame)
-            tracks = _with_noise(_tracks(found, timeline, frame), args.noise)
+                found = put_on_surface(found, timeline, frame)
+            tracks = with_noise(tracks_in_frames(found, timeline, frame), args.noise)
         with _shown(f"Measuring {timeline.name}"):
             found_series = all_series(measures, tracks, timeline, frames=indices)
         if args.anchors:  # whose motion changes no measure
@@ -285,64 +283,6 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
     if args.against is not None and len(kept) == 1:
         raise InputError("nothing goes against the only measure", "--against", "Tell others by --measures")
     return kept
-
-
-def _check_place(args: Namespace, found: LandmarkSet, timeline: Timeline) -> None:
-    """Raise InputError where landmarks are not of this scan, or there are none."""
-    if not found.is_defined.any():
-        raise InputError("has no landmark that is placed", args.landmarks, "Place some in the window first")
-    last = int(found.frames[-1])
-    if found.is_framed and last >= len(timeline):
-        raise InputError(
-            f"has landmarks of {frame_in_words(last)}, and the scan has {len(timeline)}", args.landmarks,
-            "They are of another scan",
-        )  # fmt: skip
-    apart = told_apart(found, framing(timeline, range(len(timeline))))
-    if apart is not None:
-        hint = "Use landmarks of this scan; --axes and --unit tell of the scan what it does not"
-        raise InputError(apart, args.landmarks, hint)
-
-
-def _on_surface(args: Namespace, found: LandmarkSet, timeline: Timeline, frame: int) -> LandmarkSet:
-    """The landmarks moved onto the surface, and how far, in words; those that are far from it stay."""
-    frames = found.frames if found.is_framed or len(found) > 1 else np.array([frame])
-    positions, moves, astray = found.positions.copy(), [0.0], []
-    for row, index in enumerate(frames.tolist()):
-        columns = np.flatnonzero(found.is_defined[row])
-        if index >= len(timeline) or not len(columns):
-            continue
-        surface = surface_of(timeline, timeline.visit(index))
-        for column in columns:
-            place = surface.nearest(positions[row, column])
-            if place is None:
-                astray.append(found.names[column])
-            else:
-                moves.append(float(np.linalg.norm(place - positions[row, column])))
-                positions[row, column] = place
-    unit = timeline.unit
-    if max(moves) > 0:
-        mean = np.mean(moves[1:])
-        tell(f"landmarks are moved onto the surface by up to {max(moves):.3g} {unit}, {mean:.3g} on average")
-    if astray:
-        few = ", ".join(f"'{name}'" for name in list(dict.fromkeys(astray))[:_NAMED])
-        warn(f"{len(astray)} places lie off the surface and stay there, such as {few}")
-    return replace(found, positions=positions)
-
-
-def _tracks(found: LandmarkSet, timeline: Timeline, frame: int) -> dict[str, Track]:
-    """The landmarks in all frames, in the order of the file; those that are nowhere are pending."""
-    landmarks = landmarks_of(found, timeline.pose, len(timeline), frame)
-    beside = told_beside(landmarks)
-    if beside is not None:
-        warn(beside)
-    tracks = track_landmarks(timeline, landmarks, first=frame)
-    return {name: tracks.get(name) or Track.pending(timeline.times) for name in found.names}
-
-
-def _with_noise(tracks: Mapping[str, Track], noise: float) -> dict[str, Track]:
-    """The tracks with the scanner's noise in their covariances."""
-    spread = noise**2 * np.eye(3)
-    return {name: replace(track, covariances=track.covariances + spread) for name, track in tracks.items()}
 
 
 def _in_frames(series: Series, indices: Sequence[int]) -> Series:
