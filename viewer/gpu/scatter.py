@@ -53,7 +53,7 @@ class Visits:
             self.listed.run(program)
 
 
-class Hits(NamedTuple):
+class HitCells(NamedTuple):
     """A list to be filled with the cells that were hit, some of them more than once, and slots that are none.
     slots: how many cells an item visits at most."""
 
@@ -66,7 +66,7 @@ def scatter(
     visits: Visits,
     keys: gl.BufferTexture,
     best: gl.BufferTexture,
-    hits: Hits | None = None,
+    hits: HitCells | None = None,
 ) -> None:
     """Keep the least key of those that visit a cell, then the lowest item that has it.
 
@@ -91,7 +91,7 @@ def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:
 
 
 def take_items(
-    gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.BufferTexture, hits: Hits | None = None
+    gpu: Gpu, visits: Visits, keys: gl.BufferTexture, best: gl.BufferTexture, hits: HitCells | None = None
 ) -> None:
     """The second step of `scatter`: where keys hold the least ones already, keep the lowest item that has its
     cell's."""

@@ -18,7 +18,7 @@ from .compact import IndexList
 from .context import Program
 from .culling import CulledChunks, culled_chunks
 from .pose import GpuPose
-from .scatter import Hits, Visits, scatter, take_items, take_keys
+from .scatter import HitCells, Visits, scatter, take_items, take_keys
 from .surface import Surface
 
 # The points can list the pixels that they hit, at a third pass over the points; looking for
@@ -81,7 +81,7 @@ def draw_squares(
 
 def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
     """Write points that are far fewer than pixels."""
-    hits = Hits(surface.start_listed(), size**2)
+    hits = HitCells(surface.start_listed(), size**2)
     scatter(surface.gpu, visits, surface.depths, surface.rows, hits)
     surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
 
