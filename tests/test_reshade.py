@@ -76,6 +76,7 @@ def test_what_shows_something_else_is_not_shaded(renderer: Renderer, pose: Pose)
     surface = Surface(renderer.gpu, SIZE)
     assert not reshade(renderer, request, surface), "nothing was drawn"
     render_frame(renderer, request, surface)
+    assert not reshade(renderer, request, surface), "the same is drawn again, as by who times it"
     others: tuple[dict[str, Any], ...] = (
         {"camera": replace(camera, fov_y=20.0)},
         {"params": backend("points").params({"point_size": 3})},

@@ -114,9 +114,9 @@ def render_frame(
 def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
     """Shade the surface anew where it shows the request already, in another look at most; whether it did.
 
-    Nothing is drawn, uploaded or derived for it. What it does not take up, `render_frame` does.
+    Nothing is drawn or derived for it. What it does not take up, the same look among it, `render_frame` does.
     """
-    if not surface.is_whole or colorable(request) is not request:
+    if not surface.is_whole or request.look == surface.look or colorable(request) is not request:
         return False
     start = time.perf_counter()
     pose, before, layers = renderer.resident(request.pose), surface.drawn, surface.layers
@@ -127,7 +127,7 @@ def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
         "size": surface.size,
     }
     same_numbers = layers is request.layers or not (layers.scalars or request.layers.scalars)
-    if any(before[name] != value for name, value in wanted.items()) or not same_numbers:
+    if any(before.get(name) != value for name, value in wanted.items()) or not same_numbers:
         return False
     if not surface.take_look(request.look):
         return False

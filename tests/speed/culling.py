@@ -59,7 +59,8 @@ def least(draw: Callable[[bool], None], rounds: int) -> dict[bool, tuple[float, 
             times[culled].append(
                 ((time.process_time() - processor) * 1e3, (time.perf_counter() - wall) * 1e3)
             )
-    return {culled: tuple(np.min(taken[1:], axis=0)) for culled, taken in times.items()}  # type: ignore[misc]
+    processors, walls = ({c: min(pair[i] for pair in t[1:]) for c, t in times.items()} for i in (0, 1))
+    return {culled: (processors[culled], walls[culled]) for culled in times}
 
 
 def drawn(surface: Surface, count: int) -> float:

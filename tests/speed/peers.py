@@ -1,8 +1,8 @@
 """Scan4D beside other viewers of points, in one run. Prints a table.
 
-    python3 -m venv /tmp/peers
-    /tmp/peers/bin/pip install pyvista vispy PyOpenGL polyscope open3d-cpu
-    python tests/speed/peers.py --python /tmp/peers/bin/python [--rounds 7] [--size 1920x1280]
+    python3 -m venv ENVIRONMENT
+    ENVIRONMENT/bin/pip install pyvista vispy PyOpenGL polyscope open3d-cpu
+    python tests/speed/peers.py --python ENVIRONMENT/bin/python [--rounds 7] [--size 1920x1280]
                                 [--points 100000 1000000 10000000] [--splats 100000 1000000]
                                 [--peers pyvista vispy polyscope open3d] [--pictures FOLDER]
 

@@ -21,8 +21,8 @@ from .pose import GpuPose
 from .scatter import HitCells, Visits, scatter, take_items, take_keys
 from .surface import Surface
 
-# The points can list the pixels that they hit, at a third pass over the points; looking for
-# the covered pixels costs about as much as that pass over this share of their number.
+# Points can list the pixels that they hit, in slots that each has; below this share of the pixels that takes
+# less than clearing all of them and looking for those that are covered.
 _LIST_BELOW = 0.25
 # Points are not on a grid, and not everywhere equally dense: squares that cover 1.6 times the
 # usual spacing, and 1.25 times that of the sparsest tenth unless it is sparser still, leave

@@ -278,9 +278,8 @@ class RenderTarget:
         if name == "value":
             self._blended = self.value_source, self.look.up
         if name == "level":
-            self._covered_known = self._slots_known = (
-                False  # a list of what points cover lacks what is filled
-            )
+            # A list of what points cover lacks what is filled.
+            self._covered_known = self._slots_known = False
         return self._own[name]
 
     def bind_own(self, *names: str) -> None:
