@@ -16,7 +16,7 @@
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 
-packages=(numpy moderngl PyOpenGL scipy pillow cattrs cmap platformdirs filelock tqdm pytest hypothesis)
+packages=(numpy moderngl PyOpenGL scipy pillow cattrs cmap platformdirs filelock tqdm pytest pytest-xdist hypothesis)
 of_benchmark=(open3d-cpu numba scikit-image matplotlib jinja2 DracoPy flip-evaluator)
 largest=60 # MB
 
@@ -140,7 +140,8 @@ tested=(tests/gpu tests/backends tests/numerics)
 if [ $quick = yes ]; then
     tested=(tests/gpu/test_bins.py tests/gpu/test_fastest.py tests/backends/test_instancing.py)
 fi
-pytest=("$python" -m pytest -q -rs -p no:cacheprovider -p left_out -m "not slow")
+pytest=("$python" -m pytest -q -rs -p no:cacheprovider -p no:benchmark -p left_out -m "not slow")
+! has xdist || pytest+=(-n "$(nproc)" --dist worksteal)
 speed() { step "$1" "$2" "$python" "tests/speed/$1.py" "${@:3}"; }
 if [ $quick = yes ]; then
     step tests 900 "${pytest[@]}" "${tested[@]}"

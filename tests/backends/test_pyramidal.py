@@ -96,14 +96,17 @@ def two_pods(kind: str, measured: bool = False) -> tuple[RangeView, RangeView]:
     ("kind", "measured"), [("z", False), ("z", True), ("range", False), ("height", False)]
 )
 def test_pixels_show_the_very_samples(draw: Draw, kind: str, measured: bool, camera: Camera) -> None:
-    """Depth bit for bit, number, and no nearer one in the pixel."""
+    """Depth bit for bit, number, and no nearer one in the pixel. On hardware, whose divisions OpenGL lets be
+    wrong in the last bits, up to these."""
     views = two_pods(kind, measured)
     surface = draw(views, camera, (160, 120), "pyramidal", params=BARE)
     depth, number = nearest_samples(views, surface)
     assert (number != NOTHING).mean() > 0.1
     np.testing.assert_array_equal(surface.id, number)
-    assert surface.depth.tobytes() == depth.tobytes()
-    np.testing.assert_array_equal(surface.level, np.where(number == NOTHING, 255, 0))
+    there = number != NOTHING
+    last_bits = 0 if surface.gpu.software else 4
+    np.testing.assert_array_max_ulp(surface.depth[there], depth[there], last_bits, np.float32)
+    np.testing.assert_array_equal(surface.level, np.where(there, 0, 255))
 
 
 # --- holes ----------------------------------------------------------------------------

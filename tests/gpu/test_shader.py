@@ -25,7 +25,7 @@ def test_includes_are_expanded_once_with_line_numbers(shaders: Path) -> None:
     assert source.files == ["a.comp", "common/one.glsl", "b.glsl"]
     assert source.text.count("float one()") == 1
     assert source.text.startswith("#version 430 core\n")
-    assert "\n#define SIZE 3\n#line 1\n#line 100001\n" in source.text
+    assert "\n#define SIZE 3\n#line 1\n#line 1001\n" in source.text
     assert source.text.rstrip().endswith("#line 3\nfloat last;")
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import moderngl
 import numpy as np
@@ -111,19 +113,34 @@ def default_clip_space() -> None:
     _clip.glClipControl(_clip.GL_LOWER_LEFT, _clip.GL_NEGATIVE_ONE_TO_ONE)
 
 
-def write_depth(on: bool) -> None:
-    """Whether what is drawn from now on changes the depth buffer."""
-    GL_1_0.glDepthMask(on)
+@contextmanager
+def kept_depth() -> Iterator[None]:
+    """Whatever is drawn meanwhile leaves the depth buffer as it is."""
+    GL_1_0.glDepthMask(False)
+    try:
+        yield
+    finally:
+        GL_1_0.glDepthMask(True)
 
 
-def write_colors(on: bool) -> None:
-    """Whether what is drawn from now on changes images."""
-    GL_1_0.glColorMask(on, on, on, on)
+@contextmanager
+def kept_colors() -> Iterator[None]:
+    """Whatever is drawn meanwhile leaves images as they are."""
+    GL_1_0.glColorMask(False, False, False, False)
+    try:
+        yield
+    finally:
+        GL_1_0.glColorMask(True, True, True, True)
 
 
-def divide_depth(divisor: float) -> None:
-    """Divide what reaches the depth buffer from now on; 1: as it is."""
+@contextmanager
+def divided_depth(divisor: float) -> Iterator[None]:
+    """Divide what reaches the depth buffer meanwhile."""
     GL_1_0.glDepthRange(0.0, 1.0 / divisor)
+    try:
+        yield
+    finally:
+        GL_1_0.glDepthRange(0.0, 1.0)
 
 
 def clear_words(buffer: moderngl.Buffer, word: int, count: int | None = None) -> None:

@@ -17,7 +17,8 @@ _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 # "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (AMD, Intel)
 _PLACE = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
 # Lines of a file: the number of a line says the file too, since Mesa tells 0 for the number of most files.
-_LINES = 100_000
+# NVIDIA takes numbers below 2^20.
+_LINES = 1_000
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _UNIFORMS = re.compile(r"\buniform\b([^;{]*);")  # a declaration, of one or more
 _IN_BRACKETS = re.compile(r"\([^()]*\)|\[[^][]*\]")

@@ -79,9 +79,8 @@ def blend(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
 
 def _draw_fill(larger: Points, feed: str, splats: Splats) -> None:
     """Enlarged splats behind all that the first pass found."""
-    gl.divide_depth(BEHIND)
-    draw_shapes(larger, feed, SURFEL, "surfels/passes/fill.frag", splats)
-    gl.divide_depth(1)
+    with gl.divided_depth(BEHIND):
+        draw_shapes(larger, feed, SURFEL, "surfels/passes/fill.frag", splats)
 
 
 def _add(points: Points, larger: Points, surface: Surface, feed: str, splats: Splats) -> gl.Sums:
@@ -93,12 +92,11 @@ def _add(points: Points, larger: Points, surface: Surface, feed: str, splats: Sp
             _limit(points, surface, splats)
         with gpu.timers.measure("add"):
             sums.clear()
-            gl.write_depth(False)
             gpu.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
             gpu.ctx.depth_func = ">="
             gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE
-            draw_shapes(larger, feed, SURFEL, "surfels/passes/add.frag", splats)
-            gl.write_depth(True)
+            with gl.kept_depth():
+                draw_shapes(larger, feed, SURFEL, "surfels/passes/add.frag", splats)
     return sums
 
 

@@ -79,18 +79,13 @@ class _Literal:
         sums.clear_depth()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
         gpu.ctx.depth_func = ">"  # reversed depth: near is 1
-        with gpu.timers.measure("visibility"):
-            gl.write_colors(False)
-            gl.divide_depth(_pushed(pose, surface, splats))
+        pushed = _pushed(pose, surface, splats)
+        with gpu.timers.measure("visibility"), gl.kept_colors(), gl.divided_depth(pushed):
             draw_shapes(points, feed, SURFEL, "bench/literal.frag", splats, {"SHADES": 0})
-            gl.divide_depth(1)
-            gl.write_colors(True)
-        with gpu.timers.measure("shading"):
-            gl.write_depth(False)
+        with gpu.timers.measure("shading"), gl.kept_depth():
             gpu.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
             gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE
             draw_shapes(splats.larger(points), feed, SURFEL, "bench/literal.frag", splats, {"SHADES": 1})
-            gl.write_depth(True)
             gpu.ctx.disable(moderngl.BLEND)
         with gpu.timers.measure("resolve"):
             surface.clear()
