@@ -319,17 +319,3 @@ def test_no_shader_has_an_array_of_bool(programs: list[list[Source]]) -> None:
     """Mesa's Zink reads them as integers of one bit, which SPIR-V lacks: tests/drivers/zink_bool_array.py."""
     texts = "".join({stage.text for program in programs for stage in program})
     assert not re.findall(r"^\s*bool\s+\w+\s*\[.*$", texts, re.MULTILINE)
-
-
-def test_numbers_of_lines_say_the_file_and_are_what_every_compiler_takes(
-    programs: list[list[Source]],
-) -> None:
-    """NVIDIA's takes them below 2^20."""
-    for stage in {stage.text: stage for program in programs for stage in program}.values():
-        begun = [int(number) for number in re.findall(r"^#line (\d+)$", stage.text, re.MULTILINE)]
-        assert max(begun) < 1 << 20, stage.name
-        for index, file in enumerate(stage.files):
-            if not file.startswith("<"):
-                assert stage.explain(f"0:{index * 1000 + 1}: ") == f"{file}:1: "
-                lines = Path(str(resource_path("shaders", file))).read_text(encoding="utf-8").count("\n")
-                assert lines < 1000, file

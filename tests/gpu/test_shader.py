@@ -25,7 +25,7 @@ def test_includes_are_expanded_once_with_line_numbers(shaders: Path) -> None:
     assert source.files == ["a.comp", "common/one.glsl", "b.glsl"]
     assert source.text.count("float one()") == 1
     assert source.text.startswith("#version 430 core\n")
-    assert "\n#define SIZE 3\n#line 1\n#line 1001\n" in source.text
+    assert "\n#define SIZE 3\n#line 1\n#line 100001\n" in source.text
     assert source.text.rstrip().endswith("#line 3\nfloat last;")
 
 
@@ -47,6 +47,15 @@ def test_an_error_of_meaning_names_the_part_that_it_is_in(shaders: Path, rendere
     )
     with pytest.raises(ShaderError, match=r"part\.glsl:2"):
         renderer.gpu.compute("whole.comp", parts={"part": "part.glsl"})
+
+
+def test_no_text_ends_with_the_number_of_a_line(shaders: Path) -> None:
+    """NVIDIA's compiler calls such a number invalid."""
+    (shaders / "common" / "two.glsl").write_text('#include "common/one.glsl"\n')
+    (shaders / "a.comp").write_text('float first;\n#include "common/two.glsl"\n')
+    assert Source("a.comp").text.rstrip().endswith("float one() { return 1.0; }")
+    (shaders / "b.comp").write_text('#include "common/two.glsl"\nfloat last;\n')
+    assert Source("b.comp").text.endswith("#line 2\nfloat last;\n")
 
 
 @pytest.mark.parametrize("log", ["0:12(5): error: x", "0(12) : error C0000: x", "ERROR: 0:12: 'x' : y"])

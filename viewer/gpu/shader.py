@@ -17,8 +17,7 @@ _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 # "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (AMD, Intel)
 _PLACE = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
 # Lines of a file: the number of a line says the file too, since Mesa tells 0 for the number of most files.
-# NVIDIA takes numbers below 2^20.
-_LINES = 1_000
+_LINES = 100_000
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _UNIFORMS = re.compile(r"\buniform\b([^;{]*);")  # a declaration, of one or more
 _IN_BRACKETS = re.compile(r"\([^()]*\)|\[[^][]*\]")
@@ -91,6 +90,8 @@ class Source:
             else:
                 lines.append(self._expand(found[1]) if found[1] else self._expand_part(found[2]))
                 lines.append(f"#line {index * _LINES + number + 1}")
+        if lines[-1].startswith("#line"):
+            lines.pop()  # NVIDIA takes none that nothing follows
         return "\n".join(lines) + "\n"
 
     def explain(self, log: str) -> str:

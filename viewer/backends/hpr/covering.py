@@ -161,6 +161,8 @@ class Covering:
         program = gpu.compute("hpr/near_front.comp", defines, params=cells)
         near.clear()
         near.bind()
+        if sample is not None:
+            gl.clear_words(self.visible.buffer, 0)  # of those that are not looked at
         self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
         self._held["homes"].bind(Texture.HOMES)
         self._held["spots"].bind(Texture.SPOTS)
