@@ -1,4 +1,4 @@
-"""A pytest plugin for drivers that hand out empty memory, as Mesa's do: buffers begin as any others left them.
+"""A pytest plugin for drivers that hand out empty memory, as Mesa does: buffers begin as others left them.
 
 PYTHONPATH=tests/drivers python -m pytest -p poisoned tests/gpu tests/backends
 
