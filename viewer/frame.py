@@ -97,10 +97,12 @@ def render_frame(
         "values": surface.values_key,
     }
     changed = surface.take_changes(drawn)
+    stats.asked = getattr(params, "share", 1.0)
+    share *= stats.asked
     frame = FrameView(view, params, prepared and prepared.derived, share, budget_ms, changed, moving)
     refinable = backend.draw(pose, frame, surface)
     surface.drawn = drawn
-    surface.is_whole = not (refinable or prepared is None or stats.simplified) and stats.share >= 1
+    surface.is_whole = not (refinable or prepared is None or stats.simplified or stats.is_sample)
     shade(surface, look)
 
     stats.upload_ms = sum(each.take_ms("upload") for each in {pose, surface.pose})

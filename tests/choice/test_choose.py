@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,7 @@ from range_scenes import sphere_view
 from scenes import sphere
 from test_model import seen, true_law
 
-from viewer.backends import backends
+from viewer.backends import SHARES, backends
 from viewer.camera import Camera
 from viewer.choice.choose import Candidate, Comparison, best, choose_way
 from viewer.choice.goal import PIXELS, Goal
@@ -171,3 +172,26 @@ def test_range_views_are_drawn_without_merging_their_points() -> None:
     assert {way.backend for way in ways(pose)} == {"pyramidal"}
     assert all(backends()[way.backend].draws_samples(pose, way.params) for way in ways(pose))
     assert not pose.is_merged
+
+
+def test_a_share_of_many_points_is_drawn_where_all_would_take_too_long() -> None:
+    """As a scan that has no others: the laws are those of all points."""
+    rng = np.random.default_rng(3)
+    law, view = true_law(), seen(rng)
+    view = replace(view, points=1e7, listed=1e7, in_view=1e7, spacing=0.4, sparse=0.6)
+    shares = [1.0, *SHARES]
+    offered = [DrawingWay("way", {"share": share} if share < 1 else {}) for share in shares]
+    assert {way.key for way in offered} == {"way"}
+    assert [way.share for way in offered] == shares
+    expected = [law.expect(view.of_share(share), 1.0) for share in shares]
+    assert [each.ms for each in expected] == sorted((each.ms for each in expected), reverse=True)
+    assert [each.error for each in expected] == sorted(each.error for each in expected)
+    for share, each in zip(shares, expected, strict=True):
+        choice = best(offered, view, Goal("time", 1.01 * each.ms * law.late), {"way": law})
+        assert (choice.keeps, choice.way.share) == (True, share)
+
+
+def test_shares_are_offered_of_scans_of_many_points() -> None:
+    few, many = (Pose(0, 0.0, "test", sphere(count)) for count in (10_000, 200_000))
+    assert {way.share for way in ways(few)} == {1.0}
+    assert {way.share for way in ways(many) if way.backend in ("points", "surfels")} == {1.0, *SHARES}

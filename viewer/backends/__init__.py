@@ -53,11 +53,13 @@ from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from ..look import COLOR_BY, ValueKind
-from ..params import Parameter, describe, parse
+from ..params import Parameter, describe, param, parse
 from ..scan.pose import Pose
 from ..view import View
 
 ROWS = ("points", "octants", "samples")
+SHARES = (0.5, 0.25, 0.1)  # levels of detail that are chosen automatically
+_MANY = 200_000  # points of a scan, from which on they are
 CHANGES = ("pose", "camera", "parameters", "size", "values")  # of one picture against the one before
 
 
@@ -96,6 +98,25 @@ NO_SPACING = (
     "points are drawn as large as they lie apart, which a line of them end on, or one alone, does not tell"
 )
 NO_DETAIL = "what is divided is the whole scan: a detail, tiny beside it, is within few of the parts"
+
+
+def share_param(group: str = "") -> float:
+    """The parameter `share` of a backend: a coarser level of detail. Whatever draws it finds the share in
+    `FrameView.share`, with that of a preview."""
+    return param(
+        1.0,
+        "Share of the points that are drawn, evenly chosen and larger to match; less is faster and coarser",
+        low=1e-3,
+        high=1.0,
+        title="Level of detail",
+        group=group,
+    )
+
+
+def with_levels(pose: Pose, *offered: dict[str, object]) -> tuple[dict[str, object], ...]:
+    """The values that a backend offers, each with all points and, of a scan of many, with shares of them."""
+    levels = SHARES if pose.count >= _MANY else ()
+    return (*offered, *({**values, "share": share} for values in offered for share in levels))
 
 
 class Derived(Protocol):

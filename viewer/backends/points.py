@@ -12,7 +12,7 @@ from ..gpu.squares import LARGEST_SQUARE, draw_squares
 from ..gpu.surface import Surface
 from ..params import param
 from ..scan.pose import Pose
-from . import FrameView, Suited
+from . import FrameView, Suited, share_param, with_levels
 from .hpr import mark_visible
 
 TITLE = "Points"
@@ -39,6 +39,7 @@ class Params:
         sweep=(False, True),
         basic=True,
     )
+    share: float = share_param()
 
 
 def needs(pose: Pose, params: Params) -> tuple[str, ...]:
@@ -53,7 +54,7 @@ def suits(pose: Pose) -> Suited:
 
 def offers(pose: Pose) -> tuple[dict[str, object], ...]:
     """Squares that touch, and pixels; of range views, the points would have to be merged."""
-    return () if pose.views else ({"point_size": 0}, {})
+    return () if pose.views else with_levels(pose, {"point_size": 0}, {})
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:

@@ -164,7 +164,8 @@ def with_choices(rows: Sequence[Row], model: Model) -> list[Row]:
 
 def measured_of(row: Row) -> Measured:
     """Picture that a row tells of, as models are fitted to it."""
-    return Measured(ScanInView(**row["seen"]), row["scale"], row["ms"], row["error"])
+    seen = ScanInView(**row["seen"]).of_share(way(row).share)
+    return Measured(seen, row["scale"], row["ms"], row["error"])
 
 
 def way(row: Row) -> DrawingWay:

@@ -78,7 +78,7 @@ class Comparison:
         candidates = []
         for way in known:
             law = model[way.key]
-            expected = law.expect(seen, way.scale)
+            expected = law.expect(seen.of_share(way.share), way.scale)
             other = expected.error if goal.kind == "time" else expected.ms
             candidates.append(Candidate(way, expected, _bounded(expected, law, goal, seen), other))
         return cls(goal, seen.footprint, tuple(candidates))

@@ -83,6 +83,18 @@ class ScanInView:
             footprint=self.footprint / scale,
         )
 
+    def of_share(self, share: float) -> ScanInView:
+        """A scan of which a share of the points is drawn, evenly chosen: as one that has no others."""
+        apart = share**-0.5
+        return replace(
+            self,
+            points=self.points * share,
+            listed=self.listed * share,
+            in_view=self.in_view * share,
+            spacing=self.spacing * apart,
+            sparse=self.sparse * apart,
+        )
+
 
 def _sample(cloud: PointCloud) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions (M, 3) of points by chance, relative to the origin, and how far the next one in the file is

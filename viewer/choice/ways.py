@@ -9,6 +9,7 @@ from typing import Any
 from ..backends import backend, backends
 from ..scan.pose import Pose
 
+_SHARE = "share"  # the parameter that is the level of detail
 SCALES = (1.0, 0.71, 0.5, 0.35)  # of width and height
 
 
@@ -22,8 +23,14 @@ class DrawingWay:
 
     @property
     def key(self) -> str:
-        """Name in models, which hold at every scale: 'surfels passes=one'."""
-        return " ".join([self.backend, *(f"{name}={value}" for name, value in sorted(self.values.items()))])
+        """Name in models, which hold at every scale and level of detail: 'surfels passes=one'."""
+        told = [f"{name}={value}" for name, value in sorted(self.values.items()) if name != _SHARE]
+        return " ".join([self.backend, *told])
+
+    @property
+    def share(self) -> float:
+        """The share of the points that it draws."""
+        return float(self.values.get(_SHARE, 1.0))  # type: ignore[arg-type]
 
     @property
     def params(self) -> Any:

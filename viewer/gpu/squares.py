@@ -60,9 +60,10 @@ def draw_squares(
         _draw_chunks(pose, surface, size, shown, chunks, few)
         return False
     rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
-    is_sample = surface.stats.share < 1
-    if is_sample:
-        size = min(round(size / math.sqrt(surface.stats.share)), LARGEST_SQUARE)
+    if surface.stats.share < 1:
+        enlarged = 1 / math.sqrt(surface.stats.share)
+        larger = round(point_size * enlarged) or _touching(pose, surface.view, enlarged)
+        size = min(larger, LARGEST_SQUARE)
 
     def bind(_: Program) -> None:
         pose.array("positions").bind(Texture.POSITIONS)
@@ -76,7 +77,7 @@ def draw_squares(
         _draw_listed(surface, visits, size)
     else:
         scatter(pose.gpu, visits, surface.depths, surface.rows)
-    return is_sample
+    return surface.stats.is_sample
 
 
 def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
@@ -133,9 +134,10 @@ def _defines(
     return {name: int(value) for name, value in given.items()}
 
 
-def _touching(pose: GpuPose, view: View) -> int:
-    """The size at which squares in the middle of the scan touch their neighbours, pixels."""
-    reach = pose.stored.remember(_reach)
+def _touching(pose: GpuPose, view: View, enlarged: float = 1.0) -> int:
+    """The size at which squares in the middle of the scan touch their neighbours, pixels. enlarged: how many
+    times as far apart these are as all points."""
+    reach = enlarged * pose.stored.remember(_reach)
     depth = max(float(view.depths(pose.bounds.center - pose.origin)), view.near)
     pixels = reach * view.scale / (depth if view.perspective else 1.0)
     return min(max(math.ceil(pixels), 1), LARGEST_SQUARE)

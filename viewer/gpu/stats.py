@@ -16,9 +16,10 @@ class Stats:
     many of it became what; it waits for the GPU, and tells of the last picture of its surface. chosen:
     parameter -> what "auto" stood for. samples: of each pixel, whose mean the picture shows (see
     `frame.supersample`). faces_away: whether points that face away from the eye were left
-    out. share: of the points that needed to be drawn, by the order of gpu/sample.py, less than 1 in a
-    preview. left_out: the points that are not in that share. simplified: whether it is drawn more simply than
-    a picture at rest would be, as `FrameView.moving` allows; the window draws it anew then.
+    out. share: of the points that needed to be drawn, by the order of gpu/sample.py. asked: the share that
+    the picture has once it is refined, less than 1 on a coarser level of detail. left_out: the points that
+    are in that one and not in `share`. simplified: whether it is drawn more simply than a picture at rest
+    would be, as `FrameView.moving` allows; the window draws it anew then.
     """
 
     backend: str = ""
@@ -32,6 +33,12 @@ class Stats:
     chosen: dict[str, str] = field(default_factory=dict)
     faces_away: bool = False
     share: float = 1.0
+    asked: float = 1.0
     left_out: int = 0
     simplified: bool = False
     samples: int = 1
+
+    @property
+    def is_sample(self) -> bool:
+        """Whether fewer points are drawn than it asks for: a preview."""
+        return self.share < self.asked

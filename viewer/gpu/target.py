@@ -213,20 +213,21 @@ class RenderTarget:
         points in chunks beyond are not listed. None for a backend that looks at points wherever they are.
         """
         count = len(self._cloud) if self.samples is None else int(self.samples.firsts[-1])
-        near = None
+        near, asked = None, self.stats.asked
         if margin is not None and self.samples is None:
             near = self.pose.keep(Chunks).rows_in(self.view, margin, reach)
         if near is not None:
             self.stats.skipped["points"] = f"{count - len(near):,} of {count:,} are in chunks out of view"
             if share < 1:
                 near = near[is_sampled(near, share)]
-                self.stats.share, self.stats.left_out = share, count - round(count * share)
+                self.stats.share, self.stats.left_out = share, round(count * asked) - round(count * share)
             return row_list(self.gpu).write(near), len(near)
         if share >= 1 or count < _FEW:
             return None, count
         rows, drawn = sample_of(self.gpu).take(share, count)
         points = count if self.samples is None else self.samples.count
-        self.stats.share, self.stats.left_out = share, points - round(points * drawn / count)
+        self.stats.share = share
+        self.stats.left_out = round(points * asked) - round(points * drawn / count) if share < asked else 0
         return rows, drawn
 
     def clear(self) -> None:

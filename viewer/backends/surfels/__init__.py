@@ -23,7 +23,7 @@ from ...params import param
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
-from .. import FrameView, Limit, Suited
+from .. import FrameView, Limit, Suited, share_param, with_levels
 from . import passes
 from .gaps import GapRadii
 from .splats import FRAGMENT, SURFEL, Splats
@@ -122,6 +122,7 @@ class Params:
         group="Splats",
     )
     cull_back: bool = param(False, "Leave out surfels that face away", group="Splats")
+    share: float = share_param(group="Splats")
     instancing: str = param(
         "auto",
         "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
@@ -145,7 +146,7 @@ def suits(pose: Pose) -> Suited | None:
 
 def offers(pose: Pose) -> tuple[dict[str, object], ...]:
     """Two passes, and one, where normals are stored."""
-    return () if pose.views or pose.overview.normals is None else ({}, {"passes": "one"})
+    return () if pose.views or pose.overview.normals is None else with_levels(pose, {}, {"passes": "one"})
 
 
 def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
@@ -159,7 +160,7 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     instancing = _instancing(params, surface)
     surface.stats.faces_away = params.cull_back
     _splat(points, surface, params, instancing, uniform_radius)
-    return surface.stats.share < 1 or not known
+    return surface.stats.is_sample or not known
 
 
 def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, float, bool]:

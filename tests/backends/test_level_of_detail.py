@@ -1,0 +1,116 @@
+"""Coarser levels of detail: a share of the points, larger to match, as a picture at rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import NOTHING, sphere
+
+from viewer.backends import SHARES, backend
+from viewer.camera import Camera
+from viewer.errors import InputError
+from viewer.frame import Request, render_frame, reshade, supersample
+from viewer.gpu.sample import is_sampled
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+
+SIZE = (320, 240)
+CLOUD = sphere(40_000)
+CAMERA = Camera((0.5, 0.4, 3.0), (0.0, 0.0, 0.0), fov_y=46)
+SETTINGS = {
+    "touching": ("points", {"point_size": 0}),
+    "pixels": ("points", {}),
+    "surfels": ("surfels", {}),
+    "one pass": ("surfels", {"passes": "one"}),
+    "quads": ("surfels", {"instancing": "tbo"}),
+}
+
+
+def request(setting: str, cloud: PointCloud = CLOUD, look: Look | None = None, **values: object) -> Request:
+    name, given = SETTINGS[setting]
+    params = backend(name).params({**given, **values})
+    return Request(Pose(0, 0.0, "test", cloud), CAMERA, name, params, look or Look())
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_it_is_the_preview_of_that_share_and_whole(renderer: Renderer, setting: str, share: float) -> None:
+    level, preview = Surface(renderer.gpu, SIZE), Surface(renderer.gpu, SIZE)
+    assert not render_frame(renderer, request(setting, share=share), level)
+    assert render_frame(renderer, request(setting), preview, share=share)
+    for channel, values in preview.arrays().items():
+        np.testing.assert_array_equal(level.arrays()[channel], values, channel)
+    assert level.is_whole
+    assert not preview.is_whole
+    assert (level.stats.left_out, level.stats.is_sample) == (0, False)
+    assert preview.stats.left_out == len(CLOUD) - np.count_nonzero(rows_of(share))
+
+
+def rows_of(share: float) -> np.ndarray:
+    return is_sampled(np.arange(len(CLOUD), dtype=np.uint32), share)
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_a_preview_of_it_shows_a_share_of_its_points(renderer: Renderer, setting: str) -> None:
+    surface = Surface(renderer.gpu, SIZE)
+    assert render_frame(renderer, request(setting, share=0.5), surface, share=0.2)
+    rows = np.unique(surface.row)
+    assert rows_of(0.1)[rows[rows != NOTHING]].all()
+    assert surface.stats.left_out == pytest.approx(0.4 * len(CLOUD), abs=2)
+    assert not surface.is_whole
+
+
+@pytest.mark.parametrize("setting", ["touching", "surfels", "one pass"])
+def test_what_is_left_out_leaves_no_holes_and_moves_the_surface_little(
+    renderer: Renderer, setting: str
+) -> None:
+    surfaces = {}
+    for share in (1.0, *SHARES):
+        surfaces[share] = Surface(renderer.gpu, SIZE)
+        render_frame(renderer, request(setting, share=share), surfaces[share])
+    whole = surfaces[1.0]
+    inside = np.zeros(SIZE[::-1], bool)
+    inside[60:180, 100:220] = True
+    for share in SHARES:
+        level = surfaces[share]
+        assert (level.row[inside] != NOTHING).mean() > (0.97 if setting == "touching" else 0.9999)
+        covered = [np.count_nonzero(each.row != NOTHING) for each in (level, whole)]
+        assert covered[0] == pytest.approx(covered[1], rel=0.08)
+        both = inside & (level.row != NOTHING) & (whole.row != NOTHING)
+        off = np.abs(level.depth[both] - whole.depth[both])
+        pixel = 3.0 / whole.view.scale
+        assert np.median(off) < (3.0 if setting == "touching" else 0.5) * pixel
+
+
+def test_squares_of_it_are_as_large_as_its_points_are_apart(renderer: Renderer) -> None:
+    """And not as some whole pixels, times those of all points."""
+    dense, surface = sphere(300_000), Surface(renderer.gpu, (160, 120))
+    for share in (1.0, 0.3):  # whose squares would be of two pixels if those of one were enlarged
+        render_frame(renderer, request("touching", dense, share=share), surface)
+        _, counts = np.unique(surface.row[surface.row != NOTHING], return_counts=True)
+        assert counts.max() == 1
+    render_frame(renderer, request("pixels", dense, share=0.3), surface)
+    assert np.unique(surface.row, return_counts=True)[1][:-1].max() == 4
+
+
+def test_it_is_shaded_anew_and_has_samples_as_others_have(renderer: Renderer) -> None:
+    surface = Surface(renderer.gpu, SIZE)
+    asked = request("touching", share=0.25)
+    render_frame(renderer, asked, surface)
+    other = replace(asked, look=Look(color_by="depth", quality="balanced"))
+    assert reshade(renderer, other, surface)
+    while supersample(renderer, other, surface):
+        pass
+    assert surface.stats.samples > 1
+    assert (~is_sampled(surface.row[surface.row != NOTHING], 0.25)).sum() == 0
+
+
+@pytest.mark.parametrize("bad", [0.0, 1.5, -1, "all"])
+def test_shares_are_more_than_none_and_at_most_all(bad: object) -> None:
+    with pytest.raises(InputError, match="share"):
+        backend("points").params({"share": bad})
