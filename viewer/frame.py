@@ -14,8 +14,9 @@ from .backends import backend as find_backend
 from .camera import Camera
 from .gpu.context import Gpu
 from .gpu.mean import PictureMean
-from .gpu.pose import drawn_bounds
+from .gpu.pose import GpuPose, drawn_bounds
 from .gpu.shade import shade
+from .gpu.stats import Stats
 from .gpu.surface import Surface
 from .look import SAMPLES, Look, drawable
 from .renderer import Renderer, Want
@@ -105,7 +106,7 @@ def render_frame(
     surface.is_whole = not (refinable or prepared is None or stats.simplified or stats.is_sample)
     shade(surface, look)
 
-    stats.upload_ms = sum(each.take_ms("upload") for each in {pose, surface.pose})
+    _tell_uploads(stats, {pose, surface.pose})
     stats.derive_ms = pose.take_ms("derive")
     stats.passes = timers.passes()
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
@@ -139,11 +140,20 @@ def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
     stats = surface.stats
     stats.skipped["draw"] = "what is seen is the same"
     stats.samples = 1
-    stats.upload_ms, stats.derive_ms = pose.take_ms("upload"), 0.0
+    _tell_uploads(stats, {pose})
+    stats.derive_ms = 0.0
     stats.passes = renderer.gpu.timers.passes()
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
     return True
+
+
+def _tell_uploads(stats: Stats, poses: Iterable[GpuPose]) -> None:
+    """Count what was uploaded of poses since their last pictures."""
+    stats.upload_ms = sum(pose.take_ms("upload") for pose in poses)
+    uploaded = [pose.take_uploaded() for pose in poses]
+    stats.uploaded_bytes = sum(each.nbytes for each in uploaded)
+    stats.shared = tuple(name for each in uploaded for name in each.shared)
 
 
 def supersample(renderer: Renderer, request: Request, surface: Surface, *, wait: bool = True) -> bool:

@@ -124,9 +124,9 @@ class _Resident:
 
     @property
     def nbytes(self) -> int:
-        """Bytes on the GPU."""
+        """Bytes on the GPU; of what it shares with other poses, its part."""
         derived = sum(p.derived.nbytes for p in self.derived.values() if p.derived)
-        return self.gpu_pose.uploaded_bytes + derived
+        return self.gpu_pose.counted_bytes + derived
 
     @property
     def held_bytes(self) -> int:
@@ -178,7 +178,8 @@ class Renderer:
         return sum(r.held_bytes for r in self._resident.values())
 
     def bytes_of(self, pose: Pose) -> int:
-        """Bytes that one pose holds on the GPU, with what was derived from it; 0 where it is not there."""
+        """Bytes that one pose holds on the GPU, with what was derived from it and its part of what it shares
+        with others; 0 where it is not there."""
         entry = self._resident.get(id(pose.life))
         return 0 if entry is None else entry.nbytes
 
@@ -195,7 +196,9 @@ class Renderer:
     def _hold(self, pose: Pose, entry: _Resident) -> None:
         """Keep what there is of a pose from now on, and let go of those that nobody else holds."""
         for gone in [k for k, r in self._resident.items() if r.life() is None]:
-            self._resident.pop(gone).release()
+            passed = self._resident.pop(gone)
+            entry.gpu_pose.adopt(passed.gpu_pose)
+            passed.release()
         self._resident[id(pose.life)] = entry
 
     def _find(self, pose: Pose) -> _Resident:

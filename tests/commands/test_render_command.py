@@ -319,10 +319,11 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
     assert [f["pose"] for f in stats["frames"]] == [1, 2]
     for f in stats["frames"]:
         assert list(f) == [
-            "pose", "gpu_ms", "cpu_ms", "upload_ms", "derive_ms", "passes", "points", "skipped", "counted",
-            "chosen",
+            "pose", "gpu_ms", "cpu_ms", "upload_ms", "uploaded_bytes", "shared", "derive_ms", "passes",
+            "points", "skipped", "counted", "chosen",
         ]  # fmt: skip
         assert f["upload_ms"] > 0
+        assert f["uploaded_bytes"] >= 2000 * 12
         assert f["cpu_ms"] > 0
         assert len(f["passes"]) >= 2
         assert all(set(p) == {"name", "gpu_ms"} and p["gpu_ms"] >= 0 for p in f["passes"])

@@ -140,3 +140,40 @@ def test_a_cloud_is_moved_with_its_viewpoint() -> None:
     assert moved.viewpoint.tolist() == [1.5, 2, -1]
     assert moved.world() == pytest.approx(cloud.world() + np.array([0.5, 0, -4]))
     assert PointCloud.from_arrays(np.eye(3)).moved(np.ones(3)).viewpoint is None
+
+
+def test_arrays_of_another_cloud_are_taken_where_they_hold_the_same() -> None:
+    rng = np.random.default_rng(5)
+    positions, colors = rng.random((300_000, 3), np.float32), rng.integers(0, 256, (300_000, 4), np.uint8)
+    radii = rng.random(300_000).astype(np.float32)
+    radii[7] = np.nan
+    kinds = {"kind": np.arange(300_000), "heat": radii}
+
+    def read(moved: float) -> PointCloud:
+        values = {name: each.copy() for name, each in kinds.items()}
+        values["heat"][-1] = moved
+        return PointCloud.from_arrays(
+            positions + np.float32(moved),
+            colors=colors.copy(),
+            radii=radii.copy(),
+            scalars=values,
+            origin=np.zeros(3),
+        )
+
+    first, second = read(0.0), read(1.0)
+    shared = second.sharing(first)
+    assert shared.colors is first.colors
+    assert shared.radii is first.radii, "NaN and all"
+    assert shared.scalars["kind"] is first.scalars["kind"]
+    assert shared.scalars["heat"] is second.scalars["heat"], "the last one is another"
+    assert shared.positions is second.positions
+    fewer = PointCloud.from_arrays(positions[1:], colors=colors[1:])
+    assert fewer.sharing(first) is fewer
+    zeros = PointCloud.from_arrays(np.zeros((9, 3), np.float32), radii=np.zeros(9), origin=np.zeros(3))
+    below = PointCloud.from_arrays(np.zeros((9, 3), np.float32) - 1, radii=-np.zeros(9), origin=np.zeros(3))
+    assert below.sharing(zeros) is below, "equal numbers of other bits"
+
+
+def test_colours_of_four_bytes_are_taken_as_they_are() -> None:
+    colors = np.full((2, 4), 9, np.uint8)
+    assert PointCloud.from_arrays(np.zeros((2, 3)), colors=colors).colors is colors

@@ -584,3 +584,11 @@ def test_frames_get_other_times_and_their_points_stay() -> None:
         with pytest.raises(InputError):
             scan.retime([0, 1, 1, 2])
         assert scan.pose(3).time == 1.5
+
+
+def test_frames_have_what_is_the_same_in_all_of_them_once() -> None:
+    with open_scan("demo") as scan:
+        first, second = scan.pose(0).cloud, scan.pose(7).cloud
+    assert second.colors is first.colors
+    assert second.positions is not first.positions
+    assert second.normals is not first.normals

@@ -42,6 +42,8 @@ def draw_measured(
         "gpu_ms": median(run.total() for run in runs),
         "cpu_ms": median(cpu_ms),
         "upload_ms": first.upload_ms,
+        "uploaded_bytes": first.uploaded_bytes,
+        "shared": first.shared,
         "derive_ms": first.derive_ms,
         "passes": [{"name": name, "gpu_ms": median(run[name] for run in runs)} for name in runs[0]],
         "points": _points(surface),

@@ -56,10 +56,12 @@ class GpuPose:
         self.gpu = gpu
         self.pose = pose
         self._arrays: dict[Hashable, gl.BufferTexture] = {}  # by name; what is packed, by how
+        self._shared: dict[str, SharedArray] = {}  # what holds those of them that poses may have in common
         self._samples: RangeSamples | None = None
         self._uploads: dict[str, _Upload] = {}  # that have begun
         self._estimated: PointCloud | None = None
         self._uploaded_bytes = 0
+        self._uploads_of_late = Uploaded()
         self._spent = {"upload": 0.0, "derive": 0.0}
         self._layers: dict[int, Layer] = {}
         self._made: dict[Callable[..., Any], Workspace] = {}
@@ -134,7 +136,14 @@ class GpuPose:
         """Bytes that it holds on the GPU."""
         samples = self._samples
         made = sum(each.nbytes for each in self._made.values())
-        return self._uploaded_bytes + made + (samples.nbytes if samples and samples.complete else 0)
+        shared = sum(each.nbytes for each in self._shared.values())
+        return self._uploaded_bytes + shared + made + (samples.nbytes if samples and samples.complete else 0)
+
+    @property
+    def counted_bytes(self) -> int:
+        """Bytes that it holds on the GPU, and of what it shares with other poses its part: what adds up."""
+        others = (each.nbytes - each.nbytes // len(each.holders) for each in self._shared.values())
+        return self.uploaded_bytes - sum(others)
 
     @property
     def bounds(self) -> Bounds:
@@ -202,12 +211,46 @@ class GpuPose:
         there."""
         if name == _RANGES:
             return self._upload_samples(end)
-        if name not in self._uploads:
-            self._uploads[name] = _array_upload(self.gpu, self._values(name))
+        values = self._values(name) if name not in self._uploads else None
+        if values is not None and self._take_shared(name, values):
+            return True
+        if values is not None:
+            self._uploads[name] = _array_upload(self.gpu, values)
         if not self._uploads[name].go_on(end):
             return False
-        self._keep_array(name, self._uploads.pop(name), FORMATS.get(name, gl.R32F))
+        upload, texel_format = self._uploads.pop(name), FORMATS.get(name, gl.R32F)
+        if name in FORMATS and upload.values is getattr(self.cloud, name):
+            self._arrays[name] = gl.BufferTexture(upload.target, texel_format)
+            self._share(name, _shared_arrays(self.gpu).add(name, upload.values, self._arrays[name]))
+            self._uploads_of_late.nbytes += upload.nbytes
+        else:
+            self._keep_array(name, upload, texel_format)
         return True
+
+    def _take_shared(self, name: str, values: NDArray) -> bool:
+        """Take an array that another pose has brought to the GPU, where there is one; whether there is."""
+        shared = _shared_arrays(self.gpu).find(name, values)
+        if shared is None:
+            return False
+        self._arrays[name] = shared.texels
+        self._share(name, shared)
+        self._uploads_of_late.shared += (name,)
+        return True
+
+    def adopt(self, passed: GpuPose) -> None:
+        """Take the arrays that a pose has on the GPU which goes, where this one has the same: else they would
+        go with it."""
+        points = self.pose.points
+        if not isinstance(points, PointCloud):
+            return
+        for name, shared in passed._shared.items():
+            is_same = name != "positions" and shared.values is getattr(points, name)
+            if is_same and name not in self._arrays:
+                self._take_shared(name, shared.values)
+
+    def _share(self, name: str, shared: SharedArray) -> None:
+        shared.holders.add(self)
+        self._shared[name] = shared
 
     def _upload_samples(self, end: float) -> bool:
         if self._samples is None:
@@ -216,12 +259,19 @@ class GpuPose:
 
     def _keep_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
         self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
+        self._count_upload(upload)
+
+    def _count_upload(self, upload: _Upload) -> None:
         self._uploaded_bytes += upload.nbytes
+        self._uploads_of_late.nbytes += upload.nbytes
 
     def _drop_array(self, key: Hashable) -> None:
         texels = self._arrays.pop(key)
-        self._uploaded_bytes -= texels.buffer.size
-        self.gpu.discard(texels)
+        if isinstance(key, str) and key in self._shared:
+            self._shared.pop(key).holders.discard(self)
+        else:
+            self._uploaded_bytes -= texels.buffer.size
+            self.gpu.discard(texels)
 
     def _values(self, name: str) -> NDArray:
         kind, _, scalar = name.partition(":")
@@ -275,7 +325,7 @@ class GpuPose:
                 upload = _array_upload(self.gpu, self.range_points.by_sample(made) if by_sample else made)
                 upload.go_on(np.inf)
                 layer.texels[by_sample] = gl.BufferTexture(upload.target, gl.R32F)
-                self._uploaded_bytes += upload.nbytes
+                self._count_upload(upload)
         return layer.texels[by_sample]
 
     def heights(self, axis: tuple[float, ...], by_sample: bool = False) -> gl.BufferTexture:
@@ -313,10 +363,61 @@ class GpuPose:
         taken, self._spent[kind] = self._spent[kind], 0.0
         return taken
 
+    def take_uploaded(self) -> Uploaded:
+        """What arrays were brought to the GPU since the last call, and what was there already."""
+        taken, self._uploads_of_late = self._uploads_of_late, Uploaded()
+        return taken
+
     def __del__(self) -> None:
         begun = (upload.target for upload in self._uploads.values())
         layers = (texels for layer in self._layers.values() for texels in layer.texels.values())
-        self.gpu.discard(*self._arrays.values(), *self._made.values(), *layers, *begun, self._samples)
+        own = (texels for key, texels in self._arrays.items() if key not in self._shared)
+        self.gpu.discard(*own, *self._made.values(), *layers, *begun, self._samples)
+
+
+@dataclass
+class Uploaded:
+    """What was brought to the GPU. nbytes: of arrays. shared: names of those that other poses had there."""
+
+    nbytes: int = 0
+    shared: tuple[str, ...] = ()
+
+
+class SharedArray:
+    """An array on the GPU for the poses that have the same one, for as long as any of them does.
+
+    values: what it was made of, which poses hold by themselves.
+    """
+
+    def __init__(self, gpu: Gpu, values: NDArray, texels: gl.BufferTexture) -> None:
+        self._gpu, self.values, self.texels = gpu, values, texels
+        self.nbytes = texels.buffer.size
+        self.holders: weakref.WeakSet[GpuPose] = weakref.WeakSet()
+
+    def __del__(self) -> None:
+        self._gpu.discard(self.texels)
+
+
+class SharedArrays:
+    """The arrays on the GPU by those that they were made of: by the object, as what is equal in frames of a
+    scan is made one when it is read (`PointCloud.sharing`)."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._known: weakref.WeakValueDictionary[tuple[str, int], SharedArray] = weakref.WeakValueDictionary()
+
+    def find(self, name: str, values: NDArray) -> SharedArray | None:
+        """That of an array, if it is there under this name."""
+        return self._known.get((name, id(values)))  # which no other object has while this one is held
+
+    def add(self, name: str, values: NDArray, texels: gl.BufferTexture) -> SharedArray:
+        """Take in what was uploaded of an array."""
+        shared = self._known[name, id(values)] = SharedArray(self._gpu, values, texels)
+        return shared
+
+
+def _shared_arrays(gpu: Gpu) -> SharedArrays:
+    return gpu.keep(SharedArrays)
 
 
 def drawn_bounds(pose: Pose, camera: Camera | None = None) -> Bounds:
@@ -344,8 +445,10 @@ class Layer:
 
 @dataclass
 class _Upload:
-    """A buffer on its way to the GPU: what it will be, and what is to be done, a slice a step."""
+    """A buffer on its way to the GPU: of which values, what it will be, and what is to be done, a slice a
+    step."""
 
+    values: NDArray
     target: moderngl.Buffer
     nbytes: int
     steps: deque[Callable[[], object]]
@@ -366,7 +469,7 @@ def _array_upload(gpu: Gpu, values: NDArray) -> _Upload:
     buffer = gpu.ctx.buffer(reserve=len(words))
     slices = range(0, len(words), _SLICE)
     steps = (partial(buffer.write, words[start : start + _SLICE], offset=start) for start in slices)
-    return _Upload(buffer, len(words), deque(steps))
+    return _Upload(values, buffer, len(words), deque(steps))
 
 
 def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:

@@ -11,7 +11,8 @@ class Stats:
     """Statistics of a frame. Times in milliseconds.
 
     backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose,
-    estimates included. passes: (name, gpu_ms), empty while timers are off.
+    estimates included. uploaded_bytes: of arrays of its points that came to the GPU. shared: names of those
+    that were there already, as another pose has the same. passes: (name, gpu_ms), empty while timers are off.
     skipped: what was not computed -> why. counted: what was looked at, as tiles -> a function that reads how
     many of it became what; it waits for the GPU, and tells of the last picture of its surface. chosen:
     parameter -> what "auto" stood for. samples: of each pixel, whose mean the picture shows (see
@@ -27,6 +28,8 @@ class Stats:
     cpu_ms: float = 0.0
     upload_ms: float = 0.0
     derive_ms: float = 0.0
+    uploaded_bytes: int = 0
+    shared: tuple[str, ...] = ()
     passes: list[tuple[str, float]] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
     counted: dict[str, Callable[[], dict[str, int]]] = field(default_factory=dict)

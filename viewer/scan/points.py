@@ -21,6 +21,8 @@ _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
 _SMALLEST = 1e-18  # lengths whose squares it can hold
 _LONGEST_SPLAT = 1e6  # extents of the points: float32 cannot intersect a ray with much longer ones
 _SAMPLE = 1 << 13  # points that robust statistics look at
+_ARRAYS = ("positions", "normals", "colors", "radii", "axes", "ids", "remainders")
+_SCALAR = "scalar:"  # begins the names of scalars among those of all arrays
 
 NOTHING = 0xFFFFFFFF  # the row, or the number of a face or node, where there is none
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
@@ -141,8 +143,7 @@ class PointCloud:
     @property
     def nbytes(self) -> int:
         """Bytes held by all arrays."""
-        arrays = [self.positions, self.normals, self.colors, self.radii, self.axes, self.ids, self.remainders]
-        return sum(a.nbytes for a in [*arrays, *self.scalars.values()] if a is not None)
+        return sum(values.nbytes for values in self._named_arrays().values())
 
     def world(self, rows: Any = slice(None)) -> NDArray[np.float64]:
         """Absolute positions, (N, 3) float64, as precise as the file has them. rows: of these alone."""
@@ -173,6 +174,25 @@ class PointCloud:
         if self.remainders is not None:
             offsets += self.remainders
         return replace(self, positions=offsets.astype(np.float32), remainders=None)
+
+    def sharing(self, other: PointCloud) -> PointCloud:
+        """The points with arrays of another cloud in place of their own where these hold the same to the bit,
+        as colours and radii do in many a sequence: they are in memory, and go to the GPU, once."""
+        ours, theirs = self._named_arrays(), other._named_arrays()
+        same: dict[str, Any] = {
+            name: theirs[name]
+            for name, values in ours.items()
+            if name in theirs and values is not theirs[name] and _are_same(values, theirs[name])
+        }
+        scalars = {name.removeprefix(_SCALAR): same.pop(name) for name in [*same] if name.startswith(_SCALAR)}
+        if not (same or scalars):
+            return self
+        return replace(self, **same, scalars={**self.scalars, **scalars})
+
+    def _named_arrays(self) -> dict[str, NDArray]:
+        named = {name: getattr(self, name) for name in _ARRAYS}
+        named |= {_SCALAR + name: values for name, values in self.scalars.items()}
+        return {name: values for name, values in named.items() if values is not None}
 
     def of_rows(self, rows: NDArray[np.integer]) -> PointCloud:
         """Some of the points: rows (M,), ascending. They keep their ids."""
@@ -285,6 +305,14 @@ def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:
     return keep
 
 
+def _are_same(ours: NDArray, theirs: NDArray) -> bool:
+    """Whether two arrays hold the same bits; soon told where they do not."""
+    if ours.shape != theirs.shape or ours.dtype != theirs.dtype:
+        return False
+    parts = [slice(0, _SAMPLE), *(slice(start, start + _CHUNK) for start in range(0, len(ours), _CHUNK))]
+    return all(ours[part].tobytes() == theirs[part].tobytes() for part in parts)
+
+
 def _extremes(points: NDArray) -> tuple[NDArray, NDArray]:
     columns = points.T
     return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
@@ -383,6 +411,8 @@ def _splats(
 
 
 def _rgba8(colors: NDArray) -> NDArray[np.uint8]:
+    if colors.dtype == np.uint8 and colors.shape[1] == 4:
+        return np.ascontiguousarray(colors)
     rgba = np.full((len(colors), 4), 255, np.uint8)
     for start in range(0, len(colors), _CHUNK):
         part = colors[start : start + _CHUNK]

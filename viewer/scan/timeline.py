@@ -7,6 +7,7 @@ import copy
 import operator
 import threading
 import traceback
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -92,6 +93,7 @@ class Timeline:
         self._ahead: Iterator[int] | None = None  # what is to be read ahead, while there is something
         self._wanted: int | None = None  # what was asked of the worker last,
         self._in_use: Pose | None = None  # held here even where it exceeds the cache
+        self._last_read: Callable[[], PointCloud | None] = lambda: None
         self._worker: threading.Thread | None = None
         self._reading: Task | None = None  # what the worker does
         self._closed = False
@@ -362,7 +364,7 @@ class Timeline:
     def _load(self, index: int, future: Future[Pose], ahead: bool = False) -> None:
         """Read a pose outside the lock and note what came of it; the future gets the pose or the error."""
         try:
-            pose = self._read(index)
+            pose = self._shared(self._read(index))
             self.finish(pose)
         except BaseException as error:
             with self._state:
@@ -390,6 +392,15 @@ class Timeline:
                 if index == self._wanted:
                     self._in_use = pose
         future.set_result(pose)
+
+    def _shared(self, pose: Pose) -> Pose:
+        """The pose with the arrays of the one read before where they are the same."""
+        if not isinstance(pose.points, PointCloud):
+            return pose
+        before = self._last_read()
+        shared = pose if before is None else pose.with_cloud(pose.points.sharing(before))
+        self._last_read = weakref.ref(shared.cloud)
+        return shared
 
     def _read(self, index: int) -> Pose:
         label = self.source.label(index)

@@ -10,7 +10,7 @@ from ...gpu.amplify import Points
 from ...scan.points import PointCloud
 from ...srgb import roots_from_bytes
 
-_CHUNK = 1 << 20  # points packed at a time
+_CHUNK = 1 << 15  # points packed at a time, so that they stay near the processor
 
 
 def looks_of(points: Points) -> gl.BufferTexture:
@@ -25,8 +25,8 @@ def _pack_looks(cloud: PointCloud) -> NDArray[np.uint32]:
     for first in range(0, len(cloud), _CHUNK):
         part = slice(first, first + _CHUNK)
         if cloud.colors is not None:
-            roots = roots_from_bytes(cloud.colors[part, :3]).astype(np.uint32)
-            looks[part, 0] = np.bitwise_or.reduce(roots << np.array([0, 10, 20], np.uint32), axis=1)
+            red, green, blue, _ = cloud.colors[part].T
+            looks[part, 0] = _ROOTS[0][red] | _ROOTS[1][green] | _ROOTS[2][blue]
         if cloud.normals is not None:
             looks[part, 1] = _folded(cloud.normals[part])
     return looks
@@ -34,14 +34,22 @@ def _pack_looks(cloud: PointCloud) -> NDArray[np.uint32]:
 
 def _folded(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
     """Words of normals of any length, (N, 3), as common/octahedron.glsl has them; 0 where one is missing."""
+    x, y, z = np.ascontiguousarray(normals.T)  # by columns: numpy is slow along the short axis
     with np.errstate(all="ignore"):
         # Of its largest, so that no sum of the three is beyond float32.
-        normals = normals / np.abs(normals).max(axis=1, keepdims=True)
-        normals /= np.abs(normals).sum(axis=1, keepdims=True)
-        usable = np.isfinite(normals.sum(axis=1))
-        x, y, z = np.where(usable[:, None], normals, 0).T
+        largest = np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z))
+        x, y, z = x / largest, y / largest, z / largest
+        length = np.abs(x) + np.abs(y) + np.abs(z)
+        x, y, z = x / length, y / length, z / length
+        usable = np.isfinite(x + y + z)
+    x, y, z = (np.where(usable, column, np.float32(0)) for column in (x, y, z))
     under = z < 0
     turned_x, turned_y = (np.copysign(1 - np.abs(b), a) for a, b in ((x, y), (y, x)))
     net = np.stack([np.where(under, turned_x, x), np.where(under, turned_y, y)], axis=1)
     words = np.rint(net * 32767).astype("<i2").view("<u4")[:, 0].astype(np.uint32)
     return np.where(usable, np.maximum(words, 1), np.uint32(0))
+
+
+_ROOTS = [
+    roots_from_bytes(np.arange(256, dtype=np.uint8)).astype(np.uint32) << shift for shift in (0, 10, 20)
+]
