@@ -13,6 +13,7 @@ from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
 from .gpu.context import Gpu
+from .gpu.kept import Before
 from .gpu.mean import PictureMean
 from .gpu.pose import GpuPose, drawn_bounds
 from .gpu.shade import shade
@@ -55,6 +56,7 @@ def render_frame(
     share: float = 1.0,
     moving: bool = False,
     shift: tuple[float, float] = (0.0, 0.0),
+    before: Surface | None = None,
 ) -> bool:
     """Draw what is asked for into `surface`; True if a later call would refine it.
 
@@ -62,7 +64,9 @@ def render_frame(
     a worker, plain points are drawn instead, and what a backend finds bit by bit is drawn as far as
     it is. share: of the points that need to be drawn; a preview with less than 1 is refined by a call
     with 1. moving: whether other pictures will follow at once. shift: pixels right and down by which the
-    picture is moved within its edges, up to half of one. Raises InputError for what the scan
+    picture is moved within its edges, up to half of one. before: the picture before, perhaps of another size
+    or this surface itself: while it moves, one of a share of the points may go on from what that one shows,
+    so that it depends on it. Raises InputError for what the scan
     or the parameters do not allow.
     """
     start = time.perf_counter()
@@ -81,9 +85,14 @@ def render_frame(
         backend, params, look = find_backend(FALLBACK), plain.params, plain.look
 
     view = replace(view, shift=shift)
+    goes_on = None
+    asked = getattr(params, "share", 1.0)
+    if moving and backend.keeps and before is not None and asked == 1:
+        drawn_as = before.drawn.get("pose"), before.drawn.get("parameters")
+        goes_on = Before(before, before.stats.known) if drawn_as == (pose, (backend, params)) else None
     surface.start(pose, view, look, request.layers, backend.values, backend.needs(pose.pose, params))
     stats = surface.stats
-    stats.backend = backend.name
+    stats.backend, stats.asked = backend.name, asked
     if colorable(request) is not request:
         names = request.layers.names(pose.overview.scalars)
         raise missing_source(request.look.color_by, chosen[0], names)
@@ -98,9 +107,9 @@ def render_frame(
         "values": surface.values_key,
     }
     changed = surface.take_changes(drawn)
-    stats.asked = getattr(params, "share", 1.0)
-    share *= stats.asked
-    frame = FrameView(view, params, prepared and prepared.derived, share, budget_ms, changed, moving)
+    share *= asked
+    derived = prepared and prepared.derived
+    frame = FrameView(view, params, derived, share, budget_ms, changed, moving, goes_on)
     refinable = backend.draw(pose, frame, surface)
     surface.drawn = drawn
     surface.is_whole = not (refinable or prepared is None or stats.simplified or stats.is_sample)

@@ -1,8 +1,9 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
 // CHUNKED: a list says which chunks, in whose order positions are, and with SAMPLED a list of rows.
+// KEPT: a list has rows. STRIDED: one of each `stride` rows in a run, whose turn it is.
 // FILTERED: those that are not visible are left out. SINGLE: squares are of one pixel.
 #include "common/view.glsl"
-#if CHUNKED
+#if CHUNKED || KEPT
 #include "common/list.glsl"
 #endif
 
@@ -23,6 +24,14 @@ void scatter(uint i) {
 #endif
 #if SAMPLED
     i = texelFetch(drawn_rows, int(i)).r;
+#endif
+#if KEPT
+    i = list[i];
+#endif
+#if STRIDED
+    // By chance in each run, so that nothing beats with the lines of a scan; in `stride` turns, each row once.
+    i = i * uint(stride) + (uint(turn) + (i * 0x9E3779B1u >> 16)) % uint(stride);
+    if (i >= uint(point_count)) return;
 #endif
 #if !CHUNKED
     vec3 position = texelFetch(positions, int(i)).xyz;

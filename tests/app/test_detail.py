@@ -36,6 +36,19 @@ def play(budget: Budget, ms: Cost, pictures: int, points: int = DEMO) -> list[De
     return shown
 
 
+@pytest.mark.parametrize("points", [1, CRANE, DEMO, MANY])
+def test_where_points_are_kept_few_of_them_go_before_coarse_pixels(points: int) -> None:
+    steps = details(points, PIXELS, keeps=True)
+    assert steps[0] == Detail(1, 1)
+    assert all(finer.size > coarser.size for finer, coarser in pairwise(steps))
+    assert {steps[0], steps[-1]} <= set(details(points, PIXELS)), "from and to the same"
+    coarse = [step for step in steps if step.scale < 0.5]
+    assert all(step.share * points <= max(0.25 * PIXELS, points) for step in coarse)
+    if points == MANY:
+        fine = [step for step in steps if step.scale >= 0.5]
+        assert max(step.share for step in coarse) == min(step.share for step in fine) < 0.02
+
+
 def finest_in_time(ms: Cost, points: int) -> Detail:
     """The finest detail that is in time with a margin."""
     return next(one for one in details(points, PIXELS) if ms(one) <= 0.9 * GOAL)

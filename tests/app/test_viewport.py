@@ -303,3 +303,24 @@ def test_a_preview_is_not_refined(viewport: Viewport) -> None:
     assert viewport.is_preview
     assert math.isinf(viewport.refines_at(playing=False))
     assert not viewport.refine()
+
+
+def test_points_of_a_moving_picture_are_drawn_again_in_the_next(viewport: Viewport) -> None:
+    pose = Pose(0, 0.0, "dense", sphere(60_000))
+    request = Request(pose, Camera.orbit(pose.cloud.bounds()), "points")
+    viewport.draw(request)
+    full = shown(viewport)
+    viewport.took(10_000.0, goal_ms=10.0)
+    known = []
+    for step in range(3):
+        viewport.draw(replace(request, camera=request.camera.orbited(2 + step, 0)), held=True)
+        assert viewport.surface is not None
+        assert viewport.surface.stats.share < 1
+        assert viewport.is_preview
+        known.append(viewport.surface.stats.known)
+        viewport.took(1e4 * (step + 1), goal_ms=10.0)  # the next one is of another size, or of fewer points
+    assert known == [1.0] * 3, "on from the picture in full"
+    viewport.draw(request, held=True)
+    viewport.finish()
+    for before, after in zip(full, shown(viewport), strict=True):
+        np.testing.assert_array_equal(after, before)

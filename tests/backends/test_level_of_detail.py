@@ -94,8 +94,6 @@ def test_squares_of_it_are_as_large_as_its_points_are_apart(renderer: Renderer) 
         render_frame(renderer, request("touching", dense, share=share), surface)
         _, counts = np.unique(surface.row[surface.row != NOTHING], return_counts=True)
         assert counts.max() == 1
-    render_frame(renderer, request("pixels", dense, share=0.3), surface)
-    assert np.unique(surface.row, return_counts=True)[1][:-1].max() == 4
 
 
 def test_it_is_shaded_anew_and_has_samples_as_others_have(renderer: Renderer) -> None:

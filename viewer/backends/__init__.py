@@ -25,6 +25,7 @@ It may declare
 
     ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" where it says nothing
     BLENDS               True: what a pixel shows may be of several points
+    KEEPS                True: moving pictures of a share of the points draw again what the one before showed
     FILLS                True: pixels may be filled that no point gave
     FINDS_NORMALS        True: it writes normals of its own, so that looks need none of the pose
     VALUES               numbers that it finds for the rows that it draws, for looks to colour by:
@@ -50,6 +51,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..errors import InputError, unknown_name
 from ..gpu.context import Gpu
+from ..gpu.kept import Before
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from ..look import COLOR_BY, ValueKind
@@ -138,8 +140,10 @@ class FrameView:
     backend that can draw something coarser does, and says that a later call would refine it; None: never.
     changed: what of `CHANGES` is another than in the call before for this surface; all in the first one, and
     after one that failed. "values": what `row_values` and `resolve` of the Surface give, by look and layers.
-    moving: whether other pictures will follow at once; a backend that then draws more simply says so by
-    `surface.stats.simplified`, and is called again at rest.
+    before: the picture before of the same pose with the same parameters, whose points a moving picture may
+    draw again where it draws a share; see gpu/kept.py. moving: whether other pictures will follow at once; a
+    backend that then draws more simply says so by `surface.stats.simplified`, and is called again at
+    rest.
     """
 
     view: View
@@ -149,6 +153,7 @@ class FrameView:
     budget_ms: float | None = None
     changed: frozenset[str] = frozenset(CHANGES)
     moving: bool = False
+    before: Before | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +190,11 @@ class Backend:
     def blends(self) -> bool:
         """Whether what a pixel shows may be of several points."""
         return getattr(self.module, "BLENDS", False)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether moving pictures of a share of the points draw again what the one before showed."""
+        return getattr(self.module, "KEEPS", False)
 
     @property
     def fills(self) -> bool:

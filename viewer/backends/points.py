@@ -16,6 +16,7 @@ from . import FrameView, Suited, share_param, with_levels
 from .hpr import mark_visible
 
 TITLE = "Points"
+KEEPS = True
 
 
 @dataclass(frozen=True)
@@ -61,4 +62,5 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     """Scatter the points; complete where all shall be drawn."""
     params: Params = frame.params
     shown = mark_visible(pose, frame, surface) if params.hide_hidden and len(pose.cloud) else None
-    return draw_squares(pose, surface, params.point_size, frame.share, shown, "pose" not in frame.changed)
+    stays = "pose" not in frame.changed
+    return draw_squares(pose, surface, params.point_size, frame.share, shown, stays, frame.before)

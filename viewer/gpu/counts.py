@@ -50,7 +50,7 @@ def count_points(
         others = ~shown[numbers]
         if share < 1:
             sampled = is_sampled(numbers.astype(np.uint32), share)
-            left_out += int(np.count_nonzero(~sampled))
+            left_out += int(np.count_nonzero(others & ~sampled))  # one shown may be from the picture before
             others &= sampled
         if moved.any():
             positions = positions + moved

@@ -364,7 +364,7 @@ class GpuPose:
         return taken
 
     def take_uploaded(self) -> Uploaded:
-        """What arrays were brought to the GPU since the last call, and what was there already."""
+        """Take note of what arrays came to the GPU since the last call, and which were there already."""
         taken, self._uploads_of_late = self._uploads_of_late, Uploaded()
         return taken
 
@@ -377,7 +377,7 @@ class GpuPose:
 
 @dataclass
 class Uploaded:
-    """What was brought to the GPU. nbytes: of arrays. shared: names of those that other poses had there."""
+    """Arrays that came to the GPU. nbytes: of them. shared: names of those that other poses had there."""
 
     nbytes: int = 0
     shared: tuple[str, ...] = ()

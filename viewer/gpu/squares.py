@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..scan.points import PointCloud
 from ..scan.spacing import sparse_spacing, typical_spacing
 from ..view import View
@@ -17,6 +19,7 @@ from .bindings import Texture
 from .compact import IndexList
 from .context import Program
 from .culling import CulledChunks, culled_chunks
+from .kept import Before, KeptPoints, stride_of
 from .pose import GpuPose
 from .scatter import HitCells, Visits, scatter, take_items, take_keys
 from .surface import Surface
@@ -33,10 +36,13 @@ LARGEST_SQUARE = 32  # pixels
 
 @dataclass(frozen=True)
 class _Squares:
-    """Numbers that points/cells.glsl reads. point_size: edge, pixels. point_count: of all."""
+    """Numbers that points/cells.glsl reads. point_size: edge, pixels. point_count: of all. stride, turn: of
+    how many rows in a run one is drawn, and which."""
 
     point_size: int
     point_count: int
+    stride: int = 1
+    turn: int = 0
 
 
 def draw_squares(
@@ -46,24 +52,28 @@ def draw_squares(
     share: float = 1.0,
     shown: gl.BufferTexture | None = None,
     stays: bool = False,
+    before: Before | None = None,
 ) -> bool:
     """Write the points to the Surface as squares; True if a later call would draw more of them.
 
     point_size: edge, pixels; 0: as far as the next point. share: of the points that are drawn. shown: R32UI,
     a texel a row, 0 where a point is left out; None: none is. stays: whether the picture before was of this
-    pose, so that what that one showed is of use.
+    pose, so that what that one showed is of use. before: a picture of it whose points are drawn again where
+    not all are drawn.
     """
-    size = point_size or _touching(pose, surface.view)
-    few = _LIST_BELOW * surface.size[0] * surface.size[1] / size**2
+    size = point_size or math.ceil(_touching(pose, surface.view))
+    few = _few(surface, size)
     chunks = culled_chunks(pose) if stays and share >= 1 and len(pose.cloud) > few else None
     if chunks is not None:
         _draw_chunks(pose, surface, size, shown, chunks, few)
         return False
+    if before is not None and share < 1:
+        _draw_kept(pose, surface, size, shown, share, before)
+        return True
     rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
+    surface.stats.known = surface.stats.share
     if surface.stats.share < 1:
-        enlarged = 1 / math.sqrt(surface.stats.share)
-        larger = round(point_size * enlarged) or _touching(pose, surface.view, enlarged)
-        size = min(larger, LARGEST_SQUARE)
+        size = _enlarged(size, pose, surface)
 
     def bind(_: Program) -> None:
         pose.array("positions").bind(Texture.POSITIONS)
@@ -73,11 +83,16 @@ def draw_squares(
             shown.bind(Texture.VISIBLE)
 
     visits = Visits("points/cells.glsl", count, bind, _defines(size, shown, rows), _Squares(size, count))
-    if count < few:
+    if count < _few(surface, size):
         _draw_listed(surface, visits, size)
     else:
         scatter(pose.gpu, visits, surface.depths, surface.rows)
     return surface.stats.is_sample
+
+
+def _few(surface: Surface, size: int) -> float:
+    """Points of squares of this size, fewer than which list the pixels that they hit."""
+    return _LIST_BELOW * surface.size[0] * surface.size[1] / size**2
 
 
 def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
@@ -85,6 +100,47 @@ def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
     hits = HitCells(surface.start_listed(), size**2)
     scatter(surface.gpu, visits, surface.depths, surface.rows, hits)
     surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
+
+
+def _draw_kept(
+    pose: GpuPose,
+    surface: Surface,
+    size: int,
+    shown: gl.BufferTexture | None,
+    share: float,
+    before: Before,
+) -> None:
+    """Write the points that a picture before showed, and the share of all whose turn it is."""
+    kept, stride, count = pose.keep(KeptPoints), stride_of(share), len(pose.cloud)
+    listed, turn, turns = kept.list_shown(before.target), kept.next_turn(), -(-count // stride)
+    stats = surface.stats
+    stats.share, stats.left_out = 1 / stride, count - turns
+    stats.known = min(before.known + stats.share, 1.0)
+    numbers = _Squares(_enlarged(size, pose, surface), count, stride, turn)
+
+    def bind(_: Program) -> None:
+        pose.array("positions").bind(Texture.POSITIONS)
+        if shown is not None:
+            shown.bind(Texture.VISIBLE)
+
+    defines = _defines(numbers.point_size, shown)
+    both = (
+        Visits("points/cells.glsl", count, bind, {**defines, "KEPT": 1}, numbers, listed),
+        Visits("points/cells.glsl", turns, bind, {**defines, "STRIDED": 1}, numbers),
+    )
+    surface.clear()
+    for visits in both:
+        take_keys(pose.gpu, visits, surface.depths)
+    for visits in both:
+        take_items(pose.gpu, visits, surface.depths, surface.rows)
+
+
+def _enlarged(size: int, pose: GpuPose, surface: Surface) -> int:
+    """The size of squares where some of the points stand for all, pixels: as much larger as they are sparser,
+    and no more than it takes to reach as far as the next one."""
+    sparser = 1 / math.sqrt(surface.stats.known)
+    touching = math.ceil(_touching(pose, surface.view) * sparser)
+    return min(max(size, min(round(size * sparser), touching)), LARGEST_SQUARE)
 
 
 def _draw_chunks(
@@ -130,17 +186,19 @@ def _defines(
         "SAMPLED": rows is not None,
         "FILTERED": shown is not None,
         "CHUNKED": False,
+        "KEPT": False,
+        "STRIDED": False,
     }
     return {name: int(value) for name, value in given.items()}
 
 
-def _touching(pose: GpuPose, view: View, enlarged: float = 1.0) -> int:
-    """The size at which squares in the middle of the scan touch their neighbours, pixels. enlarged: how many
-    times as far apart these are as all points."""
-    reach = enlarged * pose.stored.remember(_reach)
+def _touching(pose: GpuPose, view: View) -> float:
+    """The size at which squares in the middle of the scan touch their neighbours, pixels, at most that of the
+    largest ones."""
+    reach = pose.stored.remember(_reach)
     depth = max(float(view.depths(pose.bounds.center - pose.origin)), view.near)
     pixels = reach * view.scale / (depth if view.perspective else 1.0)
-    return min(max(math.ceil(pixels), 1), LARGEST_SQUARE)
+    return min(max(pixels, np.finfo(float).tiny), LARGEST_SQUARE)
 
 
 def _reach(cloud: PointCloud) -> float:

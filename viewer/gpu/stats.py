@@ -18,9 +18,10 @@ class Stats:
     parameter -> what "auto" stood for. samples: of each pixel, whose mean the picture shows (see
     `frame.supersample`). faces_away: whether points that face away from the eye were left
     out. share: of the points that needed to be drawn, by the order of gpu/sample.py. asked: the share that
-    the picture has once it is refined, less than 1 on a coarser level of detail. left_out: the points that
-    are in that one and not in `share`. simplified: whether it is drawn more simply than a picture at rest
-    would be, as `FrameView.moving` allows; the window draws it anew then.
+    the picture has once it is refined, less than 1 on a coarser level of detail. known: of all points, how
+    many it or the pictures went through whose points it draws again (see `FrameView.before`). left_out: the
+    points that are in `asked` and not in `share`. simplified: whether it is drawn more simply than a picture
+    at rest would be, as `FrameView.moving` allows; the window draws it anew then.
     """
 
     backend: str = ""
@@ -37,6 +38,7 @@ class Stats:
     faces_away: bool = False
     share: float = 1.0
     asked: float = 1.0
+    known: float = 1.0
     left_out: int = 0
     simplified: bool = False
     samples: int = 1

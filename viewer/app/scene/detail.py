@@ -14,6 +14,8 @@ _STEPS = tuple(2 ** (-n / 4) for n in range(1, 100))  # of points, or of pixels
 _DENSE = 0.5  # points for each pixel of the view, of which about as many are covered; more are seen by few
 _SMALLEST = 0.35  # scale; below, fewer points gain more time than they cost of the picture
 _FEWEST = 10_000  # points
+_FINE = 0.5  # scale; below, where pictures go on from the one before, fewer points cost less of them
+_SOME = 0.2  # points for each pixel of the view, as many as such pictures should have
 _LATE = {1: 4.0, 3: 2.0, 8: 1.25, 12: 1.0}  # pictures whose median tells by being so many times the goal
 _SOON, _LATEST = 12, 48  # pictures that tell that more can be drawn; and where that was often wrong
 _GAIN = 1.15  # times what the coarsest takes: where that is late too, what gains less is not left out
@@ -38,16 +40,22 @@ class Detail(NamedTuple):
 
 
 @cache
-def details(points: int, pixels: int) -> tuple[Detail, ...]:
+def details(points: int, pixels: int, keeps: bool = False) -> tuple[Detail, ...]:
     """Details for a scan and a view of so many, from full to coarsest: fewer points where they are dense,
-    fewer pixels, fewer points."""
+    fewer pixels, fewer points. keeps: whether pictures go on from what the one before shows, so that few
+    points in each suffice: these go before pixels as coarse as any."""
     dense = [1.0, *takewhile(lambda share: share * points >= _DENSE * pixels, _STEPS)]
     scales = [*takewhile(lambda scale: scale >= _SMALLEST, (step**0.5 for step in _STEPS))]
     few = [share for share in _STEPS if share < dense[-1] and share * points >= _FEWEST]
+    fine = [scale for scale in scales if scale >= _FINE or not keeps]
+    some = [share for share in few if keeps and share * points >= _SOME * pixels]
+    least = [dense[-1], *some][-1]
     return (
         *(Detail(share) for share in dense),
-        *(Detail(dense[-1], scale) for scale in scales),
-        *(Detail(share, scales[-1]) for share in few),
+        *(Detail(dense[-1], scale) for scale in fine),
+        *(Detail(share, fine[-1]) for share in some),
+        *(Detail(least, scale) for scale in scales[len(fine) :]),
+        *(Detail(share, scales[-1]) for share in few[len(some) :]),
     )
 
 
@@ -58,8 +66,10 @@ class Budget:
     took says that they will be in time with a margin: the detail does not go up and down by itself.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, keeps: bool = False) -> None:
+        """keeps: see `details`."""
         self.detail = Detail()
+        self._keeps = keeps
         self._cost: _Cost | None = None
         self._times: list[float] = []  # ms, of pictures at this detail, not yet looked at
         self._patience = _SOON  # pictures until finer ones may be tried
@@ -83,7 +93,7 @@ class Budget:
             return
         cost = self._learned(sorted([*late, self._times][0]), _work(detail, points, pixels))
         self._times.clear()
-        steps = details(points, pixels)
+        steps = details(points, pixels, self._keeps)
         now = sum(step.size > detail.size for step in steps[:-1])  # it may be of another scan or view
         expected = [cost.ms(_work(step, points, pixels)) for step in steps]
         least_ms = _GAIN * expected[-1]

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from ...analysis.pick import Picked, before_gap, pick
+from ...backends import backends
 from ...bounds import Bounds
 from ...errors import Scan4DError
 from ...frame import (
@@ -71,7 +72,7 @@ class Viewport:
         self._drawn: Any = None
         self._asked_for: Request | None = None  # the last one that was drawn as it says
         self._motion = Motion()
-        self._budgets: defaultdict[str, Budget] = defaultdict(Budget)  # by the backend's name
+        self._budgets: dict[str, Budget] = {}  # by the backend's name
         self._simplifies: defaultdict[str, bool] = defaultdict(bool)  # whether it does in motion, the same
         self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
@@ -124,7 +125,9 @@ class Viewport:
             self._detail = self._budget(request).detail if moving else Detail()
             self.surface = surface = self._surface_of(self._detail)
             share = self._detail.share
-            refinable = render_frame(self.renderer, drawn, surface, wait=False, share=share, moving=moving)
+            refinable = render_frame(
+                self.renderer, drawn, surface, wait=False, share=share, moving=moving, before=before
+            )
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self._is_rough = False
@@ -239,7 +242,10 @@ class Viewport:
             self._budget(request).note(ms, self._detail, goal_ms, request.pose.count, pixels)
 
     def _budget(self, request: Request) -> Budget:
-        return self._budgets[str(request.backend)]
+        name = str(request.backend)
+        if name not in self._budgets:
+            self._budgets[name] = Budget(name in backends() and backends()[name].keeps)
+        return self._budgets[name]
 
     def _surface_of(self, detail: Detail) -> Surface:
         """The surface for a detail; one in full and one for previews are kept."""
@@ -247,9 +253,7 @@ class Viewport:
         kind = "full" if detail.scale == 1 else "preview"
         surface = self._surfaces.get(kind)
         if surface is None or surface.size != (width, height):
-            if surface is not None:
-                del self._surfaces[kind]
-                surface.release()
+            # The one before may be what the next picture goes on from: it goes with whoever has it still.
             surface = self._surfaces[kind] = Surface(self.renderer.gpu, (width, height))
         return surface
 
