@@ -42,11 +42,12 @@ def test_where_points_are_kept_few_of_them_go_before_coarse_pixels(points: int) 
     assert steps[0] == Detail(1, 1)
     assert all(finer.size > coarser.size for finer, coarser in pairwise(steps))
     assert {steps[0], steps[-1]} <= set(details(points, PIXELS)), "from and to the same"
-    coarse = [step for step in steps if step.scale < 0.5]
-    assert all(step.share * points <= max(0.25 * PIXELS, points) for step in coarse)
     if points == MANY:
-        fine = [step for step in steps if step.scale >= 0.5]
-        assert max(step.share for step in coarse) == min(step.share for step in fine) < 0.02
+        for scale, each in ((0.7, 0.2), (0.5, 0.1)):
+            finer = [step.share * points / PIXELS for step in steps if step.scale >= scale]
+            coarser = [step.share * points / PIXELS for step in steps if step.scale < scale]
+            assert max(coarser) == min(finer)
+            assert each <= min(finer) < 1.2 * each
 
 
 def finest_in_time(ms: Cost, points: int) -> Detail:

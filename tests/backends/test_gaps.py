@@ -282,3 +282,33 @@ def test_thinned_scans_close(renderer: Renderer, draw: Draw, scene: str, data_di
     usual, now = _errors(renderer, draw, scene, data_dir, True, {"radius": "uniform"}, {})
     assert usual["hole_percent"] + usual["through_percent"] > 1
     assert now["hole_percent"] + now["through_percent"] < 0.3
+
+
+def test_while_a_scan_plays_its_radii_are_taken_as_the_last_ones_were(renderer: Renderer) -> None:
+    close = sphere(4000)
+    open_ = replace(close, radii=np.full(4000, 0.01, np.float32))
+    close = replace(close, radii=np.full(4000, 1.5 * np.sqrt(4 * np.pi / 4000), np.float32))
+    camera = Camera.orbit(close.bounds(), 30, 20, aspect=1.5)
+    surface = Surface(renderer.gpu, (120, 80))
+
+    def picture(cloud: PointCloud, moving: bool, radius: str = "auto") -> NDArray[np.uint8]:
+        params = backend("surfels").params({"radius": radius})
+        request = Request(Pose(0, 0.0, "played", replace(cloud)), camera, "surfels", params)
+        while render_frame(renderer, request, surface, moving=moving):
+            pass
+        return surface.image()
+
+    picture(close, moving=False)
+    in_motion = picture(close, moving=True)
+    assert surface.stats.simplified, "to be drawn anew at rest"
+    assert not surface.is_whole
+    assert "gaps" in surface.stats.skipped
+    np.testing.assert_array_equal(in_motion, picture(close, moving=True, radius="own"))
+    missed = picture(open_, moving=True)
+    closed = picture(open_, moving=False)
+    assert "gaps" not in surface.stats.skipped
+    assert (missed[..., 3] > 0).sum() <= (closed[..., 3] > 0).sum()
+    assert (missed != closed).any(), "at rest each is looked at"
+    picture(open_, moving=True)
+    assert "gaps" not in surface.stats.skipped, "nor taken so after one that had gaps"
+    assert "radius" in surface.stats.chosen

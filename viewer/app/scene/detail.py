@@ -14,8 +14,9 @@ _STEPS = tuple(2 ** (-n / 4) for n in range(1, 100))  # of points, or of pixels
 _DENSE = 0.5  # points for each pixel of the view, of which about as many are covered; more are seen by few
 _SMALLEST = 0.35  # scale; below, fewer points gain more time than they cost of the picture
 _FEWEST = 10_000  # points
-_FINE = 0.5  # scale; below, where pictures go on from the one before, fewer points cost less of them
-_SOME = 0.2  # points for each pixel of the view, as many as such pictures should have
+# Where pictures go on from the one before, fewer points cost less of them than pixels do: which scale is gone
+# down to, and then to how many points for each pixel of the view.
+_KEPT = ((0.7, 0.2), (0.5, 0.1))
 _LATE = {1: 4.0, 3: 2.0, 8: 1.25, 12: 1.0}  # pictures whose median tells by being so many times the goal
 _SOON, _LATEST = 12, 48  # pictures that tell that more can be drawn; and where that was often wrong
 _GAIN = 1.15  # times what the coarsest takes: where that is late too, what gains less is not left out
@@ -47,16 +48,15 @@ def details(points: int, pixels: int, keeps: bool = False) -> tuple[Detail, ...]
     dense = [1.0, *takewhile(lambda share: share * points >= _DENSE * pixels, _STEPS)]
     scales = [*takewhile(lambda scale: scale >= _SMALLEST, (step**0.5 for step in _STEPS))]
     few = [share for share in _STEPS if share < dense[-1] and share * points >= _FEWEST]
-    fine = [scale for scale in scales if scale >= _FINE or not keeps]
-    some = [share for share in few if keeps and share * points >= _SOME * pixels]
-    least = [dense[-1], *some][-1]
-    return (
-        *(Detail(share) for share in dense),
-        *(Detail(dense[-1], scale) for scale in fine),
-        *(Detail(share, fine[-1]) for share in some),
-        *(Detail(least, scale) for scale in scales[len(fine) :]),
-        *(Detail(share, scales[-1]) for share in few[len(some) :]),
-    )
+    steps = [Detail(share) for share in dense]
+    for least_scale, least_points in (*(_KEPT if keeps else ()), (_SMALLEST, 0.0)):
+        share, scale = steps[-1]
+        steps += [Detail(share, finer) for finer in scales if least_scale <= finer < scale]
+        scale = steps[-1].scale
+        steps += [
+            Detail(fewer, scale) for fewer in few if least_points * pixels <= fewer * points and fewer < share
+        ]
+    return tuple(steps)
 
 
 class Budget:

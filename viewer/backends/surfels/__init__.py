@@ -169,7 +169,11 @@ def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, 
     own, known = frame.params.radius != "uniform", True
     if frame.params.radius == "auto" and pose.stored.axes is None:
         gaps = pose.keep(GapRadii)
-        known = gaps.find(pose, wait=frame.budget_ms is None)
+        if frame.moving and pose.gpu.software and gaps.presumes_none(pose):
+            surface.stats.simplified = True
+            surface.stats.skipped["gaps"] = "it moves, and stored radii of the last pose left none"
+        else:
+            known = gaps.find(pose, wait=frame.budget_ms is None)
         own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
             points = _in_view(pose, frame, surface, gaps.largest, use_radii=True)

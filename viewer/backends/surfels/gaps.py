@@ -72,6 +72,11 @@ class GapRadii:
         if self.texels is not None:
             self.texels.release()
 
+    def presumes_none(self, pose: GpuPose) -> bool:
+        """Whether they are not known, and stored radii left no gaps in the last pose that was looked at, as
+        of a scan that plays: this does for a picture that moves, of whose time looking takes a third."""
+        return not self._found and pose.stored.radii is not None and pose.gpu.keep(_LastLook).found_none
+
     def find(self, pose: GpuPose, *, wait: bool) -> bool:
         """Go on with finding them: to the end, or for some of the points. Whether all are there."""
         if self._found:
@@ -92,7 +97,9 @@ class GapRadii:
         with _searching(pose) as (search, rows, copies):
             if stored is not None:
                 sample = _sample(pose.stored.positions[rows])
-                if not search.leave_gaps(stored[rows], sample):
+                last = pose.gpu.keep(_LastLook)
+                last.found_none = not search.leave_gaps(stored[rows], sample)
+                if last.found_none:
                     return
             radii = (yield from search.radii())[copies]
         known = radii[radii > 0]
@@ -104,6 +111,13 @@ class GapRadii:
                 usual = np.quantile(radii[radii > 0], 0.9)
             self.usual, self.largest = float(usual), float(radii.max())
             self.texels = gl.BufferTexture(pose.gpu.ctx.buffer(radii), gl.R32F)
+
+
+class _LastLook:
+    """Memory of whether the radii that a scan stores left no gaps when any were looked at last."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self.found_none = False
 
 
 @dataclass(frozen=True)
