@@ -14,18 +14,18 @@ precise vec3 disc_u, disc_v;  // half-axes at the cut-off, view space
 bool begin_disc(Point point) {
     if (!has_splat(point)) return false;
     disc_center = to_view(point.position);
-    float radius = splat_reach(point, -disc_center.z);
+    precise float radius = splat_reach(point, -disc_center.z);
     disc_area = radius * radius * mask_limit;
     vec3 to_eye = towards_eye(disc_center);
-    vec3 n = splat_normal(point, to_eye);
+    precise vec3 n = splat_normal(point, to_eye);
     disc_normal = mat3(world_to_view) * n;
 #if HAS_AXES
     vec3 u, v;
-    vec2 lengths = splat_axes(point, n, -disc_center.z, u, v) * sqrt(mask_limit);
+    precise vec2 lengths = splat_axes(point, n, -disc_center.z, u, v) * sqrt(mask_limit);
     disc_u = mat3(world_to_view) * u * lengths.x;
     disc_v = mat3(world_to_view) * v * lengths.y;
 #endif
-    float facing = dot(disc_normal, to_eye);
+    precise float facing = dot(disc_normal, to_eye);
     if (cull_back && facing <= 0.0) return false;
     return abs(facing) > 1e-6 * length(to_eye);
 }
@@ -38,7 +38,8 @@ vec2 disc_range() {
 #if HAS_AXES
 // A vector of the disc's plane in half-axes.
 vec2 in_disc(vec3 offset) {
-    return vec2(dot(offset, disc_u) / dot(disc_u, disc_u), dot(offset, disc_v) / dot(disc_v, disc_v));
+    precise vec2 local = vec2(dot(offset, disc_u) / dot(disc_u, disc_u), dot(offset, disc_v) / dot(disc_v, disc_v));
+    return local;
 }
 #endif
 
@@ -47,7 +48,7 @@ vec2 in_disc(vec3 offset) {
 // perspective, <= 1 in orthographic views.
 vec3 disc_key(out precise vec3 form) {
     float depth = -disc_center.z;
-    float pixel = 1.0 / scale_at(depth);
+    precise float pixel = 1.0 / scale_at(depth);
     precise vec3 n = disc_normal, right = vec3(pixel, 0.0, 0.0), down = vec3(0.0, -pixel, 0.0), key;
     if (view_perspective) {
         // 1 / depth of a plane is linear in pixels; so is a point of the plane over its depth.

@@ -10,7 +10,7 @@ ivec4 pixels_in(vec4 box) { return ivec4(clamp(ceil(box - 0.5), vec4(0.0), vec2(
 // pixels: as `pixels_in` has them of the disc that was begun.
 void take_pixels(ivec4 pixels, uint row) {
     vec2 center = to_pixel(disc_center);
-    vec3 form, key = disc_key(form);
+    precise vec3 form, key = disc_key(form);
     for (int y = pixels.y; y < pixels.w; ++y)
         for (int x = pixels.x; x < pixels.z; ++x) {
             vec2 off = vec2(x, y) + 0.5 - center;
@@ -18,7 +18,8 @@ void take_pixels(ivec4 pixels, uint row) {
             precise float column = key.x + key.y * off.x, here = column + key.z * off.y;
             precise float shape = form.x * off.x * off.x;
             shape += off.y * (2.0 * form.y * off.x + form.z * off.y);
-            if (shape > (view_perspective ? here * here : 1.0)) continue;
+            precise float edge = view_perspective ? here * here : 1.0;
+            if (shape > edge) continue;
             float depth = linear_depth(here);
             if (in_depth_range(depth)) take_pixel(uint(y * view_size.x + x), floatBitsToUint(depth), row);
         }

@@ -1,4 +1,4 @@
-// What a point's splat is, for quads and for discs alike.
+// What a point's splat is, for quads and for discs alike: `precise`, as in common/view.glsl.
 #include "common/view.glsl"
 #include "common/tangent.glsl"
 #include "amplify/point.glsl"
@@ -9,7 +9,8 @@
 float splat_radius(float stored, float depth) {
     float radius = uniform_radius;
     radius = stored > 0.0 && stored < UNKNOWN ? stored : radius;
-    return max(radius * radius_scale * enlarged, least_radius / scale_at(max(depth, view_near)));
+    precise float reach = max(radius * radius_scale * enlarged, least_radius / scale_at(max(depth, view_near)));
+    return reach;
 }
 
 // Points of which a compute pass made no splat have a radius of 0.
@@ -28,14 +29,16 @@ vec3 towards_eye(vec3 center) {
 
 // Unit length, from the origin's axes; a missing normal faces the eye.
 vec3 splat_normal(Point point, vec3 to_eye) {
-    float len = length(point.normal);
-    return len > 0.0 && len < UNKNOWN ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
+    precise float len = length(point.normal);
+    bool has_normal = len > 0.0 && len < UNKNOWN;
+    precise vec3 n = has_normal ? point.normal / len : normalize(transpose(mat3(world_to_view)) * to_eye);
+    return n;
 }
 
 // The longer of its half-axes, scan units.
 float splat_reach(Point point, float depth) {
 #if HAS_AXES
-    float longer = max(length(point.axes.xyz), point.axes.w);
+    precise float longer = max(length(point.axes.xyz), point.axes.w);
     if (longer > 0.0) return splat_radius(longer, depth);
 #endif
     return splat_radius(point.radius, depth);
@@ -43,12 +46,12 @@ float splat_reach(Point point, float depth) {
 
 // The directions of its half-axes, unit vectors perpendicular to the normal n, from the origin's axes; returns
 // their lengths, scan units. A tangent that is missing, or parallel to the normal, makes it round.
-vec2 splat_axes(Point point, vec3 n, float depth, out vec3 u, out vec3 v) {
-    vec2 lengths = vec2(splat_radius(point.radius, depth));
+vec2 splat_axes(Point point, vec3 n, float depth, out precise vec3 u, out precise vec3 v) {
+    precise vec2 lengths = vec2(splat_radius(point.radius, depth));
     u = tangent_of(n);
 #if HAS_AXES
-    float first = length(point.axes.xyz);
-    vec3 tangent = first > 0.0 ? point.axes.xyz / first : n;
+    precise float first = length(point.axes.xyz);
+    precise vec3 tangent = first > 0.0 ? point.axes.xyz / first : n;
     tangent -= dot(tangent, n) * n;
     if (dot(tangent, tangent) > 1e-6) {
         u = normalize(tangent);

@@ -1,8 +1,9 @@
 // A surfel's template quad, T(p) S(r, r, 1) R(u, v, n) (Slomp 2014, V-A); of an ellipse, S(r_u, r_v, 1).
 #include "surfels/splat.glsl"
 
-vec3 surfel_u, surfel_v;  // half edges, view space
-vec3 surfel_center;
+// Feeds that give the same bits are programs of their own: `precise`, as in common/view.glsl.
+precise vec3 surfel_u, surfel_v;  // half edges, view space
+precise vec3 surfel_center;
 vec4 surfel_part;  // lowest, highest local coordinates of what is drawn of the quad
 
 const float HUGE = 8.0;  // depths of the centre, or heights of the picture
@@ -55,5 +56,6 @@ bool begin_shape(Point point) {
 
 Corner corner(int i) {
     vec2 local = vec2((i & 1) == 0 ? surfel_part.x : surfel_part.z, (i >> 1) == 0 ? surfel_part.y : surfel_part.w);
-    return Corner(surfel_center + local.x * surfel_u + local.y * surfel_v, local);
+    precise vec3 view = surfel_center + local.x * surfel_u + local.y * surfel_v;
+    return Corner(view, local);
 }
