@@ -7,9 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hardware import at_borders, displaced, moved
 from numpy.typing import NDArray
 from scenes import BUFFERS, NOTHING, sphere
-from test_instancing import CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
+from test_instancing import (
+    CAMERAS,
+    CLOUD,
+    SIZE,
+    assert_agree,
+    assert_covers_the_same,
+    assert_equal,
+    every_camera,
+)
 
 from viewer.camera import Camera
 from viewer.gpu.amplify import FEEDS
@@ -53,9 +62,14 @@ def surfels(draw: Draw) -> Draw:
     return surfels
 
 
-def rays(view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where the rays through pixel centres start and what they go a unit of depth, (H, W, 3), view space."""
-    x, y = np.meshgrid(np.arange(view.size[0]) + 0.5, np.arange(view.size[1]) + 0.5)
+def rays(
+    view: View, off: tuple[float, float] = (0.0, 0.0)
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the rays through pixels start and what they go a unit of depth, (H, W, 3), view space.
+
+    off: pixels from their centres.
+    """
+    x, y = np.meshgrid(np.arange(view.size[0]) + 0.5 + off[0], np.arange(view.size[1]) + 0.5 + off[1])
     flat = np.stack([x - view.size[0] / 2, view.size[1] / 2 - y, 0 * x], axis=-1) / view.scale
     forward = np.array([0.0, 0.0, -1.0])
     if view.perspective:
@@ -64,15 +78,15 @@ def rays(view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def brute_force(
-    cloud: PointCloud, view: View, cutoff: float = 1.0
+    cloud: PointCloud, view: View, cutoff: float = 1.0, off: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[NDArray[np.float64], NDArray[np.uint32], NDArray[np.bool_]]:
     """Depth and row of the nearest disc at each pixel, disc by disc in float64; what lies on no border.
 
-    cutoff: squared distance from the centre, 1 at the half-axes, where discs end.
+    cutoff: squared distance from the centre, 1 at the half-axes, where discs end. off: as `rays` has it.
     """
     assert cloud.axes is not None
     assert cloud.normals is not None
-    start, step = rays(view)
+    start, step = rays(view, off)
     depth, row = np.full(start.shape[:2], np.inf), np.full(start.shape[:2], NOTHING, np.uint32)
     clear = np.ones(depth.shape, bool)
     for i in range(len(cloud)):
@@ -99,9 +113,7 @@ def brute_force(
 def test_they_are_what_rays_meet(surfels: Draw, camera: Camera, way: str) -> None:
     cloud, size = elliptical(sphere(400), stretch=8.0), (160, 120)
     surface = surfels(cloud, camera, size, instancing=way)
-    exact = brute_force(cloud, View.of(camera, size, cloud.origin, cloud.bounds()))
-    assert np.count_nonzero(exact[1] != NOTHING) > 3000
-    assert_exact(surface, *exact)
+    assert_exact(surface, cloud, 3000)
 
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
@@ -118,22 +130,24 @@ def test_far_from_the_axis_and_cut_off_early(surfels: Draw, way: str, projection
     cloud = PointCloud.from_arrays(positions, normals=normals, axes=axes)
     camera = Camera((0, 0, 0), (0, 0, -1), fov_y=110, projection=projection, height=6.0, near=0.05)
     surface = surfels(cloud, camera, size, instancing=way, mask_falloff=4.0, mask_cutoff=0.3)
-    view = View.of(camera, size, cloud.origin, cloud.bounds())
-    exact = brute_force(cloud, view, cutoff=-np.log(0.3) / 4)
-    assert np.count_nonzero(exact[1] != NOTHING) > 3000
-    assert_exact(surface, *exact)
+    assert_exact(surface, cloud, 3000, cutoff=-np.log(0.3) / 4)
 
 
-def assert_exact(
-    surface: Surface, depth: NDArray[np.float64], row: NDArray[np.uint32], clear: NDArray[np.bool_]
-) -> None:
-    """What `brute_force` found, but for borders and ties."""
+def assert_exact(surface: Surface, cloud: PointCloud, least: int, cutoff: float = 1.0) -> None:
+    """What `brute_force` finds, but for borders and ties, at pixel centres or where a rasteriser moves these.
+    least: pixels that it covers."""
+    found = [brute_force(cloud, surface.view, cutoff, off) for off in displaced(surface.gpu)]
+    depth, rows, clear = (np.stack(each) for each in zip(*found, strict=True))
+    row, clear = rows[0], clear.all(axis=0) & (rows == rows[0]).all(axis=0)
     covered = row != NOTHING
+    assert np.count_nonzero(covered) > least
     assert (~clear).mean() < 0.1
     np.testing.assert_array_equal((surface.row != NOTHING)[clear], covered[clear])
-    inside = clear & covered
-    np.testing.assert_allclose(surface.depth[inside], depth[inside], rtol=5e-5)
-    assert (surface.row[inside] != row[inside]).mean() < 1e-3
+    inside, shown = clear & covered, surface.depth
+    exact = np.clip(shown, depth.min(axis=0), depth.max(axis=0))
+    np.testing.assert_allclose(shown[inside], exact[inside], rtol=5e-5)
+    others = np.count_nonzero(surface.row[inside] != row[inside])
+    assert others < max(1e-3 * np.count_nonzero(inside), at_borders(surface))
 
 
 @every_camera
@@ -160,9 +174,9 @@ def test_two_passes_blend_them_alike(surfels: Draw, projection: str, enlarge: fl
         for way in ("tiles", "gs", "tbo")
     )
     for other in (gs, tiles):
-        np.testing.assert_array_equal(other.row == NOTHING, tbo.row == NOTHING)
+        assert_covers_the_same(other, tbo)
         away = np.abs(other.image().astype(int) - tbo.image()).max(axis=-1)[tbo.row != NOTHING]
-        assert (away > 1).mean() < 1e-3
+        assert np.count_nonzero(away > 1) < max(1e-3 * len(away), at_borders(tbo))
 
 
 @every_camera
@@ -179,7 +193,7 @@ def test_circles_given_as_ellipses_are_what_round_splats_are(surfels: Draw, came
     assert_agree(one, other, 0.005)
     same = (one.row == other.row) & (one.row != NOTHING)
     error = np.abs(one.depth[same] / other.depth[same] - 1)
-    assert (error > 1e-6).mean() < 2e-3
+    assert (error > 1e-6 + 2 * moved(other)[same]).mean() < 2e-3
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -242,6 +256,4 @@ def test_they_are_averaged_only_where_they_are_not_long(surfels: Draw, stretch: 
     camera = CAMERAS["perspective"]
     surface = surfels(cloud, camera, size, epsilon=0.0)
     assert (surface.stats.chosen["instancing"] == "scatter") == (stretch == 1)
-    exact = brute_force(cloud, View.of(camera, size, cloud.origin, cloud.bounds()))
-    assert np.count_nonzero(exact[1] != NOTHING) > 500
-    assert_exact(surface, *exact)
+    assert_exact(surface, cloud, 500)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hardware import stored
 from scenes import (
     DRAWS_POINTS,
     NOTHING,
@@ -81,7 +82,8 @@ def test_a_plane_has_constant_depth(draw: Draw, name: str, projection: str) -> N
     surface = draw(plane(120, 3.0), camera, (64, 48), name)
     covered = surface.id != NOTHING
     assert covered.sum() > 1000
-    np.testing.assert_allclose(surface.depth[covered], 3.0, rtol=3e-7)
+    rtol = 3e-7 if surface.gpu.software else max(3e-7, float(stored(surface, 3.0)))
+    np.testing.assert_allclose(surface.depth[covered], 3.0, rtol=rtol)
 
 
 @ways_of_surfels

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hardware import at_borders, moved, stored
 from scenes import BUFFERS, NOTHING, sphere
 
 from viewer.backends import backend
@@ -54,18 +55,33 @@ def assert_equal(one: Surface, other: Surface) -> None:
     np.testing.assert_array_equal(one.depth, other.depth)
 
 
+def assert_covers_the_same(one: Surface, other: Surface) -> None:
+    """Something is seen at the same pixels, but at outlines where a rasteriser moved corners."""
+    differ = (one.row != NOTHING) != (other.row != NOTHING)
+    assert np.count_nonzero(differ) <= at_borders(one)
+
+
+def assert_blends_alike(one: Surface, other: Surface) -> None:
+    """Colours are a level apart, but at borders of splats: of a thousandth of the pixels in software, of more
+    where a rasteriser moved corners."""
+    away = np.abs(one.image().astype(int) - other.image()).max(axis=-1)
+    assert np.count_nonzero(away > 1) <= max(1e-3 * away.size, at_borders(one))
+
+
 def assert_agree(one: Surface, other: Surface, others: float) -> None:
     """Same splats: they cover the same pixels, and where they show another one, the depths are the same
-    but for rounding, or the pixel lies on a splat's border. others: the share that may be another one."""
+    but for rounding, or the pixel lies on a splat's border. others: the share that may be another one in
+    software; on hardware any, as which of those that are as near is shown goes by last bits."""
     covered, both = one.row != NOTHING, (one.row != NOTHING) & (other.row != NOTHING)
-    few = max(1, round(1e-4 * np.count_nonzero(covered)))
+    few = max(1, round(1e-4 * np.count_nonzero(covered)), at_borders(one))
     assert np.count_nonzero(covered != (other.row != NOTHING)) <= few
     another = both & (one.row != other.row)
-    assert np.count_nonzero(another) <= max(few, others * np.count_nonzero(covered))
-    error = np.zeros(one.depth.shape)
+    if one.gpu.software:
+        assert np.count_nonzero(another) <= max(few, others * np.count_nonzero(covered))
+    error, rounding = np.zeros(one.depth.shape), moved(one) + moved(other)
     error[both] = np.abs(one.depth[both] / other.depth[both] - 1)
-    assert np.count_nonzero(error[another] > 5e-5) <= few
-    assert (error[both & ~another] < 2e-4).all()
+    assert np.count_nonzero((error > 5e-5 + rounding)[another]) <= few
+    assert (error < 2e-4 + rounding)[both & ~another].all()
     assert np.abs(one.color - other.color)[both & ~another].max() < 0.009, "a level of the brightest"
 
 
@@ -104,9 +120,15 @@ def test_splats_that_face_away_are_left_out_only_where_they_are_hidden(
     assert CLOUD.normals is not None
     other = replace(CLOUD, normals=CLOUD.normals * turned)
     one, two = (surfels(cloud, camera, instancing="tiles") for cloud in (CLOUD, other))
+    # What the first found is read back as depths; last bits may be lost on the way.
+    if not one.gpu.software:
+        covered = one.row != NOTHING
+        np.testing.assert_array_equal(covered, two.row != NOTHING)
+        error = np.abs(two.depth[covered] / one.depth[covered] - 1)
+        assert (error <= stored(one, one.depth[covered], times=2)).all()
+        return
     if projection == "perspective":
         assert_equal(one, two)
-    # What the first found is read back as depths; the last bit may be lost on the way.
     assert np.count_nonzero(one.row != two.row) <= 5
     np.testing.assert_allclose(one.depth, two.depth, rtol=2e-7)
 

@@ -14,6 +14,7 @@ from scenes import NOTHING
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import ConvexHull
 
+from viewer.bench.rounding import Rounding
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
 from viewer.scan.range_view import RangeView
@@ -76,6 +77,41 @@ def nearest_samples(
     return depth, number
 
 
+def rounding_of_places(views: tuple[RangeView, ...], surface: Surface) -> float:
+    """How far from where `placed` has it a sample may lie, scan units: along either axis of a pod's picture a
+    quotient, of ranges a root and another quotient, and three roundings, each of a number no larger than what
+    is added up."""
+    shown, extents = surface.view, []
+    for view in views:
+        pod = np.linalg.inv(view.world_to_camera)[:3, 3] - surface.pose.origin
+        aside = float(np.linalg.norm(shown.rotation @ pod + shown.translation))
+        extents.append(aside + 2 * float(view.depth[view.valid()].max()))
+    return (3 * Rounding.of(surface.gpu).quotient + 3) * 2.0**-23 * max(extents)
+
+
+def near_edges(views: tuple[RangeView, ...], surface: Surface, error: float) -> NDArray[np.bool_]:
+    """Pixels, (H, W), of samples that lie in another one where they are off by `error`, scan units."""
+    shown, quotient = surface.view, Rounding.of(surface.gpu).quotient * 2.0**-23
+    edges = np.zeros(shown.size[::-1], bool)
+    for view in views:
+        depths, pixels = placed(view, surface)
+        there = (depths > shown.near) & ((pixels > -1) & (pixels < np.add(shown.size, 1))).all(axis=1)
+        depth, at = depths[there, None].astype(np.float64), pixels[there].astype(np.float64)
+        aside = np.abs(at - shown.center)
+        slack = (
+            quotient * aside + error * (shown.scale + aside) / depth
+            if shown.perspective
+            else error * shown.scale
+        )
+        for sign in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            other = np.floor(at + slack * np.array(sign)).astype(int)
+            beside = (other != np.floor(at)).any(axis=1)
+            for x, y in np.concatenate([other[beside], np.floor(at[beside]).astype(int)]):
+                if 0 <= x < shown.size[0] and 0 <= y < shown.size[1]:
+                    edges[y, x] = True
+    return edges
+
+
 CAMERAS = {
     "perspective": Camera((3.5, 1.2, 3.0), (0.5, 0.0, 0.0), fov_y=40),
     "orthographic": Camera((3.5, 1.2, 3.0), (0.5, 0.0, 0.0), projection="orthographic", height=3.0),
@@ -96,17 +132,23 @@ def two_pods(kind: str, measured: bool = False) -> tuple[RangeView, RangeView]:
     ("kind", "measured"), [("z", False), ("z", True), ("range", False), ("height", False)]
 )
 def test_pixels_show_the_very_samples(draw: Draw, kind: str, measured: bool, camera: Camera) -> None:
-    """Depth bit for bit, number, and no nearer one in the pixel. On hardware, whose divisions OpenGL lets be
-    wrong in the last bits, up to these."""
+    """Depth bit for bit, number, and no nearer one in the pixel; on hardware but for last bits."""
     views = two_pods(kind, measured)
     surface = draw(views, camera, (160, 120), "pyramidal", params=BARE)
     depth, number = nearest_samples(views, surface)
     assert (number != NOTHING).mean() > 0.1
-    np.testing.assert_array_equal(surface.id, number)
-    there = number != NOTHING
-    last_bits = 0 if surface.gpu.software else 4
-    np.testing.assert_array_max_ulp(surface.depth[there], depth[there], last_bits, np.float32)
-    np.testing.assert_array_equal(surface.level, np.where(there, 0, 255))
+    seen, there = surface.id != NOTHING, number != NOTHING
+    np.testing.assert_array_equal(surface.level, np.where(seen, 0, 255))
+    if surface.gpu.software:
+        np.testing.assert_array_equal(surface.id, number)
+        np.testing.assert_array_equal(surface.depth[there], depth[there])
+        return
+    error = rounding_of_places(views, surface)
+    clear = ~near_edges(views, surface, error)
+    assert clear.mean() > 0.9
+    np.testing.assert_array_equal(seen[clear], there[clear])
+    np.testing.assert_allclose(surface.depth[clear & there], depth[clear & there], rtol=0, atol=error)
+    assert (surface.id != number)[clear].mean() < 1e-3, "those as near but for that"
 
 
 # --- holes ----------------------------------------------------------------------------

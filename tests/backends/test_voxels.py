@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hardware import displaced, stored
 from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, sphere, sphere_hits
 from scipy import ndimage
@@ -46,22 +47,25 @@ def voxels(draw: Draw, cloud: PointCloud, camera: Camera, size=SIZE, look=None, 
     return draw(cloud, camera, size, "voxels", look, params)
 
 
-def rays(surface: Surface) -> tuple[NDArray, NDArray]:
-    """Origins and directions through pixel centres, (H, W, 3), along which depth is the parameter; float64,
-    relative to the origin."""
+def rays(surface: Surface, off: tuple[float, float] = (0.0, 0.0)) -> tuple[NDArray, NDArray]:
+    """Origins and directions through pixels, (H, W, 3), along which depth is the parameter; float64,
+    relative to the origin. off: pixels from their centres."""
     width, height = surface.size
     y, x = np.mgrid[0:height, 0:width] + 0.5
-    pixels = np.stack([x, y], axis=-1).reshape(-1, 2)
+    pixels = np.stack([x + off[0], y + off[1]], axis=-1).reshape(-1, 2)
     at_one, at_two = (surface.view.unproject(pixels, np.full(len(pixels), depth)) for depth in (1.0, 2.0))
     along = at_two - at_one
     return (at_one - along).reshape(height, width, 3), along.reshape(height, width, 3)
 
 
-def exact(surface: Surface) -> tuple[NDArray, NDArray]:
-    """Depth and row of the nearest of the cubes that a surface shows, cube by cube in float64."""
+def exact(surface: Surface, off: tuple[float, float] = (0.0, 0.0)) -> tuple[NDArray, NDArray]:
+    """Depth and row of the nearest of the cubes that a surface shows, cube by cube in float64.
+
+    off: as `rays` has it.
+    """
     cubes, view = surface.pose.cloud, surface.view
     pixel = 0.7072 / view.scale  # the least half of an edge, at depth 1 where there is perspective
-    near, along = rays(surface)
+    near, along = rays(surface, off)
     depth, row = np.full(surface.size[::-1], np.inf), np.full(surface.size[::-1], NOTHING, np.uint32)
     for i, (center, half) in enumerate(zip(cubes.positions.astype(float), cubes.radii.astype(float))):  # type: ignore[union-attr]  # noqa: B905
         half = max(half, pixel * max(float(view.depths(center)), view.near) ** view.perspective)
@@ -79,13 +83,17 @@ def exact(surface: Surface) -> tuple[NDArray, NDArray]:
 def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, least: float) -> None:
     fixed = {"shape": "cubes", "max_depth": depth, "least": least, "pixel_threshold": 0.25}
     surface = voxels(draw, CLOUD, camera, **fixed)
-    expected, row = exact(surface)
-    seen = surface.row != NOTHING
-    assert (seen != np.isfinite(expected)).mean() <= 2e-4
-    both = seen & np.isfinite(expected)
+    depths, rows = (
+        np.stack(each) for each in zip(*(exact(surface, off) for off in displaced(surface.gpu)), strict=True)
+    )
+    expected = np.clip(surface.depth, depths.min(axis=0), depths.max(axis=0))
+    row, clear = rows[0], (rows == rows[0]).all(axis=0)  # on no border, as far as a rasteriser moves these
+    seen, there = surface.row != NOTHING, row != NOTHING
+    assert (clear & (seen != there)).mean() <= 2e-4
+    both = seen & there
     same = both & (surface.row == row)
     np.testing.assert_allclose(surface.depth[same], expected[same], rtol=2e-4)
-    others = both & ~same
+    others = both & clear & ~same
     along_axis = camera is CAMERAS["near plane"]  # in x: rays of one column run within faces
     assert others.mean() <= (0.03 if along_axis else 2e-3)
     error = np.abs(surface.depth[others] / expected[others] - 1)
@@ -107,7 +115,9 @@ def test_feeds_from_buffers_give_the_same_bits_and_the_others_agree(
         np.testing.assert_array_equal(feeds["tbo"].depth, feeds[feed].depth)
     assert_agree(feeds["gs"], feeds["tbo"], 0.003)
     chosen = voxels(draw, CLOUD, camera, (400, 300), **fixed)
-    assert chosen.stats.chosen["instancing"] in ("scatter", "scatter, gs", "tiles", "gs")
+    feeds_of_auto = ("gs",) if chosen.gpu.software else FEEDS  # on hardware whatever was fastest
+    ways = ("scatter", "tiles", *feeds_of_auto, *(f"scatter, {feed}" for feed in feeds_of_auto))
+    assert chosen.stats.chosen["instancing"] in ways
     assert (chosen.row != feeds["tbo"].row).mean() < 0.02
 
 
@@ -294,8 +304,11 @@ def test_what_faces_away_is_left_out_where_it_is_asked_for(draw: Draw) -> None:
     assert "octants facing away" in front.stats.skipped
     assert "octants facing away" not in everything.stats.skipped
     assert len(front.pose.cloud) < 0.7 * len(everything.pose.cloud)
-    changed = (everything.depth != front.depth).mean()
-    assert changed < 0.02, "of a closed surface next to nothing is seen of the other side"
+    seen = np.isfinite(everything.depth)
+    changed = seen != np.isfinite(front.depth)
+    bound = 0.0 if front.gpu.software else stored(front, front.depth[seen], times=2)
+    changed[seen] |= np.abs(everything.depth[seen] - front.depth[seen]) > bound * everything.depth[seen]
+    assert changed.mean() < 0.02, "of a closed surface next to nothing is seen of the other side"
 
 
 def test_octants_out_of_view_cost_nothing(draw: Draw) -> None:

@@ -13,6 +13,7 @@ from scenes import DRAWS_POINTS, of_variant, variants
 from viewer.backends import Backend, Limit, backends
 from viewer.backends import backend as find_backend
 from viewer.bench.numerics import EXACT, distinct_limits, rows, ways_of
+from viewer.bench.rounding import Rounding
 from viewer.bench.shots import RgbdImage, picture
 from viewer.bench.stability import Difference, Row, difference
 from viewer.camera import Camera
@@ -92,7 +93,8 @@ def test_limits_are_of_few_principles() -> None:
 
 def assert_allowed(renderer: Renderer, row: Row, backend: Backend, setting: dict[str, Any]) -> None:
     params = backend.params(setting)
-    outcome, tolerance = row.compare(renderer, backend, params), row.tolerance_of(backend, params)
+    outcome = row.compare(renderer, backend, params)
+    tolerance = row.tolerance_of(backend, params, Rounding.of(renderer.gpu))
     allowed = f"{tolerance.bound} ({tolerance.reason})"
     if outcome.limit is not None:
         allowed += f", or {outcome.limit.pixels:.1%} coarsely ({outcome.limit.reason})"

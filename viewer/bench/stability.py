@@ -11,11 +11,13 @@ import numpy as np
 from ..backends import Backend, Limit
 from ..gpu.amplify import FEEDS
 from ..renderer import Renderer
+from .rounding import IN_SOFTWARE, Rounding
 from .shots import PointView, RgbdImage, picture
 
 # From these steps on a pixel counts as another one. Eight bits round within one level, and a
 # highlight doubles that.
 _DEPTH_STEP, _COLOR_STEP = 0.1, 3  # pixel widths, levels of 255
+_ROUNDINGS = 6 * 2.0**-17  # pixels: of a coordinate between 128 and 256
 # The same where a row cannot be held: another surface or another side of it, not another point beside.
 _COARSE_STEPS = (8.0, 64)
 
@@ -74,6 +76,14 @@ class Tolerance:
         pixels = min(20 * self.error, 1.0)
         return Difference(pixels, 5 * self.error + _DEPTH_STEP * pixels, _COLOR_STEP * pixels)
 
+    def on(self, driver: Rounding, *, rasterised: bool) -> Tolerance:
+        """Tolerance of pictures by a driver: each of six roundings of a pixel coordinate may be a quotient's
+        (`numerics.FLOAT32`), and a rasteriser moves corners, evenly, by up to `driver.corner`."""
+        more = _ROUNDINGS * (driver.roundings - 1) + rasterised * driver.corner / 3**0.5
+        if not self.error or not more:
+            return self
+        return Tolerance(self.error + more, f"{self.reason}, and the driver's")
+
     def holds(self, found: Difference) -> bool:
         """Whether a difference is within it."""
         bound = self.bound
@@ -119,10 +129,11 @@ class Row:
         """Whether a backend has the parameters that the row sets."""
         return self.setting.keys() <= {parameter.name for parameter in backend.parameters}
 
-    def tolerance_of(self, backend: Backend, params: Any = None) -> Tolerance:
-        """How far apart a backend's pictures may be. params: None: its defaults."""
+    def tolerance_of(self, backend: Backend, params: Any = None, driver: Rounding = IN_SOFTWARE) -> Tolerance:
+        """How far apart a backend's pictures may be. params: None: its defaults. driver: what draws them."""
         is_summed = backend.blends and getattr(params, "instancing", None) in FEEDS
-        return self.summed if is_summed and self.summed else self.tolerance
+        tolerance = self.summed if is_summed and self.summed else self.tolerance
+        return tolerance.on(driver, rasterised=any(p.name == "instancing" for p in backend.parameters))
 
     def limit_of(self, backend: Backend, params: Any = None) -> Limit | None:
         """The bound of a backend that cannot hold the row, by its declaration; None: it must."""
@@ -138,5 +149,6 @@ class Row:
         found = difference(one, other)
         coarse = difference(one, other, *_COARSE_STEPS).pixels
         shown = not np.isposinf(one.depth).all()
-        held = shown and self.tolerance_of(backend, params).holds(found)
+        driver = Rounding.of(renderer.gpu)
+        held = shown and self.tolerance_of(backend, params, driver).holds(found)
         return Outcome(found, held, self.limit_of(backend, params), coarse)
