@@ -28,8 +28,9 @@ test: setup ## the tests, without the slow ones; a process for each core: make t
 test-all: setup ## all tests
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
 
-test-drivers: setup ## backends and numerics on a second driver (Zink), shaders through glslangValidator
+test-drivers: setup ## backends and numerics on a second driver (Zink), shaders through glslangValidator; on used memory
 	$(PYTHON) tests/drivers/zink.py tests/gpu tests/backends tests/numerics -m "not slow"
+	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p poisoned tests/gpu tests/backends tests/numerics -m "not slow"
 
 fuzz: setup ## damaged files by the thousand: make fuzz MINUTES=60 SEED=7
 	$(PYTHON) tests/fuzz/campaign.py --minutes $(MINUTES) --seed $(SEED)
