@@ -6,10 +6,11 @@ vec2 folded(vec3 normal) {
 }
 
 vec3 unfolded(vec2 net) {
-    vec3 normal = vec3(net, 1.0 - abs(net.x) - abs(net.y));
+    precise vec3 normal = vec3(net, 1.0 - abs(net.x) - abs(net.y));
     float under = max(-normal.z, 0.0);
     normal.xy -= vec2(normal.x < 0.0 ? -under : under, normal.y < 0.0 ? -under : under);
-    return normalize(normal);
+    normal = normalize(normal);
+    return normal;
 }
 
 // A unit normal in a word that is not 0; 0: none. (0, 0, 1) is kept as its like: the net holds it in no other word.

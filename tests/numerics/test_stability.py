@@ -163,6 +163,15 @@ def test_sums_of_a_rasteriser_have_a_tolerance_of_their_own() -> None:
     assert row.tolerance_of(surfels, surfels.params({"instancing": "gs"})) == row.summed
 
 
+def test_hardware_may_round_otherwise_but_not_where_the_same_numbers_reach_it() -> None:
+    row = next(row for row in ROWS if row.name.startswith("scaled"))
+    splats, points, hardware = backends()["surfels"], backends()["points"], Rounding(2.5, 1 / 512)
+    errors = [row.tolerance_of(one, driver=hardware).error for one in (points, splats)]
+    assert row.tolerance.error < errors[0] < 3 * row.tolerance.error
+    assert errors[0] < errors[1] < errors[0] + 1 / 512, "corners are moved"
+    assert EXACT.on(hardware, rasterised=True) == EXACT
+
+
 def test_rows_have_names_of_their_own() -> None:
     assert len({row.name for row in ROWS}) == len(ROWS)
 

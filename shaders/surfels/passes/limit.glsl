@@ -9,5 +9,6 @@ float visible_radius(float depth, uint row) {
 
 // The reversed depth-buffer value that splats must reach to count there.
 float limit_behind(float depth, uint row) {
-    return stored_depth(depth + epsilon * visible_radius(depth, row));
+    precise float behind = depth + epsilon * visible_radius(depth, row);
+    return stored_depth(behind);
 }

@@ -9,9 +9,10 @@ const float FULL = 31.0;  // what the centre of a splat counts
 
 // FULL exp(-4 x) to 0.03, x up to 1: a cubic of exp(-x), to the fourth power.
 float weight_at(float x) {
-    float e = 1.0 + x * (-0.997688 + x * (0.479272 - x * 0.115320));
+    precise float e = 1.0 + x * (-0.997688 + x * (0.479272 - x * 0.115320));
     e *= e;
-    return roundEven(FULL * (e * e));
+    precise float weight = FULL * (e * e);
+    return roundEven(weight);
 }
 
 const float NORMAL_STEPS = 2047.0;  // of a unit vector
