@@ -6,6 +6,7 @@ import itertools
 import os
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from hypothesis import HealthCheck, settings
 
 from viewer import cli
 from viewer.backends import backends
+from viewer.backends.surfels import tiles
 from viewer.camera import Camera
 from viewer.look import Look
 from viewer.scan.pose import Pose, Scanned
@@ -68,6 +70,13 @@ def numpy_errors_raise() -> Iterator[None]:
     """Overflow, invalid values and division by zero fail the test; underflow to zero is fine."""
     with np.errstate(all="raise", under="ignore"):
         yield
+
+
+@pytest.fixture
+def short_spans(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Discs that tiles list are no larger with software drivers than on hardware."""
+    grid = replace(tiles.SOFTWARE_GRID, span=tiles.HARDWARE_GRID.span)
+    monkeypatch.setattr(tiles, "SOFTWARE_GRID", grid)
 
 
 @pytest.fixture(scope="session")

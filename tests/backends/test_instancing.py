@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hardware import at_borders, moved, stored
+from numpy.typing import NDArray
 from scenes import BUFFERS, NOTHING, sphere
 
 from viewer.backends import backend
@@ -159,10 +160,12 @@ def test_the_same_bits_again(surfels: Draw) -> None:
 
 
 @every_camera
+@pytest.mark.usefixtures("short_spans")
 def test_pixels_may_be_shared_out_as_hardware_likes(
     renderer: Renderer, surfels: Draw, camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What lists say of parts leaves out no pixel, of ellipses seen edge on neither, in any pass."""
+    monkeypatch.setattr(tiles, "_LARGE_COST", 0)  # else it is for the length of lists to tell who draws
     random = np.random.default_rng(5)
     normals = random.normal(size=(3000, 3))
     long = np.cross(normals, random.normal(size=(3000, 3)))
@@ -181,40 +184,98 @@ def test_pixels_may_be_shared_out_as_hardware_likes(
         np.testing.assert_array_equal(surface.image(), other.image())
 
 
+@pytest.mark.usefixtures("short_spans")
 def test_what_tiles_cannot_hold_is_rasterised(
     renderer: Renderer, surfels: Draw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def rasterised(cloud: PointCloud, camera: Camera, size: tuple[int, int]) -> str:
+    def rasterised(cloud: PointCloud, camera: Camera, size: tuple[int, int], cull_back: bool = False) -> str:
         """Why; the picture is that of the rasteriser."""
-        surface = surfels(cloud, camera, size, instancing="tiles")
-        assert_equal(surface, surfels(cloud, camera, size, instancing="gs"))
+        surface = surfels(cloud, camera, size, instancing="tiles", cull_back=cull_back)
+        assert_equal(surface, surfels(cloud, camera, size, instancing="gs", cull_back=cull_back))
         return surface.stats.skipped["tiles"]
 
     with monkeypatch.context() as patched:
         patched.setattr(tiles, "_MOST_PIXELS", 80)
         assert "along an edge" in rasterised(CLOUD, CAMERAS["perspective"], SIZE)
     huge = sphere(300)
-    assert "large splats" in rasterised(huge, Camera((0.3, 0.5, 1.2)), (1600, 1200))
+    assert "large splats" in rasterised(huge, Camera((0.3, 0.5, 1.2)), (1600, 1200), cull_back=True)
     monkeypatch.setattr(renderer.gpu, "max_storage_bytes", 16 * len(CLOUD))
     assert "entries" in rasterised(CLOUD, CAMERAS["perspective"], (1280, 960))
     monkeypatch.setattr(renderer.gpu, "max_storage_bytes", 16 * len(CLOUD) - 1)
     assert "points" in rasterised(CLOUD, CAMERAS["perspective"], SIZE)
 
 
+@pytest.mark.usefixtures("short_spans")
 def test_some_large_splats_among_many(surfels: Draw) -> None:
     """A wall behind a sphere: its splats are as large as the picture."""
-    count = 3
-    wall = {"positions": [[0, 0, -3.0 - i] for i in range(count)], "normals": [[0.1, 0, 1.0]] * count}
+    cloud, camera = _before_a_wall()
+    surface = surfels(cloud, camera, (800, 600), instancing="tiles")
+    assert "3 rasterised" in surface.stats.skipped.values()
+    assert len(CLOUD) in surface.row
+    assert_agree(surface, surfels(cloud, camera, (800, 600), instancing="tbo"), 0.003)
+
+
+@pytest.mark.parametrize("passes", ["one", "two"])
+def test_software_lists_splats_as_large_as_the_picture(
+    renderer: Renderer, surfels: Draw, monkeypatch: pytest.MonkeyPatch, passes: str
+) -> None:
+    monkeypatch.setattr(renderer.gpu, "software", True)
+    cloud, camera = _before_a_wall()
+    surface, quads = (
+        surfels(cloud, camera, (800, 600), instancing=way, passes=passes, enlarge=1.0)
+        for way in ("tiles", "tbo")
+    )
+    assert not any("rasterised" in told for told in surface.stats.skipped.values())
+    assert len(CLOUD) in surface.row
+    assert_agree(surface, quads, 0.003)
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_splats_across_the_near_plane_beside_the_picture_change_nothing(
+    surfels: Draw, projection: str
+) -> None:
+    """Of those, a ring around the eye, none is rasterised; those in view are, and shown as ever."""
+    camera = Camera((0.0, 0.1, 0.2), (0.1, 0.0, 3.0), fov_y=40, near=0.05, projection=projection, height=0.8)
+    across = _across_near(camera)
+    assert np.count_nonzero(across) > 100
+    ring = surfels(CLOUD, camera, instancing="tiles")
+    assert not any("rasterised" in told for told in ring.stats.skipped.values())
+    assert CLOUD.normals is not None
+    assert CLOUD.radii is not None
+    others = PointCloud.from_arrays(
+        CLOUD.world()[~across], normals=CLOUD.normals[~across], radii=CLOUD.radii[~across]
+    )
+    np.testing.assert_allclose(ring.depth, surfels(others, camera, instancing="tiles").depth, rtol=2e-6)
+
+    forward = np.subtract(camera.target, camera.eye) / np.linalg.norm(np.subtract(camera.target, camera.eye))
+    before = np.array(camera.eye) + 0.05 * forward + [[0.0, 0.0, 0.0], [0.01, 0.01, 0.01], [0.0, 0.5, 0.0]]
+    cloud = PointCloud.from_arrays(
+        np.concatenate([CLOUD.world(), before]),
+        normals=np.concatenate([CLOUD.normals, [[0.5, 0.5, 0.2]] * 3]),
+        radii=np.concatenate([CLOUD.radii, [0.01, 0.02, 0.03]]),
+    )
+    tiled, quads = (surfels(cloud, camera, instancing=way) for way in ("tiles", "gs"))
+    assert "2 rasterised" in tiled.stats.skipped.values()
+    assert {len(CLOUD), len(CLOUD) + 1} <= set(tiled.row.ravel())
+    assert_agree(tiled, quads, 0.003)
+
+
+def _across_near(camera: Camera) -> NDArray[np.bool_]:
+    """Which discs of CLOUD may reach to both sides of the near plane."""
+    forward = np.subtract(camera.target, camera.eye)
+    depths = (CLOUD.world() - camera.eye) @ (forward / np.linalg.norm(forward))
+    return np.abs(depths - camera.near) < CLOUD.radii
+
+
+def _before_a_wall() -> tuple[PointCloud, Camera]:
+    """A sphere, and three splats behind it that are as large as the picture."""
+    wall = {"positions": [[0, 0, -3.0 - i] for i in range(3)], "normals": [[0.1, 0, 1.0]] * 3}
     cloud = PointCloud.from_arrays(
         np.concatenate([CLOUD.world(), wall["positions"]]),
         normals=np.concatenate([CLOUD.normals, wall["normals"]]),  # type: ignore[list-item]
-        radii=np.concatenate([CLOUD.radii, [5.0] * count]),  # type: ignore[list-item]
+        radii=np.concatenate([CLOUD.radii, [5.0] * 3]),  # type: ignore[list-item]
     )
-    camera = Camera((0.0, 0.0, 3.0), (0, 0, 0), fov_y=60)
-    surface = surfels(cloud, camera, (800, 600), instancing="tiles")
-    assert f"{count} rasterised" in surface.stats.skipped.values()
-    assert len(CLOUD) in surface.row
-    assert_agree(surface, surfels(cloud, camera, (800, 600), instancing="tbo"), 0.003)
+    return cloud, Camera((0.0, 0.0, 3.0), (0, 0, 0), fov_y=60)
 
 
 def test_a_feed_packs_when_it_is_chosen_and_the_pose_counts_it(renderer: Renderer) -> None:

@@ -120,6 +120,7 @@ def test_tiles_that_are_not_shown_again_are_those_that_stay(draw: Draw) -> None:
 
 
 @every_number
+@pytest.mark.usefixtures("short_spans")
 def test_large_splats_among_small_ones(draw: Draw, passes: str) -> None:
     """A hidden splat larger than the lists of tiles take."""
     x, y = np.meshgrid(np.linspace(-0.3, 0.3, 40), np.linspace(-0.3, 0.3, 40))

@@ -389,6 +389,7 @@ def test_very_many_splats_in_one_pixel_stay_in_range(draw: Draw) -> None:
     np.testing.assert_allclose(surface.normal[covered], [[0, 0, 1]] * covered.sum(), atol=0.01)
 
 
+@pytest.mark.usefixtures("short_spans")
 def test_large_splats_are_blended_by_the_rasteriser(draw: Draw) -> None:
     cloud = sphere(100)
     camera, size = Camera(eye=(0.3, 0.5, 1.5), fov_y=60), (480, 360)
@@ -400,6 +401,7 @@ def test_large_splats_are_blended_by_the_rasteriser(draw: Draw) -> None:
         np.testing.assert_array_equal(values, quads.arrays()[channel], channel)
 
 
+@pytest.mark.usefixtures("short_spans")
 @pytest.mark.parametrize(("enlarge", "cull_back"), [(1.0, True), (1.0, False), (2.0, True)])
 def test_large_splats_among_many_are_blended_with_them(draw: Draw, enlarge: float, cull_back: bool) -> None:
     """A ball full of gaps before a few discs as large as the picture, and one of its own before the eye."""

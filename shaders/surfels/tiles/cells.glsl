@@ -32,8 +32,6 @@ layout(binding = TEXTURE_AWAY) uniform usamplerBuffer known_away_depths;
 #endif
 #endif
 
-const int SPAN = 248;  // pixels along an edge of a disc that lists have
-
 void count_visits(ivec4 t) {
     visit(home_of(t.xy), 0u, 0u);
     ivec2 tile = t.xy;
@@ -70,19 +68,32 @@ ivec4 parts_of(ivec4 pixels) {
     return ivec4(pixels.xy / PART, (pixels.zw + PART - 1) / PART);
 }
 
+// Whether a disc that crosses the near plane, whose image in perspective no box holds, lies to one side of all that the eye
+// sees: around an eye within a pose most of them do.
+bool is_beside() {
+    float depth = -disc_center.z;
+    vec2 across = vec2(disc_center.x, -disc_center.y) * view_scale, edge = vec2(view_size) - view_center;
+    vec2 lengths = sqrt(view_scale * view_scale + view_center * view_center);
+    vec2 far_lengths = sqrt(view_scale * view_scale + edge * edge);
+    vec2 rounding = 1e-5 * (abs(across) + vec2(view_size) * abs(depth));
+    vec2 reach = 1.001 * sqrt(disc_area) * lengths + rounding, far_reach = 1.001 * sqrt(disc_area) * far_lengths + rounding;
+    return any(lessThan(across + view_center * depth, -reach)) || any(lessThan(edge * depth - across, -far_reach));
+}
+
 // The parts of tiles that a point's disc reaches, in words. away: as in `away_depths`.
 uvec2 parts_reached(Point point, out uint away_depth) {
     away_depth = 0u;
     if (!begin_disc(point)) return uvec2(0u);
     vec2 depths = disc_range();
     if (depths.y < view_near || depths.x > view_far) return uvec2(0u);
-    bool crosses = depths.x < view_near;
-    ivec4 pixels = crosses ? ivec4(0) : pixels_in(disc_box()), parts = parts_of(pixels), t = tiles_of(parts);
+    bool crosses = depths.x < view_near, has_box = !crosses || !view_perspective;
+    if (!has_box && is_beside()) return uvec2(0u);
+    ivec4 pixels = has_box ? pixels_in(disc_box()) : ivec4(0, 0, view_size), parts = parts_of(pixels), t = tiles_of(parts);
+    if (t.x >= t.z) return uvec2(0u);
     if (crosses || any(greaterThan(pixels.zw - pixels.xy, ivec2(SPAN)))) {
         large[atomicAdd(large_count, 1u)] = point.row;
         return uvec2(0u);
     }
-    if (t.x >= t.z) return uvec2(0u);
 #if SIDE == 1
     bool is_away = dot(disc_normal, towards_eye(disc_center)) <= 0.0;
 #else

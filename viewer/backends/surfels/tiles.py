@@ -332,7 +332,7 @@ def tile_lists(
             fits = lists.fill(points, surface, splats, side, sends=True)
         if not fits:
             reason = f"too long lists, {lists.length:,} entries"
-        elif lists.large * _LARGE_COST > lists.length + lists.sent:
+        elif not lists.away and lists.large * _LARGE_COST > lists.length + lists.sent:
             reason = f"{lists.large:,} large splats"
     if reason:
         surface.stats.skipped["tiles"] = f"{reason}: all rasterised"
@@ -430,13 +430,15 @@ class TileGrid:
     """How pixels are shared out.
 
     part: those of an invocation, width and height. parts: of a tile, which has a list, along both. tiles: of
-    a work group. masked: whether entries of lists say which parts their disc reaches.
+    a work group. masked: whether entries of lists say which parts their disc reaches. span: pixels along an
+    edge of the largest discs that are listed.
     """
 
     part: tuple[int, int]
     parts: tuple[int, int]
     tiles: int
     masked: bool
+    span: int
 
     @property
     def tile(self) -> tuple[int, int]:
@@ -454,16 +456,18 @@ class TileGrid:
             "LINES": lines,
             "ALL_PARTS": columns * lines,
         }
-        return {**sizes, "MASKED": int(self.masked), "DISC_BITS": _DISC_BITS}
+        return {**sizes, "MASKED": int(self.masked), "SPAN": self.span, "DISC_BITS": _DISC_BITS}
 
 
-SOFTWARE_GRID = TileGrid((4, 4), (4, 2), 16, masked=True)
-HARDWARE_GRID = TileGrid((1, 1), (8, 8), 2, masked=False)
+SOFTWARE_GRID = TileGrid((4, 4), (4, 2), 16, masked=True, span=2048)
+HARDWARE_GRID = TileGrid((1, 1), (8, 8), 2, masked=False, span=248)
 
 
 def _grid(gpu: Gpu) -> TileGrid:
     """The grid that suits the device: a processor's eight lanes are the parts of a tile, and each takes
-    its discs from the list; on hardware each pixel has its invocation, and two tiles fill a work group."""
+    its discs from the list; on hardware each pixel has its invocation, and two tiles fill a work group.
+    Software rasterisers take many times as long as lists for large discs; on hardware an invocation would go
+    over all tiles of one by itself."""
     return SOFTWARE_GRID if gpu.software else HARDWARE_GRID
 
 
