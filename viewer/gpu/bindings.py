@@ -62,7 +62,8 @@ class Texture(IntEnum):
     REACH = auto()
     WORK = auto()
     FARTHEST = auto()
-    AWAY = auto()  # discs that face away
+    NOTED = auto()  # points whose discs are listed
+    AWAY = auto()  # those whose discs face away
     AWAY_STARTS = auto()  # of discs that face away
     AWAY_LISTED = auto()
     NUMBERS = auto()  # of the discs of points
@@ -157,6 +158,7 @@ class Storage(IntEnum):
     WORK = 1
     PLACES = 2
     FORMS = 3
+    NOTED = 3
     REACH = 4
     DISC_LOOKS = 4
     LARGE = 5

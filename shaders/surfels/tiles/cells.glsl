@@ -2,7 +2,8 @@
 // Then points are listed by homes (surfels/tiles/homes.glsl), and in the order of these lists discs by tiles
 // (surfels/tiles/discs.glsl): points are read from anywhere, but discs that lie together in the picture do so in memory.
 // Large discs, and those that cross the near plane, are listed to be rasterised; those of up to FEW pixels are sent to
-// these at once, and are in no list.
+// these at once, and are in no list. Points whose discs are listed, and those that are left to a second filling, are noted, so
+// that no pass goes over the others again.
 // SIDE 0: all discs; 1: those that face the eye; 2: the others that 1 found, where `farthest` does not hide them;
 // 3: all that it does not hide.
 #include "surfels/tiles/reach.glsl"
@@ -10,10 +11,11 @@
 #include "amplify/texels.glsl"
 #include "surfels/pixels.glsl"
 #endif
+#include "surfels/tiles/large.glsl"
 
+layout(std430, binding = STORAGE_NOTED) writeonly buffer Noted { uint noted[]; };
 #if SIDE != 2
 layout(std430, binding = STORAGE_REACH) writeonly buffer Reach { uvec2 reach[]; };
-layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, sent, discs, large[]; };
 #if FEW
 layout(std430, binding = STORAGE_NEAREST) buffer Nearest { uint nearest_depths[]; };  // of each pixel, float bits
 #endif
@@ -23,13 +25,11 @@ layout(binding = TEXTURE_REACH) uniform usamplerBuffer reach;
 #if SIDE >= 2
 layout(binding = TEXTURE_FARTHEST) uniform usamplerBuffer farthest;  // depth that counts in each tile, float bits
 #endif
-#if SIDE == 1 || SIDE == 2
-// Of discs that face away, the nearest depth that they may reach, float bits: of those that 2 lists alone, once that
-// has counted them. 0: of others.
-layout(std430, binding = STORAGE_AWAY) writeonly buffer Away { uint away_depths[]; };
-#if SIDE == 2
-layout(binding = TEXTURE_AWAY) uniform usamplerBuffer known_away_depths;
-#endif
+// Of discs that face away: the point; the nearest depth that it may reach, float bits.
+#if SIDE == 1
+layout(std430, binding = STORAGE_AWAY) writeonly buffer Away { uvec2 away_points[]; };
+#elif SIDE == 2
+layout(binding = TEXTURE_AWAY) uniform usamplerBuffer away_points;
 #endif
 
 void count_visits(ivec4 t) {
@@ -69,25 +69,22 @@ ivec4 parts_of(ivec4 pixels) {
 }
 
 // Whether a disc that crosses the near plane, whose image in perspective no box holds, lies to one side of all that the eye
-// sees: around an eye within a pose most of them do.
-bool is_beside() {
-    float depth = -disc_center.z;
-    vec2 across = vec2(disc_center.x, -disc_center.y) * view_scale, edge = vec2(view_size) - view_center;
-    vec2 lengths = sqrt(view_scale * view_scale + view_center * view_center);
-    vec2 far_lengths = sqrt(view_scale * view_scale + edge * edge);
-    vec2 rounding = 1e-5 * (abs(across) + vec2(view_size) * abs(depth));
-    vec2 reach = 1.001 * sqrt(disc_area) * lengths + rounding, far_reach = 1.001 * sqrt(disc_area) * far_lengths + rounding;
-    return any(lessThan(across + view_center * depth, -reach)) || any(lessThan(edge * depth - across, -far_reach));
+// sees: around an eye within a pose most of them do. farthest: the depth up to which it may reach.
+bool is_beside(float farthest) {
+    vec2 across = vec2(disc_center.x, -disc_center.y) * view_scale;
+    vec2 edge = mix(view_center, vec2(view_size) - view_center, greaterThan(across, vec2(0.0)));
+    float reach = 1.001 * sqrt(disc_area) * view_scale;
+    return any(greaterThan(0.99999 * abs(across), reach + max(edge * view_near, edge * farthest)));
 }
 
-// The parts of tiles that a point's disc reaches, in words. away: as in `away_depths`.
+// The parts of tiles that a point's disc reaches, in words. away_depth: as in `away_points`; 0 where it faces the eye.
 uvec2 parts_reached(Point point, out uint away_depth) {
     away_depth = 0u;
     if (!begin_disc(point)) return uvec2(0u);
     vec2 depths = disc_range();
     if (depths.y < view_near || depths.x > view_far) return uvec2(0u);
     bool crosses = depths.x < view_near, has_box = !crosses || !view_perspective;
-    if (!has_box && is_beside()) return uvec2(0u);
+    if (!has_box && is_beside(depths.y)) return uvec2(0u);
     ivec4 pixels = has_box ? pixels_in(disc_box()) : ivec4(0, 0, view_size), parts = parts_of(pixels), t = tiles_of(parts);
     if (t.x >= t.z) return uvec2(0u);
     if (crosses || any(greaterThan(pixels.zw - pixels.xy, ivec2(SPAN)))) {
@@ -108,10 +105,7 @@ uvec2 parts_reached(Point point, out uint away_depth) {
 #endif
     float nearest = depths.x * (1.0 - 1e-6);
 #if SIDE == 1
-    if (is_away) {
-        away = 1u;
-        away_depth = floatBitsToUint(nearest);
-    }
+    away_depth = is_away ? floatBitsToUint(nearest) : 0u;
 #elif SIDE == 3
     if (is_hidden(t, nearest)) return uvec2(0u);
 #endif
@@ -122,23 +116,22 @@ void scatter(uint i) {
     uint away_depth;
     uvec2 words = parts_reached(texel_point(drawn_row(int(i))), away_depth);
     reach[i] = words;
-#if SIDE == 1
-    away_depths[i] = away_depth;
-    if (away_depth != 0u) return;
-#endif
     if (words.y == 0u) return;
-    ivec4 parts = unpacked_parts(words);
-    count_visits(tiles_of(parts));
-}
-#else
-void scatter(uint i) {
-    uint away_depth = texelFetch(known_away_depths, int(i)).r;
-    if (away_depth == 0u) return;
-    ivec4 parts = unpacked_parts(texelFetch(reach, int(i)).xy), t = tiles_of(parts);
-    if (is_hidden(t, uintBitsToFloat(away_depth))) {
-        away_depths[i] = 0u;
+#if SIDE == 1
+    if (away_depth != 0u) {
+        away_points[atomicAdd(away, 1u)] = uvec2(i, away_depth);
         return;
     }
+#endif
+    noted[atomicAdd(discs, 1u)] = i;
+    count_visits(tiles_of(unpacked_parts(words)));
+}
+#else
+void scatter(uint at) {
+    uvec2 point = texelFetch(away_points, int(at)).xy;
+    ivec4 t = tiles_of(unpacked_parts(texelFetch(reach, int(point.x)).xy));
+    if (is_hidden(t, uintBitsToFloat(point.y))) return;
+    noted[atomicAdd(discs, 1u)] = point.x;
     count_visits(t);
 }
 #endif

@@ -1,8 +1,9 @@
 // Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where some discs, which reach
 // anywhere, are rasterised or were sent to their pixels. SECOND: of a second filling. REST: those that discs of the first
 // one alone reach, once the others are listed.
+#include "surfels/tiles/large.glsl"
+
 layout(std430, binding = STORAGE_STARTS) readonly buffer Starts { uint starts[]; };
-layout(std430, binding = STORAGE_LARGE) buffer Large { uint large_count, list_length, away, longest, sent, discs, large[]; };
 layout(std430, binding = STORAGE_WORK) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
 layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { uint farthest[]; };
 
@@ -38,7 +39,6 @@ void take_sum(uint tile, uint sum) {
 #endif
     if (tile + 1u < word_count) return;
     list_length = starts[word_count];
-    discs = starts[2u * word_count] - list_length;
     uint listed = sum + is_worked, groups = (listed + TILES - 1u) / TILES;
     work_count = listed;
     groups_x = min(groups, 1024u);

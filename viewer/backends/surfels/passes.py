@@ -169,7 +169,7 @@ def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
     if lists.away and large is not None:
         show(points, surface, lists, splats, found=True, away=True)
     take = SECOND if lists.away and large is None else 0
-    blend_by_tiles(points, surface, lists, large, splats, take, lists.away)
+    blend_by_tiles(points, surface, lists, large, splats, take, lists.away > 0)
     return True
 
 

@@ -27,6 +27,7 @@ from ...gpu.amplify import Points, amplify
 from ...gpu.bindings import Storage, Texture
 from ...gpu.bins import Bins
 from ...gpu.compact import scan_words
+from ...gpu.constants import NOTHING
 from ...gpu.context import Gpu, Program
 from ...gpu.scatter import Visits, take_items
 from ...gpu.surface import Surface
@@ -58,7 +59,7 @@ class TileLists:
 
     Discs are numbered by tiles, so that those of one lie together in memory whatever the order of the points.
     length: entries of all lists. discs: how many are in lists. large: how many are left to the rasteriser.
-    away: whether some that face away from the eye were left to a second filling. sent: how many were sent to
+    away: how many that face away from the eye were left to a second filling. sent: how many were sent to
     pixels in place of lists.
     """
 
@@ -66,8 +67,7 @@ class TileLists:
         self._gpu = gpu
         self.grid = grid = _grid(gpu)
         self.tiles = (-(-size[0] // grid.tile[0]), -(-size[1] // grid.tile[1]))
-        self.length = self.discs = self.large = self.sent = self._longest = 0
-        self.away = False
+        self.length = self.discs = self.large = self.away = self.sent = self._longest = 0
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
         self._bins, self._away_bins = Bins(gpu, 2 * words), Bins(gpu, 2 * words)
@@ -117,7 +117,7 @@ class TileLists:
             points.bind(program)
             for name in ("farthest", "reach", "away"):
                 self._textures[name].bind(Texture[name.upper()])
-            self._bind_storage("reach", "large", "away")
+            self._bind_storage("reach", "large", "away", "noted")
             if sends:
                 surface.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
 
@@ -125,7 +125,8 @@ class TileLists:
             **{"PERSPECTIVE": int(surface.view.perspective), **self.grid.defines, **points.defines},
             **{"SIDE": side, "FEW": _FEW if sends else 0, "SENT": _SENT},
         }
-        visits = Visits("surfels/tiles/cells.glsl", points.count, bind, given, splats)
+        count = self.away if second else points.count
+        visits = Visits("surfels/tiles/cells.glsl", count, bind, given, splats)
         bins.count(visits)
         with gpu.timers.measure("work"):
             self._find_work(bins, "work", second)
@@ -134,7 +135,7 @@ class TileLists:
             words = self._buffer("large").read(_LARGE_HEAD)
             large, self.length, away, longest, sent, discs = struct.unpack("6I", words)
             if not second:
-                self.large, self.away, self.sent, self.discs = large, bool(away), sent, discs
+                self.large, self.away, self.sent, self.discs = large, away, sent, discs
                 self._longest = longest
         entries = self.length + discs
         if entries > gpu.max_storage_bytes // 4 or longest + both * self._longest > _LONGEST:
@@ -142,7 +143,7 @@ class TileLists:
 
         def bind_homes(program: Program) -> None:
             gpu.set(program, first_disc=first_disc, first_home=self.length)
-            for name in ("reach", "away"):
+            for name in ("reach", "noted"):
                 self._textures[name].bind(Texture[name.upper()])
             self._bind_storage("numbers")
 
@@ -155,8 +156,10 @@ class TileLists:
                 looks_of(points).bind(Texture.LOOKS)
             self._bind_storage("places", "forms", "disc_looks")
 
+        if numbered:
+            gl.clear_words(self._buffer("numbers"), NOTHING, points.count)
         homes = {**given, "NUMBERED": int(numbered)}
-        bins.fill(Visits("surfels/tiles/homes.glsl", points.count, bind_homes, homes), entries)
+        bins.fill(Visits("surfels/tiles/homes.glsl", discs, bind_homes, homes), entries)
         listed = {**given, "LOOKS": int(looks)}
         bins.fill(Visits("surfels/tiles/discs.glsl", discs, bind_discs, listed, splats), entries)
         return True
@@ -252,7 +255,8 @@ class TileLists:
         self._replace("disc_looks", 12 * count, gl.RGB32UI)
         self._replace("numbers", 4 * count, gl.R32UI)
         self._replace("reach", 8 * count, gl.RG32UI)
-        self._replace("away", 4 * count, gl.R32UI)
+        self._replace("noted", 4 * count, gl.R32UI)
+        self._replace("away", 8 * count, gl.RG32UI)
         self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
         self._bins.reserve(_ROOM * count)
 
@@ -286,7 +290,7 @@ def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int)
     lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS, sends=True)
     if lists is None:
         return False
-    away = lists.away
+    away = lists.away > 0
     farthest = farthest if away or farthest == LIMIT else 0
     show_all(points, surface, lists, splats, farthest)
     if not away:
