@@ -20,7 +20,8 @@ void main() {
     vec4 light = texelFetch(color_sums, pixel, 0);
     vec3 normal = texelFetch(normal_sums, pixel, 0).xyz;
     float total = light.a > 0.0 ? light.a : 1.0;
-    vec3 visible = normal_of(texelFetch(looks, int(row)).xy);
-    store_mean(index, light.rgb / total, normal / total, light.a > 0.0, OVER != 0 ? light.a : 1.0, row, visible);
+    float coverage = OVER != 0 ? light.a : 1.0;
+    uvec2 look = texelFetch(looks, int(row)).xy;
+    store_mean(index, light.rgb / total, normal / total, light.a > 0.0, coverage, light_of(look), normal_of(look));
     if (uintBitsToFloat(texelFetch(depths, index).r) < 0.0) list[reserve(1u)] = uint(index);
 }

@@ -5,13 +5,12 @@ layout(std430, binding = STORAGE_COLOR) writeonly buffer Color { uint own_colors
 #endif
 layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own_normals[]; };
 
-// light, normal: means of what `look.glsl` gives; where nothing was added, that of the row that is shown, whose normal
-// is `visible`. coverage: of the pixel.
-void store_mean(int index, vec3 light, vec3 normal, bool is_added, float coverage, uint row, vec3 visible) {
-    normal = is_added ? normal : visible;
+// light, normal: means of what `look.glsl` gives; where nothing was added, the visible ones, of what is shown. coverage: of
+// the pixel.
+void store_mean(int index, vec3 light, vec3 normal, bool is_added, float coverage, vec3 visible_light, vec3 visible_normal) {
+    normal = is_added ? normal : visible_normal;
 #if HAS_COLORS
-    vec3 shown = light_of(texelFetch(looks, int(row)).xy);
-    light = is_added ? light : shown;
+    light = is_added ? light : visible_light;
     own_colors[index] = packUnorm4x8(vec4(srgb_of_light(light), coverage));
 #endif
     own_normals[3 * index] = normal.x;

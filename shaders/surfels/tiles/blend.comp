@@ -1,7 +1,11 @@
 // The second of two passes (Slomp 2014, V-B): of the listed discs, enlarged, those that pass at most
 // so far behind what is visible at a pixel, weighted by their masks. LARGE: on top of what the rasteriser
 // has added up of others. TAKE: the nearest are found first, 1 of the lists, 2 of the lists of those that face
-// away (AWAY), beside what the Surface holds.
+// away (AWAY), beside what the Surface holds. PARTLY: more lists may follow; where an invocation's pixels all show something,
+// few of those reach them, so that they are blended now, and the others later.
+#if TAKE == 1
+#define KEEPS_DISCS
+#endif
 #include "surfels/tiles/nearest.glsl"
 #include "surfels/passes/limit.glsl"
 #include "surfels/passes/look.glsl"
@@ -12,7 +16,10 @@
 // tile's list, which changes from frame to frame, does not show.
 const int BLOCK = 128;
 
-layout(binding = TEXTURE_DISC_LOOKS) uniform usamplerBuffer disc_looks;
+layout(binding = TEXTURE_DISC_LOOKS) uniform usamplerBuffer disc_looks;  // and radius, as stored
+#if PARTLY
+layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };  // as show.comp has it
+#endif
 #if LARGE
 layout(binding = TEXTURE_COLOR_SUMS) uniform sampler2D color_sums;  // and weight
 layout(binding = TEXTURE_NORMAL_SUMS) uniform sampler2D normal_sums;
@@ -24,6 +31,22 @@ uvec3 light[PIXELS];
 ivec3 normal[PIXELS];
 vec3 visible[PIXELS];  // normals
 float mask_scale;
+
+// What the splat gives that a pixel shows; returns its radius, as stored. Of the nearest that were found here it lies by that of
+// others in the tile, else where its point does.
+float visible_look(int k, out vec3 rgb, out vec3 n) {
+#if TAKE == 1
+    uvec4 look = texelFetch(disc_looks, int(shown_discs[k]));
+    unpack_look(look.xyz, rgb, n);
+    return uintBitsToFloat(look.w);
+#else
+    int row = int(shown[k] == NOTHING ? 0u : shown[k]);
+    uvec2 look = texelFetch(looks, row).xy;
+    rgb = light_of(look);
+    n = normal_of(look);
+    return stored_radius(row);
+#endif
+}
 
 void blend_block(usamplerBuffer list, int first, int last) {
     float weight_sum[PIXELS];
@@ -85,6 +108,10 @@ void main() {
             if (in_picture(k)) store_pixel(k);
 #endif
     mask_scale = 0.25 * falloff;
+#if PARTLY
+    bool is_closed = tile >= 0;
+    uint most = 0u;
+#endif
     // Without branches, in each of which Mesa would read the parameters anew.
     for (int k = 0; k < PIXELS; ++k) {
         total[k] = 0;
@@ -98,26 +125,40 @@ void main() {
         float depth = in_picture(k) ? abs(uintBitsToFloat(depths[index_of(k)])) : 0.0;
 #endif
         bool is_shown = shown[k] != NOTHING;
-        uint row = is_shown ? shown[k] : 0u;
-        float behind = limit_behind(depth, row);
-        limit[k] = is_shown ? behind : 1.0;
-        visible[k] = normal_of(texelFetch(looks, int(row)).xy);
+        vec3 rgb;
+        float radius = visible_look(k, rgb, visible[k]), behind = depth + epsilon * splat_radius(radius, depth);
+        float least = stored_depth(behind);
+        limit[k] = is_shown ? least : 1.0;
+#if PARTLY
+        is_closed = is_closed && (is_shown || !in_picture(k));
+        most = max(most, in_picture(k) ? is_shown ? floatBitsToUint(behind) : NO_DEPTH : 0u);
+#endif
 #if LARGE
-        vec4 rgb = texelFetch(color_sums, pixel + off(k), 0);
-        total[k] = int(rgb.a);
-        light[k] = uvec3(rgb.rgb);
+        vec4 sums = texelFetch(color_sums, pixel + off(k), 0);
+        total[k] = int(sums.a);
+        light[k] = uvec3(sums.rgb);
         normal[k] = ivec3(texelFetch(normal_sums, pixel + off(k), 0).xyz);
 #endif
     }
+#if PARTLY
+    if (tile >= 0) atomicMax(farthest[tile], most);
+    if (!is_closed) part = ivec2(0);
+#endif
     blend(listed, part);
 #if AWAY
     blend(away_listed, away_part);
 #endif
+#if PARTLY
+    if (!is_closed) return;
+#else
     if (tile < 0) return;
+#endif
     for (int k = 0; k < PIXELS; ++k)
         if (shown[k] != NOTHING) {
             uint count = uint(max(total[k], 1));
             vec3 mean_light = means_of(light[k], count), mean_normal = means_of(normal[k], count);
-            store_mean(index_of(k), mean_light, mean_normal, total[k] > 0, 1.0, shown[k], visible[k]);
+            vec3 rgb, n;
+            visible_look(k, rgb, n);
+            store_mean(index_of(k), mean_light, mean_normal, total[k] > 0, 1.0, rgb, visible[k]);
         }
 }

@@ -10,7 +10,7 @@ layout(std430, binding = STORAGE_PLACES) writeonly buffer Places { vec4 places[]
 layout(std430, binding = STORAGE_FORMS) writeonly buffer Forms { vec4 forms[]; };
 #if LOOKS
 #include "surfels/passes/look.glsl"
-layout(std430, binding = STORAGE_DISC_LOOKS) writeonly buffer DiscLooks { uint disc_looks[]; };
+layout(std430, binding = STORAGE_DISC_LOOKS) writeonly buffer DiscLooks { uvec4 disc_looks[]; };  // and radius, as stored
 #endif
 
 uniform uint first_disc, first_home;  // the number of the first disc, and where the lists of homes begin
@@ -43,15 +43,15 @@ uint bits_of(ivec4 parts, ivec2 tile, vec2 place, vec3 key, vec3 form) {
 void scatter(uint at) {
     uint disc = first_disc + at, i = texelFetch(listed, int(first_home + at)).r;
     int row = drawn_row(int(i));
-    begin_disc(texel_point(row));
+    Point point = texel_point(row);
+    begin_disc(point);
     vec2 place = to_pixel(disc_center);
     vec3 form, key = disc_key(form);
     places[disc] = vec4(place, key.xy);
     forms[disc] = vec4(key.z, form);
 #if LOOKS
     uvec2 look = texelFetch(looks, row).xy;
-    uvec3 words = packed_look(light_of(look), normal_of(look));
-    for (uint k = 0u; k < 3u; ++k) disc_looks[3u * disc + k] = words[k];
+    disc_looks[disc] = uvec4(packed_look(light_of(look), normal_of(look)), floatBitsToUint(point.radius));
 #endif
 #if MASKED
     begin_parts(key, form);

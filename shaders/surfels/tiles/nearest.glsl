@@ -30,6 +30,9 @@ const int PIXELS = PART_WIDTH * PART_HEIGHT;
 
 float best[PIXELS];  // reversed depth-buffer values
 uint shown[PIXELS];
+#ifdef KEEPS_DISCS
+uint shown_discs[PIXELS];
+#endif
 ivec2 pixel;         // the first of this invocation's
 
 // -1: none, at the end of the last work group; its pixels are outside the picture.
@@ -164,6 +167,9 @@ void take_nearest(usamplerBuffer list, ivec2 part, int points_at) {
                 bool better = is_inside(form_at(k, y), here) && (here > best[k] || (here == best[k] && row < shown[k]));
                 best[k] = better && is_there ? here : best[k];
                 shown[k] = better && is_there ? row : shown[k];
+#ifdef KEEPS_DISCS
+                shown_discs[k] = better && is_there ? number : shown_discs[k];
+#endif
             }
         } while (found != uvec4(0u));
         first += RUN;
@@ -186,6 +192,9 @@ void begin_pixels() {
     for (int k = 0; k < PIXELS; ++k) {
         best[k] = farthest_key;
         shown[k] = NOTHING;
+#ifdef KEEPS_DISCS
+        shown_discs[k] = 0u;
+#endif
 #if FILL
         best[k] = in_picture(k) ? farthest_key : CLOSED;
 #endif

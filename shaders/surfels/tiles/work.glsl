@@ -1,11 +1,11 @@
 // Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where some discs, which reach
 // anywhere, are rasterised or were sent to their pixels. SECOND: of a second filling. REST: those that discs of the first
-// one alone reach, once the others are listed.
+// one alone reach, once the others are listed, and where a pixel shows nothing.
 #include "surfels/tiles/large.glsl"
 
 layout(std430, binding = STORAGE_STARTS) readonly buffer Starts { uint starts[]; };
 layout(std430, binding = STORAGE_WORK) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
-layout(std430, binding = STORAGE_FARTHEST) writeonly buffer Farthest { uint farthest[]; };
+layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };
 
 #if REST
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer first_starts;
@@ -20,7 +20,7 @@ uint entries_of(uint tile) { return starts[tile + 1u] - starts[tile]; }
 uint word_of(uint tile) {
     bool is_reached = entries_of(tile) > 0u || large_count > 0u || sent > 0u;
 #if REST
-    is_reached = !is_reached && has_first(tile);
+    is_reached = !is_reached && has_first(tile) && farthest[tile] == NO_DEPTH;
 #endif
     return is_reached ? 1u : 0u;
 }

@@ -154,22 +154,25 @@ def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
 
 
 def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
-    """Draw both passes by the same lists, at once where no disc is large. False where the rasteriser has to
-    do it all."""
+    """Draw both passes by the same lists, at once where no disc is large, but for what may show discs that
+    face away. False where the rasteriser has to do it all."""
     lists = tile_lists(points, surface, splats, ALL if splats.cull_back else TOWARDS, looks=True)
     if lists is None:
         return False
-    if not lists.away and not lists.large:
+    large = None
+    if lists.large:
+        large = show_all(points, surface, lists, splats, LIMIT if lists.away else 0)
+    else:
         surface.clear()
-        blend_by_tiles(points, surface, lists, None, splats, take=FIRST)
-        return True
-    large = show_all(points, surface, lists, splats, LIMIT if lists.away else 0)
+        blend_by_tiles(points, surface, lists, None, splats, FIRST, partly=lists.away > 0)
+        if not lists.away:
+            return True
     if lists.away and not fill_away(points, surface, lists, splats, blends=True):
         return False
     if lists.away and large is not None:
         show(points, surface, lists, splats, found=True, away=True)
-    take = SECOND if lists.away and large is None else 0
-    blend_by_tiles(points, surface, lists, large, splats, take, lists.away > 0)
+    take = SECOND if large is None else 0
+    blend_by_tiles(points, surface, lists, large, splats, take, away=lists.away > 0)
     return True
 
 
@@ -197,11 +200,13 @@ def blend_by_tiles(
     splats: Splats,
     take: int = 0,
     away: bool = False,
+    partly: bool = False,
 ) -> None:
     """The second pass, as `blend`, of the splats that are listed and of the large ones.
 
     take: whether the nearest of the FIRST or the SECOND lists, of what faces away, are still to be found.
-    away: whether there are such second lists.
+    away: whether there are such second lists. partly: whether they follow, so that only pixels are blended
+    that they hardly reach, and tiles are told how far behind splats still count.
     """
     if large is not None:
         sums = _add(points, large, surface, FALLBACK, splats)
@@ -211,9 +216,9 @@ def blend_by_tiles(
         **bind_looks(points, surface),
     }
     if away and large is None:
-        alone = {**defines, "FOUND": 1, "TAKE": 0, "AWAY": 0}
+        alone = {**defines, "FOUND": 1, "TAKE": 0, "AWAY": 0, "PARTLY": 0}
         run("blend", surface, lists, alone, points, splats, work="rest")
-    defines |= {"FOUND": int(take != FIRST), "TAKE": take, "AWAY": int(away)}
+    defines |= {"FOUND": int(take != FIRST), "TAKE": take, "AWAY": int(away), "PARTLY": int(partly)}
     run("blend", surface, lists, defines, points, splats)
 
 

@@ -36,7 +36,7 @@ from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
 _MOST_PIXELS = (1 << 16) - 1  # along an edge of the picture: what cells.glsl's words have bits for
 _DISC_BITS = 24  # of an entry, beside which it says which parts of a tile its disc reaches
-_DISC_BYTES = 16  # of a point in each of two buffers
+_DISC_BYTES = 16  # of a point in each of three buffers
 _FEW = 4  # pixels of the box of a disc that is sent to them: a square that the smallest discs fit into
 _SENT = "0xFFFFFFFFu"  # what cells.glsl says in place of the parts that such a disc reaches
 _LARGE_COST = 200  # entries of lists that a large disc, which is rasterised, takes as long as
@@ -101,9 +101,10 @@ class TileLists:
         side: ALL; TOWARDS, those that face the eye; AWAY, the others that it found, in lists beside, unless
         they are hidden by what `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large
         ones are counted but for AWAY. both: whether `run` goes over the first lists, too: "work" is then all
-        tiles where there are large discs, and "rest" those that have first lists alone. sends: whether discs
-        of a few pixels are in none, but their depths on the surface, which is empty. looks: whether what they
-        look like is wanted, for blending. numbered: whether it is kept which disc each point has.
+        tiles where there are large discs, and "rest" those that have first lists alone and open pixels.
+        sends: whether discs of a few pixels are in none, but their depths on the surface, which is empty.
+        looks: whether what they look like is wanted, for blending. numbered: whether it is kept which disc
+        each point has.
         """
         gpu, second = self._gpu, side == AWAY
         bins = self._away_bins if second else self._bins
@@ -176,7 +177,8 @@ class TileLists:
         take_items(self._gpu, visits, surface.depths, surface.rows)
 
     def _find_work(self, bins: Bins, work: str, second: bool) -> None:
-        """List the tiles that discs reach: "work", those of these lists; "rest", those of the first alone."""
+        """List the tiles that discs reach: "work", those of these lists; "rest", those of the first alone
+        where a pixel shows nothing."""
 
         def bind(_: Program) -> None:
             bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
@@ -199,7 +201,7 @@ class TileLists:
         """Run a program that includes surfels/tiles/nearest.glsl.
 
         work: on which tiles: "work", those that discs of the last filling reach; "rest", those that discs of
-        the first alone do; "again", those that are to be shown again.
+        the first alone do, where a pixel shows nothing; "again", those that are to be shown again.
         """
         for name in ("places", "forms", "disc_looks"):
             self._textures[name].bind(Texture[name.upper()])
@@ -252,7 +254,7 @@ class TileLists:
         self._room = count
         self._replace("places", _DISC_BYTES * count, gl.RGBA32F)
         self._replace("forms", _DISC_BYTES * count, gl.RGBA32F)
-        self._replace("disc_looks", 12 * count, gl.RGB32UI)
+        self._replace("disc_looks", _DISC_BYTES * count, gl.RGBA32UI)
         self._replace("numbers", 4 * count, gl.R32UI)
         self._replace("reach", 8 * count, gl.RG32UI)
         self._replace("noted", 4 * count, gl.R32UI)
