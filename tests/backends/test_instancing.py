@@ -164,7 +164,8 @@ def test_the_same_bits_again(surfels: Draw) -> None:
 def test_pixels_may_be_shared_out_as_hardware_likes(
     renderer: Renderer, surfels: Draw, camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What lists say of parts leaves out no pixel, of ellipses seen edge on neither, in any pass."""
+    """What lists say of parts leaves out no pixel, of ellipses seen edge on neither, in any pass; and it does not
+    show which parts are blended before what faces away is listed: those without a gap."""
     monkeypatch.setattr(tiles, "_LARGE_COST", 0)  # else it is for the length of lists to tell who draws
     random = np.random.default_rng(5)
     normals = random.normal(size=(3000, 3))
@@ -175,11 +176,17 @@ def test_pixels_may_be_shared_out_as_hardware_likes(
         normals=normals,
         axes=np.concatenate([long, np.full((3000, 1), 0.05)], axis=1),
     )
-    scenes = [(cloud, passes) for cloud in (CLOUD, ellipses) for passes in ("one", "two")]
-    others = [surfels(cloud, camera, instancing="tiles", passes=passes) for cloud, passes in scenes]
+    kinds: tuple[dict[str, object], ...] = (
+        {"passes": "one"},
+        {"passes": "two"},
+        {"passes": "two", "enlarge": 1.0},
+        {"passes": "two", "enlarge": 1.0, "radius_scale": 0.6},
+    )
+    scenes = [(cloud, kind) for cloud in (CLOUD, ellipses) for kind in kinds]
+    others = [surfels(cloud, camera, instancing="tiles", **kind) for cloud, kind in scenes]
     monkeypatch.setattr(renderer.gpu, "software", not renderer.gpu.software)
-    for (cloud, passes), other in zip(scenes, others, strict=True):
-        surface = surfels(cloud, camera, instancing="tiles", passes=passes)
+    for (cloud, kind), other in zip(scenes, others, strict=True):
+        surface = surfels(cloud, camera, instancing="tiles", **kind)
         assert_equal(surface, other)
         np.testing.assert_array_equal(surface.image(), other.image())
 

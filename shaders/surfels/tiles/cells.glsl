@@ -117,13 +117,15 @@ void scatter(uint i) {
     uvec2 words = parts_reached(texel_point(drawn_row(int(i))), away_depth);
     reach[i] = words;
     if (words.y == 0u) return;
+    bool is_away = away_depth != 0u;
+    uint at = atomicAdd(discs[int(is_away)], 1u);  // one for both, as Mesa runs through both sides of a branch
 #if SIDE == 1
-    if (away_depth != 0u) {
-        away_points[atomicAdd(away, 1u)] = uvec2(i, away_depth);
+    if (is_away) {
+        away_points[at] = uvec2(i, away_depth);
         return;
     }
 #endif
-    noted[atomicAdd(discs, 1u)] = i;
+    noted[at] = i;
     count_visits(tiles_of(unpacked_parts(words)));
 }
 #else
@@ -131,7 +133,7 @@ void scatter(uint at) {
     uvec2 point = texelFetch(away_points, int(at)).xy;
     ivec4 t = tiles_of(unpacked_parts(texelFetch(reach, int(point.x)).xy));
     if (is_hidden(t, uintBitsToFloat(point.y))) return;
-    noted[atomicAdd(discs, 1u)] = point.x;
+    noted[atomicAdd(discs[0], 1u)] = point.x;
     count_visits(t);
 }
 #endif

@@ -134,7 +134,7 @@ class TileLists:
             if both:
                 self._find_work(bins, "rest", second)
             words = self._buffer("large").read(_LARGE_HEAD)
-            large, self.length, away, longest, sent, discs = struct.unpack("6I", words)
+            large, self.length, longest, sent, discs, away = struct.unpack("6I", words)
             if not second:
                 self.large, self.away, self.sent, self.discs = large, away, sent, discs
                 self._longest = longest
