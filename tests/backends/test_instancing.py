@@ -164,8 +164,8 @@ def test_the_same_bits_again(surfels: Draw) -> None:
 def test_pixels_may_be_shared_out_as_hardware_likes(
     renderer: Renderer, surfels: Draw, camera: Camera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What lists say of parts leaves out no pixel, of ellipses seen edge on neither, in any pass; and it does not
-    show which parts are blended before what faces away is listed: those without a gap."""
+    """What lists say of parts leaves out no pixel, of ellipses seen edge on neither, in any pass. It does not
+    show either which of them are blended before what faces away is listed: those without a gap."""
     monkeypatch.setattr(tiles, "_LARGE_COST", 0)  # else it is for the length of lists to tell who draws
     random = np.random.default_rng(5)
     normals = random.normal(size=(3000, 3))
