@@ -3,7 +3,7 @@
 // has added up of others. TAKE: the nearest are found first, 1 of the lists, 2 of the lists of those that face
 // away (AWAY), beside what the Surface holds. PARTLY: more lists may follow; where an invocation's pixels all show something,
 // few of those reach them, so that they are blended now, and the others later.
-#if TAKE == 1
+#if TAKE
 #define KEEPS_DISCS
 #endif
 #include "surfels/tiles/nearest.glsl"
@@ -32,19 +32,39 @@ ivec3 normal[PIXELS];
 vec3 visible[PIXELS];  // normals
 float mask_scale;
 
-// What the splat gives that a pixel shows; returns its radius, as stored. Of the nearest that were found here it lies by that of
-// others in the tile, else where its point does.
-float visible_look(int k, out vec3 rgb, out vec3 n) {
-#if TAKE == 1
-    uvec4 look = texelFetch(disc_looks, int(shown_discs[k]));
+#if TAKE
+// What a disc gives; returns its radius, as stored. It lies by that of others in the tile.
+float listed_look(uint disc, out vec3 rgb, out vec3 n) {
+    uvec4 look = texelFetch(disc_looks, int(disc));
     unpack_look(look.xyz, rgb, n);
     return uintBitsToFloat(look.w);
-#else
-    int row = int(shown[k] == NOTHING ? 0u : shown[k]);
-    uvec2 look = texelFetch(looks, row).xy;
+}
+#endif
+
+// The same of a point, which lies anywhere.
+float stored_look(uint row, out vec3 rgb, out vec3 n) {
+    uvec2 look = texelFetch(looks, int(row)).xy;
     rgb = light_of(look);
     n = normal_of(look);
-    return stored_radius(row);
+    return stored_radius(int(row));
+}
+
+// The same of the splat that a pixel shows.
+float visible_look(int k, out vec3 rgb, out vec3 n) {
+    bool is_shown = shown[k] != NOTHING;
+#if TAKE
+    bool is_listed = shown_discs[k] != NOTHING;
+    float radius = listed_look(is_listed ? shown_discs[k] : 0u, rgb, n);
+#if TAKE == 2
+    vec3 other_rgb, other_n;
+    float other = stored_look(is_shown && !is_listed ? shown[k] : 0u, other_rgb, other_n);
+    rgb = is_listed ? rgb : other_rgb;
+    n = is_listed ? n : other_n;
+    radius = is_listed ? radius : other;
+#endif
+    return radius;
+#else
+    return stored_look(is_shown ? shown[k] : 0u, rgb, n);
 #endif
 }
 

@@ -31,7 +31,7 @@ const int PIXELS = PART_WIDTH * PART_HEIGHT;
 float best[PIXELS];  // reversed depth-buffer values
 uint shown[PIXELS];
 #ifdef KEEPS_DISCS
-uint shown_discs[PIXELS];
+uint shown_discs[PIXELS];  // of those that were found in lists
 #endif
 ivec2 pixel;         // the first of this invocation's
 
@@ -193,7 +193,7 @@ void begin_pixels() {
         best[k] = farthest_key;
         shown[k] = NOTHING;
 #ifdef KEEPS_DISCS
-        shown_discs[k] = 0u;
+        shown_discs[k] = NOTHING;
 #endif
 #if FILL
         best[k] = in_picture(k) ? farthest_key : CLOSED;
