@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, settings
 
 from viewer import cli
 from viewer.backends import backends
-from viewer.backends.surfels import tiles
+from viewer.backends.surfels import lists
 from viewer.camera import Camera
 from viewer.look import Look
 from viewer.scan.pose import Pose, Scanned
@@ -75,8 +75,8 @@ def numpy_errors_raise() -> Iterator[None]:
 @pytest.fixture
 def short_spans(monkeypatch: pytest.MonkeyPatch) -> None:
     """Discs that tiles list are no larger with software drivers than on hardware."""
-    grid = replace(tiles.SOFTWARE_GRID, span=tiles.HARDWARE_GRID.span)
-    monkeypatch.setattr(tiles, "SOFTWARE_GRID", grid)
+    grid = replace(lists.SOFTWARE_GRID, span=lists.HARDWARE_GRID.span)
+    monkeypatch.setattr(lists, "SOFTWARE_GRID", grid)
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from scenes import BUFFERS, NOTHING, sphere
 from viewer.backends import backend
 from viewer.backends import surfels as surfels_backend
 from viewer.backends.surfels import tiles
-from viewer.backends.surfels.tiles import TileLists
+from viewer.backends.surfels.lists import TileLists
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu import gl

@@ -17,9 +17,10 @@ from ...gpu.context import Gpu
 from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
+from .lists import TileLists
 from .passes import blend, blend_by_tiles
 from .splats import FRAGMENT, SURFEL, Splats
-from .tiles import FALLBACK, TileLists, show_all, show_smaller, show_with, tile_lists
+from .tiles import FALLBACK, show_all, show_smaller, show_with, tile_lists
 
 WAYS = ("tiles", "tbo", "pull")  # how packed points become splats
 _SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it

@@ -21,15 +21,12 @@ from ...gpu.context import Gpu
 from ...gpu.surface import Surface
 from ...scan.ranges import robust_range
 from .. import FrameView
+from .lists import ALL, NOT_HIDDEN, TOWARDS, TileLists
 from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import (
-    ALL,
     FALLBACK,
     LIMIT,
-    NOT_HIDDEN,
-    TOWARDS,
-    TileLists,
     fill_away,
     run,
     show,

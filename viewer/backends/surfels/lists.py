@@ -1,0 +1,305 @@
+"""Lists: which discs reach each tile of a picture, as surfels/tiles.py draws them."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, replace
+
+import moderngl
+import numpy as np
+
+from ...gpu import gl
+from ...gpu.amplify import Points
+from ...gpu.bindings import Storage, Texture
+from ...gpu.bins import Bins
+from ...gpu.compact import scan_words
+from ...gpu.constants import NOTHING
+from ...gpu.context import Gpu, Program
+from ...gpu.scatter import Visits, take_items
+from ...gpu.surface import Surface
+from .looks import looks_of
+from .splats import Splats
+
+DISC_BITS = 24  # of an entry, beside which it says which parts of a tile its disc reaches
+DISC_BYTES = 16  # of a point in each of three buffers
+_FEW = 4  # pixels of the box of a disc that is sent to them: a square that the smallest discs fit into
+_SENT = "0xFFFFFFFFu"  # what cells.glsl says in place of the parts that such a disc reaches
+_ROOM = 4  # entries of the list for each point, to begin with
+# Entries of one tile's list, or of both where they are blended together: of more, sums of light could exceed
+# 32 bits (31 x 4095 each); llvmpipe ends all loops of an invocation after 65 535 turns, and a pass may go
+# over its list twice, with 73 turns for 64 entries; on hardware a pixel alone with so many would be slow.
+_LONGEST = 28_000
+_SPARE = 4  # times the points that there is room for, beyond which room is given up
+_LARGE_HEAD = 24  # bytes before the rows of large discs
+_WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
+ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
+
+
+class TileLists:
+    """The discs that reach each tile of a picture, made anew for each frame (shaders/surfels/tiles/).
+
+    Discs are numbered by tiles, so that those of one lie together in memory whatever the order of the points.
+    length: entries of all lists. discs: how many are in lists. large: how many are left to the rasteriser.
+    away: how many that face away from the eye were left to a second filling. sent: how many were sent to
+    pixels in place of lists.
+    """
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self.grid = grid = _grid(gpu)
+        self.tiles = (-(-size[0] // grid.tile[0]), -(-size[1] // grid.tile[1]))
+        self.length = self.discs = self.large = self.away = self.sent = self._longest = 0
+        self._room = 0  # points
+        words = self.tiles[0] * self.tiles[1]
+        self._bins, self._away_bins = Bins(gpu, 2 * words), Bins(gpu, 2 * words)
+        self._textures = {"farthest": self._texture(4 * words, gl.R32UI)}
+        for name in ("work", "rest", "again"):
+            self._textures[name] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
+        self._large_rows: gl.BufferTexture | None = None
+        self._rows: gl.BufferTexture | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        textures = [*self._textures.values(), *([self._large_rows] if self._large_rows else [])]
+        bins = self._bins.nbytes + self._away_bins.nbytes
+        return bins + sum(texture.buffer.size for texture in textures)
+
+    def fill(
+        self,
+        points: Points,
+        surface: Surface,
+        splats: Splats,
+        side: int = ALL,
+        *,
+        both: bool = False,
+        sends: bool = False,
+        looks: bool = False,
+        numbered: bool = False,
+    ) -> bool:
+        """List the discs of points for the surface's view; False where the lists would grow too long.
+
+        side: ALL; TOWARDS, those that face the eye; AWAY, the others that it found, in lists beside, unless
+        they are hidden by what `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large
+        ones are counted but for AWAY. both: whether `run` goes over the first lists, too: "work" is then all
+        tiles where there are large discs, and "rest" those that have first lists alone and open pixels.
+        sends: whether discs of a few pixels are in none, but their depths on the surface, which is empty.
+        looks: whether what they look like is wanted, for blending. numbered: whether it is kept which disc
+        each point has.
+        """
+        gpu, second = self._gpu, side == AWAY
+        bins = self._away_bins if second else self._bins
+        if not second:
+            self._reserve(max(points.count, 1))
+            self._rows = points.rows
+        self._buffer("large").write(struct.pack("6I", self.large if both else 0, *[0] * 5))
+        first_disc = self.discs if second else 0
+
+        def bind(program: Program) -> None:
+            points.bind(program)
+            for name in ("farthest", "reach", "away"):
+                self._textures[name].bind(Texture[name.upper()])
+            self._bind_storage("reach", "large", "away", "noted")
+            if sends:
+                surface.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
+
+        given = {
+            **{"PERSPECTIVE": int(surface.view.perspective), **self.grid.defines, **points.defines},
+            **{"SIDE": side, "FEW": _FEW if sends else 0, "SENT": _SENT},
+        }
+        count = self.away if second else points.count
+        visits = Visits("surfels/tiles/cells.glsl", count, bind, given, splats)
+        bins.count(visits)
+        with gpu.timers.measure("work"):
+            self._find_work(bins, "work", second)
+            if both:
+                self._find_work(bins, "rest", second)
+            words = self._buffer("large").read(_LARGE_HEAD)
+            large, self.length, longest, sent, discs, away = struct.unpack("6I", words)
+            if not second:
+                self.large, self.away, self.sent, self.discs = large, away, sent, discs
+                self._longest = longest
+        entries = self.length + discs
+        if entries > gpu.max_storage_bytes // 4 or longest + both * self._longest > _LONGEST:
+            return False
+
+        def bind_homes(program: Program) -> None:
+            gpu.set(program, first_disc=first_disc, first_home=self.length)
+            for name in ("reach", "noted"):
+                self._textures[name].bind(Texture[name.upper()])
+            self._bind_storage("numbers")
+
+        def bind_discs(program: Program) -> None:
+            points.bind(program)
+            gpu.set(program, first_disc=first_disc, first_home=self.length)
+            self._textures["reach"].bind(Texture.REACH)
+            bins.items.bind(Texture.LISTED)
+            if looks:
+                looks_of(points).bind(Texture.LOOKS)
+            self._bind_storage("places", "forms", "disc_looks")
+
+        if numbered:
+            gl.clear_words(self._buffer("numbers"), NOTHING, points.count)
+        homes = {**given, "NUMBERED": int(numbered)}
+        bins.fill(Visits("surfels/tiles/homes.glsl", discs, bind_homes, homes), entries)
+        listed = {**given, "LOOKS": int(looks)}
+        bins.fill(Visits("surfels/tiles/discs.glsl", discs, bind_discs, listed, splats), entries)
+        return True
+
+    def take_sent(self, points: Points, surface: Surface, splats: Splats) -> None:
+        """Find the points of the discs that were sent to pixels, whose depths the surface has."""
+
+        def bind(program: Program) -> None:
+            points.bind(program)
+            self._textures["reach"].bind(Texture.REACH)
+
+        defines = {"SENT": _SENT, **points.defines}
+        visits = Visits("surfels/scatter.glsl", points.count, bind, defines, splats)
+        take_items(self._gpu, visits, surface.depths, surface.rows)
+
+    def _find_work(self, bins: Bins, work: str, second: bool) -> None:
+        """List the tiles that discs reach: "work", those of these lists; "rest", those of the first alone
+        where a pixel shows nothing."""
+
+        def bind(_: Program) -> None:
+            bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
+            self._bins.starts.bind(Texture.STARTS)
+            self._bind_storage("large", "farthest")
+            self._buffer(work).bind_to_storage_buffer(Storage.WORK)
+
+        defines = {"TILES": f"{self.grid.tiles}u", "SECOND": int(second), "REST": int(work == "rest")}
+        scan_words(self._gpu, "surfels/tiles/work.glsl", self.tiles[0] * self.tiles[1], bind, defines)
+
+    def large_points(self, points: Points) -> Points:
+        """The points that are left to the rasteriser."""
+        rows = np.frombuffer(self._buffer("large").read(4 * self.large, offset=_LARGE_HEAD), np.uint32)
+        self._gpu.discard(self._large_rows)
+        # Ascending, so that ties fall to the lowest row.
+        self._large_rows = gl.BufferTexture(self._gpu.ctx.buffer(np.sort(rows)), gl.R32UI)
+        return replace(points, rows=self._large_rows, count=self.large)
+
+    def run(self, program: moderngl.ComputeShader, work: str = "work") -> None:
+        """Run a program that includes surfels/tiles/nearest.glsl.
+
+        work: on which tiles: "work", those that discs of the last filling reach; "rest", those that discs of
+        the first alone do, where a pixel shows nothing; "again", those that are to be shown again.
+        """
+        for name in ("places", "forms", "disc_looks"):
+            self._textures[name].bind(Texture[name.upper()])
+        self._textures[work].bind(Texture.WORK)
+        self._bins.starts.bind(Texture.STARTS)
+        self._bins.items.bind(Texture.LISTED)
+        self._away_bins.starts.bind(Texture.AWAY_STARTS)
+        self._away_bins.items.bind(Texture.AWAY_LISTED)
+        if self._rows is not None:
+            self._rows.bind(Texture.DRAWN_ROWS)
+        self._bind_storage("farthest")
+        self._gpu.dispatch_indirect(program, self._buffer(work))
+
+    def bind_forms(self) -> None:
+        """Bind the forms of discs for shaders to change them, and which disc each point has."""
+        self._bind_storage("forms")
+        self._textures["numbers"].bind(Texture.NUMBERS)
+
+    def start_again(self) -> None:
+        """Empty, and bind, the list of tiles that are to be shown again."""
+        self._buffer("again").write(struct.pack("4I", 0, 0, 1, 0))
+        gl.clear_words(self.farthest, 0)
+        self._bind_storage("again")
+
+    def shown_again(self) -> dict[str, int]:
+        """How many tiles of those that discs reach were shown again; waits for the GPU."""
+        worked, again = (
+            int.from_bytes(self._buffer(name).read(4, offset=12), "little") for name in ("work", "again")
+        )
+        return {"in": worked, "again": again}
+
+    def release(self) -> None:
+        """Delete everything."""
+        self._gpu.discard(self._bins, self._away_bins, *self._textures.values(), self._large_rows)
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """Macros for shaders that include surfels/tiles/nearest.glsl."""
+        return {"SAMPLED": int(self._rows is not None), **self.grid.defines}
+
+    @property
+    def farthest(self) -> moderngl.Buffer:
+        """The farthest depth shown in each tile, a word each: what FARTHEST of show.comp writes."""
+        return self._buffer("farthest")
+
+    def _reserve(self, count: int) -> None:
+        """Make room for so many points, and give up what a much larger pose has left."""
+        if count <= self._room <= _SPARE * count:
+            return
+        self._room = count
+        self._replace("places", DISC_BYTES * count, gl.RGBA32F)
+        self._replace("forms", DISC_BYTES * count, gl.RGBA32F)
+        self._replace("disc_looks", DISC_BYTES * count, gl.RGBA32UI)
+        self._replace("numbers", 4 * count, gl.R32UI)
+        self._replace("reach", 8 * count, gl.RG32UI)
+        self._replace("noted", 4 * count, gl.R32UI)
+        self._replace("away", 8 * count, gl.RG32UI)
+        self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
+        self._bins.reserve(_ROOM * count)
+
+    def _replace(self, name: str, nbytes: int, texel_format: int) -> None:
+        self._gpu.discard(self._textures.pop(name, None))
+        self._textures[name] = self._texture(nbytes, texel_format)
+
+    def _texture(self, nbytes: int, texel_format: int) -> gl.BufferTexture:
+        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=max(nbytes, 16)), texel_format)
+
+    def _buffer(self, name: str) -> moderngl.Buffer:
+        return self._textures[name].buffer
+
+    def _bind_storage(self, *names: str) -> None:
+        for name in names:
+            self._buffer(name).bind_to_storage_buffer(Storage[name.upper()])
+
+
+@dataclass(frozen=True)
+class TileGrid:
+    """How pixels are shared out.
+
+    part: those of an invocation, width and height. parts: of a tile, which has a list, along both. tiles: of
+    a work group. masked: whether entries of lists say which parts their disc reaches. span: pixels along an
+    edge of the largest discs that are listed.
+    """
+
+    part: tuple[int, int]
+    parts: tuple[int, int]
+    tiles: int
+    masked: bool
+    span: int
+
+    @property
+    def tile(self) -> tuple[int, int]:
+        """Pixels of a tile, width and height."""
+        return self.part[0] * self.parts[0], self.part[1] * self.parts[1]
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """Macros for shaders that include surfels/tiles/grid.glsl."""
+        (width, height), (columns, lines) = self.part, self.parts
+        sizes = {
+            "PART_WIDTH": width,
+            "PART_HEIGHT": height,
+            "COLUMNS": columns,
+            "LINES": lines,
+            "ALL_PARTS": columns * lines,
+        }
+        return {**sizes, "MASKED": int(self.masked), "SPAN": self.span, "DISC_BITS": DISC_BITS}
+
+
+# An invocation goes over the tiles of a disc up to twice, and llvmpipe ends its loops after 65 535 turns.
+SOFTWARE_GRID = TileGrid((4, 4), (4, 2), 16, masked=True, span=1920)
+HARDWARE_GRID = TileGrid((1, 1), (8, 8), 2, masked=False, span=248)
+
+
+def _grid(gpu: Gpu) -> TileGrid:
+    """The grid that suits the device: a processor's eight lanes are the parts of a tile, and each takes
+    its discs from the list; on hardware each pixel has its invocation, and two tiles fill a work group.
+    Software rasterisers take many times as long as lists for large discs; on hardware an invocation would go
+    over all tiles of one by itself."""
+    return SOFTWARE_GRID if gpu.software else HARDWARE_GRID
