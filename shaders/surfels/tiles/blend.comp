@@ -87,7 +87,8 @@ void blend_block(usamplerBuffer list, int first, int last) {
                 float y = down_at(k), here = key_at(k, y), form = form_at(k, y), edge = edge_of(here);
                 bool counts = form <= edge && here >= limit[k] && is_there;
                 // Rounding takes the form of a disc that is seen edge on below zero, where the mask has no bound.
-                float full = weight_at(max(mask_scale * form / edge, 0.0)), weight = counts ? full : 0.0;
+                precise float fading = mask_scale * form / edge;
+                float full = weight_at(max(fading, 0.0)), weight = counts ? full : 0.0;
                 weight_sum[k] += weight;
                 light_sum[k] += weight * rgb;
                 normal_sum[k] += turned(weight, n, visible[k]) * n;
@@ -146,7 +147,8 @@ void main() {
 #endif
         bool is_shown = shown[k] != NOTHING;
         vec3 rgb;
-        float radius = visible_look(k, rgb, visible[k]), behind = depth + epsilon * splat_radius(radius, depth);
+        float radius = visible_look(k, rgb, visible[k]);
+        precise float behind = depth + epsilon * splat_radius(radius, depth);
         float least = stored_depth(behind);
         limit[k] = is_shown ? least : 1.0;
 #if PARTLY

@@ -149,7 +149,10 @@ float form_at(int k, float y) {
 }
 
 // What a form is at the border.
-float edge_of(float key) { return view_perspective ? key * key : 1.0; }
+float edge_of(float key) {
+    precise float edge = view_perspective ? key * key : 1.0;
+    return edge;
+}
 
 bool is_inside(float form, float key) { return form <= edge_of(key); }
 

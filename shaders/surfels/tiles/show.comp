@@ -49,7 +49,8 @@ void main() {
         uint bits = depth_bits(k);
 #if FARTHEST == 2
         bool is_shown = shown[k] != NOTHING;
-        float depth = uintBitsToFloat(bits), behind = depth + epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
+        float depth = uintBitsToFloat(bits);
+        precise float behind = depth + epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
         bits = is_shown ? floatBitsToUint(behind) : bits;
 #endif
         most = max(most, in_picture(k) ? bits : 0u);
