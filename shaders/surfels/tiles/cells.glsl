@@ -118,7 +118,9 @@ void scatter(uint i) {
     reach[i] = words;
     if (words.y == 0u) return;
     bool is_away = away_depth != 0u;
-    uint at = atomicAdd(discs[int(is_away)], 1u);  // one for both, as Mesa runs through both sides of a branch
+    // One for both, as Mesa runs through both sides of a branch. By a variable: NVIDIA's compiler fails where a constructor
+    // is in the index of what an atomic changes.
+    uint side = is_away ? 1u : 0u, at = atomicAdd(discs[side], 1u);
 #if SIDE == 1
     if (is_away) {
         away_points[at] = uvec2(i, away_depth);
