@@ -2,10 +2,10 @@
 
     python tests/speed/series.py [--counts 100000 1000000] [--size 1920x1280] [--poses 12] [--cores 2]
 
-A dented sphere in the order of a scanner moves: positions and normals are new in each pose, colours and
-radii the same in all, or equal and copied for each ("copies"). Pictures are read back. In motion discs are
-those that nobody blends, as in the window while it plays with nothing left out; at rest they are blended,
-and each pose is looked at for gaps. Medians: wall time, processor time of all threads over the cores, and the
+A dented sphere in the order of a scanner moves: positions and normals are new in each pose, colours
+and radii the same in all, or equal and copied for each ("copies"). Pictures are read back. In motion discs
+are not blended, as in the window while it plays with nothing left out; at rest they are blended, and
+each pose is looked at for gaps. Medians: wall time, processor time of all threads over the cores, and the
 pictures a second that this makes; of these parts, and bytes that came to the GPU.
 """
 
