@@ -105,7 +105,9 @@ def draw_all(renderer: Renderer, whole: bool) -> None:
     request = Request(flat, Camera.orbit(flat.bounds, **CAMERA), "points")
     render_frame(renderer, request, surface)
     supersample(renderer, request, surface)
-    render_frame(renderer, request, surface, share=0.5, moving=True, before=surface)
+    touching = replace(request, params=backend("points").params({"point_size": 0}))
+    render_frame(renderer, touching, surface)
+    render_frame(renderer, touching, surface, share=0.5, moving=True, before=surface)
 
     def draw(
         scanned: PointCloud | Pose,

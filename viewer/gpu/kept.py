@@ -3,15 +3,17 @@
 Schütz, Mandlburger, Otepka and Wimmer 2020, "Progressive Real-Time Rendering of One Billion Points Without
 Hierarchical Acceleration Structures": what was seen is drawn at its exact new place, and what comes into view
 is found by a part of all points that is another one each time. Where the camera rests, the picture is the one
-of all points, to the bit, once each was in its turn.
+of all points, to the bit, once each was in its turn, but for gaps that are closed.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+from . import gl
 from .bindings import Texture
 from .compact import IndexList
+from .context import Gpu
 from .pose import GpuPose
 from .target import RenderTarget
 
@@ -23,6 +25,36 @@ class Before(NamedTuple):
 
     target: RenderTarget
     known: float
+
+
+class ClosedGaps:
+    """Room for the depths and rows of a picture as they were before its gaps are closed."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._copies = [
+            gl.BufferTexture(gpu.ctx.buffer(reserve=4 * size[0] * size[1]), gl.R32UI) for _ in range(2)
+        ]
+        self.nbytes = 8 * size[0] * size[1]
+
+    def close(self, target: RenderTarget, step_depth: float) -> None:
+        """Close gaps of one pixel between points: where three of the four pixels around are nearer by more
+        than that, scan units, the nearest of them is shown."""
+        gpu = target.gpu
+        program = gpu.compute("points/gaps.comp")
+        gpu.set(program, step_depth=step_depth)
+        with gpu.timers.measure("gaps"):
+            for copy, unit, texels in zip(
+                self._copies, (Texture.DEPTHS, Texture.ROWS), (target.depths, target.rows), strict=True
+            ):
+                gpu.ctx.copy_buffer(copy.buffer, texels.buffer)
+                copy.bind(unit)
+            target.bind_storage()
+            gpu.dispatch(program, target.size[0] * target.size[1])
+
+    def release(self) -> None:
+        """Delete it."""
+        for copy in self._copies:
+            copy.release()
 
 
 class KeptPoints:

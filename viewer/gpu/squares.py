@@ -19,7 +19,7 @@ from .bindings import Texture
 from .compact import IndexList
 from .context import Program
 from .culling import CulledChunks, culled_chunks
-from .kept import Before, KeptPoints, stride_of
+from .kept import Before, ClosedGaps, KeptPoints, stride_of
 from .pose import GpuPose
 from .scatter import HitCells, Visits, scatter, take_items, take_keys
 from .surface import Surface
@@ -32,6 +32,7 @@ _LIST_BELOW = 0.25
 # few gaps.
 _USUAL_OVERLAP, _SPARSE_OVERLAP = 1.6, 1.25
 LARGEST_SQUARE = 32  # pixels
+_STEP = 4.0  # squares that touch, by which depths of a closed surface differ at most between pixels
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,8 @@ def _draw_kept(
         take_keys(pose.gpu, visits, surface.depths)
     for visits in both:
         take_items(pose.gpu, visits, surface.depths, surface.rows)
+    if _touching(pose, surface.view) <= size:
+        surface.keep(ClosedGaps).close(surface, _STEP * pose.stored.remember(_reach))
 
 
 def _enlarged(size: int, pose: GpuPose, surface: Surface) -> int:
