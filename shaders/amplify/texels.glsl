@@ -1,9 +1,15 @@
 // Points from buffer textures. SAMPLED: only the listed rows are drawn. PACKED: normal, radius and half-axes are words.
+// REORDERED: they stand in another order, and places in that are listed in place of rows.
 #include "amplify/point.glsl"
 #include "amplify/radii.glsl"
 
+#if REORDERED
+// Two texels a point, three with half-axes: position and radius; normal and row; half-axes.
+layout(binding = TEXTURE_ARRANGED) uniform usamplerBuffer arranged;
+#else
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
-#if !PACKED
+#endif
+#if !PACKED && !REORDERED
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 #if HAS_AXES
 layout(binding = TEXTURE_AXES) uniform samplerBuffer axes;
@@ -16,7 +22,7 @@ layout(binding = TEXTURE_COLORS) uniform samplerBuffer fed_colors;
 layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
 
-// The row of the i-th point that is drawn.
+// The row, or the place, of the i-th point that is drawn.
 int drawn_row(int i) {
 #if SAMPLED
     return int(texelFetch(drawn_rows, i).r);
@@ -26,6 +32,16 @@ int drawn_row(int i) {
 }
 
 Point texel_point(int at) {
+#if REORDERED
+    at *= 2 + HAS_AXES;
+    uvec4 first = texelFetch(arranged, at), second = texelFetch(arranged, at + 1);
+#if HAS_AXES
+    vec4 half_axes = uintBitsToFloat(texelFetch(arranged, at + 2));
+#else
+    const vec4 half_axes = vec4(0.0);
+#endif
+    return Point(uintBitsToFloat(first.xyz), uintBitsToFloat(second.xyz), uintBitsToFloat(first.w), half_axes, second.w);
+#else
     vec3 position = texelFetch(positions, at).xyz;
     float radius = stored_radius(at);
 #ifdef FED_COLOR
@@ -45,4 +61,5 @@ Point texel_point(int at) {
     const vec4 half_axes = vec4(0.0);
 #endif
     return Point(position, normal, radius, half_axes, uint(at));
+#endif
 }

@@ -209,7 +209,7 @@ def draw_packed(renderer: Renderer, whole: bool) -> None:
 
 def draw_chunks(renderer: Renderer) -> None:
     """Pictures of points of which chunks are left out, in the order of the file and in another one."""
-    cloud = sphere(1500)
+    cloud, (_, rich, *_) = sphere(1500), clouds()
     for ordered, size in product((chunks.in_file_order, chunks.in_coarse_order), (1, 9)):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(chunks, "LEAST", 1)
@@ -222,6 +222,14 @@ def draw_chunks(renderer: Renderer) -> None:
                 params = backend("points").params({"point_size": size, "hide_hidden": shown})
                 render_frame(renderer, Request(pose, camera, "points", params), surface)
             assert surface.stats.counted
+            if size > 1:
+                continue
+            for scan, params in ((cloud, {}), (rich, {"instancing": "gs", "cull_back": True})):
+                pose = Pose(0, 0.0, "test", scan)
+                for _ in range(3):
+                    splats = Request(pose, camera, "surfels", backend("surfels").params(params))
+                    render_frame(renderer, splats, surface)
+                assert surface.stats.counted
 
 
 def use_primitives(gpu: Gpu) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import moderngl
 import numpy as np
@@ -52,12 +52,26 @@ class Shape:
     corners: int
 
 
+class ListedRows(gl.BufferTexture):
+    """Rows in any order.
+
+    ascending: gives the same ones ascending; None where they are. places, arranged: where those points stand
+    in an order of their own, and all points in that, as amplify/texels.glsl has them; None where they are
+    read by rows.
+    """
+
+    ascending: Callable[[], gl.BufferTexture] | None = None
+    places: gl.BufferTexture | None = None
+    arranged: gl.BufferTexture | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Points:
     """The points of a pose that are drawn.
 
-    use_radii: whether they bring their own radius, or half-axes. count: how many. rows: which,
-    ascending; None: all. enlarged: the factor on their size with which they together cover what all do.
+    use_radii: whether they bring their own radius, or half-axes. count: how many. rows: which, None: all;
+    ascending, or else `ListedRows`. enlarged: the factor on their size with which they together cover what
+    all do.
     buffers: in place of the pose's arrays of these names, such as normals that a compute pass found;
     "splats", normal, radius and half-axes of each row in three words, as amplify/packed.glsl reads them,
     in place of all three, but for the radii where these are given as well; "looks", colour and normal as
@@ -90,6 +104,18 @@ class Points:
         enlarged = 1 / math.sqrt(share)
         rows, count = surface.take_sample(share, margin, enlarged * reach)
         return cls(pose, use_radii, count, rows, enlarged if surface.stats.share < 1 else 1.0)
+
+    def ascending(self) -> Points:
+        """Points in the order of rows: of two at one depth the rasteriser keeps the first."""
+        rows = self.rows
+        if isinstance(rows, ListedRows) and rows.ascending is not None:
+            return replace(self, rows=rows.ascending())
+        return self
+
+    @property
+    def _listed(self) -> ListedRows | None:
+        """The rows where points are read in an order of their own."""
+        return self.rows if isinstance(self.rows, ListedRows) and self.rows.places is not None else None
 
     @property
     def packed(self) -> bool:
@@ -128,12 +154,19 @@ class Points:
             "PACKED": int(self.packed),
             "RADII_APART": int(self.use_radii and (not self.packed or "radii" in self.buffers)),
             "SAMPLED": int(self.rows is not None),
+            "REORDERED": int(self._listed is not None),
             **({"FED_COLOR": 1} if self.colored else {}),
         }
 
     def bind(self, program: Program) -> None:
         """Bind what amplify/texels.glsl reads."""
         self.pose.gpu.set(program, enlarged=self.enlarged)
+        if (listed := self._listed) is not None:
+            assert listed.places is not None
+            assert listed.arranged is not None
+            listed.arranged.bind(Texture.ARRANGED)
+            listed.places.bind(Texture.DRAWN_ROWS)
+            return
         if self.packed:
             self._bind("positions")
             self.bind_radii()
@@ -202,7 +235,7 @@ def draw_shapes(
 
     macros: of the fragment shader.
     """
-    gpu, feed = points.pose.gpu, fitting_feed(points, feed)
+    gpu, feed, points = points.pose.gpu, fitting_feed(points, feed), points.ascending()
     stages, parts = _FEEDS[feed]
     defines = {**points.defines, **(macros or {}), "CORNERS": shape.corners}
     if feed == "ubo":

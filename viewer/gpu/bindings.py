@@ -72,6 +72,11 @@ class Texture(IntEnum):
     # Chunks of points.
     BOXES = auto()
     FARTHEST_TILES = auto()
+    CONES = auto()  # round their normals
+    REACHES = auto()  # of their splats
+    ARRANGED = auto()  # points in their order
+    CHUNK_ROWS = auto()  # of points in the order of chunks
+    CHUNK_NUMBERS = auto()  # of rows
     # Neighborhoods, beside splats.
     SLOTS = auto()  # participants in the order of their cells
     NEAR_TO = auto()
@@ -131,6 +136,11 @@ class Storage(IntEnum):
     HITS = 7  # cells that were hit
     # Chunks of points, beside a list.
     FARTHEST_TILES = 0
+    BOXES = 0
+    CONES = 1
+    REACHES = 4
+    ARRANGED = 0
+    DRAWN_PLACES = 0
     SEEN = 4
     # Bins, beside what says which cells are visited, which has those from 2 on.
     CURSORS = 0

@@ -71,10 +71,18 @@ class Ordered:
             listed[self.rows[chunk * self.chunk : (chunk + 1) * self.chunk]] = True
         return np.flatnonzero(listed).astype(np.uint32)
 
+    def numbers(self, size: int) -> NDArray[np.uint32]:
+        """The number of the chunk of so many points that each row is in, (N,), where rows are in an order of
+        their own."""
+        assert self.rows is not None
+        numbers = np.empty(len(self.rows), np.uint32)
+        numbers[self.rows] = np.arange(len(self.rows), dtype=np.uint32) // np.uint32(size)
+        return numbers
+
 
 def in_file_order(cloud: PointCloud) -> Ordered:
     """The points as they are."""
-    chunk = _chunk_of(cloud)
+    chunk = chunk_size(len(cloud))
     return Ordered(chunk, None, *_boxes(cloud.positions, chunk))
 
 
@@ -92,13 +100,13 @@ def in_coarse_order(cloud: PointCloud) -> Ordered:
         x, y, z = (_DIGITS[column] for column in cells.T)
         codes[part] = x | y << 1 | z << 2
     rows = np.argsort(codes, kind="stable").astype(np.uint32)  # of 16 bits: by their digits, in linear time
-    chunk = _chunk_of(cloud)
+    chunk = chunk_size(len(cloud))
     return Ordered(chunk, rows, *_boxes(positions.take(rows, axis=0), chunk))
 
 
-def _chunk_of(cloud: PointCloud) -> int:
-    """How many points a chunk has: a power of two."""
-    return max(_CHUNK, 1 << max(len(cloud) // _CHUNKS, 1).bit_length() - 1)
+def chunk_size(count: int, chunks: int = _CHUNKS, least: int = _CHUNK) -> int:
+    """How many of so many points a chunk has, a power of two: about so many chunks, of so many at least."""
+    return max(least, 1 << max(count // chunks, 1).bit_length() - 1)
 
 
 def _boxes(positions: NDArray[np.float32], chunk: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

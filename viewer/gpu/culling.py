@@ -2,15 +2,18 @@
 
 Hierarchical z in two phases (Greene, Kass and Miller 1993): the chunks that the last picture showed are drawn
 first; of the others only those that this depth leaves room for. What is left out has farther depths than all
-pixels that it could cover, so the picture is the same to the bit.
+pixels that it could cover, so the picture is the same to the bit. Here for points as squares of pixels; for
+splats in `splat_culling.py`.
 """
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from ..view import View
 from . import gl
@@ -23,18 +26,34 @@ from .target import RenderTarget
 
 _TILE = 16  # pixels along an edge, whose farthest depth hides chunks
 _MOST_TILES = 1024  # that are looked at for one chunk; one that is larger in the picture counts as shown
-_SLACK = 1.0  # pixels, for what float32 rounds
+SLACK = 1.0  # pixels, for what float32 rounds
 _ROUNDING = 1e-5  # of the pose's size, by which boxes are larger for the same reason
-_NOW, _IN_VIEW = 2, 4  # bits of what is seen
+START, FIND, _GIVE = range(3)  # steps of chunks/cull.comp
+LAST, NOW, IN_VIEW, FACES_AWAY = 1, 2, 4, 8  # bits of what is seen, as it has them
 
 
 @dataclass(frozen=True)
-class _Culling:
-    """Numbers that points/cull.comp reads. box_slack: scan units by which boxes are larger. pixel_margin:
-    pixels around a point that it may cover."""
+class Margins:
+    """Numbers that chunks/cull.comp reads. box_slack: scan units by which boxes are larger. pixel_margin:
+    pixels around a point that it may cover.
+
+    Of splats: radius_scale: factor on radii. uniform_radius: scan units, of those without one of their own.
+    least_radius: pixels. behind, pixels_behind: how far behind what is shown others still count, scan units,
+    and as large as so many pixels are there. cull_back: whether those that face away are left out. trusts:
+    whether chunks that were hidden wait until it is known that they are not. spare_pixels: pixels around a
+    chunk that must hide it, too, for it to be left out of the next picture at first.
+    """
 
     box_slack: float
     pixel_margin: float
+    radius_scale: float = 0.0
+    uniform_radius: float = 0.0
+    least_radius: float = 0.0
+    behind: float = 0.0
+    pixels_behind: float = 0.0
+    cull_back: bool = False
+    trusts: bool = False
+    spare_pixels: int = 0
 
 
 def culled_chunks(pose: GpuPose) -> CulledChunks | None:
@@ -44,45 +63,117 @@ def culled_chunks(pose: GpuPose) -> CulledChunks | None:
     return pose.keep(CulledChunks) if is_of_use else None
 
 
-class CulledChunks:
-    """The chunks of a pose on the GPU: its points in their order, and which chunks pictures show.
+class ChunkBoxes:
+    """The boxes of a pose's chunks on the GPU.
 
-    rows: the row of each point, in that order; None where they are in that of the file.
+    order: of the points. count: of these. size: points of a chunk. chunks: how many. rows: the row of each
+    point, in that order; None where it is that of the file. boxes: two RGB32F texels a chunk, its corners.
     """
+
+    def __init__(self, pose: GpuPose, size: int | None = None) -> None:
+        self._gpu = gpu = pose.gpu
+        self.order = order = pose.keep(Chunks).known
+        self.count, self.size = len(pose.cloud), size or order.chunk
+        self.chunks = -(-self.count // self.size)
+        self.boxes = gl.BufferTexture(gpu.ctx.buffer(reserve=24 * self.chunks), gl.RGB32F)
+        corners = np.stack([order.low, order.high], axis=1)
+        if size is None:
+            self.boxes.buffer.write(corners)
+        self.rows: gl.BufferTexture | None = None
+        if order.rows is not None:
+            self.rows = gl.BufferTexture(gpu.ctx.buffer(order.rows), gl.R32UI)
+        self.slack = _ROUNDING * float(np.abs(corners).max())
+
+    def test(self, surface: RenderTarget, step: int, margins: Margins, **defines: object) -> None:
+        """Run a step of chunks/cull.comp on all of them. defines: of its variants."""
+        gpu = self._gpu
+        given = {"STEP": step, "TILE": _TILE, "MOST_TILES": _MOST_TILES, "LISTS": 0, "SPLATS": 0, **defines}
+        program = gpu.compute("chunks/cull.comp", given, params=margins)
+        with gpu.timers.measure("cull"):
+            self.boxes.bind(Texture.BOXES)
+            surface.keep(SeenChunks).of(self).bind_to_storage_buffer(Storage.SEEN)
+            if step == FIND:
+                surface.keep(_Farthest).texels.bind(Texture.FARTHEST_TILES)
+            gpu.dispatch(program, self.chunks)
+
+    def bind_rows(self) -> None:
+        """Bind `rows`, where there are any."""
+        if self.rows is not None:
+            self.rows.bind(Texture.CHUNK_ROWS)
+
+    def points_of(self, chunks: NDArray[np.intp]) -> int:
+        """How many points some chunks have, (C,) ascending."""
+        has_last = bool(len(chunks)) and chunks[-1] == self.chunks - 1
+        return len(chunks) * self.size - has_last * (self.chunks * self.size - self.count)
+
+    def seen(self, surface: RenderTarget) -> NDArray[np.uint32]:
+        """Read what the last step told of each, bits, (C,); waits for the GPU."""
+        return np.frombuffer(surface.keep(SeenChunks).of(self).read(), np.uint32)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return self.boxes.buffer.size + (self.rows.buffer.size if self.rows else 0)
+
+    def release(self) -> None:
+        """Delete what it holds on the GPU."""
+        self._gpu.discard(self.boxes, self.rows)
+
+
+class SeenChunks:
+    """Words of bits, what the last picture of a surface told of each of a pose's chunks. Made with
+    `Surface.keep`."""
+
+    def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
+        self._gpu = gpu
+        self._buffer: moderngl.Buffer | None = None
+        self._of: weakref.ref[ChunkBoxes] | None = None
+        self.nbytes = 0
+
+    def of(self, boxes: ChunkBoxes) -> moderngl.Buffer:
+        """The words; 0 where the last chunks that were asked for were others."""
+        if self._buffer is None or self._of is None or self._of() is not boxes:
+            self.release()
+            self._of, self.nbytes = weakref.ref(boxes), 4 * boxes.chunks
+            self._buffer = self._gpu.ctx.buffer(bytes(self.nbytes))
+        return self._buffer
+
+    def release(self) -> None:
+        """Delete them."""
+        self._gpu.discard(self._buffer)
+        self._buffer = None
+
+
+class CulledChunks:
+    """The points of a pose as squares: in the order of its chunks, and lists of those that pictures show."""
 
     def __init__(self, pose: GpuPose) -> None:
         self._gpu = gpu = pose.gpu
-        self._order = order = pose.keep(Chunks).known
-        self.count, self._size = len(pose.cloud), order.chunk
-        self._chunks = len(order.low)
-        boxes = np.stack([order.low, order.high], axis=1)
-        self._boxes = gl.BufferTexture(gpu.ctx.buffer(boxes), gl.RGB32F)
-        self._seen = gpu.ctx.buffer(bytes(4 * self._chunks))
-        self._lists = [IndexList(gpu, self._chunks, self._size) for _ in range(3)]
-        self.rows = self._positions = None
-        if order.rows is not None:
-            self.rows = gl.BufferTexture(gpu.ctx.buffer(order.rows), gl.R32UI)
-            in_order = pose.cloud.positions.take(order.rows, axis=0)
+        self._boxes = boxes = ChunkBoxes(pose)
+        self.count, self._size = boxes.count, boxes.size
+        self._lists = [IndexList(gpu, boxes.chunks, self._size) for _ in range(3)]
+        self._positions = None
+        if boxes.order.rows is not None:
+            in_order = pose.cloud.positions.take(boxes.order.rows, axis=0)
             self._positions = gl.BufferTexture(gpu.ctx.buffer(in_order), gl.RGB32F)
-        self._slack = _ROUNDING * float(np.abs(boxes).max())
 
     @property
     def defines(self) -> dict[str, object]:
         """Macros of points/cells.glsl."""
-        return {"CHUNKED": 1, "CHUNK": self._size, "SAMPLED": int(self.rows is not None)}
+        return {"CHUNKED": 1, "CHUNK": self._size, "SAMPLED": int(self._boxes.rows is not None)}
 
     def bind(self, pose: GpuPose) -> None:
         """Bind the positions and rows of the pose's points, in the order of chunks."""
         (self._positions or pose.array("positions")).bind(Texture.POSITIONS)
-        if self.rows is not None:
-            self.rows.bind(Texture.DRAWN_ROWS)
+        if self._boxes.rows is not None:
+            self._boxes.rows.bind(Texture.DRAWN_ROWS)
 
     def few(self, pose: GpuPose, view: View, margin: float, most: float) -> tuple[IndexList, int] | None:
         """The chunks that a view may show, and how many points that are, where these are at most so many: so
         few that looking for hidden ones would take longer. margin: as in `start`."""
         if view.holds(pose.bounds.corners() - view.origin):
             return None
-        found = pose.keep(Chunks).shown_in(self._order, view, margin)
+        found = pose.keep(Chunks).shown_in(self._boxes.order, view, margin)
         if (points := min(len(found) * self._size, self.count)) > most:
             return None
         listed = self._lists[0]
@@ -91,55 +182,48 @@ class CulledChunks:
 
     def start(self, surface: RenderTarget, margin: float) -> IndexList:
         """The chunks to draw first. margin: pixels around a point that it may cover."""
-        self._culling = _Culling(self._slack, margin + _SLACK)
-        return self._list(surface, 0)
+        self._margins = Margins(self._boxes.slack, margin + SLACK)
+        return self._list(surface, START)
 
     def late(self, surface: RenderTarget) -> IndexList:
         """The chunks to draw beside these, when they are."""
-        surface.keep(_Farthest).find(surface)
-        return self._list(surface, 1)
+        find_farthest(surface)
+        return self._list(surface, FIND)
 
     def shown(self, surface: RenderTarget) -> IndexList:
         """All chunks that the picture may show."""
-        surface.stats.counted["chunks"] = self._counts
-        return self._list(surface, 2)
+        surface.stats.counted["chunks"] = lambda: counts_of(self._boxes.seen(surface))
+        return self._list(surface, _GIVE)
 
     def _list(self, surface: RenderTarget, step: int) -> IndexList:
-        gpu, listed = self._gpu, self._lists[step]
-        defines = {"STEP": step, "CHUNK": self._size, "TILE": _TILE, "MOST_TILES": _MOST_TILES}
-        program = gpu.compute("points/cull.comp", defines, params=self._culling)
-        with gpu.timers.measure("cull"):
-            listed.clear()
-            listed.bind()
-            self._boxes.bind(Texture.BOXES)
-            self._seen.bind_to_storage_buffer(Storage.SEEN)
-            surface.keep(_Farthest).texels.bind(Texture.FARTHEST_TILES)
-            gpu.dispatch(program, self._chunks)
+        listed = self._lists[step]
+        listed.clear()
+        listed.bind()
+        self._boxes.test(surface, step, self._margins, LISTS=1, CHUNK=self._size)
         return listed
-
-    def _counts(self) -> dict[str, int]:
-        """How many chunks were shown, hidden by what is before them, or out of view."""
-        seen = np.frombuffer(self._seen.read(), np.uint32)
-        shown, in_view = (int(np.count_nonzero(seen & bit)) for bit in (_NOW, _IN_VIEW))
-        return {"shown": shown, "hidden": in_view - shown, "outside": self._chunks - in_view}
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        own = sum(texels.buffer.size for texels in self._texels)
-        return own + self._seen.size + sum(listed.nbytes for listed in self._lists)
-
-    @property
-    def _texels(self) -> list[gl.BufferTexture]:
-        return [texels for texels in (self._boxes, self._positions, self.rows) if texels is not None]
+        own = 0 if self._positions is None else self._positions.buffer.size
+        return own + self._boxes.nbytes + sum(listed.nbytes for listed in self._lists)
 
     def release(self) -> None:
         """Delete what it holds on the GPU."""
-        self._seen.release()
-        for listed in self._lists:
-            listed.release()
-        for texels in self._texels:
-            texels.release()
+        self._gpu.discard(self._boxes, self._positions, *self._lists)
+
+
+def counts_of(seen: NDArray[np.uint32]) -> dict[str, int]:
+    """How many chunks were shown, hidden by what is before them, or out of view, and how many face away where
+    any does. seen: bits of each, (C,)."""
+    shown, in_view, away = (int(np.count_nonzero(seen & bit)) for bit in (NOW, IN_VIEW, FACES_AWAY))
+    told = {"shown": shown, "hidden": in_view - shown - away, "outside": len(seen) - in_view}
+    return {**told, "away": away} if away else told
+
+
+def find_farthest(surface: RenderTarget) -> None:
+    """Find the farthest depth of each tile of what was drawn so far."""
+    surface.keep(_Farthest).find(surface)
 
 
 class _Farthest:
@@ -154,7 +238,7 @@ class _Farthest:
     def find(self, surface: RenderTarget) -> None:
         """Find it of the depths that were drawn so far."""
         gpu = surface.gpu
-        program = gpu.compute("points/farthest.comp", {"TILE": _TILE})
+        program = gpu.compute("chunks/farthest.comp", {"TILE": _TILE})
         with gpu.timers.measure("farthest"):
             surface.depths.bind(Texture.DEPTHS)
             self._buffer.bind_to_storage_buffer(Storage.FARTHEST_TILES)

@@ -123,6 +123,11 @@ class RenderTarget:
         self.is_lit = False
         self.stats = Stats()
 
+    def restart(self) -> None:
+        """Begin the picture anew, which is drawn once more: nothing that was written of it counts."""
+        self._covered_known = self._slots_known = self.is_lit = False
+        self._written.clear()
+
     def take_changes(self, wanted: dict[str, object]) -> frozenset[str]:
         """The names of what is wanted that is another than what is `drawn`, which nothing is from then on:
         whoever draws sets it anew when that is done."""

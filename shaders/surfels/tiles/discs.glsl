@@ -42,15 +42,14 @@ uint bits_of(ivec4 parts, ivec2 tile, vec2 place, vec3 key, vec3 form) {
 
 void scatter(uint at) {
     uint disc = first_disc + at, i = texelFetch(listed, int(first_home + at)).r;
-    int row = drawn_row(int(i));
-    Point point = texel_point(row);
+    Point point = texel_point(drawn_row(int(i)));
     begin_disc(point);
     vec2 place = to_pixel(disc_center);
     vec3 form, key = disc_key(form);
     places[disc] = vec4(place, key.xy);
     forms[disc] = vec4(key.z, form);
 #if LOOKS
-    uvec2 look = texelFetch(looks, row).xy;
+    uvec2 look = texelFetch(looks, int(point.row)).xy;
     disc_looks[disc] = uvec4(packed_look(light_of(look), normal_of(look)), floatBitsToUint(point.radius));
 #endif
 #if MASKED

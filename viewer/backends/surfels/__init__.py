@@ -7,17 +7,19 @@ off; in one pass, or in two that blend what overlaps. Elliptical where the scan 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...gpu import gl
 from ...gpu.amplify import FEEDS, Points, amplify
 from ...gpu.constants import LEAST_RADIUS, UNKNOWN
 from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
+from ...gpu.splat_culling import SplatLimits, draw_unhidden, may_cull
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.points import PointCloud
@@ -61,6 +63,7 @@ KEPT = {
 
 _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
+_HIDING = ("one", *_TWO)  # those in which nothing shows through what lies before it
 # A uniform radius of 1.5 times the spacing closes a surface that is evenly covered.
 _RADIUS_PER_SPACING = 1.5
 
@@ -155,17 +158,50 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     if not len(pose.cloud):
         surface.clear()
         return False
-    points, uniform_radius, known = _points(pose, frame, surface)
     params = _with_passes(params, frame, surface)
     instancing = _instancing(params, surface)
     surface.stats.faces_away = params.cull_back
-    _splat(points, surface, params, instancing, uniform_radius)
+    sizes, known = _sizes(pose, frame, surface)
+
+    def draw_points(points: Points) -> None:
+        _splat(points, surface, params, instancing, sizes.uniform)
+
+    reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
+    larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
+    stays = frame.share >= 1 and "pose" not in frame.changed
+    if stays and params.passes in _HIDING and may_cull(pose):
+        points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)
+        limits = SplatLimits(
+            radius_scale=larger * params.radius_scale,
+            uniform_radius=sizes.uniform,
+            least_radius=larger * margin,
+            largest=sizes.largest,
+            epsilon=params.epsilon,
+            cull_back=params.cull_back,
+        )
+        draw_unhidden(points, surface, limits, draw_points)
+    else:
+        points = Points.of(pose, surface, frame.share, sizes.own, larger * margin, larger * reach)
+        draw_points(replace(points, buffers=sizes.buffers))
     return surface.stats.is_sample or not known
 
 
-def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, float, bool]:
-    """The points to draw, the radius of those without one of their own, and whether those are all known
-    that they shall have: else one is for all, meanwhile."""
+@dataclass(frozen=True)
+class _Sizes:
+    """How large discs are.
+
+    own: whether points bring their own radii. uniform: the radius of those that have none, scan units.
+    largest: of all radii. buffers: as `Points` has them.
+    """
+
+    own: bool
+    uniform: float
+    largest: float
+    buffers: Mapping[str, gl.BufferTexture] = field(default_factory=dict)
+
+
+def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, bool]:
+    """How large discs are, and whether that is known as it shall be: else one size is for all, meanwhile."""
     own, known = frame.params.radius != "uniform", True
     if frame.params.radius == "auto" and pose.stored.axes is None:
         gaps = pose.keep(GapRadii)
@@ -176,24 +212,13 @@ def _points(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Points, 
             known = gaps.find(pose, wait=frame.budget_ms is None)
         own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
-            points = _in_view(pose, frame, surface, gaps.largest, use_radii=True)
-            buffers = {**points.buffers, "radii": gaps.texels}
             if own:
                 surface.stats.chosen["radius"] = "as large as gaps, of which the scan's leave some"
-            return replace(points, buffers=buffers), gaps.usual, True
+            return _Sizes(True, gaps.usual, gaps.largest, {"radii": gaps.texels}), True
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)
     uniform = 0.0 if suffices else _uniform_radius(pose)
-    largest = max(uniform, pose.cloud.longest_reach() if own else 0.0)
-    return _in_view(pose, frame, surface, largest, own), uniform, known
-
-
-def _in_view(pose: GpuPose, frame: FrameView, surface: Surface, largest: float, use_radii: bool) -> Points:
-    """The points whose discs the picture may show. largest: of their radii, scan units."""
-    params: Params = frame.params
-    margin, reach = _splats(params, 0.0).least_radius, params.radius_scale * largest
-    larger = max(params.enlarge, 1.0)
-    return Points.of(pose, surface, frame.share, use_radii, larger * margin, larger * reach)
+    return _Sizes(own, uniform, max(uniform, pose.cloud.longest_reach() if own else 0.0)), known
 
 
 def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:

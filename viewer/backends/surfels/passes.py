@@ -276,7 +276,7 @@ def _resolve(points: Points, surface: Surface, over: bool) -> None:
 def _close(points: Points, surface: Surface, splats: Splats) -> None:
     """Take back what the second pass filled beyond the outline, and give the rest a level in place of points;
     `covered` lists what it filled."""
-    gpu, filled = surface.gpu, surface.covered
+    gpu, filled, points = surface.gpu, surface.covered, replace(points, rows=None)  # which are read by rows
 
     def run(*steps: int) -> None:
         surface.bind_storage()

@@ -1,0 +1,302 @@
+"""Splats that are hidden, turned away or out of view are left out by chunks; no bit of pictures changes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from viewer.backends import backend
+from viewer.camera import Camera
+from viewer.frame import Request, render_frame
+from viewer.gpu import chunks, splat_culling
+from viewer.gpu.amplify import Points
+from viewer.gpu.surface import Surface
+from viewer.look import Look
+from viewer.renderer import Renderer
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.view import View
+
+SIZE = (120, 80)
+MANY = 60_000
+RADII = (1.0, 0.8, 0.6, 0.4, 0.2)
+MIDDLE = np.array([1e6, 0, -1e6])
+NAMES = ("depth", "id", "color", "normal", "level")
+
+
+@pytest.fixture(autouse=True)
+def few_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunks, "LEAST", 1)
+
+
+def sphere(rng: np.random.Generator, count: int) -> np.ndarray:
+    points = rng.standard_normal((count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def cloud_of(
+    points: np.ndarray, normals: np.ndarray, spacing: float, order: str, axes: bool = False
+) -> PointCloud:
+    """A scan along bands, as a scanner writes it, or by chance, each third point twice."""
+    rng = np.random.default_rng(1)
+    rows = rng.permutation(len(points))
+    if order == "bands":
+        rows = np.lexsort(
+            (points[:, 0], np.floor(points[:, 1] * 12), np.linalg.norm(points, axis=1).round(1))
+        )
+    rows = np.repeat(rows, np.resize([1, 1, 2], len(rows)))
+    points, normals = points[rows], normals[rows].copy()
+    normals[::97] = 0  # not known
+    radii = spacing * rng.uniform(1.2, 2.0, len(points))
+    halves = np.column_stack([np.cross(normals, [0.0, 0.6, 0.8]) * 2 * radii[:, None], radii])
+    return PointCloud.from_arrays(
+        points + MIDDLE,
+        normals=normals,
+        radii=radii,
+        axes=halves if axes else None,
+        colors=rng.random((len(points), 3)),
+    )
+
+
+def shells(order: str, axes: bool = False, count: int = 9000, radii: tuple[float, ...] = RADII) -> PointCloud:
+    """Spheres in one another."""
+    normals = sphere(np.random.default_rng(6), count)
+    points = normals * np.resize(radii, count)[:, None]
+    return cloud_of(points, normals, (4 * np.pi * len(radii) / count) ** 0.5, order, axes)
+
+
+def crowd(order: str) -> PointCloud:
+    """A dozen spheres behind and beside one another."""
+    rng = np.random.default_rng(2)
+    normals = sphere(rng, 12_000)
+    middles = np.stack(np.meshgrid([-0.8, 0.0, 0.8], [-0.4, 0.4], [-0.5, 0.5]), axis=-1).reshape(-1, 3)
+    return cloud_of(
+        0.35 * normals + np.resize(middles, normals.shape), normals, 0.35 * (4 * np.pi / 1000) ** 0.5, order
+    )
+
+
+def room(order: str) -> PointCloud:
+    """A room with a pillar, walls facing inwards."""
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1, 1, (8000, 3))
+    side = np.abs(points).argmax(axis=1)
+    normals = np.zeros_like(points)
+    normals[np.arange(len(points)), side] = -np.sign(points[np.arange(len(points)), side])
+    points[np.arange(len(points)), side] = -normals[np.arange(len(points)), side]
+    turns = rng.uniform(0, 2 * np.pi, 2000)
+    pillar = np.stack([np.cos(turns), np.zeros(2000), np.sin(turns)], axis=1)
+    upright = rng.uniform(-1, 1, (2000, 1)) * [0, 1, 0]
+    return cloud_of(
+        np.concatenate([points, 0.3 * pillar + upright]), np.concatenate([normals, pillar]), 0.06, order
+    )
+
+
+def looking(cloud: PointCloud, azimuth: float, nearer: float = 1.0, **changes: Any) -> Camera:
+    camera = Camera.orbit(cloud.bounds(), azimuth, 20, aspect=1.5)
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    return replace(camera, eye=tuple(target + (eye - target) * nearer), **changes)
+
+
+def views(cloud: PointCloud) -> Iterator[Camera]:
+    """Cameras one after another: small turns, large ones, near, inside, and with planes that cut."""
+    for azimuth in (0, 1, 2, 5, 40, 41, 200):
+        yield looking(cloud, azimuth)
+    for azimuth, nearer in ((200, 0.5), (203, 0.5), (205, 0.2), (210, 0.02), (290, 0.02), (90, 4)):
+        yield looking(cloud, azimuth, nearer)
+    yield looking(cloud, 30, projection="orthographic")
+    yield looking(cloud, 32, projection="orthographic")
+    yield looking(cloud, 40, 30, fov_y=0.4)
+    yield looking(cloud, 50, near=2.2)
+    yield looking(cloud, 50, near=1.2, far=2.4)
+    away = looking(cloud, 50)
+    yield replace(away, target=tuple(2 * np.array(away.eye) - np.array(away.target)))
+    yield looking(cloud, 50)
+
+
+def request_of(pose: Pose, camera: Camera, **params: object) -> Request:
+    return Request(pose, camera, "surfels", backend("surfels").params(params), Look(light="head"))
+
+
+def in_order(renderer: Renderer, request: Request, surface: Surface) -> None:
+    """Draw until the points are in an order of use."""
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        render_frame(renderer, request, surface)
+        if "chunks" in surface.stats.counted:
+            return
+        time.sleep(0.02)
+    raise AssertionError("they are in no order of use")
+
+
+def assert_same(renderer: Renderer, request: Request, surface: Surface) -> None:
+    """The picture of a surface that has none before is of all splats."""
+    fresh = Surface(renderer.gpu, surface.size)
+    render_frame(renderer, request, fresh)
+    assert "chunks" not in fresh.stats.counted
+    for name in NAMES:
+        np.testing.assert_array_equal(
+            getattr(surface, name), getattr(fresh, name), err_msg=f"{name}, {request.camera}"
+        )
+    np.testing.assert_array_equal(surface.image(), fresh.image())
+    fresh.release()
+
+
+SETTINGS: list[tuple[str, dict[str, object]]] = [
+    ("shells", {}),
+    ("shells", {"passes": "one", "cull_back": True}),
+    ("shells", {"passes": "two", "enlarge": 2.0, "radius_scale": 0.6}),
+    ("shells", {"passes": "two_large", "enlarge": 1.5, "cull_back": True, "epsilon": 1.5}),
+    ("shells", {"radius": "own", "instancing": "gs"}),
+    ("shells", {"instancing": "pull", "passes": "one"}),
+    ("dense", {"radius_scale": 0.3, "radius": "own"}),  # of about a pixel
+    ("ellipses", {"cull_back": True, "radius": "own"}),
+    ("crowd", {}),
+    ("crowd", {"passes": "one"}),
+    ("crowd", {"instancing": "vbo", "cull_back": True}),
+    ("room", {"radius": "own"}),
+    ("room", {"passes": "one", "cull_back": True}),
+]
+SCENES = {
+    "shells": shells,
+    "dense": lambda order: shells(order, count=MANY),
+    "ellipses": lambda order: shells(order, axes=True),
+    "crowd": crowd,
+    "room": room,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", ["bands", "chance"])
+@pytest.mark.parametrize(("scene", "params"), SETTINGS, ids=str)
+def test_pictures_are_the_same_to_the_bit(
+    renderer: Renderer, scene: str, params: dict[str, object], order: str
+) -> None:
+    cloud = SCENES[scene](order)
+    pose = Pose(0, 0.0, scene, cloud)
+    surface = Surface(renderer.gpu, SIZE)
+    in_order(renderer, request_of(pose, looking(cloud, 0), **params), surface)
+    hidden = away = outside = 0
+    for camera in views(cloud):
+        request = request_of(pose, camera, **params)
+        render_frame(renderer, request, surface)
+        told = surface.stats.counted["chunks"]()
+        assert sum(told.values()) == -(-len(cloud) // 32)
+        hidden, outside = hidden + told["hidden"], outside + told["outside"]
+        away += told.get("away", 0)
+        assert_same(renderer, request, surface)
+    assert outside
+    assert hidden
+    assert bool(away) == ("cull_back" in params)
+
+
+def test_what_is_hidden_or_turned_away_is_not_drawn(renderer: Renderer) -> None:
+    cloud = shells("bands", count=MANY)
+    pose, surface = Pose(0, 0.0, "shells", cloud), Surface(renderer.gpu, (600, 400))
+    request = request_of(pose, looking(cloud, 0))
+    in_order(renderer, request, surface)
+    first = surface.stats.counted["chunks"]()
+    assert first["hidden"] > 0.6 * sum(first.values()), first
+    assert "hidden" in surface.stats.skipped["points"]
+    turned = request_of(pose, looking(cloud, 0), cull_back=True)
+    render_frame(renderer, turned, surface)
+    counted = surface.stats.counted["chunks"]()
+    assert counted["away"] > 0.25 * sum(counted.values()), counted
+    assert_same(renderer, turned, surface)
+
+
+def test_others_are_shown_as_soon_as_what_hid_them_is_gone(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through a hole cut into the outermost shell the next one is seen, which was left out at first."""
+    cloud = shells("bands", count=MANY)
+    camera = looking(cloud, 0)
+    pose, surface = Pose(0, 0.0, "shells", cloud), Surface(renderer.gpu, (600, 400))
+    request = request_of(pose, camera)
+    in_order(renderer, request, surface)
+    drawn: list[int] = []
+    take = splat_culling.SplatChunks.take
+
+    def noted(chunks: splat_culling.SplatChunks, *given: Any) -> Points:
+        points = take(chunks, *given)
+        drawn.append(points.count)
+        return points
+
+    monkeypatch.setattr(splat_culling.SplatChunks, "take", noted)
+    render_frame(renderer, request, surface)
+    assert len(drawn) == 1, "nothing new is seen"
+    assert drawn[0] < 0.5 * len(cloud)
+    distance = float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
+    for near, radius in ((distance - 0.9, 0.8), (distance - 0.7, 0.6), (None, 1.0)):
+        drawn.clear()
+        cut = replace(request, camera=replace(camera, near=near))
+        render_frame(renderer, cut, surface)
+        assert len(drawn) == 1 + (near is not None)
+        middle = cloud.positions[surface.id[200, 300]] + (cloud.origin - MIDDLE)
+        assert np.linalg.norm(middle) == pytest.approx(radius, abs=0.02)
+        assert_same(renderer, cut, surface)
+
+
+def test_what_never_stays_hidden_is_not_looked_for_each_time(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where each picture shows what the last one hid, drawing twice does not pay, and rests for a while."""
+    monkeypatch.setattr(splat_culling, "_MOST_SPARE", 0)
+    cloud = shells("bands", radii=(1.0,))
+    pose, surface = Pose(0, 0.0, "sphere", cloud), Surface(renderer.gpu, SIZE)
+    in_order(renderer, request_of(pose, looking(cloud, 0)), surface)
+    pauses = []
+    for turn in range(12):
+        request = request_of(pose, looking(cloud, 180 * (turn % 2 == 0)))
+        render_frame(renderer, request, surface)
+        pauses.append(surface.keep(splat_culling._Pictures).pause)
+        assert_same(renderer, request, surface)
+    assert max(pauses) >= 4, pauses
+    assert 0 in pauses
+
+
+def test_poses_that_play_are_the_same_to_the_bit(renderer: Renderer) -> None:
+    """Chunks are those of one pose: each other one is drawn whole at first, wherever it is in between."""
+    clouds = [shells("bands"), crowd("chance"), room("chance")]
+    poses = [Pose(i, float(i), str(i), cloud) for i, cloud in enumerate(clouds)]
+    surface = Surface(renderer.gpu, SIZE)
+    for pose, cloud in zip(poses, clouds, strict=True):
+        in_order(renderer, request_of(pose, looking(cloud, 0)), surface)
+    for turn in range(9):
+        pose = poses[turn // 2 % 3]
+        request = request_of(pose, looking(clouds[0], 3 * turn))
+        render_frame(renderer, request, surface)
+        assert ("chunks" in surface.stats.counted) == (turn % 2 == 1)
+        assert_same(renderer, request, surface)
+
+
+@given(st.integers(0, 2**32 - 1), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_chunks_that_face_away_hold_no_splat_that_faces_the_eye(
+    renderer: Renderer, seed: int, perspective: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    count, chunk = 4096, 32
+    normals = sphere(rng, count // chunk).repeat(chunk, axis=0) + rng.uniform(0, 1) * sphere(rng, count)
+    points = rng.normal(size=(count // chunk, 3)).repeat(chunk, axis=0) + 0.2 * rng.normal(size=(count, 3))
+    cloud = PointCloud.from_arrays(points, normals=normals, radii=np.full(count, 0.05), origin=np.zeros(3))
+    gpu_pose = renderer.resident(Pose(0, 0.0, "cones", cloud))
+    gpu_pose.keep(chunks.Chunks)._order = chunks.in_file_order(cloud)
+    kind: Any = "perspective" if perspective else "orthographic"
+    surface, eye = Surface(renderer.gpu, SIZE), rng.normal(size=3) * 3
+    camera = Camera(tuple(eye), tuple(rng.normal(size=3)), (0, 1, 0), kind, near=0.01, far=100.0)
+    surface.start(gpu_pose, View.of(camera, SIZE, np.zeros(3), cloud.bounds()))
+    told = gpu_pose.keep(splat_culling.SplatChunks)
+    told.measure(Points(gpu_pose, True, count))
+    limits = splat_culling.SplatLimits(1.0, 0.0, 0.7, 0.05, 1.0, cull_back=True)
+    told.test(surface, 0, limits.margins(told.boxes.slack, True, 0))
+    is_away = (told.boxes.seen(surface) & 8).astype(bool).repeat(chunk)
+    faces_eye = ~surface.view.faces_away(cloud.positions, normals)
+    assert not (is_away & faces_eye).any()
+    surface.release()
