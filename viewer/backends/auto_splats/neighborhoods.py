@@ -52,6 +52,9 @@ _SPARSE, _WIDEST = 0.9, 1.5  # quantile that tells sparse parts; their radii fro
 _SPARE = 4  # times the room that is needed, beyond which it is given up
 
 
+_Sample = tuple[gl.BufferTexture | None, int]  # rows, None for all, and how many
+
+
 @dataclass(frozen=True)
 class Search:
     """Rules of what belongs to a neighborhood.
@@ -184,7 +187,9 @@ class Neighborhoods:
             self._search(pose, search)
 
     def _find_seen(self, pose: GpuPose, surface: Surface, search: Search, share: float, border: int) -> None:
-        visible = self._project(pose, surface, share)
+        # No point takes part that is farther beside the picture: none in chunks there is looked at.
+        sample = surface.take_sample(share, border + (1 << COARSEST))
+        visible = self._project(pose, sample)
         if visible:
             self._divide(search, visible, pose, border)
             self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
@@ -197,7 +202,7 @@ class Neighborhoods:
                 ("next", 4, gl.R32F),
             ):
                 self._reserve(name, nbytes * visible, texel)
-            self._gather(pose, surface, search, share)
+            self._gather(pose, surface, search, sample)
             self._search(pose, search)
 
     @contextmanager
@@ -209,9 +214,8 @@ class Neighborhoods:
         finally:
             surface.bind_view()
 
-    def _project(self, pose: GpuPose, surface: Surface, share: float) -> int:
+    def _project(self, pose: GpuPose, sample: _Sample) -> int:
         """Find the nearest point of each pixel; how many pixels have one."""
-        sample = surface.take_sample(share)
         self._reserve("depths", 4 * self._size[0] * self._size[1], gl.R32UI)
         self._reserve("rows", 4 * self._size[0] * self._size[1], gl.R32UI)
         visits = self._visits("points/cells.glsl", pose, sample, {"SINGLE": 1}, _Pixels())
@@ -224,7 +228,7 @@ class Neighborhoods:
         self,
         cells: str,
         pose: GpuPose,
-        sample: tuple[gl.BufferTexture | None, int],
+        sample: _Sample,
         defines: Mapping[str, object],
         params: Any,
     ) -> Visits:
@@ -279,10 +283,10 @@ class Neighborhoods:
             self._pixels.run(program)
             return self._read_totals()[0]
 
-    def _gather(self, pose: GpuPose, surface: Surface, search: Search, share: float) -> None:
+    def _gather(self, pose: GpuPose, surface: Surface, search: Search, sample: _Sample) -> None:
         """List the participants by cells, and those of them that are active. Where too many would take part
         that others hide, none of these does."""
-        sample, grids = surface.take_sample(share), self._grids
+        grids = self._grids
         if self._bins.cells != grids.fine_cells:
             self._gpu.discard(self._bins)
             self._bins = Bins(self._gpu, grids.fine_cells)
