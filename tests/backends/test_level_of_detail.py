@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import NOTHING, sphere
 
-from viewer.backends import SHARES, backend
+from viewer.backends import SHARES, backend, surfels
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, reshade, supersample
@@ -112,3 +112,27 @@ def test_it_is_shaded_anew_and_has_samples_as_others_have(renderer: Renderer) ->
 def test_shares_are_more_than_none_and_at_most_all(bad: object) -> None:
     with pytest.raises(InputError, match="share"):
         backend("points").params({"share": bad})
+
+
+def test_more_splats_than_can_be_listed_are_drawn_on_a_coarser_level(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And not by the rasteriser, which takes many times as long; all of them where that is asked for, or
+    they are so small that they are not listed."""
+    monkeypatch.setattr(renderer.gpu, "software", True)
+    monkeypatch.setattr(surfels, "most_listed", lambda gpu: len(CLOUD) // 4)
+    surface, level, whole = (Surface(renderer.gpu, SIZE) for _ in range(3))
+    for passes in ("one", "two"):
+        tiles = {"instancing": "tiles", "passes": passes}
+        assert not render_frame(renderer, request("surfels", **tiles), surface)
+        assert surface.is_whole
+        assert surface.stats.chosen["share"].startswith("0.25")
+        render_frame(renderer, request("surfels", share=0.25, **tiles), level)
+        render_frame(renderer, request("surfels", share=1.0, **tiles), whole)
+        np.testing.assert_array_equal(surface.depth, level.depth)
+        assert "share" not in whole.stats.chosen
+        assert not is_sampled(whole.row[whole.row != NOTHING], 0.25).all()
+    far = replace(request("surfels", instancing="tiles"), camera=replace(CAMERA, eye=(50.0, 40.0, 300.0)))
+    render_frame(renderer, far, surface)
+    assert "second pass" in surface.stats.skipped  # under a pixel
+    assert "share" not in surface.stats.chosen

@@ -102,12 +102,14 @@ NO_SPACING = (
 NO_DETAIL = "what is divided is the whole scan: a detail, tiny beside it, is within few of the parts"
 
 
-def share_param(group: str = "") -> float:
+def share_param(default: float | None = 1.0, auto: str = "", group: str = "") -> Any:
     """The parameter `share` of a backend: a coarser level of detail. Whatever draws it finds the share in
-    `FrameView.share`, with that of a preview."""
+    `FrameView.share`, with that of a preview. auto: what None stands for."""
     return param(
-        1.0,
-        "Share of the points that are drawn, evenly chosen and larger to match; less is faster and coarser",
+        default,
+        "Share of the points that are drawn, evenly chosen and larger to match; less is faster and coarser"
+        + (f"; auto: {auto}" if auto else ""),
+        type=float,
         low=1e-3,
         high=1.0,
         title="Level of detail",

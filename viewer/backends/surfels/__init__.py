@@ -30,7 +30,7 @@ from . import passes
 from .gaps import GapRadii
 from .splats import FRAGMENT, SURFEL, Splats
 from .subpixel import average, splat_subpixel, subpixel_share
-from .tiles import FALLBACK, splat
+from .tiles import FALLBACK, most_listed, splat
 
 TITLE = "Discs"
 BLENDS = FILLS = True
@@ -125,7 +125,9 @@ class Params:
         group="Splats",
     )
     cull_back: bool = param(False, "Leave out surfels that face away", group="Splats")
-    share: float = share_param(group="Splats")
+    share: float | None = share_param(
+        None, "all, or where software drivers have no room to list them, as many as these have", "Splats"
+    )
     instancing: str = param(
         "auto",
         "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
@@ -168,7 +170,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 
     reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
     larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
-    stays = frame.share >= 1 and "pose" not in frame.changed
+    most = most_listed(surface.gpu) if instancing == "tiles" and params.share is None else len(pose.cloud)
+    stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
     if stays and params.passes in _HIDING and may_cull(pose):
         points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)
         limits = SplatLimits(
@@ -182,8 +185,21 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         draw_unhidden(points, surface, limits, draw_points)
     else:
         points = Points.of(pose, surface, frame.share, sizes.own, larger * margin, larger * reach)
+        splats = _splats(params, sizes.uniform)
+        if points.count > most and _mean_share(points, surface, params, splats) < 1:
+            points = _as_many(most, points, pose, frame, surface, (larger * margin, larger * reach))
         draw_points(replace(points, buffers=sizes.buffers))
     return surface.stats.is_sample or not known
+
+
+def _as_many(
+    most: int, points: Points, pose: GpuPose, frame: FrameView, surface: Surface, margins: tuple[float, float]
+) -> Points:
+    """So many in place of all of these points: a coarser level of detail. margins: as `Points.of` has."""
+    stats, share = surface.stats, most / points.count
+    stats.asked, stats.left_out = share, 0
+    stats.chosen["share"] = f"{share:.2f}: of {points.count:,} splats in view {most:,} are listed at once"
+    return Points.of(pose, surface, share * frame.share, points.use_radii, *margins)
 
 
 @dataclass(frozen=True)
@@ -230,15 +246,20 @@ def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:
 
 def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
     splats = _splats(params, uniform_radius)
-    enlarged = splats.larger(points) if params.passes in _TWO else points
-    may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
-    share = subpixel_share(enlarged, surface, splats) if may_average else 0.0
+    share = _mean_share(points, surface, params, splats)
     if share == 1 or (share > 0 and params.passes == "one"):
         _draw_subpixel(points, surface, params, instancing, replace(splats, mean_share=share))
     elif params.passes in _TWO:
         _draw_two(points, surface, params, instancing, splats)
     else:
         _draw_one(points, surface, params, instancing, splats)
+
+
+def _mean_share(points: Points, surface: Surface, params: Params, splats: Splats) -> float:
+    """The part of what a pixel shows that is the mean of its splats: 1 where they are under a pixel."""
+    enlarged = splats.larger(points) if params.passes in _TWO else points
+    may_average = params.passes == "one" or (params.passes in _TWO and params.epsilon > 0)
+    return subpixel_share(enlarged, surface, splats) if may_average else 0.0
 
 
 def _splats(params: Params, uniform_radius: float) -> Splats:

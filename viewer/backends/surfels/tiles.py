@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ...gpu.amplify import Points, amplify
+from ...gpu.context import Gpu
 from ...gpu.surface import Surface
 from .lists import ALL, AWAY, DISC_BITS, DISC_BYTES, TOWARDS, TileLists
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
@@ -181,6 +182,13 @@ def show_smaller(surface: Surface, lists: TileLists, splats: Splats) -> None:
     lists.start_again()
     run("again", surface, lists, {"AWAY": 0})
     run("show", surface, lists, _SHOWN, splats=splats, work="again")
+
+
+def most_listed(gpu: Gpu) -> int:
+    """How many discs are listed at once at most, for any to be in several lists: of all that lists can number
+    with software drivers, where the rasteriser takes many times as long as a coarser picture."""
+    room = min(gpu.max_storage_bytes // DISC_BYTES, 1 << DISC_BITS)
+    return room // 2 if gpu.software else room
 
 
 def _unfit(points: Points, surface: Surface) -> str:
