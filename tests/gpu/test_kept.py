@@ -147,6 +147,18 @@ def test_where_the_camera_rests_it_becomes_the_picture_of_all(
     np.testing.assert_array_equal(surface.depth, depth)
 
 
+def test_where_hidden_points_are_left_out_each_picture_is_its_own(renderer: Renderer) -> None:
+    pose, surface = Pose(0, 0.0, "", sphere(5000)), Surface(renderer.gpu, SIZE)
+    request = seen(pose)
+    request = replace(request, params=replace(request.params, hide_hidden=True))
+    before = whole(renderer, request)
+    wanted = Surface(renderer.gpu, SIZE)
+    render_frame(renderer, request, wanted, share=SHARE, moving=True)
+    render_frame(renderer, request, surface, share=SHARE, moving=True, before=before)
+    assert surface.stats.known == SHARE, "as hidden ones are found among the share alone"
+    assert_same(surface, wanted)
+
+
 def test_pictures_of_any_size_go_on_from_each_other(renderer: Renderer, pose: Pose) -> None:
     sparse = Pose(0, 0.0, "", sphere(5000))  # too few to touch: no gap of theirs is closed
     small, request = Surface(renderer.gpu, (60, 40)), seen(sparse)

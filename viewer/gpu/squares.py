@@ -60,7 +60,7 @@ def draw_squares(
     point_size: edge, pixels; 0: as far as the next point. share: of the points that are drawn. shown: R32UI,
     a texel a row, 0 where a point is left out; None: none is. stays: whether the picture before was of this
     pose, so that what that one showed is of use. before: a picture of it whose points are drawn again where
-    not all are drawn.
+    not all are drawn, and none is left out.
     """
     size = point_size or math.ceil(_touching(pose, surface.view))
     few = _few(surface, size)
@@ -68,8 +68,8 @@ def draw_squares(
     if chunks is not None:
         _draw_chunks(pose, surface, size, shown, chunks, few)
         return False
-    if before is not None and share < 1:
-        _draw_kept(pose, surface, size, shown, share, before)
+    if before is not None and shown is None and share < 1:
+        _draw_kept(pose, surface, size, share, before)
         return True
     rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
     surface.stats.known = surface.stats.share
@@ -103,14 +103,7 @@ def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
     surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
 
 
-def _draw_kept(
-    pose: GpuPose,
-    surface: Surface,
-    size: int,
-    shown: gl.BufferTexture | None,
-    share: float,
-    before: Before,
-) -> None:
+def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before: Before) -> None:
     """Write the points that a picture before showed, and the share of all whose turn it is."""
     kept, stride, count = pose.keep(KeptPoints), stride_of(share), len(pose.cloud)
     listed, turn, turns = kept.list_shown(before.target), kept.next_turn(), -(-count // stride)
@@ -121,10 +114,8 @@ def _draw_kept(
 
     def bind(_: Program) -> None:
         pose.array("positions").bind(Texture.POSITIONS)
-        if shown is not None:
-            shown.bind(Texture.VISIBLE)
 
-    defines = _defines(numbers.point_size, shown)
+    defines = _defines(numbers.point_size, None)
     both = (
         Visits("points/cells.glsl", count, bind, {**defines, "KEPT": 1}, numbers, listed),
         Visits("points/cells.glsl", turns, bind, {**defines, "STRIDED": 1}, numbers),
