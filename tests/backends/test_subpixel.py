@@ -13,6 +13,7 @@ from test_instancing import assert_agree, assert_covers_the_same
 from viewer.bench.judge import Judge, Walk
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
+from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.scan.points import PointCloud
@@ -80,7 +81,9 @@ def test_larger_splats_are_averaged_less_and_less(draw: Draw, radii: float, shar
     pair = in_one_pixel([1.0, 1.0], [[200, 0, 0], [0, 100, 0]], [[0, 0, 1], [0, 0.6, 0.8]])
     scale = draw(pair, view, size, "surfels").view.scale
     cloud = replace(pair, radii=np.full(2, radii * 0.7072 / scale, np.float32))
-    surface = draw(cloud, view, size, "surfels", Look(light="flat"), {"passes": "one"})
+    # Of two at one place and depth, the rasteriser's fewer bits may have the later one nearer.
+    given = {"passes": "one", "instancing": "auto" if share else "tiles"}
+    surface = draw(cloud, view, size, "surfels", Look(light="flat"), given)
     light = linear_from_bytes(cloud.colors[:, :3])
     shown = bytes_from_linear(share * light.mean(axis=0) + (1 - share) * light[0])
     np.testing.assert_allclose(surface.image()[4, 4, :3], shown, atol=1)
@@ -158,7 +161,9 @@ def test_larger_splats_are_neither_scattered_nor_averaged(draw: Draw) -> None:
     radii[7] = 2.0
     one_large = PointCloud.from_arrays(CLOUD.positions, normals=CLOUD.normals, radii=radii)
     for surface in (close, surfels(draw, one_large, camera())):
-        assert surface.stats.chosen["instancing"] == "tiles"
+        assert surface.stats.chosen["instancing"] in (
+            ("tiles",) if surface.gpu.software else ("tiles", *FEEDS)
+        )
         assert not surface.is_own("normal")
     assert surface.row.min() >= 0
 

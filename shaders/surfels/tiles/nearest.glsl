@@ -228,6 +228,9 @@ uint depth_bits(int k) {
 }
 
 void store_pixel(int k) {
+#if FOUND
+    if (rows[index_of(k)] == shown[k]) return;  // a depth that was read may have lost its last bits on the way
+#endif
     depths[index_of(k)] = depth_bits(k);
     rows[index_of(k)] = shown[k];
 }

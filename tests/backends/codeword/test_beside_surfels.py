@@ -41,7 +41,8 @@ def drawn_both(draw: Draw, projection: str, quality: str) -> tuple[Surface, Surf
     """Discs, the nearest alone, and code words of the same points."""
     cloud = torus()
     camera = camera_for(cloud, projection)
-    discs = draw(cloud, camera, SIZE, "surfels", params={"passes": "one", "radius": "own", "epsilon": 0.0})
+    nearest = {"passes": "one", "radius": "own", "epsilon": 0.0, "instancing": "tiles"}
+    discs = draw(cloud, camera, SIZE, "surfels", params=nearest)
     return discs, draw(cloud, camera, SIZE, "codeword", params={"quality": quality})
 
 

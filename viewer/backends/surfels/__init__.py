@@ -170,7 +170,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
 
     reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
     larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
-    most = most_listed(surface.gpu) if instancing == "tiles" and params.share is None else len(pose.cloud)
+    may_thin = params.share is None and instancing == "tiles" and surface.gpu.software
+    most = most_listed(surface.gpu) if may_thin else len(pose.cloud)
     stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
     if stays and params.passes in _HIDING and may_cull(pose):
         points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)

@@ -185,10 +185,9 @@ def show_smaller(surface: Surface, lists: TileLists, splats: Splats) -> None:
 
 
 def most_listed(gpu: Gpu) -> int:
-    """How many discs are listed at once at most, for any to be in several lists: of all that lists can number
-    with software drivers, where the rasteriser takes many times as long as a coarser picture."""
-    room = min(gpu.max_storage_bytes // DISC_BYTES, 1 << DISC_BITS)
-    return room // 2 if gpu.software else room
+    """How many discs software drivers list at once with room for each to be in several lists: of more, a
+    coarser picture takes a part of the time that the rasteriser does."""
+    return min(gpu.max_storage_bytes // DISC_BYTES, 1 << DISC_BITS) // 2
 
 
 def _unfit(points: Points, surface: Surface) -> str:
