@@ -31,6 +31,12 @@ struct Reach {
 };
 
 #if SPLATS
+// Of the radius of a splat, pixels, half of that from which on tiles leave it to the rasteriser. How many do so decides how all
+// are drawn, so that chunks which may have such are never hidden.
+const float LARGE = 60.0;
+#endif
+
+#if SPLATS
 // How far a splat of the chunk reaches from its point at most, scan units, as surfels/splat.glsl has it.
 float splat_reach(uint chunk, vec3 low, vec3 high) {
     vec3 halves = 0.5 * (high - low), along = vec3(world_to_view[0].z, world_to_view[1].z, world_to_view[2].z);
@@ -74,6 +80,9 @@ Reach reach_of(uint chunk, vec3 low, vec3 high) {
     if (!is_before) first = vec2(0.0), last = vec2(view_size);
     first = max(first - pixel_margin, vec2(0.0));
     last = min(last + pixel_margin, vec2(view_size) - 1.0);
+#if SPLATS
+    is_before = is_before && slack * scale_at(near) < LARGE;
+#endif
     bool in_view = all(lessThanEqual(first, last)) && far >= view_near && near <= view_far;
     return Reach(in_view, ivec2(first), ivec2(max(last, vec2(0.0))), is_before ? near - 1e-5 * abs(near) : 0.0);
 }

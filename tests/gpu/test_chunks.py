@@ -108,7 +108,7 @@ def test_orders_hold_each_point_once_and_boxes_hold_theirs() -> None:
     assert coarse.rows is not None
     assert (np.sort(coarse.rows) == np.arange(COUNT)).all()
     for ordered in (file, coarse):
-        for chunk in range(-(-COUNT // 256)):
+        for chunk in range(-(-COUNT // 64)):
             rows = ordered.rows_of(np.array([chunk]), COUNT)
             assert (np.diff(rows.astype(int)) > 0).all()
             points = cloud.positions[rows]

@@ -64,14 +64,14 @@ def moved(camera: Camera, distance: float | None) -> Camera:
 
 
 def close_up(cloud: PointCloud, camera: Camera, size: tuple[int, int]) -> Camera:
-    """The camera so near that so many of the points are in view."""
+    """The camera zoomed in until so many of the points are in view."""
     some = cloud.positions[::97]
-    near, far = 1.01, 3.0
+    low, high = 0.5, camera.fov_y
     for _ in range(20):
-        middle = (near + far) / 2
-        view = View.of(moved(camera, middle), size, cloud.origin, cloud.bounds())
-        near, far = (near, middle) if view.contains(some).mean() > CLOSE else (middle, far)
-    return moved(camera, far)
+        middle = (low + high) / 2
+        view = View.of(replace(camera, fov_y=middle), size, cloud.origin, cloud.bounds())
+        low, high = (low, middle) if view.contains(some).mean() > CLOSE else (middle, high)
+    return replace(camera, fov_y=low)
 
 
 def turned(camera: Camera, degrees: float) -> Camera:

@@ -20,8 +20,8 @@ from ..task import Task, in_background
 from ..view import View
 from .pose import GpuPose
 
-_CHUNKS = 1 << 12  # about as many as a pose has: fewer hide less, more take longer to test
-_CHUNK = 1 << 8  # points at least
+_CHUNKS = 1 << 14  # about as many as a pose has: fewer hide less, more take longer to test
+_CHUNK = 1 << 6  # points at least
 LEAST = 1 << 18  # points of a pose, below which looking at all of them takes next to no time
 MOST = 0.5  # share of the points from which on all are looked at, as that needs no list
 # Mean size of the boxes, in that of the pose: from where on another order is worth a second of a thread,

@@ -91,31 +91,45 @@ def may_cull(pose: GpuPose) -> bool:
 
 
 def draw_unhidden(
-    points: Points, surface: Surface, limits: SplatLimits, draw: Callable[[Points], None]
+    points: Points, surface: Surface, limits: SplatLimits, draw: Callable[[Points], bool]
 ) -> None:
-    """Draw those of a pose's points that the picture may show. points: all of them. draw: what draws some,
-    once or twice."""
+    """Draw those of a pose's points that the picture may show. points: all of them. draw: what draws some, up
+    to three times; whether it may have drawn them in another way had there been more."""
     chunks, before = points.pose.keep(SplatChunks), surface.keep(_Pictures)
     chunks.measure(points)
     boxes, trusts = chunks.boxes, before.pause == 0
     margins = limits.margins(boxes.slack, trusts, before.moved_to(surface))
     chunks.test(surface, START, margins)
     seen = boxes.seen(surface)
-    draw(chunks.take(points, surface, seen, LAST))
-    if before.pause <= 1:
+    is_late, is_dear = False, draw(chunks.take(points, surface, seen, LAST)) and _leaves_out(seen, LAST)
+    if not is_dear and before.pause <= 1:
         find_farthest(surface)
         chunks.test(surface, FIND, margins)
         seen = boxes.seen(surface)
         is_late = bool(((seen & (LAST | NOW)) == NOW).any())
         if is_late:
             surface.restart()
-            draw(chunks.take(points, surface, seen, NOW))
-    else:
-        seen, is_late = seen | (seen & np.uint32(LAST)) << np.uint32(1), False
-    before.go_on(is_late, seen)
+            is_dear = draw(chunks.take(points, surface, seen, NOW)) and _leaves_out(seen, NOW)
+    elif not is_dear:
+        seen = seen | (seen & np.uint32(LAST)) << np.uint32(1)
+    if is_dear:
+        surface.restart()
+        draw(chunks.take(points, surface, seen, IN_VIEW))
+        seen = seen | _may_show(seen) * np.uint32(NOW)
+    before.go_on(is_late, is_dear, seen)
     surface.stats.counted["chunks"] = lambda: counts_of(seen)
     if told := _told(boxes, seen):
         surface.stats.skipped["points"] = told
+
+
+def _may_show(seen: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    """Tell which chunks are in view and do not face away, (C,)."""
+    return (seen & (IN_VIEW | FACES_AWAY)) == IN_VIEW
+
+
+def _leaves_out(seen: NDArray[np.uint32], bit: int) -> bool:
+    """Whether chunks without that bit may be hidden, for all that is known of others."""
+    return bool((_may_show(seen) & ((seen & bit) == 0)).any())
 
 
 def _told(boxes: ChunkBoxes, seen: NDArray[np.uint32]) -> str:
@@ -332,13 +346,14 @@ class _Pictures:
         wanted = self._wider * max(farthest, _LEAST_MOVE) if farthest > 0 else 0.0
         return min(_SPARE + math.ceil(wanted), _MOST_SPARE) if wanted < _MOST_SPARE else _MOST_SPARE
 
-    def go_on(self, is_late: bool, seen: NDArray[np.uint32]) -> None:
-        """Go on after a picture. is_late: whether it was drawn twice; seen: bits of chunks, (C,)."""
+    def go_on(self, is_late: bool, is_dear: bool, seen: NDArray[np.uint32]) -> None:
+        """Go on after a picture. is_late: whether it was drawn twice; is_dear: whether anew with all, after
+        chunks had been left out; seen: bits of chunks, (C,)."""
         if self.pause:
             self.pause -= 1
             return
         in_view, first, shown = (np.count_nonzero(seen & bit) for bit in (IN_VIEW, LAST, NOW))
-        is_dear = is_late and first + shown > _DEAR * in_view
+        is_dear = is_dear or bool(is_late and first + shown > _DEAR * in_view)
         self._wider = min(2 * self._wider, _WIDEST) if is_late else max(_NARROWER * self._wider, 1.0)
         self.pause = self._next_pause if is_dear else 0
         self._next_pause = min(2 * self._next_pause, _LONGEST_PAUSE) if is_dear else 1

@@ -127,6 +127,7 @@ class RenderTarget:
         """Begin the picture anew, which is drawn once more: nothing that was written of it counts."""
         self._covered_known = self._slots_known = self.is_lit = False
         self._written.clear()
+        self.stats.skipped.clear()
 
     def take_changes(self, wanted: dict[str, object]) -> frozenset[str]:
         """The names of what is wanted that is another than what is `drawn`, which nothing is from then on:

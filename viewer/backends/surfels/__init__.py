@@ -165,8 +165,9 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
     surface.stats.faces_away = params.cull_back
     sizes, known = _sizes(pose, frame, surface)
 
-    def draw_points(points: Points) -> None:
+    def draw_points(points: Points) -> bool:
         _splat(points, surface, params, instancing, sizes.uniform)
+        return "tiles" in surface.stats.skipped  # as there are many large ones among these
 
     reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
     larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
