@@ -159,7 +159,7 @@ def main() -> None:
         light = "flat" if options.backend == "points" else "head"
         for setting in settings:
             params = backend(options.backend).params(setting)
-            end = time.monotonic() + 60
+            end = time.monotonic() + 20
             while time.monotonic() < end:
                 draw(first, True)
                 if surface.stats.counted.keys() & {"chunks"} or "points" in surface.stats.skipped:
