@@ -149,6 +149,9 @@ class Chunks:
         moved = pose.cloud.origin - view.origin
         reach += _ROUNDING * pose.bounds.radius
         low, high = order.low + (moved - reach), order.high + (moved + reach)
+        whole = low.min(axis=0, keepdims=True), high.max(axis=0, keepdims=True)
+        if not view.may_show(*whole, margin + _SLACK).any():
+            return np.empty(0, np.intp)
         return np.flatnonzero(view.may_show(low, high, margin + _SLACK))
 
     def take_order(self) -> Ordered | None:
