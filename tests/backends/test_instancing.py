@@ -159,7 +159,15 @@ def test_the_same_bits_again(surfels: Draw) -> None:
     np.testing.assert_array_equal(first.image(), again.image())
 
 
-@every_camera
+@pytest.mark.parametrize(
+    "camera",
+    [
+        pytest.param(
+            camera, id=name, marks=[pytest.mark.slow] if name in ("perspective", "orthographic") else []
+        )
+        for name, camera in CAMERAS.items()
+    ],
+)
 @pytest.mark.usefixtures("short_spans")
 def test_pixels_may_be_shared_out_as_hardware_likes(
     renderer: Renderer, surfels: Draw, camera: Camera, monkeypatch: pytest.MonkeyPatch

@@ -310,7 +310,7 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
     assert stats["timer"] in ("query", "finish")
     assert (stats["backend"], stats["params"], stats["size"]) == (
         "points",
-        {"point_size": 2, "hide_hidden": False},
+        {"point_size": 2, "hide_hidden": False, "share": 1.0},
         [96, 64],
     )
     assert (stats["automatic"], stats["drawn_size"]) == (None, [96, 64])
