@@ -14,6 +14,7 @@ import queue
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
@@ -29,6 +30,8 @@ from viewer.app.scene.view import words_over
 from viewer.document.measurements import Measurements
 from viewer.document.schema import plain
 
+FIELDS = ("input_text", "input_text_with_hint")  # functions of ImGui
+
 
 class Observer:
     """Writes a line for each turn."""
@@ -41,7 +44,22 @@ class Observer:
         self._is_acting = False
         self._problem = ""
         self._told = 0
+        self._fields: tuple[int, dict[str, str]] = 0, {}  # frame; the text of each field in it, by its label
+        for name in FIELDS:
+            setattr(imgui, name, self._noting(getattr(imgui, name)))
         threading.Thread(target=self._listen, daemon=True).start()
+
+    def _noting(self, field: Callable[..., tuple[bool, str]]) -> Callable[..., tuple[bool, str]]:
+        """A function of ImGui that declares a text field, and notes the field's text."""
+
+        def declare(label: str, *arguments: Any) -> tuple[bool, str]:
+            changed, text = field(label, *arguments)
+            if self._fields[0] != imgui.get_frame_count():
+                self._fields = imgui.get_frame_count(), {}
+            self._fields[1][label] = text
+            return changed, text
+
+        return declare
 
     def _listen(self) -> None:
         for line in sys.stdin:
@@ -61,6 +79,7 @@ class Observer:
             "problem": self._problem,
             "is_idle": is_idle(app),
             "notes": notes,
+            "fields": self._fields[1] if self._fields[0] == imgui.get_frame_count() else {},
             **shown(app),
         }
         self._lines.write(json.dumps(state) + "\n")

@@ -33,6 +33,7 @@ _KEYS = {
     **{f"F{n}": getattr(imgui.Key, f"f{n}") for n in range(1, 13)},
 }
 _SHIFT = int(imgui.Key.mod_shift)
+_MODIFIER_BITS = sum(int(bit) for bit in _MODIFIERS.values())
 _ARROWS = {"Right": (1, 0), "Left": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 # What leads the keyboard through widgets, and works them.
 _WIDGETS_OWN = {
@@ -80,6 +81,7 @@ class Keys:
         self._chords = [
             (self._commands[name], keys) for name, text in self.of.items() for keys in chords(text)
         ]
+        self._used: imgui.Key | None = None  # the key of the last command, until it is released
 
     def has(self, keys: str) -> bool:
         """Whether a command has these keys."""
@@ -98,6 +100,26 @@ class Keys:
     def handle(self, app: App) -> None:
         """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there,
         and to widgets those that lead through them."""
+        self._run_commands(app)
+        self._drop_characters()
+
+    def _drop_characters(self) -> None:
+        """Keep the characters of a key that ran a command out of the text field that the command opened.
+
+        The system sends a character with the key, or later, and again while the user holds the key. Another
+        key ends this: what the user types next goes into the field.
+        """
+        if self._used is None:
+            return
+        others = (key for key in _KEYS.values() if key != self._used)
+        if any(imgui.is_key_pressed(key, repeat=False) for key in others):
+            self._used = None
+            return
+        imgui.get_io().input_queue_characters.clear()
+        if not imgui.is_key_down(self._used):
+            self._used = None
+
+    def _run_commands(self, app: App) -> None:
         if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
             return
         is_in_widgets = app.keyboard.part != VIEW or app.help.focused is not None
@@ -108,6 +130,7 @@ class Keys:
             flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
             with app.failures.told(command.title):
                 if imgui.shortcut(pressed, flags) and command.can(app):
+                    self._used = imgui.Key(pressed & ~_MODIFIER_BITS)
                     command.act(app)
 
 
