@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from .imports import explain_missing_packages
+
 TYPE_CHECKING = False  # as `typing` has it, which takes its time to import
 if TYPE_CHECKING:
     from typing import Any
@@ -37,6 +39,9 @@ _HOMES = {
     "estimate_normals": "analysis.visible_normals",
     "open_scan": "scan.open",
 }
+
+
+explain_missing_packages()
 
 
 def __getattr__(name: str) -> object:

@@ -36,6 +36,10 @@ class InputError(Scan4DError):
     exit_code = 2
 
 
+class MissingPackageError(InputError, ModuleNotFoundError):
+    """A library that is not installed (viewer/imports.py)."""
+
+
 class NoOpenGLError(Scan4DError):
     """No OpenGL that Scan4D can use."""
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import Run
+from missing import leave_out
 
 from viewer.bench.report.results import RESULTS, read_rows
 from viewer.bench.run import Bench
@@ -248,16 +249,16 @@ def test_points_without_faces_are_no_scene(refused: Refused, tmp_path: Path) -> 
 
 
 def test_a_missing_library_is_told(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "_LIBRARIES", ("numpy", "no_such_library"))
+    leave_out(monkeypatch, "jinja2", "skimage")
     message = refused("bench", "-o", tmp_path)
-    assert "no_such_library" in message
-    assert "scan4d[bench]" in message
+    assert "not installed: jinja2, skimage. " in message
+    assert message.endswith("-m pip install jinja2 scikit-image\n")
 
 
 def test_what_octrees_are_compared_with_is_needed_for_them_alone(
     refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench, "find_spec", lambda name: None if name == "DracoPy" else name)
+    leave_out(monkeypatch, "DracoPy")
     assert "DracoPy" in refused("bench", "--suite", "octrees", "-o", tmp_path)
     assert "DracoPy" not in refused("bench", "--scene", "nowhere", "-o", tmp_path)
 

@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 from itertools import chain, count, product
 from pathlib import Path
 
@@ -40,6 +39,7 @@ from ..bench.suites import PAGE_SUITES
 from ..choice.known import keep_model
 from ..errors import InputError, explained
 from ..files import whole_file
+from ..imports import require
 from ..signals import held_interrupts
 from . import _arguments as arguments
 from . import _drawing as drawing
@@ -114,7 +114,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Measure, report, compare, or only report. 1 where Ctrl-C stopped it."""
-    _check_libraries(args.suite)
+    require(*_LIBRARIES, *(("DracoPy",) if args.suite == "octrees" else ()))
     if args.calibrate:
         return _calibrate(args)
     if args.report:
@@ -357,12 +357,3 @@ def _make_folder(out: Path) -> None:
 def _write_notes(out: Path, notes: Sequence[str]) -> None:
     with whole_file(out / NOTES) as path:
         path.write_text("".join(f"{note}\n" for note in notes), encoding="utf-8")
-
-
-def _check_libraries(suite: str | None) -> None:
-    needed = (*_LIBRARIES, *(("DracoPy",) if suite == "octrees" else ()))
-    missing = [name for name in needed if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"the benchmark needs {', '.join(missing)}", hint="Install them: pip install 'scan4d[bench]'"
-        )

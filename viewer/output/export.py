@@ -24,7 +24,7 @@ from zlib import Z_RLE
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, explained
+from ..errors import InputError, MissingPackageError, explained
 from ..files import open_plain, whole_file
 from ..look import Look, rgba
 from ..native import OPENEXR, unsaid
@@ -162,6 +162,8 @@ def read_description(path: Path) -> str:
     """The description that a .png or .exr carries. Raises InputError where there is none."""
     try:
         text = (_png_texts if path.suffix.lower() == ".png" else _exr_header)(path).get(_DESCRIPTION)
+    except MissingPackageError:
+        raise
     except Exception as error:  # whatever a damaged picture does to a reader
         if isinstance(error, OSError) and error.errno:
             what, hint = explained(error)

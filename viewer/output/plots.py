@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +14,8 @@ from numpy.typing import NDArray
 from ..analysis.measures.curves import BAND_SIGMAS, PER_ORDER, MeasureCurve
 from ..analysis.trajectories import Trajectory
 from ..csv_text import save_rows
-from ..errors import InputError
 from ..files import whole_file
+from ..imports import require
 from ..scan.units import Scale
 
 if TYPE_CHECKING:
@@ -155,9 +154,9 @@ class CurvePlot:
 
 
 def check_plot(path: Path) -> None:
-    """Raise InputError where a picture is wanted, by the file's suffix, and matplotlib is not there."""
-    if path.suffix.lower() != ".csv" and find_spec("matplotlib") is None:
-        raise InputError("pictures of plots need matplotlib", path, "Install it: pip install 'scan4d[plots]'")
+    """Raise MissingPackageError where a picture is wanted, by the suffix, and matplotlib is missing."""
+    if path.suffix.lower() != ".csv":
+        require("matplotlib")
 
 
 def color_of_curve(number: int) -> int:
