@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import os
+import re
+import secrets
 import signal
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from viewer.errors import InputError
 from viewer.files import whole_file
 from viewer.helper import start_python
-from viewer.unfinished import remove_leftovers, temporary_name
+from viewer.unfinished import remove_leftovers, temporary_file, temporary_folder
 
+TOKEN = "0123456789abcdef"
 ROOT = Path(__file__).resolve().parents[1]
 WORK = """
 import sys, time
@@ -79,6 +85,15 @@ def test_what_a_living_process_makes_stays(folder: Path) -> None:
 
 
 @posix
+def test_nobody_else_can_read_what_is_made(folder: Path, notes: Path) -> None:
+    with at_work(folder):
+        assert stat.S_IMODE(notes.stat().st_mode) == stat.S_IMODE(notes.parent.stat().st_mode) == 0o700
+        assert [stat.S_IMODE(path.stat().st_mode) for path in notes.iterdir()] == [0o600] * 2
+        (inside,) = (path for path in folder.iterdir() if path.is_dir())
+        assert stat.S_IMODE(inside.stat().st_mode) == 0o700
+
+
+@posix
 def test_who_ends_well_leaves_no_notes(folder: Path, notes: Path) -> None:
     subprocess.run([sys.executable, "-c", WRITE, str(folder / "a.txt")], cwd=ROOT, check=True)
     assert [path.name for path in folder.iterdir()] == ["a.txt"]
@@ -90,20 +105,25 @@ def test_nothing_but_our_own_is_removed_whatever_is_noted(
     folder: Path, notes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
-    for name in ("a.png", ".bashrc", ".scan4d", ".scan4d_file", ".a.part.png", "a.1.part.png"):
+    for name in ("a.png", ".bashrc", ".scan4d", f".scan4d_{TOKEN}", ".a.part.png", f"a.{TOKEN}.part.png"):
         (folder / name).write_text("precious")
-    for name in ("b", ".a.1.part.png", ".scan4d_"):
+    for name in ("b", f".a.{TOKEN}.part.png", ".scan4d_"):
         (folder / name).mkdir()
         (folder / name / "c").write_text("precious")
-    (folder / ".scan4d_link").symlink_to(folder / "b")
-    (folder / ".b.1.part.txt").symlink_to(folder / "a.png")
-    (folder / ".relative.1.part.png").write_text("precious")
+    (folder / f".scan4d_{TOKEN[::-1]}").symlink_to(folder / "b")
+    (folder / f".b.{TOKEN}.part.txt").symlink_to(folder / "a.png")
+    (folder / f".relative.{TOKEN}.part.png").write_text("precious")
     (tmp_path / "through").symlink_to(folder)
-    (folder / ".linked.1.part.png").write_text("precious")
+    (folder / f".linked.{TOKEN}.part.png").write_text("precious")
     before = sorted(folder.rglob("*"))
     places = [str(path) for path in [*before, folder, folder / "b" / "..", "/", tmp_path]]
     places = [place for place in places if "linked" not in place and "relative" not in place]
-    places += [".relative.1.part.png", str(tmp_path / "through" / ".linked.1.part.png"), "", "\udcff"]
+    places += [
+        f".relative.{TOKEN}.part.png",
+        str(tmp_path / "through" / f".linked.{TOKEN}.part.png"),
+        "",
+        "\udcff",
+    ]
     notes.mkdir(parents=True)
     (notes / "1_a.lock").touch()
     (notes / "1_a").write_bytes(b"\0".join(map(os.fsencode, places)))
@@ -115,11 +135,12 @@ def test_nothing_but_our_own_is_removed_whatever_is_noted(
 def test_what_stands_inside_a_link_of_a_folder_stays(folder: Path, notes: Path) -> None:
     (folder / "kept").mkdir()
     (folder / "kept" / "a").write_text("precious")
-    (folder / ".scan4d_1").mkdir()
-    (folder / ".scan4d_1" / "link").symlink_to(folder / "kept")
+    made = folder / f".scan4d_{TOKEN}"
+    made.mkdir()
+    (made / "link").symlink_to(folder / "kept")
     notes.mkdir(parents=True)
     (notes / "1_a.lock").touch()
-    (notes / "1_a").write_bytes(os.fsencode(folder / ".scan4d_1"))
+    (notes / "1_a").write_bytes(os.fsencode(made))
     remove_leftovers()
     assert sorted(path.name for path in folder.rglob("*")) == ["a", "kept"]
 
@@ -139,14 +160,64 @@ def test_without_a_cache_folder_files_are_written(tmp_path: Path, monkeypatch: p
 def test_a_name_as_long_as_can_be_is_written(folder: Path, stem: str) -> None:
     path = folder / f"{stem}.txt"
     with whole_file(path) as temporary:
-        assert temporary == temporary_name(path)
+        assert [entry.name for entry in folder.iterdir()] == [temporary.name]
         temporary.write_text("whole")
     assert [entry.name for entry in folder.iterdir()] == [path.name]
 
 
-def test_long_names_that_differ_in_their_number_have_files_of_their_own() -> None:
-    names = {temporary_name(Path("n" * 240 + f"{number:04d}.png")) for number in range(100)}
-    assert len(names) == 100
+@posix
+def test_no_file_is_made_where_another_has_planted_a_link(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even where the name can be foretold: the link stays, and so does what it leads to."""
+    monkeypatch.setattr(secrets, "token_hex", lambda size: "0" * 2 * size)
+    (tmp_path / "precious").write_text("precious")
+    with whole_file(folder / "a.txt") as temporary:
+        name = temporary.name
+    for target in ("precious", "missing"):
+        (folder / name).symlink_to(tmp_path / target)
+        with pytest.raises(InputError, match="cannot be written"), whole_file(folder / "a.txt") as temporary:
+            temporary.write_text("planted")
+        assert (tmp_path / "precious").read_text() == "precious"
+        assert not (tmp_path / "missing").exists()
+        (folder / name).unlink(missing_ok=True)
+    (folder / f".scan4d_{'0' * 16}").symlink_to(tmp_path)
+    with pytest.raises(FileExistsError), temporary_folder(folder):
+        pass
+
+
+def test_names_of_temporary_files_are_made_by_chance(folder: Path) -> None:
+    names = set()
+    for _ in range(20):
+        with temporary_file(folder / "a.txt") as file, temporary_folder(folder) as inside:
+            names |= {file.name, inside.name}
+    assert len(names) == 40
+    assert all(len(set(re.findall("[0-9a-f]{16}", name))) == 1 for name in names)
+    assert not any(str(os.getpid()) == part for name in names for part in name.split("."))
+
+
+@posix
+def test_what_is_left_of_unpacking_goes_at_the_next_start(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process that is killed while it reads LAZ leaves its unpacked points; any command removes them."""
+    import laspy
+
+    monkeypatch.setenv("TMPDIR", str(folder))
+    rng = np.random.default_rng(0)
+    las = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+    las.x, las.y, las.z = rng.normal(size=(3, 2_000_000))
+    las.write(tmp_path / "a.laz")
+    command = [sys.executable, "-m", "viewer.cli", "info"]
+    with subprocess.Popen([*command, str(tmp_path / "a.laz")], cwd=ROOT) as process:
+        while not any(path.stat().st_size for path in folder.rglob("plain.las")):
+            assert process.poll() is None
+        (kept,) = folder.iterdir()
+        assert stat.S_IMODE(kept.stat().st_mode) == 0o700
+        process.kill()
+    assert list(folder.rglob("plain.las"))
+    subprocess.run([*command, "demo"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    assert list(folder.iterdir()) == []
 
 
 @posix

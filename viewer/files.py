@@ -19,9 +19,10 @@ from .unfinished import temporary_file
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """A temporary path in the same folder; it becomes `path` only if the block ends well.
+    """A temporary file in the same folder; it becomes `path` only if the block ends well.
 
-    Whatever goes wrong, a former file of that name stays as it was and nothing else remains.
+    Whatever goes wrong, a former file of that name stays as it was and nothing else remains. Only this user
+    can read files in Scan4D's own folders, which are made where they are missing (see `new_file`).
     Raises InputError where the file cannot be written.
     """
     path = Path(path)
@@ -35,6 +36,15 @@ def whole_file(path: Path | str) -> Iterator[Path]:
     except OSError as error:
         what, hint = explained(error)
         raise InputError(f"cannot be written: {what}", path, hint) from error
+
+
+def output_folder(path: Path) -> None:
+    """Make a folder that the user has named for output, where it is missing. Raises InputError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be made: {what}", path, hint) from error
 
 
 def _store(path: Path) -> None:

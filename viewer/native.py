@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import re
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
+
+from .unfinished import nameless_file
 
 OPENEXR = re.compile(rb".*\(EXR_ERR_\w+\)|\s*$")  # the lines of OpenEXR, and empty ones
 # Those of libtiff, which begin with the name of a function or of a file of Pillow's, and no exception's.
@@ -27,7 +28,7 @@ def unsaid(lines: re.Pattern[bytes]) -> Iterator[None]:
     """
     with _turn:
         try:
-            before, kept = os.dup(_STDERR), tempfile.TemporaryFile()  # noqa: SIM115
+            before, kept = os.dup(_STDERR), nameless_file()
         except OSError:  # it is closed, or there is no room: then they are not left out
             yield
             return

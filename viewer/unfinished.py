@@ -1,8 +1,8 @@
-"""Temporary files and folders, noted for this user before they are made and until they are gone.
+"""Temporary files and folders: all that Scan4D makes are made here.
 
-Who is killed cannot tidy up. Each process notes what it makes in a file of its own in the cache folder,
-beside a lock that it holds as long as it lives: where the lock is free, what is noted is deleted at the
-next start of whoever writes.
+Nobody can foretell their names, and none is made through a link. A killed process cannot tidy up: so each
+process notes what it makes in a file of its own in the cache folder, beside a lock that it holds while it
+lives. Where the lock is free, the next start of Scan4D deletes what is noted.
 """
 
 from __future__ import annotations
@@ -13,41 +13,59 @@ import re
 import secrets
 import shutil
 import stat
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from .folders import cache_folder
+from .folders import cache_folder, new_file, new_folder, own_folder
 
-_FILE = re.compile(r"\..+\.[0-9]+\.part(\.[^.]+)?", re.DOTALL)  # as `temporary_name` has it
-_FOLDER = re.compile(r"\.scan4d_[0-9a-z_]+")
+_TOKEN = 8  # bytes of chance in a name
+_FILE = re.compile(rf"\..+\.[0-9a-f]{{{2 * _TOKEN}}}\.part(\.[^.]+)?", re.DOTALL)  # as `_beside` has it
+_FOLDER = re.compile(rf"\.scan4d_[0-9a-f]{{{2 * _TOKEN}}}")
 _LONGEST_NAME = 255  # bytes, on the file systems of today
 _LOCK = ".lock"
 
 
-def temporary_name(path: Path) -> Path:
-    """The file beside `path` that becomes it. A name that would be too long keeps its end, the number."""
-    stem, rest = path.stem, f".{os.getpid()}.part{path.suffix}"
-    while stem[1:] and len(os.fsencode(f".{stem}{rest}")) > _LONGEST_NAME:
-        stem = stem[1:]
-    return path.with_name(f".{stem}{rest}")
-
-
 @contextmanager
 def temporary_file(path: Path) -> Iterator[Path]:
-    """The name of a temporary file beside `path`; the file is deleted at the end, if it is still there."""
-    with _noted(temporary_name(path)) as temporary:
+    """A new, empty file beside `path`, which may become it; deleted at the end, if it is still there.
+
+    Raises OSError where it cannot be made.
+    """
+    with _noted(_beside(path)) as temporary:
+        os.close(new_file(temporary))
         yield temporary
 
 
 @contextmanager
-def temporary_folder(parent: Path) -> Iterator[Path]:
-    """A new folder in this one, `.scan4d_*`; it is deleted at the end, with all in it. Raises OSError."""
-    with _noted(parent / f".scan4d_{secrets.token_hex(4)}") as folder:
-        folder.mkdir(mode=0o700)
+def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
+    """A new folder that only this user can read; deleted at the end, with all in it. Raises OSError.
+
+    parent: the folder to make it in. None: the system's folder of temporary files.
+    """
+    parent = Path(tempfile.gettempdir()) if parent is None else parent
+    with _noted(parent / f".scan4d_{secrets.token_hex(_TOKEN)}") as folder:
+        new_folder(folder)
         yield folder
+
+
+def nameless_file(folder: Path | None = None) -> IO[bytes]:
+    """A file without a name, which is gone when it is closed, however this process ends. Raises OSError.
+
+    folder: where to make it. None: the system's folder of temporary files.
+    """
+    return tempfile.TemporaryFile(dir=folder)
+
+
+def _beside(path: Path) -> Path:
+    """A name for a file that becomes `path`. One that would be too long loses its beginning."""
+    stem, rest = path.stem, f".{secrets.token_hex(_TOKEN)}.part{path.suffix}"
+    while stem[1:] and len(os.fsencode(f".{stem}{rest}")) > _LONGEST_NAME:
+        stem = stem[1:]
+    return path.with_name(f".{stem}{rest}")
 
 
 def remove_leftovers() -> None:
@@ -107,12 +125,12 @@ class _Notes:
         from filelock import FileLock
 
         folder = _folder()
-        folder.mkdir(parents=True, exist_ok=True)
+        own_folder(folder)
         lock_file = folder / f"{os.getpid()}_{secrets.token_hex(4)}{_LOCK}"
-        lock = FileLock(lock_file, timeout=1, thread_local=False, fallback_to_soft=False)
+        lock = FileLock(lock_file, timeout=1, mode=0o600, thread_local=False, fallback_to_soft=False)
         lock.acquire()  # Timeout is an OSError
         self.lock_file, self._lock = lock_file, lock
-        self._stream = open(lock_file.with_suffix(""), "ab", buffering=0)  # noqa: SIM115
+        self._stream = os.fdopen(new_file(lock_file.with_suffix("")), "wb", buffering=0)
 
     def _end(self) -> None:
         """Delete what an interrupt of the tidying has left, and the notes."""

@@ -66,6 +66,7 @@ def test_without_a_file_the_usual_keys_hold(file: Path) -> None:
 
 
 def test_the_template_changes_nothing_and_each_line_of_it_can_be_used(file: Path) -> None:
+    file.parent.mkdir()
     write_template(file, COMMANDS)
     keys, problems = load_keys(file, COMMANDS)
     assert (keys.of, problems) == (USUAL, [])

@@ -62,7 +62,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    return tmp_path / "new" / settings.FILE
+    return tmp_path / "home" / "scan4d" / settings.FILE
 
 
 def written(file: Path, data: Any) -> Path:

@@ -128,12 +128,12 @@ def test_the_page_of_choices(tmp_path: Path) -> None:
 def test_a_device_is_calibrated_and_chosen_for(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, renderer: Renderer
 ) -> None:
-    monkeypatch.setattr(known, "user_folder", lambda: tmp_path / "settings")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
     scene = ("--scene", "torus", "--views", "2", "--size", "120x80")
     small = (*scene, "-o", tmp_path / "out")
     done = run("bench", "--calibrate", *small)
     assert done.code == 0, done.err
-    file = tmp_path / "settings" / known.FILE
+    file = tmp_path / "settings" / "scan4d" / known.FILE
     assert str(file) in done.out
     assert known.model_of(renderer.gpu) == laws_of(read_rows(tmp_path / "out" / WAYS))
     assert run("bench", "--calibrate", *small).code == 2  # the rows are there

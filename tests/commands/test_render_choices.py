@@ -23,9 +23,8 @@ MODEL = read_models(resource_path("assets", known.FILE))["software"]
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's folder in which nothing is kept yet."""
-    folder = tmp_path / "settings"
-    monkeypatch.setattr(known, "user_folder", lambda: folder)
-    return folder
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    return tmp_path / "settings" / "scan4d"
 
 
 def drawn(run: Run, scan: Path, folder: Path, *args: object) -> tuple[dict[str, Any], Path]:
@@ -109,7 +108,7 @@ def test_the_model_of_the_device_comes_before_the_one_that_is_shipped(
 
 
 def test_a_damaged_file_counts_as_none(run: Run, scans: Path, tmp_path: Path, own_folder: Path) -> None:
-    own_folder.mkdir()
+    own_folder.mkdir(parents=True)
     for text in ("", "[", '{"format": 1, "models": 3}', '{"format": 9, "models": {}}'):
         (own_folder / known.FILE).write_text(text)
         assert read_models(own_folder / known.FILE) == {}

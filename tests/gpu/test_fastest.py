@@ -40,7 +40,7 @@ def ways(calls: list[str]) -> Callable[[], dict[str, Callable[[], None]]]:
 
 
 def test_it_is_measured_once(renderer: Renderer, tmp_path: Path) -> None:
-    file, calls = tmp_path / "cache" / "fastest.json", list[str]()
+    file, calls = tmp_path / "fastest.json", list[str]()
     assert fastest(renderer.gpu, "a task", NAMES, ways(calls), file) == "quick"
     assert {"slow", "quick"} == set(calls)
     calls.clear()

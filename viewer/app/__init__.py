@@ -53,8 +53,6 @@ def run(
     with Signals() as signals:
         with uncollected():
             from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
-            from ..task import Task, in_background
-            from ..unfinished import remove_leftovers
             from . import settings
             from .app import App
             from .files.keeping import take_over
@@ -77,7 +75,6 @@ def run(
                     app.note(note)
                 app.scans.tell([refused, *problems] if refused else problems)
                 app.capture.find_unfinished()
-                in_background(Task("Tidying"), remove_leftovers)
                 if device is not None:
                     app.note("The display's own GPU draws the window; a device number has no effect on it.")
                 if replay is not None:

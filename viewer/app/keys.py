@@ -226,7 +226,6 @@ def write_template(path: Path, commands: Commands) -> None:
     named = " ".join(_NAMED)
     lines = [f"# {name} = {_quoted(command.key)}  # {command.title}" for name, command in commands.of.items()]
     with whole_file(path) as temporary:
-        path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_text(_HEAD.format(named=named) + "\n".join(lines) + "\n", encoding="utf-8")
 
 

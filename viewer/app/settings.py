@@ -165,10 +165,9 @@ def load(path: Path) -> tuple[Settings, list[str]]:
 
 
 def save(settings: Settings, path: Path) -> None:
-    """Write the file, and its folder. Raises InputError where it cannot be written."""
+    """Write the file. Raises InputError where it cannot be written."""
     text = json.dumps(settings.to_json(), indent=1)
     with whole_file(path) as temporary:
-        path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_text(text + "\n", encoding="utf-8")
 
 

@@ -22,7 +22,7 @@ from .. import __version__
 from ..backends import backend
 from ..camera import Camera
 from ..errors import InputError
-from ..files import whole_file
+from ..files import output_folder, whole_file
 from ..frame import Request
 from ..gpu.surface import Surface
 from ..look import Look
@@ -392,7 +392,7 @@ def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:
     true = {"image": judge.image, "depth": reference.depth, "normal": reference.normal}
     drawn = {"image": surface.image(), "depth": surface.depth, "normal": surface.normal}
     panels = side_by_side(true, drawn, footprint(reference.view, reference.depth))
-    path.parent.mkdir(parents=True, exist_ok=True)
+    output_folder(path.parent)
     with whole_file(path) as temporary:
         Image.fromarray(panels).save(temporary)
 

@@ -56,10 +56,9 @@ def read_models(file: Path) -> dict[str, Model]:
 
 
 def write_models(models: Mapping[str, Model], file: Path) -> None:
-    """Write models by device, and the folder. Raises InputError where that is not possible."""
+    """Write models by device. Raises InputError where that is not possible."""
     plain = {device: {key: asdict(law) for key, law in model.items()} for device, model in models.items()}
     with whole_file(file) as temporary:
-        file.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_text(
             json.dumps({"format": FORMAT, "models": plain}, indent=1) + "\n", encoding="utf-8"
         )

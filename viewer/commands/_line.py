@@ -12,6 +12,7 @@ from ..errors import InputError, Scan4DError
 from ..imports import uncollected
 from ..signals import ending_as_interrupts, ignore_from_now_on
 from ..task import listening
+from ..unfinished import remove_leftovers
 from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, escaped, quietly
 from ._parsing import parsed
 
@@ -47,6 +48,7 @@ def _run(words: Sequence[str]) -> int:
         with uncollected():
             args = parsed(words)
         with quietly(args.quiet), _logged(args.debug), listening(Delays()), ending_as_interrupts():
+            remove_leftovers()
             return args.run(args)
     except SystemExit as stop:  # --help, --version
         return int(stop.code or 0)

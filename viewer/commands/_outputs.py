@@ -10,7 +10,6 @@ from pathlib import Path
 
 from ..errors import InputError, explained
 from ..scan.inputs import found_among
-from ..unfinished import remove_leftovers
 from ._console import escaped
 
 
@@ -23,10 +22,8 @@ def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
     """Raise InputError, before any work, where these files are not to be written.
 
     Refused are inputs of the command, under whatever name (links as well); and what is there already, unless
-    force is told or a person at the terminal agrees. inputs: they need not be there. What killed processes
-    have left behind is removed on the way.
+    force is told or a person at the terminal agrees. inputs: they need not be there.
     """
-    remove_leftovers()
     for path in found_among(outputs, inputs):
         raise InputError("is read by this command, and is not replaced", path, "Write to another file")
     there = [path for path in outputs if _is_there(path)]

@@ -38,7 +38,7 @@ from ..bench.scenes import catalog
 from ..bench.suites import PAGE_SUITES
 from ..choice.known import keep_model
 from ..errors import InputError, explained
-from ..files import whole_file
+from ..files import output_folder, whole_file
 from ..imports import require
 from ..signals import held_interrupts
 from . import _arguments as arguments
@@ -139,7 +139,7 @@ def run(args: Namespace) -> int:
     tested = names if args.suite in (None, "numerics") else []
     bench = Bench(drawing.renderer(args.device), settings, args.out)
     _claim(args, settings, groups, bool(tested))
-    _make_folder(args.out)
+    output_folder(args.out)
     for name in missing:
         warn(name)
 
@@ -180,7 +180,7 @@ def _calibrate(args: Namespace) -> int:
     renderer = drawing.renderer(args.device)
     if not args.report:
         claim([args.out / WAYS, args.out / NOTES], [*map(Path, args.scene or ())], args.force)
-        _make_folder(args.out)
+        output_folder(args.out)
         bench = Bench(renderer, settings)
         scenes = args.scene or (_QUICK_CALIBRATION if args.quick else SCENES)
         with held_interrupts() as bench.interrupts:
@@ -259,9 +259,9 @@ def _write(path: Path, bench: Bench, steps: int, rows: Iterator[Row]) -> bool:
         if first is None:
             return False
         try:
-            if path.is_file() and path.stat().st_size:
+            if os.path.lexists(path):
                 path.replace(_free_beside(path))
-            with open(path, "w", encoding="utf-8") as stream:
+            with open(path, "x", encoding="utf-8") as stream:
                 for row in chain([first], rows):
                     write_row(stream, row)
         except OSError as error:
@@ -344,14 +344,6 @@ def _groups(args: Namespace, settings: BenchSettings, names: Sequence[str]) -> t
 def _left_out(missing: Mapping[str, str]) -> list[str]:
     """Sentences on scenes that cannot be had, by name with the reason."""
     return [f"{name} is left out: {reason}" for name, reason in missing.items()]
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be written: {what}", out, hint) from error
 
 
 def _write_notes(out: Path, notes: Sequence[str]) -> None:

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from ..document.recording import Recording, is_recording, place_of
 from ..document.saved_session import SavedSession, is_session
-from ..errors import InputError, NoOpenGLError, explained
-from ..files import printable
+from ..errors import InputError, NoOpenGLError
+from ..files import output_folder, printable
 from ..frame import Request
 from ..look import Look
 from ..output.export import contact_sheet, film, thumbnail, write_png
@@ -27,7 +27,6 @@ from ..scan.open import DEMO
 from ..scan.pods import first_camera
 from ..scan.timeline import Timeline
 from ..timing import draw
-from ..unfinished import remove_leftovers
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
@@ -120,7 +119,6 @@ def _open_window(args: Namespace, named: _Named, first: Timeline, refused: Input
         )
     from .. import app
 
-    remove_leftovers()
     return app.run(
         named.scans, opened=first, unit=args.unit, fps=args.fps, up=args.up, device=args.device,
         replay=named.replay, session=named.session, refused=refused,
@@ -129,11 +127,7 @@ def _open_window(args: Namespace, named: _Named, first: Timeline, refused: Input
 
 def _play_all(args: Namespace, timelines: Sequence[Timeline]) -> None:
     """Play the scans into the folder of --fallback."""
-    try:
-        args.fallback.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be made: {what}", args.fallback, hint) from error
+    output_folder(args.fallback)
     prefixes = [f"{number}_" if len(timelines) > 1 else "" for number in range(len(timelines))]
     outputs: list[Path] = []
     inputs: list[Path] = []

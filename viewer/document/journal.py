@@ -19,6 +19,7 @@ from typing import Any
 from .. import __version__
 from ..errors import InputError, explained
 from ..files import free_file, read_text
+from ..folders import new_file, own_folder, state_folder
 from ..scan.open import is_demo
 from .recording import FORMAT, Recording
 from .schema import DAMAGED
@@ -35,13 +36,13 @@ class Journal:
         from filelock import FileLock
 
         journals = journal_folder()
-        journals.mkdir(parents=True, exist_ok=True)
+        own_folder(journals)
         self._path = journals / f"{os.getpid()}_{secrets.token_hex(4)}{_SUFFIX}"
         self._lock = FileLock(
-            self._path.with_suffix(_LOCK), timeout=1, thread_local=False, fallback_to_soft=False
+            self._path.with_suffix(_LOCK), timeout=1, mode=0o600, thread_local=False, fallback_to_soft=False
         )
         self._lock.acquire()
-        self._stream = open(self._path, "ab", buffering=0)  # noqa: SIM115
+        self._stream = os.fdopen(new_file(self._path), "wb", buffering=0)
         self.add({"format": FORMAT, "version": __version__, "folder": str(folder)})
 
     def add(self, change: Mapping[str, Any]) -> None:
@@ -178,6 +179,4 @@ def _delete(journal: Path) -> None:
 
 def journal_folder() -> Path:
     """The folder of this user's journals; it need not be there yet."""
-    import platformdirs
-
-    return platformdirs.user_state_path("scan4d", appauthor=False) / "recordings"
+    return state_folder() / "recordings"

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ..errors import InputError, Scan4DError, explained
 from ..files import printable
+from ..folders import new_file, new_folder
 from ..helper import start_python
 from ..output.export import numbered
 from ..scan.open import searches_folders
@@ -57,7 +58,7 @@ def make(
     with _folder_beside(out) as folder:
         told_once, made = folder / "recording.json", folder / "made"
         recording.save(told_once)
-        made.mkdir()
+        new_folder(made)
         arguments = ["render", "--replay", str(told_once), "-o", str(made / out.name)]
         arguments += ["--fps", f"{fps:.17g}", "--progress", *(["--anonymous"] if anonymous else [])]
         scan = recording.entries[0].scan
@@ -113,7 +114,7 @@ def _run(task: Task, arguments: list[str], said: Path, told_once: Path) -> tuple
     """
     program = f"from runpy import run_module; run_module({_PROGRAM!r}, run_name='__main__')"
     with (
-        open(said, "wb") as stream,
+        os.fdopen(new_file(said), "wb") as stream,
         start_python(program, *arguments, nice=_NICE, stdin=subprocess.DEVNULL, stderr=stream) as process,
     ):
         device = _follow(task, process, told_once)

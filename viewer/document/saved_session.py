@@ -22,8 +22,8 @@ from typing import Annotated, Any
 
 from .. import __version__
 from ..errors import InputError, explained
-from ..files import absolute, open_plain, whole_file
-from ..folders import user_folder
+from ..files import absolute, open_plain, output_folder, whole_file
+from ..folders import new_file, user_folder
 from ..scan.open import is_demo
 from .document import Document
 from .schema import (
@@ -95,9 +95,8 @@ class SavedSession:
         return str(InputError(what, self.scan, "They stay in its file, for a Scan4D that can"))
 
     def save(self, path: Path) -> None:
-        """Write the file, and its folder. Raises InputError where it cannot be written."""
+        """Write the file. Raises InputError where it cannot be written."""
         with whole_file(path) as temporary:
-            path.parent.mkdir(parents=True, exist_ok=True)
             temporary.write_bytes(self._text)
 
     @property
@@ -105,7 +104,11 @@ class SavedSession:
         return (json.dumps(self.to_json(), indent=1) + "\n").encode()
 
     def export(self, path: Path) -> None:
-        """Write the file with the scan named from its folder, so that both can be moved together."""
+        """Write the file with the scan named from its folder, so that both can be moved together.
+
+        The folder is made where it is missing.
+        """
+        output_folder(path.parent)
         replace(self, scan=_named_from(path.parent, self.scan)).save(path)
 
     @classmethod
@@ -231,7 +234,7 @@ def _put_aside(path: Path) -> Path:
     for number in count(1):
         aside = path.with_name(f"{path.stem}.old-{number}{SUFFIX}")
         try:
-            aside.touch(exist_ok=False)
+            os.close(new_file(aside))
             os.replace(path, aside)
             return aside
         except FileExistsError:

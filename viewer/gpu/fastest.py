@@ -49,10 +49,8 @@ def fastest(
         with gpu.timers.paused():
             times = _times(gpu, ways())
         remembered[key] = min(times, key=lambda name: times[name], default=names[0])
-        with suppress(InputError, OSError):
-            file.parent.mkdir(parents=True, exist_ok=True)
-            with whole_file(file) as temporary:
-                temporary.write_text(json.dumps(remembered, indent=1), encoding="utf-8")
+        with suppress(InputError), whole_file(file) as temporary:
+            temporary.write_text(json.dumps(remembered, indent=1), encoding="utf-8")
     return remembered[key]
 
 

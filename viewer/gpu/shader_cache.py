@@ -10,9 +10,9 @@ import os
 import sys
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryFile
 
 from ..errors import explained
+from ..unfinished import nameless_file
 
 _DISABLE = "MESA_SHADER_CACHE_DISABLE"
 _FOLDER = "mesa_shader_cache"
@@ -61,5 +61,5 @@ def _try_to_write(folder: Path) -> None:
     """Raise OSError where the folder has no room for a cache; it need not be there yet."""
     while not os.path.lexists(folder):
         folder = folder.parent
-    with TemporaryFile(dir=folder) as file:
+    with nameless_file(folder) as file:
         os.posix_fallocate(file.fileno(), 0, _ROOM)

@@ -157,7 +157,9 @@ def remeasure_tables(page: Path, *tables: Callable[[], str]) -> None:
     made_by = {table.__name__: table for table in tables}
     for name in sys.argv[1:] or made_by:
         made = made_by[name]()
-        page.write_text(put_tables(page.read_text(encoding="utf-8"), {name: made}), encoding="utf-8")
+        text = put_tables(page.read_text(encoding="utf-8"), {name: made})
+        with whole_file(page) as temporary:
+            temporary.write_text(text, encoding="utf-8")
         print(f"{name}\n{made}\n", flush=True)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError
-from ...files import whole_file
+from ...files import output_folder, whole_file
 from ...resources import resource_path
 from ..baselines import CEILING, FLOOR
 from . import plots
@@ -334,7 +334,7 @@ def _plot(figure: Figure, name: str, heading: str, note: str, folder: Path, mark
     from markupsafe import Markup, escape
 
     path = folder / "plots" / f"{name}.png"
-    path.parent.mkdir(parents=True, exist_ok=True)
+    output_folder(path.parent)
     plots.png(figure, path)
     if marks > _MANY:
         body = f'<img class="plot" alt="{escape(heading)}" src="{_inline(path)}">'

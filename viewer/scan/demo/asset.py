@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...files import whole_file
 from ...resources import resource_path
 
 
@@ -49,11 +50,12 @@ def rest_points() -> RestPoints:
 
 def save_asset(points: RestPoints, path: Path) -> None:
     """Write points as `rest_points` reads them: normals in 16 bits an axis, radii as halves."""
-    np.savez_compressed(
-        path,
-        positions=points.positions,
-        normals=np.rint(points.normals * 32767.0).astype(np.int16),
-        colors=points.colors,
-        radii=points.radii.astype(np.float16),
-        skin=points.skin,
-    )
+    with whole_file(path) as temporary:
+        np.savez_compressed(
+            temporary,
+            positions=points.positions,
+            normals=np.rint(points.normals * 32767.0).astype(np.int16),
+            colors=points.colors,
+            radii=points.radii.astype(np.float16),
+            skin=points.skin,
+        )

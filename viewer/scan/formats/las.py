@@ -15,7 +15,6 @@ import os
 import struct
 import subprocess
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...helper import start_python
 from ...task import checkpoint
+from ...unfinished import temporary_folder
 from ..points import PointCloud
 from ._admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
 from ._columns import cloud_from_columns, named
@@ -59,8 +59,8 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             stream.seek(0)
             with laspy.open(stream, closefd=False) as reader:
                 return cloud_from_columns(_columns(reader, held))
-    with TemporaryDirectory() as folder:
-        plain = Path(folder) / "plain.las"
+    with temporary_folder() as folder:
+        plain = folder / "plain.las"
         _unpack_beside(path, plain)
         with laspy.open(plain) as reader:
             return cloud_from_columns(_columns(reader, plain.stat().st_size))

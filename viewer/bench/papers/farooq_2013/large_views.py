@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from ....scan.pose import Pose
 from ....scan.range_view import RangeView
 from ....simulate.scanner import Faults, around, capture, rig
 from ....timing import call_ms, draw
+from ....unfinished import temporary_folder
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed
 from ...scenes.viewpoints import pod_camera, sample_near
@@ -64,8 +64,8 @@ def measure_large_views(bench: Bench, view_size: tuple[int, int] | None = None) 
     """
     paper = pyramids.paper()
     size, view_size = tuple(paper["size"]), view_size or tuple(paper["view_size"])
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "head.exr"
+    with temporary_folder() as folder:
+        file = folder / "head.exr"
         views = scan_head(view_size)
         write_views(file, views)
         scenarios = list(_scenarios(views[0], size))

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from ....frame import Request, render_frame
 from ....gpu.surface import Surface
 from ....scan.formats.exr import write_views
 from ....scan.open import open_scan
 from ....scan.timeline import Timeline
+from ....unfinished import temporary_folder
 from ...plan import Group
 from ...report.results import Row
 from ...run import LOOK, Bench
@@ -32,9 +31,9 @@ def measure_playing(bench: Bench, poses: int = POSES) -> Iterator[Row]:
     after the other, none left out. Shaders are compiled before.
     """
     subject = bench.subject(Group(SCENE, (), noise=0.0))
-    with TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         for index in range(poses):
-            write_views(Path(folder) / f"head{index:02d}.exr", subject.moment(index).pose.views)
+            write_views(folder / f"head{index:02d}.exr", subject.moment(index).pose.views)
         for primitive in pyramids.PRIMITIVES:
             with open_scan(folder) as timeline:
                 _play(bench, timeline, primitive, 1)

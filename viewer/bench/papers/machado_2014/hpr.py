@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ....files import output_folder
 from ...report import measurement
 from ...report.measurement import Measurement, markdown_table, rows_if_any, spaced, write_measurement
 from ...report.page import three_digits
@@ -164,7 +165,7 @@ def _plot_growth(rows: Sequence[dict[str, Any]], path: Path) -> None:
         for scene in exact
     }
     if found:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        output_folder(path.parent)
         png(curves(found, exact, "sectors, k", "visible points", "exact"), path)
 
 

@@ -12,7 +12,7 @@ from ....backends import backend
 from ....backends.hpr import MODES, calibrated, visible_points
 from ....backends.hpr.exact import exact_visible_points
 from ....camera import Camera
-from ....files import whole_file
+from ....files import output_folder, whole_file
 from ....frame import Request
 from ....gpu.surface import Surface
 from ....look import Look
@@ -97,7 +97,6 @@ def save_picture(pixels: Image, path: Path) -> None:
     """Write a picture as PNG, into a folder that is made where there is none."""
     from PIL import Image as Pillow
 
-    path.parent.mkdir(parents=True, exist_ok=True)
-
+    output_folder(path.parent)
     with whole_file(path) as temporary:
         Pillow.fromarray(pixels).save(temporary)
