@@ -17,6 +17,7 @@ from viewer.params import param
 from viewer.scan.pose import Pose
 
 TITLE = "Filling"
+GOOD_FOR = "Tests"
 FILLS = True
 SHADER = str(Path(__file__).with_suffix(".comp").resolve())
 BACKEND = Backend("filling", sys.modules[__name__])

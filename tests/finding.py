@@ -22,6 +22,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 TITLE = "Finding"
+GOOD_FOR = "Tests"
 FINDS_NORMALS = True
 VALUES = {
     "gap": ValueKind("Distance to the point before, scan units", is_length=True, is_log=True),

@@ -156,6 +156,7 @@ class _Splats:
     """Draws packed splats with a function of points and surface."""
 
     TITLE = "Packed splats"
+    GOOD_FOR = "Tests"
     BLENDS = True
     Params = NoParams
 

@@ -24,6 +24,7 @@ from viewer.scan.pose import Pose
 from viewer.scan.range_points import RangePoints
 
 TITLE = "Sampling"
+GOOD_FOR = "Tests"
 ROWS = "samples"
 DERIVES_ON_THREAD = True
 BACKEND = Backend("sampling", sys.modules[__name__])

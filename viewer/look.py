@@ -27,14 +27,14 @@ HOLE_REACH = 8  # pixels: half of the widest gaps that count as holes, which are
 _UNMAPPED = {"color_by": tuple(name for name in COLOR_BY if name not in ("depth", "height"))}
 _UNRANGED = {"color_by": (*_UNMAPPED["color_by"], "depth")}  # where it depends on the view
 COLOR_WORDS = {
-    "auto": "The scan's own",
-    "own": "Its colours",
-    "plain": "One colour",
-    "normal": "Direction of the surface",
+    "auto": "Automatic",
+    "own": "Photo colour",
+    "plain": "Single colour",
+    "normal": "Surface normal",
     "depth": "Distance from the viewer",
     "height": "Height",
-    "id": "Number of the point",
-    "level": "What was filled",
+    "id": "Point index",
+    "level": "Filled areas",
 }
 LIGHT_WORDS = {
     "auto": "Automatic",
@@ -65,7 +65,7 @@ class Look:
     quality: str = param(
         "balanced",
         "Smooth edges at rest: fast: one sample of each pixel; balanced: the mean of 5; fine: of 17",
-        choices=tuple(SAMPLES), words=QUALITY_WORDS, basic=True,
+        choices=tuple(SAMPLES), words=QUALITY_WORDS, title="Anti-aliasing", basic=True,
     )  # fmt: skip
     color_by: str = param(
         "auto",
@@ -106,7 +106,7 @@ class Look:
     )
     plain: str = param(
         "#c8c2b8", "Colour of points that have none, #rrggbb",
-        title="Surface", group="Colour", basic=True,
+        title="Surface colour", group="Colour", basic=True,
     )  # fmt: skip
     background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa", group="Colour", basic=True)
     holes: bool = param(
@@ -134,8 +134,8 @@ class Look:
     specular: float = param(0.12, "Phong's specular share", low=0, high=1, group="Light", unless=_FLAT)
     shininess: float = param(24.0, "Phong's exponent", low=1, high=200, group="Light", unless=_FLAT)
     eye_dome: bool | None = param(
-        None, "Darken where the depth steps back; auto: if unlit",
-        type=bool, title="Dark edges", group="Light", basic=True,
+        None, "Darken edges where the depth steps back; auto: only where nothing is lit",
+        type=bool, title="Edge shading (eye-dome)", group="Light", basic=True,
     )  # fmt: skip
     eye_dome_strength: float = param(
         1.0, "Strength of eye-dome lighting", low=0, high=20, group="Light", when=_EYE_DOME

@@ -88,7 +88,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     y, x = np.argwhere(surface.level == 2)[0].tolist()
     picked, pose = pick(surface, x, y), Pose(0, 0.0, "", cloud)
     assert picked is not None
-    with pytest.raises(InputError, match="hole is filled"):
+    with pytest.raises(InputError, match="filled by the renderer"):
         Spot.of(picked, pose)
     made = Spot.of(picked, pose, filled=True)
     assert (made.snapped, made.id, made.level) == ("surface", None, 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewer.analysis.pick import Picked
-from viewer.app.scene.pointed import describe_pick
+from viewer.app.scene.pointed import describe_pick, point_details
 from viewer.scan.units import Scale
 
 
@@ -22,11 +22,13 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
         normal=np.array([0, 0.6, 0.8], np.float32),
         scalars={"temperature": 36.6123456789, "label": 4},
     )
-    assert describe_pick(picked, "frame 3/25", Scale("mm"), 150.0) == [
+    assert describe_pick(picked, "frame 3/25", Scale("mm"), 150.0, "temperature") == [
         "12.35, -0.50, 1000.00 ± 0.39 mm",
         "frame 3/25",
-        "point 7, measured",
         "temperature 36.6123",
+    ], "colours show the temperature"
+    assert point_details(picked, "temperature") == [
+        "point 7",
         "label 4",
         "colour #ff8000",
         "normal 0.00, 0.60, 0.80",

@@ -49,6 +49,7 @@ FULL = Settings(
     drawer=22.5,
     goal=Goal("error", 0.5, "px"),
     glide=False,
+    point_details=True,
     slow_devices=("llvmpipe",),
     welcomed=True,
     tools={"notes": {"texts": False}},

@@ -241,12 +241,16 @@ def test_the_line_under_the_timeline_says_what_is_seen(app: RunningApp) -> None:
     picked = pick(surface, x, y)
     assert picked is not None
     app.screen.do("mousemove", *on_screen(app, x, y))
-    told = app.see(lambda state: state.pointed).pointed
+    assert len(app.see(lambda state: state.pointed).pointed) == 2, "place and frame; more is a choice"
+    app.act("##MainMenuBar", ("menu_click", "View/###point_details"))
+    app.screen.do("mousemove", *on_screen(app, x, y))
+    told = app.see(lambda state: len(state.pointed) > 2).pointed
     assert [float(v) for v in told[0].partition(" ±")[0].split(", ")] == pytest.approx(
         picked.position, abs=1e-2
     )
-    assert told[1:3] == [f"frame {shot.description['pose'] + 1}/5", f"point {picked.id}, measured"]
+    assert told[1:3] == [f"frame {shot.description['pose'] + 1}/5", f"point {picked.id}"]
     assert "colour #" + bytes(picked.color[:3]).hex() in told
+    app.act("##MainMenuBar", ("menu_click", "View/###point_details"))
     app.screen.do("mousemove", *on_screen(app, 3, 3))
     app.see(pointed=[])
 

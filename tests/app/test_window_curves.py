@@ -92,7 +92,7 @@ def pasted(screen: Screen) -> list[dict[str, str]]:
 
 
 def save_as(app: RunningApp, name: str) -> Path:
-    app.act(DRAWER, ("item_click", "Save..."))
+    app.act(DRAWER, ("item_click", "Export plot..."))
     app.settle()
     app.screen.do("type", "--delay", 40, name)
     app.screen.do("key", "Return")
@@ -248,14 +248,14 @@ def test_curves_are_saved_and_ways_are_drawn_and_held_still(
             app.settle()
         left, top, width, height = app.view()
         before = screen.picture()[top : top + height, left : left + width].copy()
-        app.act(PANEL, ("item_open", "Ways of landmarks"))
-        app.act(PANEL, ("item_click", "Ways of landmarks/ways/$$0/##traced"))
+        app.act(PANEL, ("item_open", "Landmark paths (trajectories)"))
+        app.act(PANEL, ("item_click", "Landmark paths (trajectories)/ways/$$0/##traced"))
         app.settle()
         after = screen.picture()[top : top + height, left : left + width]
         assert (before != after).any(axis=2).sum() > 100
         check_saved_picture(app, tmp_path)
         for number in (1, 2, 3):
-            app.act(PANEL, ("item_click", f"Ways of landmarks/ways/$${number}/##anchors"))
-        app.act(PANEL, ("item_click", "Ways of landmarks/hold/##value"))
+            app.act(PANEL, ("item_click", f"Landmark paths (trajectories)/ways/$${number}/##anchors"))
+        app.act(PANEL, ("item_click", "Landmark paths (trajectories)/hold/##value"))
         app.settle()
         assert "Traceback" not in app.log()

@@ -90,7 +90,7 @@ def test_21_landmarks_take_21_clicks_and_are_followed(screen: Screen, tmp_path: 
     with running_app(screen, tmp_path, scan) as app:
         begin_with(app, "face-21")
         before = app.settle()
-        assert {state for state, _ in before.landmarks.values()} == {"to place"}
+        assert {state for state, _ in before.landmarks.values()} == {"not placed"}
         for number in numbers:
             x, y = on_screen(app, grid(1)[number])
             screen.do("mousemove", x, y, "sleep", 0.1, "click", 1, "sleep", 0.1)
@@ -152,7 +152,7 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         assert list(keys_of(state, "Landmark 1")) == [0]
 
         state = press(app, "shift+x")
-        assert state.landmarks["Landmark 1"][0] == "missing in this frame"
+        assert state.landmarks["Landmark 1"][0] == "not visible in this frame"
         state = press(app, "Home")
         assert state.landmarks["Landmark 1"][0] == "placed"
 
@@ -224,7 +224,7 @@ def test_present_landmarks_become_a_template(screen: Screen, tmp_path: Path, sca
         screen.do("key", "Return")
         app.see(clicking="landmarks")
         state = app.settle()
-        assert [one[0] for one in state.landmarks.values()] == ["to place", "to place"]
+        assert [one[0] for one in state.landmarks.values()] == ["not placed", "not placed"]
         assert part(state)["template"] == "pair"
         assert "Traceback" not in app.log()
 
@@ -237,7 +237,7 @@ def test_notes_are_pinned_and_kept(screen: Screen, tmp_path: Path, scan: Path) -
         state = click(app, points[34])
         screen.do("type", "--delay", 40, "scar")
         app.settle()
-        app.act(PANEL, ("item_click", "Note on the frame"))
+        app.act(PANEL, ("item_click", "Add frame note"))
         screen.do("type", "--delay", 40, "blink")
         state = app.settle()
         place, frame = part(state)["notes"]
@@ -269,7 +269,7 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
         app.drop(tmp_path / "elsewhere.mrk.json")
         app.told("the landmarks lie off the scan")
         app.drop(tmp_path / "here.mrk.json")
-        app.told("Read 2 landmarks of here.mrk.json")
+        app.told("Imported 2 landmarks from here.mrk.json")
         state = app.see(lambda state: "B" in state.landmarks)
         assert is_at(state.landmarks["A"][1], points[34])
         press(app, "Right")

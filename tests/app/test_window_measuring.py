@@ -93,7 +93,7 @@ def read_back(app: RunningApp, folder: Path) -> None:
     ctrl(screen, "k")
     app.settle()
     screen.do("key", "Tab", "sleep", 0.2, "key", "Down", "sleep", 0.2, "key", "Return")  # the older of two
-    app.told("Read 1 measurements")
+    app.told("Imported 1 distances")
 
 
 @pytest.fixture
@@ -157,7 +157,7 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
 
         ctrl(screen, "z")
         expect_reading(app)
-        for told in ("Read 1 measurements.", "Read 0 measurements, 1 were there already"):
+        for told in ("Imported 1 distances.", "Imported 0 distances, 1 were there already"):
             app.drop(tmp_path / "table.csv")
             app.told(re.escape(told))
             expect_reading(app, distances[1])
@@ -187,7 +187,7 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "m")
         click(app, (app.view()[0] + 10, app.view()[1] + 10))
-        app.told("There is nothing to measure here")
+        app.told("No surface here")
         distance, _ = measure(app, points, 34, 128)
         expect_reading(app, distance)
         screen.do("key", "End")

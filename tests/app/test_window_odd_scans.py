@@ -54,7 +54,7 @@ def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float
     app.act(PANEL, ("item_click", "Add a measure/Add measure"))
     for number in range(len(PLACES)):
         for column in ("traced", "anchors"):
-            app.act(PANEL, ("item_click", f"Ways of landmarks/ways/$${number}/##{column}"))
+            app.act(PANEL, ("item_click", f"Landmark paths (trajectories)/ways/$${number}/##{column}"))
     app.settle()
     for combo, words in (
         ("mode", ("against", "repeats", "time")),
@@ -63,7 +63,7 @@ def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float
         for word in words:
             app.choose("drawer/plotting", f"##{combo}", f"###{word}")
             app.settle()
-    app.act(PANEL, ("item_click", "Ways of landmarks/hold/##value"))
+    app.act(PANEL, ("item_click", "Landmark paths (trajectories)/hold/##value"))
     press(app, "End")
     press(app, "p")
     app.told("Saved ")

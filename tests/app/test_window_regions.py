@@ -86,7 +86,7 @@ def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
         picture = screen.picture()[view]
         assert pixels_of(picture, PLOT_COLORS[0]) + pixels_of(picture, PLOT_COLORS[1]) > 4 * height / 8
 
-        app.act(PANEL, ("item_click", "Through"), ("item_click", "###region"))
+        app.act(PANEL, ("item_click", "Include surface behind"), ("item_click", "###region"))
         drag_round(app, height / 8)
         name = "Region 2, area"
         both = app.see(lambda state: np.isfinite(state.measured.get(name, [np.nan])).all()).measured[name]
@@ -95,7 +95,7 @@ def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
         app.act(PANEL, ("item_click", "###region"))
         left, top, *_ = app.view()
         app.drag((left + 4, top + 40), (left + 20, top + 60))
-        app.told("Go round a part of the surface")
+        app.told("No surface inside that outline")
         assert app.settle().clicking == "plotting"
         screen.do("key", "Escape")
         assert app.settle().clicking is None

@@ -61,8 +61,8 @@ class Spot:
         filled place where it may not be taken.
         """
         if not (picked.measured or filled):
-            hint = "Click where points are, or allow filled places"
-            raise InputError("nothing was measured here, the hole is filled", hint=hint)
+            hint = "Zoom in, or tick 'Allow clicks on filled holes'"
+            raise InputError("no data here (filled by the renderer)", hint=hint)
         spacing, neighbors = picked.spacing, picked.neighbors
         if picked.point is None:
             unmoved = place.inverse.points(picked.position)

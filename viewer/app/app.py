@@ -145,7 +145,7 @@ class App:
         self.keeping = Keeping(
             self.session, self.playback, self.note, self.remembered, remembered, user_folder() / settings.FILE
         )
-        self.pointer: Pointer = Pointer(self.viewport, self.playback)
+        self.pointer: Pointer = Pointer(self.viewport, self.playback, remembered.point_details)
         self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
         self.choosing: Choosing = Choosing(self.session, self.playback, self.viewport)
         self.steering: Steering = Steering(
@@ -312,6 +312,7 @@ class App:
             turn_seconds=self.steering.turntable.seconds, recent=self.scans.recent,
             export=self.exporting.kept, export_marks=self.exporting.marks, tools=self.tools.remembered(),
             panel=self.panel.chosen, drawer=self.drawer.height, glide=self.glide.is_wanted,
+            point_details=self.pointer.has_details,
             welcomed=self.welcome.is_over, slow_devices=self._slow_devices,
         )  # fmt: skip
 

@@ -196,7 +196,7 @@ _FILE: Menu[App] = Menu("File", (
         Listing("Scans", lambda app: app.scans.items(app.scans.listed)),
         Command("next_scan", "Next scan", lambda app: app.scans.step(1), "PageDown", can=_has_scans),
         Command("previous_scan", "Previous scan", lambda app: app.scans.step(-1), "PageUp", can=_has_scans),
-        Command("scans", "Back to the list of scans", lambda app: app.browser.show(), "Q"),
+        Command("scans", "Scan list...", lambda app: app.browser.show(), "Q"),
     ),
     (
         Command(
@@ -244,7 +244,7 @@ _TURNTABLE: Menu[App] = Menu("Turntable", (
             is_on=lambda app: app.steering.turntable.is_on, can=_has_camera,
         ),
     ),
-    (Listing("Time for a turn", lambda app: app.steering.turntable.items()),),
+    (Listing("Seconds per turn", lambda app: app.steering.turntable.items()),),
 ))  # fmt: skip
 _BOOKMARKS: Menu[App] = Menu("Bookmarks", (
     (
@@ -258,7 +258,7 @@ _BOOKMARKS: Menu[App] = Menu("Bookmarks", (
     (Listing("Go to", lambda app: app.bookmarks.items()),),
 ))  # fmt: skip
 _FROM: Menu[App] = Menu(
-    "From", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)
+    "Look from", (tuple(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),)
 )
 _MOVE: Menu[App] = Menu("Move", (
     tuple(_nudge("orbit", f"Turn {side}", side, f"Ctrl+{side.capitalize()}") for side in _WAYS),
@@ -271,7 +271,8 @@ _VIEW: Menu[App] = Menu("View", (
             "fit", "Fit", lambda app: app.steering.fit(), "F", can=_has_camera, short="Fit",
             icon=icons.ICON_FA_EXPAND,
         ),
-        Command("center", "Centre the point", lambda app: app.steering.center(), "Z", can=_has_camera),
+        Command("center", "Centre on the point under the mouse",
+            lambda app: app.steering.center(), "Z", can=_has_camera),
         Command(
             "follow", "Follow the subject", lambda app: app.steering.toggle_following(), "Shift+F",
             is_on=lambda app: app.steering.follows, can=_has_frames,
@@ -280,7 +281,7 @@ _VIEW: Menu[App] = Menu("View", (
         _MOVE,
         Listing("Up", lambda app: app.steering.ups()),
         Command(
-            "set_front", "This side is the front", lambda app: app.steering.set_front(), can=_has_camera
+            "set_front", "Set current view as front", lambda app: app.steering.set_front(), can=_has_camera
         ),
         Command(
             "orthographic", "Orthographic", lambda app: app.steering.switch_projection(), "O",
@@ -298,40 +299,44 @@ _VIEW: Menu[App] = Menu("View", (
             "panels", "Panels", lambda app: app.full_view.toggle(), "Tab",
             is_on=lambda app: not app.full_view.is_on,
         ),
-        Command("next_part", "Keyboard to the next part", lambda app: app.keyboard.go(1), "F6 Ctrl+F6"),
-        Command("part_before", "Keyboard to the part before", lambda app: app.keyboard.go(-1), "Shift+F6"),
+        Command("next_part", "Focus next area", lambda app: app.keyboard.go(1), "F6 Ctrl+F6"),
+        Command("part_before", "Focus previous area", lambda app: app.keyboard.go(-1), "Shift+F6"),
         Command(
             "cube", "Orientation cube", lambda app: app.steering.cube.toggle(),
             is_on=lambda app: app.steering.cube.is_shown,
         ),
         Command(
-            "glide", "Views glide", lambda app: app.glide.toggle(),
+            "glide", "Animate view changes", lambda app: app.glide.toggle(),
             is_on=lambda app: app.glide.is_wanted,
+        ),
+        Command(
+            "point_details", "Point details in status bar", lambda app: app.pointer.toggle_details(),
+            is_on=lambda app: app.pointer.has_details,
         ),
     ),
     (
         _mark("scale_bar", "Scale bar", "S"), _mark("color_bar", "Colour bar", "C"),
         Command(
-            "marks_in_files", "Save pictures with these, and with what tools draw",
+            "marks_in_files", "Include overlays in screenshots",
             lambda app: app.marks.toggle_in_files(), is_on=lambda app: app.marks.in_files,
         ),
     ),
     (
         *(_look_switch(parameter) for parameter in describe(Look) if parameter.key),
         Command(
-            "reset", "Back to the usual appearance", lambda app: app.rendering.reset(), "Ctrl+R",
+            "reset", "Reset appearance", lambda app: app.rendering.reset(), "Ctrl+R",
             can=lambda app: not app.rendering.is_default,
         ),
     ),
-    (Listing("Theme", _themes), Command("theme", "Next theme", lambda app: app.next_theme(), "T")),
+    (Listing("Theme", _themes), Command("theme", "Switch theme", lambda app: app.next_theme(), "T")),
     (
         Command("text_larger", "Larger text", lambda app: app.change_text(1), "Ctrl+="),
         Command("text_smaller", "Smaller text", lambda app: app.change_text(-1), "Ctrl+-"),
-        Command("text_usual", "Usual text", lambda app: app.change_text(0), "Ctrl+0"),
+        Command("text_usual", "Default text size", lambda app: app.change_text(0), "Ctrl+0"),
     ),
 ))  # fmt: skip
 _SWITCHES: Menu[App] = Menu(
-    "Of this renderer", (switch_commands(backends().values()),), lambda app: bool(app.rendering.switches)
+    "Renderer options", (switch_commands(backends().values()),), lambda app: bool(app.rendering.switches)
 )
 _PLAYBACK: Menu[App] = Menu("Playback", (
     (
@@ -350,8 +355,8 @@ _PLAYBACK: Menu[App] = Menu("Playback", (
         Command("speed_1", "Speed 1x", lambda app: app.change_pace(speed=1.0), "Backspace", can=_has_frames),
     ),
     (
-        _end("span_first", "Begin with this frame", "I", is_last=False),
-        _end("span_last", "End with this frame", "Shift+I", is_last=True),
+        _end("span_first", "Set start of playback", "I", is_last=False),
+        _end("span_last", "Set end of playback", "Shift+I", is_last=True),
         Command(
             "span_all", "Play all frames", lambda app: app.playback.clear_span(), "Alt+I",
             can=lambda app: app.document.span is not None,
@@ -367,7 +372,7 @@ _TOOLS: Menu[App] = Menu("Tools", (
     (
         Listing("Renderer", _renderers),
         Command("backend", "Next renderer", lambda app: app.rendering.step(1), "B"),
-        Command("backend_before", "Renderer before", lambda app: app.rendering.step(-1), "Shift+B"),
+        Command("backend_before", "Previous renderer", lambda app: app.rendering.step(-1), "Shift+B"),
         Command(
             "automatic", "Automatic renderer", lambda app: app.rendering.switch_automatic(),
             is_on=lambda app: app.document.goal is not None,
@@ -380,7 +385,7 @@ _TOOLS: Menu[App] = Menu("Tools", (
 _HELP: Menu[App] = Menu("Help", (
     (
         Command("keys", "Keys and mouse", lambda app: app.help.toggle("Keys and mouse"), "F1"),
-        Command("edit_keys", "Change keys", lambda app: app.write_keys()),
+        Command("edit_keys", "Edit keys file", lambda app: app.write_keys()),
     ),
     (
         Command("messages", "Messages", lambda app: app.help.toggle("Messages")),
@@ -397,7 +402,7 @@ _MOUSE: tuple[tuple[str, str], ...] = (
     ("Left drag", "Orbit"),
     ("Middle drag, Shift+left drag", "Pan"),
     ("Wheel, right drag", "Zoom"),
-    ("Double click", "Turn about what is there"),
+    ("Double click", "Orbit about the clicked point"),
 )
 
 

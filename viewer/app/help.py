@@ -80,7 +80,7 @@ class Help:
         ]
         found = [(title, rows) for title, rows in found if rows]
         if not found:
-            imgui.text_disabled("Nothing has these words.")
+            imgui.text_disabled("No match")
         room = imgui.get_content_region_avail().x / imgui.get_font_size()
         columns = 2 if room >= _TWO_COLUMNS and not words else 1
         if found and imgui.begin_table("commands", columns):
@@ -104,7 +104,7 @@ class Help:
     def _draw_messages(self) -> None:
         """Declare all messages, the latest first."""
         if not self._notices.all:
-            imgui.text_disabled("There are none.")
+            imgui.text_disabled("No messages")
         elif imgui.button("Copy all"):
             lines = (f"{notice.at:%H:%M:%S}  {notice.text}" for notice in self._notices.all)
             imgui.set_clipboard_text("\n".join(lines))
@@ -124,7 +124,7 @@ class Help:
         imgui.spacing()
         if imgui.button("Copy"):
             imgui.set_clipboard_text(f"Scan4D {__version__}, OpenGL {gpu.driver} on {gpu.device}{software}")
-        widgets.tooltip("Version and device, for a report")
+        widgets.tooltip("Copy version and device, for a report")
 
 
 def has_words(texts: Iterable[str], words: Iterable[str]) -> bool:

@@ -165,7 +165,7 @@ class Notices:
             if imgui.button("Copy"):
                 imgui.set_clipboard_text(notice.text)
             imgui.same_line()
-        if widgets.icon_button(icons.ICON_FA_XMARK, "Send it away (Esc)"):
+        if widgets.icon_button(icons.ICON_FA_XMARK, "Dismiss (Esc)"):
             self.send_away(notice)
         if notice.offer is not None:
             imgui.set_cursor_pos_x(start)

@@ -84,6 +84,7 @@ class Settings:
     export, export_marks: of the export dialog. recent: the scans opened last, newest first. places: what
     earlier versions kept here of each scan, whose documents have files of their own now.
     panel: its width, and which of its sections are open. drawer: its height. glide: whether views glide.
+    point_details: whether the status bar has all that is known of the point under the mouse.
     slow_devices: those of which the user was told that they draw in software. welcomed: whether the card of
     the first start was seen.
     tools: name of a tool -> values of its `Settings` that are not the defaults.
@@ -108,6 +109,7 @@ class Settings:
     panel: PanelChoices = field(default_factory=PanelChoices)
     drawer: drawer.DrawerHeight = drawer.USUAL
     glide: bool = True
+    point_details: bool = False
     welcomed: bool = False
     slow_devices: tuple[str, ...] = ()
     tools: Annotated[Mapping[str, Mapping[str, Any]], ReadBy(_read_tools)] = field(default_factory=dict)

@@ -36,21 +36,23 @@ def edit(
     now: Mapping[str, Any] | None = None,
     idle: Mapping[str, str] | None = None,
     rows: Mapping[str, Callable[[T], T]] | None = None,
+    rest: str = "More options",
 ) -> T:
     """A row for each parameter that matters beside the others: label, widget, and what resets it where it is
-    not its default; those that are not basic under "Advanced", which is closed at first, and the headings of
-    their groups. The same object while nothing is edited.
+    not its default; those that are not basic under a heading of their own, which is closed at first, and the
+    headings of their groups. The same object while nothing is edited.
 
     choices: words to choose from and their titles, for parameters that declare none. hidden: names of
     parameters that stand elsewhere. now: the values that "auto" stands for now, which parameters begin with
     that are not automatic any more. idle: name -> why a parameter changes nothing now: its row is greyed, and
     says so. rows: what declares the rows of parameters that have their own, by name.
+    rest: the heading of those that are not basic.
     """
     more = _More(choices or {}, now or {}, idle or {}, rows or {})
     shown = [one for one in describe(type(values)) if one.matters(values) and one.name not in hidden]
     basic = [one for one in shown if one.basic]
     values = _edit_rows(basic, values, defaults, more)
-    if len(basic) < len(shown) and imgui.tree_node_ex(f"Advanced##{type(values).__qualname__}", _NO_PUSH):
+    if len(basic) < len(shown) and imgui.tree_node_ex(rest, _NO_PUSH):
         group = ""
         for parameter in shown:
             if parameter.basic or not parameter.matters(values):

@@ -4,6 +4,7 @@ A backend answers one question: which surface does each pixel see? Its module ha
 
     a docstring          the first line says in the panel what it is
     TITLE                its name in the panel
+    GOOD_FOR             what to choose it for, in a few words, such as "Range images; fills holes"
     Params               a frozen dataclass of parameters (see viewer/params.py)
     needs(pose, params) -> what the pose must have: "normals" and "radii" of its points are estimated where
                          they are missing; "views": range views, without which it cannot be drawn;
@@ -172,6 +173,11 @@ class Backend:
     def title(self) -> str:
         """The name in the panel."""
         return self.module.TITLE
+
+    @property
+    def good_for(self) -> str:
+        """What to choose it for, in a few words."""
+        return self.module.GOOD_FOR
 
     @property
     def help(self) -> str:

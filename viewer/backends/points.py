@@ -16,6 +16,7 @@ from . import FrameView, Suited, share_param, with_levels
 from .hpr import mark_visible
 
 TITLE = "Points"
+GOOD_FOR = "Fastest; exact positions"
 KEEPS = True
 
 

@@ -35,6 +35,7 @@ class Params:
         "table: shapes, places and depths in the steps of the paper; exact: outlines are the discs' own, and "
         "depth follows their planes",
         choices=("table", "exact"),
+        title="Code table",
         sweep=("table", "exact"),
         group="Words",
         basic=True,

@@ -113,7 +113,7 @@ class Landmarks(Part, name="landmarks"):
         names = [landmark.name for landmark in self.all]
         start = names.index(after) + 1 if after in names else 0
         in_turn = (*self.all[start:], *self.all[:start])
-        waiting = (one for one in in_turn if one.state == "to place" and frame not in one.missing)
+        waiting = (one for one in in_turn if one.state == "not placed" and frame not in one.missing)
         return next(waiting, None)
 
     def free_name(self) -> str:

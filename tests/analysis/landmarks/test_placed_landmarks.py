@@ -49,7 +49,7 @@ def test_what_a_file_has_becomes_keys() -> None:
     assert [key.frame for key in left.keys] == [0]  # frame 7 is none of the scan's
     assert [key.frame for key in right.keys] == [0]  # of tracked ones, where nothing was placed
     assert (left.partner, right.partner, later.partner) == ("chR", "chL", "sooner")
-    assert (later.state, later.about) == ("to place", "at the end")
+    assert (later.state, later.about) == ("not placed", "at the end")
 
 
 def test_one_moment_is_of_the_frame_that_is_shown() -> None:

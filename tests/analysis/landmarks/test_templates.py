@@ -28,7 +28,7 @@ def test_those_that_are_shipped() -> None:
     assert len(templates()["face-21"].landmarks) == 21
     for template in templates().values():
         names = [landmark.name for landmark in template.landmarks]
-        assert all(landmark.about and landmark.state == "to place" for landmark in template.landmarks)
+        assert all(landmark.about and landmark.state == "not placed" for landmark in template.landmarks)
         assert template.title
         assert template.source
         partners = {landmark.name: landmark.partner for landmark in template.landmarks if landmark.partner}

@@ -45,10 +45,10 @@ TRACKS = {
 
 def test_states_in_each_frame() -> None:
     shown = [ShownLandmarks.of(ALL, TRACKS, frame) for frame in range(4)]
-    words = ["placed", "tracked", "gap: hidden", "missing in this frame"]
+    words = ["placed", "tracked", "no data: hidden", "not visible in this frame"]
     assert [one.state(0) for one in shown] == words
     assert [one.is_there.tolist() for one in shown] == [[known, False, False] for known in (1, 1, 0, 0)]
-    assert (shown[0].state(1), shown[0].state(2)) == ("to place", "skipped")
+    assert (shown[0].state(1), shown[0].state(2)) == ("not placed", "skipped")
     assert ShownLandmarks.of(ALL, {}, 1).state(0) == "not tracked yet"
     assert not np.isfinite(shown[2].positions).any(), "a gap is nowhere"
 
@@ -72,8 +72,8 @@ def test_gaps_are_marked_in_runs() -> None:
     tracks = {**TRACKS, "other": track(Known.PLACED, Known.TRACKED, Known.TRACKED, Known.GAP)}
     spans = gap_spans((PLACED, other), tracks)
     assert [(span.frames, span.words) for span in spans] == [
-        (range(2, 3), "Gap of placed"),
-        (range(3, 4), "Gap of placed, other"),
+        (range(2, 3), "No data for placed"),
+        (range(3, 4), "No data for placed, other"),
     ]
     assert [span.frames for span in gap_spans((PLACED,), TRACKS)] == [range(2, 4)]
 

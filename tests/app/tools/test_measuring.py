@@ -50,7 +50,7 @@ def test_two_ends_make_a_measurement_of_the_document() -> None:
     assert (measuring.begun, measuring.made.all) == (None, (Measurement(first, second),))
     measuring.clear()
     assert measuring.made.all == ()
-    for name, count in (("Clear measurements", 1), ("Measure", 0)):
+    for name, count in (("Clear distances", 1), ("Measure", 0)):
         assert session.history.undoes == name
         session.history.undo()
         assert len(measuring.made.all) == count

@@ -8,7 +8,7 @@ from typing import Literal
 from ..measures import Measure
 from ..spot import Spot
 
-State = Literal["to place", "placed", "skipped"]
+State = Literal["not placed", "placed", "skipped"]
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,8 @@ class Landmark:
 
     keys: where a user has set it, one a frame at most, by frame. skipped: whether it is not to be set.
     missing: frames in which a user has said that it is not there, increasing. partner: the name of the one
-    that is its mirror image, "" for none. about: how a person finds it.
+    that is its mirror image, "" for none. about: how a person finds it; a name in words and a colon may come
+    first.
     """
 
     name: str
@@ -28,11 +29,18 @@ class Landmark:
     about: str = ""
 
     @property
+    def title(self) -> str:
+        """The name in words and the short one, such as "Subnasale (sn)"; the short one alone where no other
+        is known."""
+        words, colon, _ = self.about.partition(":")
+        return f"{words} ({self.name})" if colon and words.lower() != self.name.lower() else self.name
+
+    @property
     def state(self) -> State:
         """Whether it is set in any frame, or shall be."""
         if self.keys:
             return "placed"
-        return "skipped" if self.skipped else "to place"
+        return "skipped" if self.skipped else "not placed"
 
     def key_at(self, frame: int) -> Spot | None:
         """The spot at which it was set in a frame; None where it was not."""

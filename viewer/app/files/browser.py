@@ -259,7 +259,7 @@ class Browser:
 
     def _draw_filter(self) -> None:
         imgui.set_next_item_width(-1)
-        changed, text = imgui.input_text_with_hint("##filter", "Filter: type a part of a name", self._filter)
+        changed, text = imgui.input_text_with_hint("##filter", "Filter by name", self._filter)
         if changed:
             self._narrow(text)
 
@@ -273,14 +273,14 @@ class Browser:
 
     def _draw_path(self) -> None:
         imgui.push_item_flag(imgui.ItemFlags_.no_tab_stop, True)  # the first Tab goes to the field
-        if widgets.icon_button(icons.ICON_FA_ARROW_UP, "The folder above (Backspace)"):
+        if widgets.icon_button(icons.ICON_FA_ARROW_UP, "Parent folder (Backspace)"):
             self._go_up()
         imgui.pop_item_flag()
         imgui.same_line()
         imgui.set_next_item_width(-1)
         returns = imgui.InputTextFlags_.enter_returns_true
         entered, self._text = widgets.edit_path("##path", self._text, returns)
-        widgets.tooltip("A folder, a file, or a pattern such as frame%04d.ply; Enter goes there")
+        widgets.tooltip("Folder, file, or pattern such as frame%04d.ply; Enter opens it")
         if entered:
             imgui.set_nav_cursor_visible(False)  # the next Enter is for the rows
             self._enter_text()
@@ -302,7 +302,7 @@ class Browser:
         if scans.are_together:
             self._draw_names("Opened together", scans.listed)
             imgui.spacing()
-        self._draw_names("Opened lately", scans.lately)
+        self._draw_names("Recent", scans.lately)
 
     def _draw_names(self, head: str, scans: Sequence[str]) -> None:
         imgui.text_disabled(head)
@@ -351,7 +351,7 @@ class Browser:
 
     def _draw_rows(self) -> None:
         if not self._rows:
-            nothing = f"No name here has '{self._filter}' in it." if self._all else "There are no scans here."
+            nothing = f"No name contains '{self._filter}'." if self._all else "No scans in this folder."
             told = "Reading ..." if self._listing else self._problem or nothing
             imgui.text_wrapped(printable(told))
             return
@@ -380,7 +380,7 @@ class Browser:
         self._draw_words(row, size.x, faint=number != self._chosen)
         if row.kind == "folder" and row.frames:
             imgui.same_line(start.x + size.x)
-            if widgets.icon_button(icons.ICON_FA_ANGLE_RIGHT, "Look into this folder (Right)"):
+            if widgets.icon_button(icons.ICON_FA_ANGLE_RIGHT, "Open this folder (Right)"):
                 self._go(Path(row.path))
         imgui.pop_id()
         if clicked:
@@ -410,7 +410,7 @@ class Browser:
     def _draw_foot(self) -> None:
         row = self._row
         goes = row is not None and not row.frames
-        texts = ("Go there" if goes else "Open", "Cancel")
+        texts = ("Go" if goes else "Open", "Cancel")
         padding, gap = imgui.get_style().frame_padding.x, imgui.get_style().item_spacing.x
         room = sum(imgui.calc_text_size(text).x + 2 * padding for text in texts) + gap
         left = imgui.get_content_region_avail().x - room

@@ -149,7 +149,7 @@ class Capture:
                 self._note(Problem(f"Cannot record: {error}"))
                 return
             self.recorder = Recorder(now)
-            self._note("Recording what is shown, until you stop it.")
+            self._note("Recording the view (R stops)")
             self._begin_journal()
             self.note_shown()
             return
@@ -177,7 +177,7 @@ class Capture:
             journal.remove()
         choices = {
             "Save as film": lambda: self._film(recording, path.with_suffix(FILM_SUFFIX)),
-            "Keep the recording alone": lambda: None,
+            "Keep recording only": lambda: None,
         }
         self._note(Offer(f"Recorded {recording.seconds:.1f} s.  Saved {path}", choices, "recording"))
 

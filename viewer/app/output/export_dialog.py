@@ -17,17 +17,17 @@ from .export_plan import AS_SHOWN, EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choic
 from .exporting import Exporting
 
 _TITLE, _LEAVING = "Export", "Close Scan4D?"
-_WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Frames, one after the other"}
-_FORMATS = {PNG: "PNG pictures", EXR: "EXR: the surface behind the picture", MP4: "MP4 film"}
+_WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Image sequence / film"}
+_FORMATS = {PNG: "PNG pictures", EXR: "EXR: surface data", MP4: "MP4 film"}
 _SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
 _MARKS = {
     "scale_bar": "Scale bar",
     "color_bar": "Colour bar",
     "stamp": "Frame and time",
-    "measurements": "Measurements",
+    "measurements": "Distances",
     "notes": "Notes",
     "landmarks": "Landmarks",
-    "trajectories": "Ways of landmarks",
+    "trajectories": "Landmark paths",
     "measure_lines": "Measures",
 }
 _FIRST_MARKS = 0.55  # of a row of boxes, for the first one
@@ -56,7 +56,7 @@ def draw(exporting: Exporting, quit: Callable[[], None]) -> None:
 
 
 def _edit_what(choices: Choices, count: int, problems: dict[str, str]) -> Choices:
-    widgets.label("What", "Turntable: all round, from the current view on")
+    widgets.label("What", "Turntable: one full turn, starting at the current view")
     choices = replace(choices, what=widgets.combo("what", choices.what, list(_WHAT), _WHAT))
     if choices.what == TURNTABLE:
         widgets.label("Pictures", _HELP["pictures"])
@@ -80,7 +80,7 @@ def _edit_format(choices: Choices, rate: float, problems: dict[str, str]) -> Cho
     widgets.label("Format", _HELP["format"])
     choices = replace(choices, format=widgets.combo("format", choices.format, list(_FORMATS), _FORMATS))
     if choices.format == MP4:
-        widgets.label("Pictures a second", _HELP["fps"])
+        widgets.label("Frames per second", _HELP["fps"])
         edited, fps = imgui.input_float("##fps", rate, 0, 0, "%.5g")
         choices = replace(choices, fps=round(fps, 3)) if edited else choices
     _draw_problems(problems, "format", "fps")
@@ -92,7 +92,7 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
     if of_view is not None:
         titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, as the view"
     now = f"{choices.width}x{choices.height}"
-    widgets.label("Size", "Pixels. Another shape than the view's shows more or less at the sides")
+    widgets.label("Size", "Pixels. A shape other than the view's shows more or less at the sides")
     chosen = widgets.combo("size", now if now in titles else "Other", list(titles), titles)
     if chosen in titles and chosen != now:
         width, height = (int(side) for side in chosen.split("x"))
@@ -110,16 +110,16 @@ def _edit_quality(choices: Choices, shown: str) -> Choices:
     """Declare the choice of samples. shown: the word for that of the view."""
     titles = {AS_SHOWN: f"As in Appearance: {QUALITY_WORDS[shown]}", **QUALITY_WORDS}
     imgui.begin_disabled(choices.format == EXR)
-    widgets.label("Quality", _HELP["quality"])
+    widgets.label("Anti-aliasing", _HELP["quality"])
     quality = widgets.combo("quality", choices.quality, list(titles), titles)
     imgui.end_disabled()
     if choices.format == EXR:
-        widgets.tooltip("EXR holds the surface in the middle of each pixel")
+        widgets.tooltip("EXR stores the surface at the middle of each pixel")
     return replace(choices, quality=quality)
 
 
 def _edit_marks(marks: Marks, choices: Choices) -> Marks:
-    widgets.label("Over the picture", "Not over EXR, which holds the surface behind the picture")
+    widgets.label("Overlays", "EXR has none: it stores the surface, not a picture")
     imgui.begin_disabled(choices.format == EXR)
     imgui.begin_group()
     width = imgui.get_content_region_avail().x
@@ -134,10 +134,10 @@ def _edit_marks(marks: Marks, choices: Choices) -> Marks:
 
 
 def _edit_place(choices: Choices, problems: dict[str, str]) -> Choices:
-    widgets.label("Leave out names, paths", _HELP["anonymous"])
+    widgets.label("Anonymise (no names, paths)", _HELP["anonymous"])
     imgui.begin_disabled(choices.format == MP4)
     anonymous = imgui.checkbox("##anonymous", choices.anonymous)[1]
-    widgets.tooltip("A film tells nothing of its scan" if choices.format == MP4 else _HELP["anonymous"])
+    widgets.tooltip("A film stores no names and paths" if choices.format == MP4 else _HELP["anonymous"])
     imgui.end_disabled()
     widgets.label("Folder", _HELP["folder"])
     folder = widgets.edit_path("##folder", choices.folder)[1]
@@ -182,7 +182,7 @@ def _draw_end(exporting: Exporting, can: bool) -> None:
         names = dict.fromkeys(numbered(out, n).name for n in (numbers[0], numbers[-1]))
         imgui.text_wrapped(f"{len(numbers)} picture{'s' * (len(numbers) > 1)}: {' to '.join(names)}")
     if exporting.refused:
-        _warn(f"{exporting.refused[0].name} is a file of the scan, and is not replaced.")
+        _warn(f"{exporting.refused[0].name} is a file of the scan: Scan4D does not replace it.")
     elif exporting.replaced:
         _warn(_there_already([path.name for path in exporting.replaced]))
     imgui.begin_disabled(not can)
@@ -198,15 +198,17 @@ def _draw_end(exporting: Exporting, can: bool) -> None:
 
 def _there_already(names: list[str]) -> str:
     if len(names) == 1:
-        return f"{names[0]} is there already."
-    return f"{len(names)} of these files are there already."
+        return f"{names[0]} exists already."
+    return f"{len(names)} of these files exist already."
 
 
 def _draw_leaving(exporting: Exporting, quit: Callable[[], None]) -> None:
-    imgui.text_wrapped("An export is running. Closing the window cancels it, and nothing is left of it.")
+    imgui.text_wrapped(
+        "An export is running. If you close the window, Scan4D cancels it and removes its files."
+    )
     leaves = imgui.button("Cancel the export and close")
     imgui.same_line()
-    stays = imgui.button("Go on") or imgui.is_key_pressed(imgui.Key.escape)
+    stays = imgui.button("Continue export") or imgui.is_key_pressed(imgui.Key.escape)
     task = exporting.task
     if leaves and task is not None:
         task.cancel()

@@ -27,8 +27,8 @@ _FIXED = "fixed"  # both ends are given
 _THEME, _OWN = "theme", "own"
 _FIRST_OWN = {_THEME: Look().background, _OWN: "#7f858d"}  # no preset's
 _BACKGROUND_WORDS = {
-    _THEME: "As the theme", "white": "White, for print", "black": "Black", "transparent": "Transparent",
-    _OWN: "Own colour",
+    _THEME: "Same as theme", "white": "White, for print", "black": "Black", "transparent": "Transparent",
+    _OWN: "Custom colour",
 }  # fmt: skip
 _OF_NUMBERS = ("color_map", "range", "low", "high")
 _OF_LIGHT = ("ambient", "diffuse", "specular", "shininess")
@@ -54,17 +54,17 @@ def draw(
     edited = widgets.edit(
         told, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
         dict(zip(("low", "high"), shown or (), strict=False)), idle,
-        {"range": partial(_edit_range, shown), "background": _edit_background},
+        {"range": partial(_edit_range, shown), "background": _edit_background}, "More appearance options",
     )  # fmt: skip
     ends = _in_unit(edited, 1 / factor)
     low = look.low if edited.low == told.low else ends.low  # what is not edited stays to the last bit
     high = look.high if edited.high == told.high else ends.high
     rendering.edit_look(replace(edited, low=low, high=high))
     imgui.begin_disabled(rendering.is_default)
-    if imgui.button("Back to the usual", ui.button_size(1)):
+    if imgui.button("Reset appearance", ui.button_size(1)):
         rendering.reset()
     imgui.end_disabled()
-    ui.tooltip("Appearance and renderer as of a scan that was never open", "reset")
+    ui.tooltip("Set appearance and renderer to the defaults of a new scan", "reset")
 
 
 def _in_unit(look: Look, factor: float) -> Look:
@@ -75,7 +75,9 @@ def _in_unit(look: Look, factor: float) -> Look:
 
 def _edit_background(look: Look) -> Look:
     """Declare what chooses the background, and a field for one's own."""
-    help = "background: what is behind the scan, here and in what is saved; films have no transparency"
+    help = (
+        "background: what is behind the scan, in the window and in saved pictures; films have no transparency"
+    )
     widgets.label("Background", help, imgui.get_frame_height())
     presets = {color: name for name, color in BACKGROUNDS.items()}
     now = _THEME if theme.leaves_background(look) else presets.get(look.background, _OWN)
@@ -93,11 +95,11 @@ def _why_unlit(look: Look, name: str, params: object, pose: Pose) -> str:
     drawn_by, cloud = backend(name), pose.overview
     is_photograph = drawn_by.draws_samples(pose, params) and cloud.colors is not None
     if is_photograph and look.color_by in ("auto", "own"):
-        return "Photographs of range images are shown as they are; choose another Light"
+        return "Scan4D shows the photos of range images without light; choose another Light"
     has_normals = cloud.normals is not None or drawn_by.finds_normals
     if has_normals or "normals" in drawn_by.needs(pose, params):
         return ""
-    return "Nothing is lit where there are no normals; with another Light they are estimated"
+    return "The scan has no normals, so nothing is lit; with another Light, Scan4D estimates them"
 
 
 def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> dict[str, str]:
@@ -106,17 +108,17 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
     has_own = pose.overview.colors is not None
     idle = {}
     if has_own and (look.color_by in ("auto", "own") or not is_here):
-        idle["plain"] = "The scan's own colours are shown; choose One colour above"
+        idle["plain"] = "The scan has its own colours; choose Single colour above"
     elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
         idle["plain"] = (
             f"Colours are by {COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()} now"
         )
     if not is_here:
-        idle |= dict.fromkeys(_OF_NUMBERS, "What the colours are by is not in this frame")
+        idle |= dict.fromkeys(_OF_NUMBERS, "This frame does not have what the colours show")
     if look.light == "auto" and why_unlit:
         idle |= dict.fromkeys(_OF_LIGHT, why_unlit)
     elif look.eye_dome is None:
-        idle |= dict.fromkeys(_OF_EDGES, "Edges are dark by themselves only where nothing is lit")
+        idle |= dict.fromkeys(_OF_EDGES, "Edge shading is on automatically only where nothing is lit")
     return idle
 
 
@@ -125,7 +127,7 @@ def _edit_range(shown: tuple[float, float] | None, look: Look) -> Look:
 
     shown: where it begins and ends in the picture; None: nowhere.
     """
-    help = "range: what the colours span. Fixed keeps what that is now, to be changed below"
+    help = "range: the values that the colours span. Fixed keeps the present range, which you can edit below"
     widgets.label("Range", help, imgui.get_frame_height())
     now = look.range if None in (look.low, look.high) else _FIXED
     titles = RANGE_WORDS | ({_FIXED: "Fixed"} if shown or now == _FIXED else {})
@@ -148,4 +150,4 @@ def _colors(look: Look, scalars: Collection[str], found: Collection[str]) -> dic
     if look.color_by in titles:
         return titles
     is_here = drawable(look, scalars) == look  # as the scalar's number
-    return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not here)")}
+    return titles | {look.color_by: printable(look.color_by) + ("" if is_here else " (not in this frame)")}

@@ -40,7 +40,7 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
     goal = session.document.goal
     imgui.begin_disabled(goal is None and bool(choosing.why_not))  # as of another device it can be ended
     imgui.begin_group()
-    widgets.label("Automatic", "Have the renderer chosen for each view, by a bound")
+    widgets.label("Automatic", "Scan4D chooses the renderer for each view, so that it keeps a limit")
     wanted = imgui.checkbox("##automatic", goal is not None)[1]
     imgui.end_group()
     imgui.end_disabled()
@@ -60,14 +60,14 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
     scan is, in it; None while that is not known."""
     lengths = sorted({unit, goal.unit} - {PIXELS, "ms"})
     words = {"ms": "Time", PIXELS: "Error in pixels"} | {each: f"Error in {each}" for each in lengths}
-    widgets.label("Bound", "What a picture may take, or be off by")
+    widgets.label("Limit", "What may not be exceeded: the drawing time of a picture, or its error")
     kind = widgets.combo("bound", goal.unit, list(words), words)
     if kind != goal.unit:
         first = _FIRST_ERROR if kind == PIXELS else float(f"{_FIRST_ERROR * (footprint or 1.0):.2g}")
         return FIRST_GOAL if kind == "ms" else Goal("error", first, kind)
     pixel = 1.0 if kind == PIXELS else footprint or goal.bound / _FIRST_ERROR
     low, high = _TIMES if kind == "ms" else (_ERRORS[0] * pixel, _ERRORS[1] * pixel)
-    widgets.label("At most", "Drawing once in full; at rest it is refined beyond that")
+    widgets.label("Maximum", "For one full picture. At rest, Scan4D goes on refining it")
     flags = imgui.SliderFlags_.logarithmic.value
     edited, bound = imgui.slider_float("##most", goal.bound, low, high, f"%.3g {kind}", flags)
     return Goal(goal.kind, float(f"{bound:.3g}"), goal.unit) if edited and bound > 0 else goal
@@ -76,19 +76,19 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
 def _draw_choice(choosing: Choosing) -> None:
     """Declare what was chosen, and what it is expected to take."""
     if choosing.problem:
-        widgets.faint(f"Nothing is chosen: {choosing.problem}.")
+        widgets.faint(f"Scan4D chooses nothing: {choosing.problem}.")
     choice, comparison, measured = choosing.choice, choosing.comparison, choosing.measured_ms
     if choice is None or comparison is None:
         return
-    widgets.fact("Chosen", way_in_words(choice.way))
+    widgets.fact("Using", way_in_words(choice.way))
     widgets.fact("Expected", _expected(choice))
     bounded = next(each.bounded for each in comparison.candidates if each.way == choice.way)
-    widgets.fact("Mostly", f"within {bounded:.2g} {comparison.goal.unit}")
-    widgets.tooltip("Nine of ten pictures; this is what the bound is about")
+    widgets.fact("90 % within", f"{bounded:.2g} {comparison.goal.unit}")
+    widgets.tooltip("Nine of ten pictures stay within this; the limit applies to it")
     if measured is not None:
-        widgets.fact("Last took", f"{measured:.3g} ms")
+        widgets.fact("Last picture", f"{measured:.3g} ms")
     if not choice.keeps:
-        widgets.faint("None is surely within the bound; this one comes nearest.")
+        widgets.faint("No renderer is sure to meet the limit; using the closest.")
     _draw_curve(comparison, choice)
 
 
@@ -101,7 +101,7 @@ def way_in_words(way: DrawingWay) -> str:
 def _expected(choice: Choice) -> str:
     error, goal = choice.expected.error, choice.goal
     length = f" ({error * choice.footprint:.2g} {goal.unit})" if goal.unit not in ("ms", PIXELS) else ""
-    return f"{choice.expected.ms:.3g} ms, off by {error:.2g} px{length}"
+    return f"{choice.expected.ms:.3g} ms, error {error:.2g} px{length}"
 
 
 def _draw_curve(comparison: Comparison, choice: Choice) -> None:
@@ -134,7 +134,7 @@ def _draw_curve(comparison: Comparison, choice: Choice) -> None:
     implot.end_plot()
     if pointed is not None:
         time, error = _place(pointed)
-        imgui.set_tooltip(f"{way_in_words(pointed.way)}\n{time:.3g} ms, {error:.2g} px")
+        imgui.set_tooltip(f"{way_in_words(pointed.way)}\n{time:.3g} ms, error {error:.2g} px")
 
 
 def _place(candidate: Candidate) -> tuple[float, float]:

@@ -26,8 +26,11 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
     widgets.tooltip(f"{name}: {backend(name).help}")
     if chosen != name:
         rendering.choose(chosen)
+    widgets.faint(backend(chosen).good_for)
     automatic.draw(session, rendering, choosing, scale)
     name, params = session.document.chosen(pose)
     imgui.push_id("renderer")  # the look has parameters of the same names
-    rendering.edit_params(widgets.edit(params, session.document.defaults(pose)[1]))
+    rendering.edit_params(
+        widgets.edit(params, session.document.defaults(pose)[1], rest="More renderer options")
+    )
     imgui.pop_id()

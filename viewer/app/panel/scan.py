@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..session import Session
 
 _OWN = "own"  # the unit that the scan has
+_PLURALS = {"m": "metres", "mm": "millimetres"}  # of the units that are guessed
 _ATTRIBUTES = {"colors": "colours", "normals": "normals", "radii": "radii"}
 
 
@@ -87,31 +88,35 @@ class ScanSection:
         widgets.fact("Stored", _stored(pose))
         if estimated := _estimated(pose, *self.session.document.chosen(pose)):
             widgets.fact("Estimated", ", ".join(estimated))
-            widgets.tooltip("What the scan does not store and its renderer uses: estimated from the points")
+            widgets.tooltip(
+                "The scan does not store what the renderer needs here: Scan4D estimates it from the points"
+            )
 
     def _draw_unit(self, pose: Pose) -> None:
         """Declare what chooses the unit of length, a guess where nobody has told it, and what lengths are
         shown in."""
         told, document = self.playback.timeline.unit, self.session.document
-        own = "not known" if told == UNKNOWN_UNIT else f"{told}, as the scan tells"
+        own = "not set" if told == UNKNOWN_UNIT else f"{told} (from file)"
         names = [*UNIT_WORDS, *([document.unit] if document.unit and document.unit not in UNIT_WORDS else [])]
         titles = {_OWN: own} | {name: UNIT_WORDS.get(name, name) for name in names}
-        widgets.label("1 unit is", "How long one unit of the scan's coordinates is. It stays with the scan.")
+        widgets.label(
+            "Scan unit", "How long one unit of the scan's coordinates is. Scan4D keeps it with the scan."
+        )
         chosen = widgets.combo("unit", document.unit or _OWN, list(titles), titles)
         guess = guess_unit(self.steering.bounds(pose), document.look.up)
         if told == UNKNOWN_UNIT and document.unit is None and guess is not None:
             widgets.label("")
-            if imgui.button(f"Is it {guess[0]}?###accept", ImVec2(-1, 0)):
+            if imgui.button(f"Set to {_PLURALS[guess[0]]}?###accept", ImVec2(-1, 0)):
                 chosen = guess[0]
-            widgets.tooltip(f"In {guess[0]} it is as large as {guess[1]}. A click says so.")
+            widgets.tooltip(f"In {guess[0]}, the scan is as large as {guess[1]}. Click to set this unit.")
         if chosen != (document.unit or _OWN):
-            self.session.change("Tell the unit", unit=None if chosen == _OWN else chosen)
+            self.session.change("Set the unit", unit=None if chosen == _OWN else chosen)
         if not is_length(self.playback.unit):
             return
         shown = {_OWN: UNIT_WORDS.get(self.playback.unit, self.playback.unit)}
         shown |= {name: word for name, word in UNIT_WORDS.items() if name != self.playback.unit}
         now = self.playback.scale.unit if self.playback.scale.unit != self.playback.unit else _OWN
-        widgets.label("Lengths in", "The unit that lengths are shown, drawn and saved in")
+        widgets.label("Show lengths in", "The unit of the lengths that Scan4D shows, draws and saves")
         wanted = widgets.combo("shown_unit", now, list(shown), shown)
         if wanted != now:
             self.session.change("Show lengths in another unit", shown_unit=None if wanted == _OWN else wanted)
@@ -122,10 +127,13 @@ class ScanSection:
         if len(self.playback.timeline) == 1:
             return
         if not pacing.can_change:
-            by = "as the command line says" if pacing.is_told else f"by {TIMES_FILE}"
+            by = "set on the command line" if pacing.is_told else f"from {TIMES_FILE}"
             widgets.fact("Rate", f"{pacing.rate:.4g} Hz, {by}")
             return
-        widgets.label("Frame rate", "Frames a second of the scan, by Enter. It stays with the scan.")
+        widgets.label(
+            "Frame rate",
+            "Frames per second of the scan. Press Enter to set it. Scan4D keeps it with the scan.",
+        )
         entered, rate = imgui.input_float(
             "##rate", pacing.rate, format="%.4g Hz", flags=imgui.InputTextFlags_.enter_returns_true.value
         )
@@ -134,15 +142,15 @@ class ScanSection:
         if pacing.has_names:
             by_names = self.session.document.times_by_names
             changed, wanted = imgui.checkbox("Times from file names", by_names)
-            widgets.tooltip("The names of the files tell when each frame was taken")
+            widgets.tooltip("Read the time of each frame from its file name")
             if changed:
                 pacing.use_names(wanted)
 
     def _draw_up(self) -> None:
         pose, now = self.playback.pose, self.session.document.look.up
         why = f": {pose.upright.why}" if pose and pose.upright.up == now else ""
-        widgets.label("Up", f"The axis of the scan that points up{why}. Heights are measured along it.")
-        chosen = widgets.combo("up", now, tuple(AXES), {} if now in AXES else {now: "as picked"})
+        widgets.label("Up", f"The axis of the scan that points up{why}. Scan4D measures heights along it.")
+        chosen = widgets.combo("up", now, tuple(AXES), {} if now in AXES else {now: "custom"})
         if chosen != now:
             self.steering.set_up(chosen)
 

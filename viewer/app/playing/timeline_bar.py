@@ -45,7 +45,7 @@ def draw(app: App) -> None:
     _draw_place(app.playback)
     report = _report(app.playback) if app.playback.player.playing else ""
     # Its width stays while it says nothing: the track must not move under the mouse.
-    room = imgui.calc_text_size("100 of 100 fps, 10000 dropped").x + imgui.get_style().item_spacing.x
+    room = imgui.calc_text_size(_rates("100", "100", "10000 skipped")).x + imgui.get_style().item_spacing.x
     width = imgui.get_content_region_avail().x
     is_wide = several and width - room > _SHORTEST_TRACK * imgui.get_font_size()
     _draw_track(app, width - room if is_wide else width)
@@ -53,8 +53,8 @@ def draw(app: App) -> None:
         imgui.same_line()
         imgui.text_disabled(report)
         widgets.tooltip(
-            "Frames a second that are shown, and that the scan has at this speed; frames that were left out, "
-            "as they were not read or drawn at their time"
+            "How many frames per second you see, and how many the scan has at this speed. "
+            "Scan4D skips frames that it cannot load or draw in time"
         )
     _draw_status(app.playback, app.pointer, app.notices)
 
@@ -83,16 +83,16 @@ def _draw_pace(app: App) -> None:
     """Declare how it plays."""
     pace, accent = app.session.pace, app.palette.accent
     for icon, name, about in (
-        (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": play round the end"),
+        (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": start again at the end"),
         (icons.ICON_FA_BACKWARD, "reverse", ""),
-        (icons.ICON_FA_FILM, "every_frame", ", however long it takes, rather than keep time"),
+        (icons.ICON_FA_FILM, "every_frame", ": show each one, even if that is slower"),
     ):
         _draw_button(app, icon, name, accent if getattr(pace, name) else None, about)
     imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())
     titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
     chosen = float(widgets.combo("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
     hints = (app.keys.hint(name) for name in ("slower", "faster", "speed_1"))
-    widgets.tooltip("Speed of playing. " + ", ".join(hints))
+    widgets.tooltip("Playback speed. " + ", ".join(hints))
     if chosen != pace.speed:
         app.change_pace(speed=chosen)
     imgui.same_line()
@@ -122,7 +122,11 @@ def _report(playback: Playback) -> str:
         f"{rate:.0f}" if playback.player.rate >= 10 else f"{rate:.1f}"
         for rate in (playback.rate, playback.player.rate)
     )
-    return f"{shown} of {due} fps, " + ("every frame" if pace.every_frame else f"{playback.dropped} dropped")
+    return _rates(shown, due, "every frame" if pace.every_frame else f"{playback.dropped} skipped")
+
+
+def _rates(shown: str, due: str, more: str) -> str:
+    return f"playing {shown} of {due} frames/s ({more})"
 
 
 def _draw_track(app: App, width: float) -> None:

@@ -19,26 +19,35 @@ _DIGITS = 4  # of positions, after the leading digit of the scan's radius
 class Pointer:
     """The place of the picture that is under the mouse.
 
-    picked: what is seen there, None where nothing is. words: the same for users.
+    picked: what is seen there, None where nothing is. words: the same for users. has_details: whether these
+    have all that is known of the point, by the user's choice.
     """
 
-    def __init__(self, viewport: Viewport, playback: Playback) -> None:
+    def __init__(self, viewport: Viewport, playback: Playback, has_details: bool = False) -> None:
         self._viewport, self._playback = viewport, playback
+        self.has_details = has_details
         self.picked: Picked | None = None
         self.words: list[str] = []
-        self._scale: Scale | None = None  # that they are told in
+        self._told: tuple[Scale, bool] | None = None  # the unit of the words, and whether they have details
+
+    def toggle_details(self) -> None:
+        """Switch whether the words have all that is known of the point."""
+        self.has_details = not self.has_details
 
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
         picked = self._viewport.pick(pixel) if pixel else None
-        scale = self._playback.scale
-        if picked is self.picked and scale == self._scale:
+        told = self._playback.scale, self.has_details
+        if picked is self.picked and told == self._told:
             return
-        self.picked, self.words, self._scale = picked, [], scale
+        self.picked, self.words, self._told = picked, [], told
         if picked is not None and (request := self._viewport.request) is not None:
             pose = request.pose
             frame = f"{frame_in_words(pose.index)}/{len(self._playback.timeline)}"
-            self.words = describe_pick(picked, frame, scale, self._viewport.bounds(pose).radius)
+            radius, shown = self._viewport.bounds(pose).radius, request.look.color_by
+            self.words = describe_pick(picked, frame, self._playback.scale, radius, shown)
+            if self.has_details:
+                self.words += point_details(picked, shown)
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
@@ -46,20 +55,29 @@ class Pointer:
         return self._viewport.pick_in_full() or self.picked
 
 
-def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float) -> list[str]:
-    """Position, frame, point and the point's attributes: the most wanted first.
+def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown: str = "") -> list[str]:
+    """Position, frame and the number that colours show, the most wanted first.
 
-    radius: of the scan, scan units; positions get the digits that matter for its size.
+    radius: of the scan, scan units; positions get the digits that matter for its size. shown: what the
+    look colours by.
     """
     decimals = min(max(_DIGITS - math.floor(math.log10(scale.factor * radius or 1.0)), 0), 9)
     sure = "" if picked.uncertainty is None else f" ± {scale.factor * picked.uncertainty:.2g}"
     place = ", ".join(f"{scale.factor * v:.{decimals}f}" for v in picked.position)
     words = [f"{place}{sure} {scale.unit}", frame]
-    seen = "measured" if picked.measured else f"filled from level {picked.level}"
-    words.append(seen if picked.id is None else f"point {picked.id}, {seen}")
+    if shown in picked.scalars:
+        words.append(f"{shown} {_number(picked.scalars[shown])}")
+    if not picked.measured:
+        words.append(f"filled from level {picked.level}")
     if picked.at_outline:
         words.append("at an outline")
-    words += [f"{name} {_number(value)}" for name, value in picked.scalars.items()]
+    return words
+
+
+def point_details(picked: Picked, shown: str = "") -> list[str]:
+    """The index of the point, and its attributes but the one that `describe_pick` has told."""
+    words = [] if picked.id is None else [f"point {picked.id}"]
+    words += [f"{name} {_number(value)}" for name, value in picked.scalars.items() if name != shown]
     if picked.color is not None:
         words.append("colour #" + "".join(f"{channel:02x}" for channel in picked.color[:3]))
     if picked.normal is not None:

@@ -67,11 +67,11 @@ class Rendering:
         former = self._session.document.goal
         if goal is None:
             document = self._session.document
-            self._session.history.change("Choose by hand", document.drawn_by(document.backend))
+            self._session.history.change("Choose renderer by hand", document.drawn_by(document.backend))
         elif former is None:
-            self._session.change("Choose automatically", goal=goal)
+            self._session.change("Choose renderer automatically", goal=goal)
         elif goal != former:
-            self._session.change("Change bound", merge="Change bound", goal=goal)
+            self._session.change("Change limit", merge="Change limit", goal=goal)
 
     def switch_automatic(self) -> None:
         """Have the backend chosen automatically, within a time at first, or not any more."""
@@ -81,7 +81,7 @@ class Rendering:
         """Draw as a scan is drawn that was never open: renderer, its parameters and look."""
         look = Look(up=self._session.document.look.up)
         usual = replace(self._session.document.drawn_by(None), params={}, look=look)
-        self._session.history.change("Back to defaults", usual)
+        self._session.history.change("Reset appearance", usual)
 
     @property
     def is_default(self) -> bool:

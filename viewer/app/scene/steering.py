@@ -101,7 +101,7 @@ class Steering:
             bounds, aspect = self.whole(pose), self._viewport.aspect
             azimuth += self._session.document.front
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
-            self._session.change("Look from there", camera=turned, pivot=None)
+            self._session.change("Look from side", camera=turned, pivot=None)
 
     def set_up(self, up: str) -> None:
         """Say what is up in the scan, as `up_vector` takes it, and show all of it upright, from the front."""
@@ -140,7 +140,7 @@ class Steering:
         """Bring what is under the mouse to the middle of the view, and orbit about it from now on."""
         camera, picked = self._session.document.camera, self._pointer.in_full()
         if picked and camera:
-            self._session.change("Centre the point", camera=camera.centered(picked.place), pivot=picked.place)
+            self._session.change("Centre on point", camera=camera.centered(picked.place), pivot=picked.place)
 
     def toggle_following(self) -> None:
         """Go with the subject from now on, or stay."""
@@ -207,7 +207,7 @@ class Steering:
                 self._session.amend(look=look, front=pose.upright.front)
                 if pose.upright.up != UP:
                     self._note(
-                        f"Up is taken to be {pose.upright.up}: {pose.upright.why}. Change it beside the cube."
+                        f"Up axis guessed: {pose.upright.up} ({pose.upright.why}). Change it beside the cube."
                     )
             if camera is not None and not navigation.shows(camera, self.bounds(pose), self._viewport.aspect):
                 camera = None

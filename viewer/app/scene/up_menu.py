@@ -28,7 +28,7 @@ def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object
     where = cube_place(size.x, size.y, em)
     if where is None:
         return False
-    text = f"Up {up if up in AXES else 'as picked'} {icons.ICON_FA_CARET_DOWN}"
+    text = f"Up: {up if up in AXES else 'custom'} {icons.ICON_FA_CARET_DOWN}"
     width = imgui.calc_text_size(text).x + 2 * imgui.get_style().frame_padding.x
     inset, before = size.x - where[0], imgui.get_cursor_pos()
     imgui.set_cursor_pos(ImVec2(min(where[0] - width / 2, size.x - width - 0.3 * em), _BELOW * inset))
@@ -56,7 +56,7 @@ def _draw_ways(steering: Steering, pick: Callable[[], object]) -> None:
         if imgui.menu_item(f"{title} is up###{title}", "", is_on)[0]:
             act()
     imgui.separator()
-    if imgui.menu_item("This side is the front###front", "", False)[0]:
+    if imgui.menu_item("Set current view as front###front", "", False)[0]:
         steering.set_front()
-    if imgui.menu_item("A surface faces up...###pick", "", False)[0]:
+    if imgui.menu_item("Set up from a surface...###pick", "", False)[0]:
         pick()

@@ -11,6 +11,7 @@ from ...camera import Camera
 from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
+from ...scan.times import frame_in_words
 from .. import notices, theme, widgets
 from . import cube, navigation, up_menu
 from .canvas import ViewPlace
@@ -160,7 +161,7 @@ def words_over(app: App) -> str | None:
     if playback.problem:
         return f"{playback.problem}\n{playback.pose.label} is shown instead."
     doing = "Loading" if playback.timeline.ready(app.session.index) is None else "Preparing"
-    return f"{doing} {playback.timeline.label(app.session.index)} ..."
+    return f"{doing} {frame_in_words(app.session.index)} ..."
 
 
 def _words_on_nothing(app: App) -> str | None:

@@ -31,14 +31,14 @@ class Tool:
 
     def prompt(self) -> str:
         """The words that say what a click does."""
-        return "Turning upright: click a surface that faces up, such as a floor.  Esc ends."
+        return "Click a surface that faces up, such as a floor. Esc to stop."
 
     def on_click(self, click: Click) -> bool:
         """Take what was clicked to face up; raises InputError where no surface is there."""
         surface, camera = self.desk.viewport.surface, self.desk.document.camera
         direction = seen_normal(surface, *click.pixel) if surface and click.picked else None
         if direction is None or camera is None:
-            raise InputError("There is no surface here that could face up.")
+            raise InputError("No surface here: click on the scan.")
         up = up_name(direction)
         bounds = click.motion.bounds(self.desk.viewport.bounds(click.pose))
         self.desk.change(
@@ -56,7 +56,7 @@ class Tool:
 COMMANDS: dict[str, tuple[Command[Tool], ...]] = {
     "View": (
         Command(
-            "pick_up", "A surface faces up...", lambda tool: tool.toggle(),
+            "pick_up", "Set up from a surface...", lambda tool: tool.toggle(),
             is_on=lambda tool: tool.desk.has_clicks,
         ),
     ),

@@ -23,6 +23,7 @@ from .values import VALUES as VALUES
 from .values import give_value
 
 TITLE = "Smooth surface"
+GOOD_FOR = "Best look for points without normals"
 BLENDS = True
 FINDS_NORMALS = True
 

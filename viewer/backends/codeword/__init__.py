@@ -31,6 +31,7 @@ from .encoder import encode_points
 from .engine import Sheet, WordBuffers, draw_bands
 
 TITLE = "Code words"
+GOOD_FOR = "Research: discs from compact tables"
 
 _HELD = (
     "words hold places, shapes, depths and colours in steps: the last bit moves some by a whole step, and "

@@ -39,6 +39,7 @@ from .sectors import Sectors
 from .spacing import Spacings, copies_in, steady_points
 
 TITLE = "Visible points"
+GOOD_FOR = "Points without those on the far side"
 BLENDS = True
 FILLS = True
 FINDS_NORMALS = True
@@ -117,6 +118,7 @@ class Params:
     quality: float = param(
         _QUALITY,
         "Sectors, as many times those of which half would have a point",
+        title="Sector density",
         low=0.05,
         high=64,
         sweep=(0.25, 0.5, 1, 4),

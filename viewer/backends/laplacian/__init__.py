@@ -20,6 +20,7 @@ from ..pyramidal.views import ViewSource
 from .spline import FILTERS, Bands, spline_views
 
 TITLE = "Merged views"
+GOOD_FOR = "Several range views, without seams"
 ROWS = "samples"
 FILLS = True
 BLENDS = True
@@ -88,6 +89,7 @@ class Params:
         "How a pixel looks up what a view sees where samples lie closer than pixels: at one place, between "
         "two levels; or, for pictures that can wait, at four places of a finer level",
         choices=("fast", "fine"),
+        title="Texture sampling",
         group=_VIEWS,
         sweep=("fast", "fine"),
         when={"bands": ("picture",)},

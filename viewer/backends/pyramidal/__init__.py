@@ -29,6 +29,7 @@ from .targets import LEVELS, Targets
 from .views import MODES, ViewSource
 
 TITLE = "Filled surface"
+GOOD_FOR = "Range images; fills holes"
 FILLS = True
 BLENDS = True
 

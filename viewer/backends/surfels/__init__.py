@@ -33,6 +33,7 @@ from .subpixel import average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, most_listed, splat
 
 TITLE = "Discs"
+GOOD_FOR = "Best look for points with normals"
 BLENDS = FILLS = True
 
 _SORTED = {"passes": ("sorted",)}

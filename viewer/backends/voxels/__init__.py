@@ -32,6 +32,7 @@ from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
 
 TITLE = "Voxels"
+GOOD_FOR = "Large scans; coarser where far away"
 ROWS = "octants"
 BLENDS = True
 DERIVES_ON_THREAD = True

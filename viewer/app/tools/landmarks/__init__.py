@@ -41,9 +41,9 @@ _OFF = 3.0, 0.03  # deviations, and shares of the scan's radius, that the surfac
 class Settings:
     """Choices that come back at the next start."""
 
-    follow: bool = param(True, "Follow landmarks through all frames as soon as they are placed")
-    names: bool = param(True, "Show names in the view, as far as there is room")
-    loupe: bool = param(True, "Magnify what is under the mouse while placing")
+    follow: bool = param(True, "Track landmarks through all frames as soon as you place them")
+    names: bool = param(True, "Show names in the view, where there is room")
+    loupe: bool = param(True, "Magnify what is under the mouse while you place landmarks")
 
 
 class Tool:
@@ -116,7 +116,7 @@ class Tool:
         """The landmark that a click sets: the chosen one, else the next that is to be placed."""
         chosen = self.made.named(self.selected)
         if chosen is not None:
-            waits = chosen.state == "to place" and self.frame not in chosen.missing
+            waits = chosen.state == "not placed" and self.frame not in chosen.missing
             if self.corrects or waits:
                 return chosen
         return self.made.next_to_place(self.frame, self.selected)
@@ -175,16 +175,16 @@ class Tool:
     def prompt(self) -> str:
         """The words that say what a click does."""
         if self.notebook.is_pinning:
-            return "Note: click the place that it is of.  Esc ends."
+            return "Note: click its place. Esc to stop."
         target, names = self.target, [one.name for one in self.made.all]
-        if target is not None and target.state == "to place":
+        if target is not None and target.state == "not placed":
             number = names.index(target.name) + 1
-            return f"{target.name} ({number} of {len(names)}): click its place.  Esc ends."
+            return f"{target.title}, {number} of {len(names)}: click it. Esc to stop."
         if target is not None:
-            return f"{target.name}: click its place in {frame_in_words(self.frame)}.  Esc ends."
+            return f"{target.title}: click it in {frame_in_words(self.frame)}. Esc to stop."
         if self.is_free:
-            return f"{self.made.free_name()}: click its place.  Esc ends."
-        return "All are placed: drag one to correct it, or choose one in the list.  Esc ends."
+            return f"{self.made.free_name()}: click its place. Esc to stop."
+        return "All landmarks are placed: drag one to correct it, or choose one in the list. Esc to stop."
 
     def on_click(self, click: Click) -> bool:
         """Set the next one at what was clicked; raises InputError where it cannot be."""
@@ -204,10 +204,10 @@ class Tool:
     def _set(self, landmark: Landmark, click: Click, name: str, merge: object = None) -> None:
         """Set one at what is seen, and go on to the next. name, merge: of the step of the history."""
         if click.picked is None:
-            raise InputError("There is nothing to place a landmark on here.")
+            raise InputError("No surface here: click on the scan.")
         spot = moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
         if click.through_gap:
-            self.desk.note("That was seen through a gap: the landmark is on the surface before it.")
+            self.desk.note("No data there; placed on the nearest surface in front.")
         self.corrects = self.corrects and bool(landmark.keys)
         self.selected = landmark.name
         self.desk.change(name, self.made.with_landmark(landmark.with_key(spot)), merge=merge)
@@ -233,7 +233,7 @@ class Tool:
         self.desk.redraw()
         if ends and landmark is not None:
             if picked is None:
-                raise InputError(f"There is nothing there: {landmark.name} stays where it was.")
+                raise InputError(f"No surface there: {landmark.name} stays where it was.")
             self.corrects = False
             self._set(landmark, click, "Move landmark")
 
@@ -244,7 +244,7 @@ class Tool:
             return False
         click = self.desk.seen_at(vector(self.positions[number]), (right, up)) if self.seen[number] else None
         if click is None or click.pose.index != self.shown.frame:
-            raise InputError(f"{self.selected} is not seen from here: turn the view to move it.")
+            raise InputError(f"{self.selected} is hidden in this view: turn the view to move it.")
         if click.picked is not None:
             landmark = self.shown.landmarks[number]
             self._set(landmark, click, "Nudge landmark", merge=("nudge", landmark.name, self.frame))
@@ -254,13 +254,15 @@ class Tool:
         """Set the next one where the mirror image of its partner is, on the surface that is seen there."""
         target, proposal, pose = self.target, self.proposal, self.desk.pose
         if target is None or proposal is None or pose is None:
-            raise InputError("Nothing is mirrored here: its partner and a few others have to be placed.")
+            raise InputError(
+                "No mirror place is known: place its mirror partner and a few other pairs first."
+            )
         place = self.desk.motion(pose).points(proposal.position)
         click = self.desk.seen_at(vector(place))
         deviations, share = _OFF
         most = deviations * np.nan_to_num(proposal.sigma) + share * self.desk.viewport.bounds(pose).radius
         if click is None or click.picked is None or np.linalg.norm(click.picked.position - place) > most:
-            raise InputError(f"The mirrored place of {target.name} is not seen from here: turn the view.")
+            raise InputError(f"The mirror place of {target.name} is hidden in this view: turn the view.")
         self._set(target, click, "Place landmark")
 
     # --- the list ---------------------------------------------------------------------
@@ -271,7 +273,7 @@ class Tool:
         if landmark is None:
             return
         self.selected = name
-        self.corrects = self.is_active and landmark.state != "to place"
+        self.corrects = self.is_active and landmark.state != "not placed"
         number = self.shown.number(name)
         if number is not None and self.shown.is_there[number]:
             self._look_at(number)
@@ -309,7 +311,7 @@ class Tool:
         landmark = self.target or self.made.named(self.selected)
         if landmark is not None:
             self.selected = landmark.name
-            self.change_selected("Landmark missing", landmark.with_missing(self.frame))
+            self.change_selected("Mark landmark not visible", landmark.with_missing(self.frame))
 
     def rename(self, name: str) -> None:
         """Give the selected one another name. Raises InputError for one that is taken."""
@@ -317,13 +319,13 @@ class Tool:
         if not name or name == self.selected:
             return
         if self.made.named(name) is not None:
-            raise InputError(f"There is a landmark '{name}' already.")
+            raise InputError(f"A landmark '{name}' exists already. Choose another name.")
         self.desk.change("Rename landmark", self.made.renamed(self.selected, name))
         self.selected = name
 
     def pair(self, partner: str) -> None:
         """Have the selected one and another be mirror images of each other; "": of none."""
-        self.desk.change("Pair landmarks", self.made.paired(self.selected, partner))
+        self.desk.change("Set mirror partner", self.made.paired(self.selected, partner))
 
     def delete(self) -> None:
         """Delete the selected one."""
@@ -334,7 +336,7 @@ class Tool:
     def take_key_away(self) -> None:
         """Take back that the selected one was set in this frame."""
         if landmark := self.made.named(self.selected):
-            self.change_selected("Take landmark back", landmark.without_key(self.frame))
+            self.change_selected("Remove correction", landmark.without_key(self.frame))
 
     def has_key(self) -> bool:
         """Whether the selected one was set in this frame."""
@@ -415,28 +417,29 @@ COMMANDS = {
         ),
         Menu("Landmarks", (
             (
-                _while_active("skip_landmark", "Skip, or place after all", Tool.skip, "X"),
-                _while_active("missing_landmark", "Missing in this frame", Tool.set_missing, "Shift+X"),
-                _while_active("mirrored_landmark", "Take the mirrored place", Tool.take_mirrored, "A"),
+                _while_active("skip_landmark", "Skip / unskip", Tool.skip, "X"),
+                _while_active("missing_landmark", "Not visible in this frame", Tool.set_missing, "Shift+X"),
+                _while_active("mirrored_landmark", "Place from mirror partner", Tool.take_mirrored, "A"),
                 Command(
-                    "delete_landmark", "Delete", Tool.delete, "Delete", can=lambda tool: bool(tool.selected)
+                    "delete_landmark", "Delete landmark", Tool.delete, "Delete",
+                    can=lambda tool: bool(tool.selected)
                 ),
                 Command(
-                    "landmark_key", "Take back in this frame", Tool.take_key_away, "Shift+Delete",
+                    "landmark_key", "Remove correction in this frame", Tool.take_key_away, "Shift+Delete",
                     can=Tool.has_key,
                 ),
             ),
             (
                 Command("note_at_place", "Pin a note", Tool.pin_note, "J"),
                 Command(
-                    "note_at_frame", "Note on this frame",
+                    "note_at_frame", "Add frame note",
                     lambda tool: tool.notebook.add_to_frame(tool.frame), "Shift+J",
                 ),
             ),
             (
-                Command("read_landmarks", "Read...", lambda tool: tool.exchange.ask_to_read()),
+                Command("read_landmarks", "Import landmarks...", lambda tool: tool.exchange.ask_to_read()),
                 Command(
-                    "choose_template", "Template of your own...",
+                    "choose_template", "Load template...",
                     lambda tool: tool.exchange.ask_for_template(),
                 ),
                 Command(
@@ -444,7 +447,7 @@ COMMANDS = {
                     lambda tool: tool.exchange.ask_to_save_template(), can=lambda tool: bool(tool.made.all),
                 ),
                 Command(
-                    "save_landmarks", "Save...", lambda tool: tool.exchange.ask_to_save(),
+                    "save_landmarks", "Export landmarks...", lambda tool: tool.exchange.ask_to_save(),
                     can=lambda tool: any(one.keys for one in tool.made.all),
                 ),
             ),

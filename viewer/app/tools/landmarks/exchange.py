@@ -46,13 +46,13 @@ class Exchange:
         self._desk, self._begin = desk, begin
         self.templates: dict[str, Template] = dict(templates())
         written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
-        about = f"The ending tells the format: {_USUAL}, {', '.join(written)}"
-        self._saving = SaveDialog("Save landmarks", about, _USUAL, self._save, written)
-        about = "A file of landmarks, or a template of your own"
-        self._reading = ReadDialog("Read landmarks", about, ".json", self._read, landmark_suffixes())
+        about = f"The ending sets the format: {_USUAL}, {', '.join(written)}"
+        self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, written)
+        about = "A file of landmarks, or a template"
+        self._reading = ReadDialog("Import landmarks", about, ".json", self._read, landmark_suffixes())
         about = "Names, pairs and measures of the landmarks, for other scans"
         self._template_saving = SaveDialog("Save template", about, ".json", self._save_template)
-        about = "Your own, as 'Save as template...' writes it"
+        about = "A file that 'Save as template...' has written"
         self._template_reading = ReadDialog("Choose template", about, ".json", self._read_template)
         self._doubted: Path | None = None  # file whose landmarks seem to be of another scan
 
@@ -117,7 +117,7 @@ class Exchange:
             found = read_landmarks(path, unit)
             problem = None if is_sure else told_apart(found, _bounds(found, timeline, frame))
             if problem is not None:
-                raise InputError(problem, path, "Read it again to take them all the same")
+                raise InputError(problem, path, "Import the file again to use them all the same")
             return found, landmarks_of(found, timeline.visit, len(timeline), frame, known)
 
         def take(result: tuple[LandmarkSet, tuple[Landmark, ...]]) -> None:
@@ -129,13 +129,13 @@ class Exchange:
         desk.run(f"Reading {path.name}", read, take)
 
     def _add(self, path: Path, found: LandmarkSet, landmarks: tuple[Landmark, ...]) -> None:
-        self._desk.change("Read landmarks", self._desk.document.part(Landmarks).with_read(landmarks))
+        self._desk.change("Import landmarks", self._desk.document.part(Landmarks).with_read(landmarks))
         self._desk.reveal()
         for text in found.told:
             self._desk.note(f"{path.name}: {text}.")
         if beside := told_beside(landmarks):
             self._desk.note(f"{path.name}: {beside}")
-        self._desk.note(f"Read {len(landmarks)} landmarks of {path.name}.")
+        self._desk.note(f"Imported {len(landmarks)} landmarks from {path.name}.")
 
     def _save(self, file: Path) -> None:
         timeline, desk = self._desk.timeline, self._desk
@@ -152,7 +152,7 @@ class Exchange:
 
         def tell(remark: str | None) -> None:
             frames = frame_in_words(frame) if is_one else f"{len(timeline)} frames"
-            gaps = "" if is_one or is_whole else "; some frames are not followed yet, and are gaps in it"
+            gaps = "" if is_one or is_whole else "; some frames are not tracked yet, and have no data in it"
             desk.note(f"Saved {file}, {frames}{gaps}." + (f" {remark}" if remark else ""))
 
         desk.run(f"Saving {file.name}", save, tell)

@@ -93,4 +93,4 @@ class Following:
                 for _ in tracker.run():
                     pass
 
-            self._task = self._desk.run("Following landmarks", follow, lambda _: None)
+            self._task = self._desk.run("Tracking landmarks", follow, lambda _: None)

@@ -39,7 +39,7 @@ class Notebook:
     def pin(self, click: Click) -> None:
         """Add a note at what was clicked, in its frame; raises InputError where nothing is."""
         if click.picked is None:
-            raise InputError("There is nothing to pin a note to.")
+            raise InputError("No surface here: click on the scan.")
         self.is_pinning = False
         place = vector(click.motion.inverse.points(np.array(click.picked.place)))
         self._add(Note("", click.pose.index, place))
@@ -82,9 +82,9 @@ class Notebook:
             imgui.set_keyboard_focus_here()
             self._takes_keyboard = False
         imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * (side + gap))
-        changed, text = imgui.input_text_with_hint("##text", "Text of the note", note.text)
+        changed, text = imgui.input_text_with_hint("##text", "Note text", note.text)
         where = "All frames" if note.frame is None else frame_in_words(note.frame).capitalize()
-        widgets.tooltip(f"{where}, {'pinned to a place' if note.position else 'on the whole'}")
+        widgets.tooltip(f"{where}, {'pinned to a place' if note.position else 'on the whole frame'}")
         imgui.same_line()
         goes = widgets.icon_button(icons.ICON_FA_CROSSHAIRS, f"Go there: {where.lower()}")
         imgui.same_line()

@@ -49,7 +49,7 @@ def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:
         there = view.on_screen(vector(tool.desk.motion(pose).points(proposal.position)))
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
-            canvas.labels([Label(["mirrored:  A takes it"], (there, there), faint=True)])
+            canvas.labels([Label(["mirror place: A sets it"], (there, there), faint=True)])
     if tool.dragged is not None and (there := view.on_screen(tool.dragged)) is not None:
         canvas.ring(there, _CHOSEN)
     mouse = imgui.get_mouse_pos()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _ROWS = 6  # of the list that are shown at once
 _COLORS = {Known.PLACED: 0x8DE36B, Known.TRACKED: 0xF2C14E, Known.GAP: 0xE0A03E, Known.PENDING: 0x969CA6}
-_FREE, _NONE = "Free names", "None"
+_FREE, _NONE = "No template", "None"
 
 
 def draw(tool: Tool, ui: Ui) -> None:
@@ -27,46 +27,50 @@ def draw(tool: Tool, ui: Ui) -> None:
     words = "Stop placing" if tool.is_active else "Place"
     if imgui.button(f"{words}###place", ui.button_size(3)):
         tool.toggle()
-    ui.tooltip("Click each landmark's place in the view, one after the other", "landmarks")
+    ui.tooltip("Click the place of each landmark in the view, one after the other", "landmarks")
     imgui.begin_disabled(not tool.is_active)
     imgui.same_line()
     if imgui.button("Skip", ui.button_size(2)):
         tool.skip()
-    ui.tooltip("Leave out the next one, or place it after all", "skip_landmark")
+    ui.tooltip("Skip the next landmark, or bring it back", "skip_landmark")
     imgui.same_line()
-    if imgui.button("Missing", ui.button_size(1)):
+    if imgui.button("Not visible here", ui.button_size(1)):
         tool.set_missing()
-    ui.tooltip("It cannot be seen in this frame, and is a gap there", "missing_landmark")
+    ui.tooltip("Mark the landmark as not visible in this frame", "missing_landmark")
     imgui.end_disabled()
     if tool.is_active and tool.proposal is not None and tool.target is not None:
-        if imgui.button("Take the mirrored place", ui.button_size(1)):
+        if imgui.button("Place from mirror partner", ui.button_size(1)):
             tool.take_mirrored()
-        ui.tooltip(f"{tool.target.name} as the mirror image of {tool.target.partner}", "mirrored_landmark")
+        ui.tooltip(
+            f"Place {tool.target.name} where the mirror image of {tool.target.partner} lies",
+            "mirrored_landmark",
+        )
     if tool.is_active and tool.target is not None and tool.target.about:
         widgets.faint(tool.target.about)
     if tool.made.all:
         _draw_list(tool)
     else:
-        widgets.faint("No landmarks yet. Choose a template, or press Place and click places on the surface.")
+        widgets.faint("No landmarks yet. Choose a template, or press Place and click on the surface.")
     if tool.selected:
         _draw_selected(tool, ui)
     _draw_following(tool)
     imgui.separator_text("Notes")
     if imgui.button("Pin a note", ui.button_size(2)):
         tool.pin_note()
-    ui.tooltip("Click the place that it is of", "note_at_place")
+    ui.tooltip("Click a place in the view to pin a note to it", "note_at_place")
     imgui.same_line()
-    if imgui.button("Note on the frame", ui.button_size(1)):
+    if imgui.button("Add frame note", ui.button_size(1)):
         tool.notebook.add_to_frame(tool.frame)
-    ui.tooltip("A note on the whole of this frame", "note_at_frame")
+    ui.tooltip("Add a note to this whole frame", "note_at_frame")
     tool.notebook.draw_list()
-    tool.desk.settings = widgets.edit(tool.desk.settings, type(tool.desk.settings)())
+    settings = tool.desk.settings
+    tool.desk.settings = widgets.edit(settings, type(settings)(), rest="More landmark options")
 
 
 def _draw_template(tool: Tool) -> None:
     known = tool.exchange.templates
     titles = {"": _FREE, **{name: template.title for name, template in known.items()}}
-    widgets.label("Template", "The landmarks that are to be placed, in their order")
+    widgets.label("Template", "The list of landmarks to place, in order")
     chosen = tool.made.template
     if imgui.begin_combo("##template", widgets.unhidden(titles.get(chosen, chosen))):
         for name, title in titles.items():
@@ -74,7 +78,7 @@ def _draw_template(tool: Tool) -> None:
             if imgui.selectable(label, name == chosen)[0] and name != chosen:
                 tool.begin(known.get(name))
         imgui.separator()
-        if imgui.selectable("From a file...###template file", False)[0]:
+        if imgui.selectable("Load template...###template file", False)[0]:
             tool.exchange.ask_for_template()
         if tool.made.all and imgui.selectable("Save as template...###save template", False)[0]:
             tool.exchange.ask_to_save_template()
@@ -114,7 +118,7 @@ def _draw_row(tool: Tool, number: int, height: float) -> None:
     room = corner.x + width - left - gap.x
     state = widgets.fitted(state, 0.6 * room)
     right = corner.x + width - imgui.calc_text_size(state).x
-    name = widgets.fitted(printable(landmark.name), right - left - gap.x)
+    name = widgets.fitted(printable(landmark.title), right - left - gap.x)
     draw_list.add_text(ImVec2(left, corner.y), imgui.get_color_u32(imgui.Col_.text), name)
     draw_list.add_text(ImVec2(right, corner.y), faint, state)
     words = widgets.fitted(place_words(shown, number, tool.desk.scale), room)
@@ -130,24 +134,24 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     imgui.separator_text("Selected")
     imgui.set_next_item_width(-1)
     entered, name = imgui.input_text("##name", landmark.name, imgui.InputTextFlags_.enter_returns_true.value)
-    widgets.tooltip("Its name; Enter changes it")
+    widgets.tooltip("Name of the landmark. Press Enter to change it")
     _draw_partner(tool, landmark)
     imgui.begin_disabled(not tool.has_key())
-    if imgui.button("Take back here", ui.button_size(2)):
+    if imgui.button("Remove correction in this frame", ui.button_size(2)):
         tool.take_key_away()
-    ui.tooltip("Undo that it was set in this frame", "landmark_key")
+    ui.tooltip("Remove the place that you set in this frame; tracking finds it again", "landmark_key")
     imgui.end_disabled()
     imgui.same_line()
     if imgui.button("Delete", ui.button_size(1)):
         tool.delete()
-    ui.tooltip("Delete it, with its measures; undo brings it back", "delete_landmark")
+    ui.tooltip("Delete the landmark and its measures. Undo restores them", "delete_landmark")
     if entered:
         tool.rename(name)
 
 
 def _draw_partner(tool: Tool, landmark: Landmark) -> None:
     """Declare the choice of the landmark that is another's mirror image."""
-    widgets.label("Mirrored", "The landmark that is its mirror image, left and right")
+    widgets.label("Mirror partner", "The landmark on the other side, its mirror image")
     if imgui.begin_combo("##partner", widgets.unhidden(landmark.partner or _NONE)):
         for name in ("", *(one.name for one in tool.made.all if one.name != landmark.name)):
             label = f"{widgets.unhidden(name or _NONE)}###partner {widgets.unhidden(name)}"
@@ -162,9 +166,9 @@ def _draw_following(tool: Tool) -> None:
         return
     tracks, pending = tool.desk.followed.tracks, tool.follower.pending
     if tool.follower.is_running:
-        widgets.faint(f"Following {pending} of {len(tracks)} landmarks through all frames ...")
+        widgets.faint(f"Tracking {pending} of {len(tracks)} landmarks through all frames ...")
     elif pending and tool.follower.is_stopped:
-        if imgui.button("Go on following"):
+        if imgui.button("Continue tracking"):
             tool.follower.resume()
     elif pending:
-        widgets.faint(f"{pending} of {len(tracks)} landmarks are not followed through all frames.")
+        widgets.faint(f"{pending} of {len(tracks)} landmarks are not tracked through all frames.")

@@ -15,7 +15,7 @@ from ....analysis.track import Known, Track
 from ....geometry import vector
 from ....output.overlays import DrawnLandmark
 
-MISSING = "missing in this frame"
+MISSING = "not visible in this frame"
 _UNKNOWN = (np.nan,) * 6
 _ROWS = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # of a covariance's six numbers, as a matrix
 
@@ -88,7 +88,7 @@ class ShownLandmarks:
             return landmark.state
         if known is Known.GAP:
             reason = self.reasons.get(number, "")
-            return f"gap: {reason}" if reason else "gap"
+            return f"no data: {reason}" if reason else "no data"
         return {Known.PENDING: "not tracked yet", Known.TRACKED: "tracked", Known.PLACED: "placed"}[known]
 
 

@@ -45,7 +45,7 @@ def gap_spans(landmarks: Iterable[Landmark], tracks: Mapping[str, Track]) -> lis
             spans[-1] = FrameSpan(range(spans[-1].frames.start, frame + 1), _GAP_COLOR, spans[-1].words)
         else:
             more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-            words = f"Gap of {', '.join(names[:_MOST_NAMED])}{more}"
+            words = f"No data for {', '.join(names[:_MOST_NAMED])}{more}"
             spans.append(FrameSpan(range(frame, frame + 1), _GAP_COLOR, words))
         last = names
     return spans

@@ -31,7 +31,7 @@ from . import overlay, panel
 from .words import distance_words
 
 log = logging.getLogger(__name__)
-TITLE = "Measurements"
+TITLE = "Distances (this frame)"
 
 
 class Tool:
@@ -44,10 +44,10 @@ class Tool:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.filled = False
-        about = "All measurements, as a table of comma separated values"
-        self.saving = SaveDialog("Save measurements", about, ".csv", self._save)
-        about = "A table that Save CSV has written of this scan"
-        self.reading = ReadDialog("Read measurements", about, ".csv", self._read)
+        about = "All distances, as a table of comma separated values"
+        self.saving = SaveDialog("Export distances", about, ".csv", self._save)
+        about = "A table that 'Export distances...' has written of this scan"
+        self.reading = ReadDialog("Import distances", about, ".csv", self._read)
         self.begun: Spot | None = None
         self._seen: tuple[object, dict[Spot, bool]] = None, {}
         self._told: list[str] = []
@@ -61,11 +61,11 @@ class Tool:
 
     def delete(self, number: int) -> None:
         """Take away the one at this place, counted from 0."""
-        self.desk.change("Delete measurement", self.made.without(number))
+        self.desk.change("Delete distance", self.made.without(number))
 
     def clear(self) -> None:
         """Take away all."""
-        self.desk.change("Clear measurements", Measurements())
+        self.desk.change("Clear distances", Measurements())
 
     @property
     def is_active(self) -> bool:
@@ -99,15 +99,15 @@ class Tool:
 
     def prompt(self) -> str:
         """The words that say what a click does."""
-        return f"Measuring: click the {'second' if self.begun else 'first'} place.  Esc ends."
+        return f"Measuring: click the {'second' if self.begun else 'first'} place. Esc to stop."
 
     def on_click(self, click: Click) -> bool:
         """Set an end at what was clicked; raises InputError where it cannot be."""
         if click.picked is None:
-            raise InputError("There is nothing to measure here.")
+            raise InputError("No surface here: click on the scan.")
         end = Spot.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
-            self.desk.note("That was seen through a gap: the end is at the point before it.")
+            self.desk.note("No data there; placed on the nearest surface in front.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
         self.set_end(end)
         _learn_topology(self.desk.timeline, click.pose.index)
@@ -163,7 +163,7 @@ class Tool:
         elif self._followed == scan and one_topology is False:
             self._followed = ""
             if readings:
-                self.desk.note("Not all frames have the same points: measurements stay fixed in space.")
+                self.desk.note("Not all frames have the same points: distances stay fixed in space.")
         told = [f"{distance_words(reading, self.desk.scale)}, {reading.motion}" for reading in readings]
         if told != self._told:
             self._told = told
@@ -187,7 +187,7 @@ class Tool:
     def copy(self) -> None:
         """Put a table of all into the clipboard, for spreadsheets."""
         imgui.set_clipboard_text(to_text(self._table(), "\t"))
-        self.desk.note(f"Copied {len(self.made.all)} measurements as a table.")
+        self.desk.note(f"Copied {len(self.made.all)} distances as a table.")
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
@@ -216,7 +216,7 @@ class Tool:
 
     def _read(self, file: Path) -> None:
         if not self.on_file(file):
-            raise InputError("holds no measurements", file, "Choose a table that 'Save CSV...' has written")
+            raise InputError("holds no distances", file, "Choose a table of 'Export distances...'")
 
     def on_file(self, path: Path) -> bool:
         """Add the measurements of a table that was saved of this scan, but those that are there; whether the
@@ -225,7 +225,7 @@ class Tool:
             return False
         pose, timeline = self.desk.pose, self.desk.timeline
         if pose is not None and not self.desk.motion(pose).is_identity:
-            self.desk.note("The scan is moved by a tool: put it back first, then open the table again.")
+            self.desk.note("The scan is moved: turn off Remove head motion, then open the table again.")
             return True
         work = partial(read_measurements, path, timeline.name, self.desk.unit, len(timeline), timeline.pose)
         self.desk.run(f"Reading {path.name}", work, self._add)
@@ -235,10 +235,10 @@ class Tool:
         known = {_places(measurement) for measurement in self.made.all}
         new = tuple(measurement for measurement in read if _places(measurement) not in known)
         if new:
-            self.desk.change("Read measurements", Measurements((*self.made.all, *new)))
+            self.desk.change("Import distances", Measurements((*self.made.all, *new)))
             self.desk.reveal()
         there = f", {len(read) - len(new)} were there already" if len(new) < len(read) else ""
-        self.desk.note(f"Read {len(new)} measurements{there}.")
+        self.desk.note(f"Imported {len(new)} distances{there}.")
 
     def _table(self) -> list[list[object]]:
         """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
@@ -276,15 +276,15 @@ def _at_all(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]
 COMMANDS = {
     "Tools": (
         Command(
-            "measure", "Measure", Tool.toggle, "M",
+            "measure", "Measure distance", Tool.toggle, "M",
             is_on=lambda tool: tool.is_active, can=lambda tool: tool.desk.document.camera is not None,
-            short="Measure", icon=icons.ICON_FA_RULER,
+            short="Distances", icon=icons.ICON_FA_RULER,
         ),
-        Menu("Measurements", (
+        Menu("Distances", (
             (
                 _at_all("copy", "Copy as table", Tool.copy),
-                _at_all("save", "Save CSV...", Tool.ask_to_save),
-                Command("read_measurements", "Read CSV...", Tool.ask_to_read),
+                _at_all("save", "Export distances...", Tool.ask_to_save),
+                Command("read_measurements", "Import distances...", Tool.ask_to_read),
                 _at_all("clear", "Clear", Tool.clear),
             ),
         )),

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
 def draw(measuring: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
-    words = "Stop measuring" if measuring.is_active else "Measure"
+    words = "Stop measuring" if measuring.is_active else "Measure distance"
     if imgui.button(f"{words}###measure", ui.button_size(2)):
         measuring.toggle()
-    ui.tooltip("Click two places in the view for their distance", "measure")
+    ui.tooltip("Click two places in the view to measure their distance", "measure")
     imgui.same_line()
-    measuring.filled = imgui.checkbox("Allow filled", measuring.filled)[1]
-    widgets.tooltip("Also take places where the renderer has filled a hole, and no point was measured")
+    measuring.filled = imgui.checkbox("Allow clicks on filled holes", measuring.filled)[1]
+    widgets.tooltip("Also measure where the renderer has filled a hole, and the scanner measured no point")
     if not measuring.made.all:
-        widgets.faint("No measurements yet. Press Measure, then click two places on the surface.")
+        widgets.faint("No distances yet. Press Measure distance, then click two places on the surface.")
     for number, reading in enumerate(measuring.readings()):
         imgui.push_id(number)
         if _draw_row(measuring, number, reading):
@@ -60,8 +60,13 @@ def _details(reading: Reading, scale: Scale) -> str:
     """A text that tells both ends in full."""
     ends = [_end_words(end, scale) for end in reading.measurement.ends]
     if reading.measurement.uncertainty is None:
-        return "\n".join([*ends, "How sure it is, is not known: measure anew"])
-    return "\n".join([*ends, "± covers the true distance in 95 % of cases: points around, pixels, following"])
+        return "\n".join([*ends, "Its uncertainty is not known: measure it again"])
+    return "\n".join(
+        [
+            *ends,
+            "± covers the true distance in 95 % of cases. It includes point spacing, pixel size and tracking",
+        ]
+    )
 
 
 def _end_words(end: Spot, scale: Scale) -> str:
@@ -69,7 +74,7 @@ def _end_words(end: Spot, scale: Scale) -> str:
     place = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
     spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"
     seen = f", filled from level {end.level}" if end.level else ""
-    seen += ", at an outline: it may be the surface before or behind" if end.at_outline else ""
+    seen += ", at an outline: it may lie on the surface in front or behind" if end.at_outline else ""
     sure = "" if end.uncertainty is None else f" ± {scale.factor * end.uncertainty:.2g}"
     return f"{what}, {frame_in_words(end.frame)}: {place}{sure} {scale.unit}, spacing {spacing}{seen}"
 
@@ -78,12 +83,12 @@ def _draw_outlets(measuring: Tool, ui: Ui) -> None:
     third = ui.button_size(3)
     if imgui.button("Copy", third):
         measuring.copy()
-    widgets.tooltip("As a table, into the clipboard")
+    widgets.tooltip("Copy all distances as a table")
     imgui.same_line()
-    if imgui.button("Save CSV...", third):
+    if imgui.button("Export CSV...", third):
         measuring.ask_to_save()
-    widgets.tooltip("Opening or dropping the file brings them back")
+    widgets.tooltip("Save all distances to a file. Open or drop the file to load them again")
     imgui.same_line()
     if imgui.button("Clear", third):
         measuring.clear()
-    widgets.tooltip("Delete all; undo brings them back")
+    widgets.tooltip("Delete all distances. Undo restores them")

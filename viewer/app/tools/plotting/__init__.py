@@ -37,7 +37,7 @@ from .shown import Curve, Kept, Shown
 from .ways import Ways
 from .words import numbers_in_words
 
-TITLE = "Curves"
+TITLE = "Measures over time"
 
 
 class Tool:
@@ -59,7 +59,7 @@ class Tool:
         self.pointed: str | None = None
         self.renaming = Renaming()
         self.saving = SaveDialog(
-            "Save curves", "What is plotted: a table (.csv) or a picture (.png, .svg)",
+            "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
             PLOT_SUFFIXES[0], self._save, PLOT_SUFFIXES[1:],
         )  # fmt: skip
         self._words = Kept()
@@ -171,7 +171,7 @@ class Tool:
         measures = [one.name for one in self.landmarks.measures]
         measure = Adding().measure(self.placed, measures)
         if measure is None:
-            raise InputError("A distance takes two landmarks: place them first.")
+            raise InputError("A distance needs two landmarks: place them first.")
         self.add(measure)
 
     # --- regions ----------------------------------------------------------------------
@@ -268,7 +268,7 @@ class Tool:
     def _save(self, file: Path) -> None:
         shown = self.shown.plot
         if shown is None:
-            raise InputError("There are no curves to save.")
+            raise InputError("There is no plot to export.")
         refuse_input(file, self.desk.timeline)
         self.desk.run(
             f"Saving {file.name}", lambda: shown.save(file), lambda _: self.desk.note(f"Saved {file}")
@@ -283,37 +283,37 @@ def _with_plot(name: str, title: str, act: Callable[[Tool], None]) -> Command[To
 COMMANDS = {
     "Tools": (
         Command(
-            "curves", "Curves", Tool.toggle, "V",
-            is_on=Tool.is_below, short="Curves", icon=icons.ICON_FA_CHART_LINE,
+            "curves", "Plot measures", Tool.toggle, "V",
+            is_on=Tool.is_below, short="Measures over time", icon=icons.ICON_FA_CHART_LINE,
         ),
-        Menu("Curves", (
+        Menu("Plot options", (
             (
                 Command(
-                    "measure_distance", "Distance of the two placed last", Tool.measure_distance, "D"
+                    "measure_distance", "Distance between last two landmarks", Tool.measure_distance, "D"
                 ),
                 Command(
-                    "lasso", "Area and outline of a region", lambda tool: tool.lasso.toggle(),
+                    "lasso", "Outline a region", lambda tool: tool.lasso.toggle(),
                     is_on=lambda tool: tool.lasso.is_drawn,
                 ),
                 Command(
-                    "trajectories", "Ways of landmarks", Tool.toggle_ways, "W",
+                    "trajectories", "Landmark paths", Tool.toggle_ways, "W",
                     is_on=lambda tool: tool.settings.trajectories,
                 ),
                 Command(
-                    "measure_lines", "What is measured in the view", Tool.show_lines,
+                    "measure_lines", "Show measures in the view", Tool.show_lines,
                     is_on=lambda tool: tool.settings.lines,
                 ),
             ),
             (
                 _with_plot("copy_curves", "Copy as table", Tool.copy),
                 _with_plot("copy_numbers", "Copy numbers", Tool.copy_numbers),
-                _with_plot("save_curves", "Save...", Tool.ask_to_save),
+                _with_plot("save_curves", "Export plot...", Tool.ask_to_save),
             ),
         )),
     )
 }  # fmt: skip
 MOUSE = (
-    ("Drag, after Region", "Measure the area and the outline of what you go round"),
-    ("Drag the line in a plot of curves, or click", "Go to that frame"),
-    ("Wheel, drag, right drag, double click in a plot of curves", "Zoom, move, zoom to a box, show all"),
+    ("Drag, after Outline a region", "Measure the area and the perimeter inside the outline"),
+    ("Drag the line in a plot, or click", "Go to that frame"),
+    ("Wheel, drag, right drag, double click in a plot", "Zoom, move, zoom to a box, show all"),
 )

@@ -67,7 +67,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     """Declare the rows that put a measure together, and the button that adds it."""
     adding, kinds = tool.adding, measure_kinds()
     titles = {name: kind.title for name, kind in kinds.items()}
-    widgets.label("Measure", "What is measured of landmarks")
+    widgets.label("Measure", "What to measure between landmarks")
     chosen = widgets.combo("kind", adding.kind, list(titles), titles)
     widgets.tooltip(kinds[chosen].about)
     if chosen != adding.kind:
@@ -75,7 +75,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     kind, placed = kinds[chosen], tool.placed
     measure = adding.measure(placed, [one.name for one in tool.landmarks.measures])
     if measure is None:
-        widgets.faint(f"{kind.title} takes {kind.least} landmarks: place them first.")
+        widgets.faint(f"{kind.title} needs {kind.least} landmarks: place them first.")
         return
     _draw_landmarks(adding, kind, measure, placed)
     for option, words in kind.choices.items():
@@ -84,7 +84,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     if imgui.button("Add measure", ui.button_size(1)):
         tool.add(measure)
         adding.begin_anew()
-    widgets.tooltip(f"{measure.name}, over time")
+    widgets.tooltip(f"Measure {measure.name} in all frames")
 
 
 def _draw_landmarks(adding: Adding, kind: MeasureKind, measure: Measure, placed: Sequence[str]) -> None:
@@ -101,7 +101,7 @@ def _draw_landmarks(adding: Adding, kind: MeasureKind, measure: Measure, placed:
         return
     for icon, about, other in (
         (icons.ICON_FA_PLUS, "One more landmark", count + 1),
-        (icons.ICON_FA_MINUS, "One landmark less", count - 1),
+        (icons.ICON_FA_MINUS, "One landmark fewer", count - 1),
     ):
         imgui.begin_disabled(other < kind.least or other > (kind.most or len(placed)))
         if widgets.icon_button(icon, about):

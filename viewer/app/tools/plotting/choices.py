@@ -46,31 +46,33 @@ class CurveChoices(Part, name="curves"):
 class Settings:
     """Choices that come back at the next start, whatever the scan."""
 
-    is_open: bool = param(False, "Curves under the timeline")
-    mode: str = param(TIME, "What is plotted over what", choices=tuple(MODE_WORDS), words=MODE_WORDS)
+    is_open: bool = param(False, "Show the plot under the timeline")
+    mode: str = param(TIME, "What the plot shows, and over what", choices=tuple(MODE_WORDS), words=MODE_WORDS)
     order: str = param(VALUE, "Values, or how fast they change", choices=ORDERS, words=ORDER_WORDS)
     bands: bool = param(True, "Two standard deviations to either side of a curve", title="±")
     seconds: float = param(
-        0.3, "Width of the window in which curves are smoothed for speed, acceleration and numbers",
+        0.3, "Width of the window that smooths curves, for speed, acceleration and numbers",
         low=0.02, high=5.0, unit="s", title="smoothing",
     )  # fmt: skip
-    lines: bool = param(True, "Draw in the view what is measured there, with its value", title="In the view")
+    lines: bool = param(True, "Draw each measure in the view, with its value", title="In the view")
     least: float = param(
         0.5, "How much of a curve's range a peak stands out by to count as a repeat", low=0.05, high=1.0,
         title="least repeat",
     )  # fmt: skip
     trajectories: bool = param(
-        True, "Draw the ways of the landmarks that are ticked", title="Show ways", basic=True
+        True, "Draw the paths of the landmarks that are ticked", title="Show paths", basic=True
     )
     coordinates: str = param(
-        SCAN, "Ways as the scan has them, or with the motion of the anchors taken off",
-        choices=(SCAN, ANCHORS), words={SCAN: "Of the scan", ANCHORS: "Held still by anchors"}, basic=True,
+        SCAN, "Show paths as recorded, or with the motion of the rigid references removed",
+        choices=(SCAN, ANCHORS), words={SCAN: "As recorded", ANCHORS: "With head motion removed"}, basic=True,
     )  # fmt: skip
     hold: bool = param(
-        False, "Show the scan itself held still by the anchors", title="Hold the scan still", basic=True,
+        False, "Show the scan itself without the motion of the rigid references",
+        title="Remove head motion", basic=True,
     )  # fmt: skip
     by_speed: bool = param(
-        True, "Colour ways by speed; else each landmark has a colour", title="Colour by speed", basic=True,
+        True, "Colour paths by speed; else each landmark has its own colour",
+        title="Colour by speed", basic=True,
     )  # fmt: skip
 
     @property

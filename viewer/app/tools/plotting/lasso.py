@@ -72,14 +72,14 @@ class Lasso:
         spots = [self._spot(place) for place in (places[corners_of(places)] if len(places) > 2 else ())]
         found = [spot for spot in spots if spot is not None]
         if len(found) < 3:
-            raise InputError("Go round a part of the surface: that was round nothing.")
+            raise InputError("No surface inside that outline.")
         name = _free_name(made)
         names = tuple(f"{name}.{number}" for number in range(1, len(found) + 1))
         landmarks = (Landmark(each).with_key(spot) for each, spot in zip(names, found, strict=True))
         options = {"depth": "through"} if self.through else {}
         measures = (
             Measure(f"{name}, area", "area", names, options),
-            Measure(f"{name}, outline", "perimeter", names, options),
+            Measure(f"{name}, perimeter", "perimeter", names, options),
         )
         made = replace(made, all=(*made.all, *landmarks), measures=(*made.measures, *measures))
         self._desk.change("Add region", made)
@@ -102,7 +102,7 @@ class Lasso:
 
     def prompt(self) -> str:
         """The words that say what a drag does."""
-        return "Region: press on the surface, go round it, let go.  Esc ends."
+        return "Press on the surface, draw round the region, let go. Esc to stop."
 
 
 def without_overlap(places: NDArray[np.float64]) -> NDArray[np.float64]:

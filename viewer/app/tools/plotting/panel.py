@@ -24,24 +24,24 @@ _BAR_STEPS = 16  # of the bar of colours
 
 def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
-    words = "Hide curves" if tool.is_below() else "Show curves"
+    words = "Hide plot" if tool.is_below() else "Plot measures"
     if imgui.button(f"{words}###curves", ui.button_size(1)):
         tool.toggle()
-    ui.tooltip("Measures over time, under the timeline", "curves")
+    ui.tooltip("Plot the measures of all frames under the timeline", "curves")
     _draw_measures(tool)
     if measures_there := bool(tool.landmarks.measures):
-        changed, _ = imgui.checkbox("Show in the view", tool.settings.lines)
+        changed, _ = imgui.checkbox("Show measures in the view", tool.settings.lines)
         if changed:
             tool.show_lines()
-        ui.tooltip("The lines that are measured, each with its value", "measure_lines")
+        ui.tooltip("Draw each measure in the view, with its value", "measure_lines")
         _draw_noise(tool)
-    words = "Stop" if tool.lasso.is_drawn else "Region"
+    words = "Stop" if tool.lasso.is_drawn else "Outline a region"
     if imgui.button(f"{words}###region", ui.button_size(2)):
         tool.lasso.toggle()
-    ui.tooltip("Go round a part of the surface: its area and outline are measured", "lasso")
+    ui.tooltip("Draw round a part of the surface to measure its area and perimeter", "lasso")
     imgui.same_line()
-    _, tool.lasso.through = imgui.checkbox("Through", tool.lasso.through)
-    ui.tooltip("What lies before and behind the region is measured with it", "lasso")
+    _, tool.lasso.through = imgui.checkbox("Include surface behind", tool.lasso.through)
+    ui.tooltip("Also measure the surface in front of and behind the region", "lasso")
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
         adding.draw(tool, ui)
         imgui.tree_pop()
@@ -52,15 +52,15 @@ def _draw_measures(tool: Tool) -> None:
     """The measures, each with what shows it and what deletes it, and a row to add one."""
     measures, choices = tool.landmarks.measures, tool.choices
     if not measures:
-        widgets.faint("No measures yet. They come with templates of landmarks, or are added here.")
+        widgets.faint("No measures yet. Choose a landmark template that has some, or add one below.")
     for number, measure in enumerate(measures):
         imgui.push_id(number)
         right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
         changed, is_shown = imgui.checkbox("##shown", measure.name not in choices.hidden)
-        widgets.tooltip("Plot it")
+        widgets.tooltip("Plot this measure")
         if changed:
             others = tuple(name for name in choices.hidden if name != measure.name)
-            tool.choose("Show curve", hidden=others if is_shown else (*others, measure.name))
+            tool.choose("Show measure", hidden=others if is_shown else (*others, measure.name))
         imgui.same_line()
         room = right - imgui.get_cursor_pos_x() - 3 * imgui.get_frame_height()
         if tool.renaming.name == measure.name:
@@ -81,25 +81,31 @@ def _draw_measures(tool: Tool) -> None:
 def _draw_noise(tool: Tool) -> None:
     """The scanner's noise, which adds to how uncertain measures are."""
     scale, noise = tool.desk.scale, tool.choices.noise
-    widgets.label("Noise", "Of the scanner: standard deviation of a coordinate. It makes measures less sure")
+    widgets.label(
+        "Scanner noise (SD)",
+        "Standard deviation of a coordinate. Scan4D adds it to the uncertainty of measures",
+    )
     low, high, speed = 0.0, 1e9, 0.01
     changed, new = imgui.drag_float("##noise", scale.factor * noise, speed, low, high, f"%.3g {scale.unit}")
     if changed:
-        tool.choose("State noise", noise=max(float(f"{new / scale.factor:.6g}"), 0.0))
+        tool.choose("Set scanner noise", noise=max(float(f"{new / scale.factor:.6g}"), 0.0))
 
 
 def _draw_ways(tool: Tool) -> None:
     """The landmarks, each with whether its way is drawn and whether it holds the scan still."""
     placed = tool.placed
-    if not placed or not imgui.tree_node("Ways of landmarks"):
+    if not placed or not imgui.tree_node("Landmark paths (trajectories)"):
         return
     choices = tool.choices
     if imgui.begin_table("ways", 3, imgui.TableFlags_.sizing_fixed_fit.value):
         imgui.table_setup_column("landmark", imgui.TableColumnFlags_.width_stretch.value)
         for words, about in (
             ("", ""),
-            ("way", "Draw its way over the picture"),
-            ("anchor", "It holds the scan still"),
+            ("path", "Draw its path over the picture"),
+            (
+                "rigid reference",
+                "A place that does not deform, such as the forehead: Scan4D removes its motion",
+            ),
         ):
             imgui.table_next_column()
             imgui.text_disabled(words)
@@ -116,10 +122,10 @@ def _draw_ways(tool: Tool) -> None:
                 changed, is_on = imgui.checkbox(f"##{column}", name in names)
                 if changed:
                     others = tuple(one for one in names if one != name)
-                    tool.choose("Choose ways", **{column: (*others, name) if is_on else others})
+                    tool.choose("Choose paths", **{column: (*others, name) if is_on else others})
             imgui.pop_id()
         imgui.end_table()
-    tool.settings = widgets.edit(tool.settings, Settings(), hidden=_OF_THE_PLOT)
+    tool.settings = widgets.edit(tool.settings, Settings(), hidden=_OF_THE_PLOT, rest="More path options")
     if (tool.settings.hold or tool.settings.coordinates == ANCHORS) and tool.ways.problem:
         widgets.faint(tool.ways.problem)
     if tool.settings.by_speed and tool.settings.trajectories and tool.ways.fastest:

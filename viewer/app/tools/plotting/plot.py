@@ -60,24 +60,28 @@ def _why_none(tool: Tool) -> str:
     settings, mode = tool.settings, tool.settings.mode
     if tool.shown.plot is not None:
         if tool.desk.followed.is_busy:
-            return "The measures are being found."
+            return "Scan4D is measuring the frames."
         if not settings.derivative:
-            return "No measure is known in any frame."
+            return "No measure has a value in any frame."
         words, count = ORDER_WORDS[settings.order], settings.smoothing.degree + 1
-        return f"{words} takes {count} frames in a row in which a measure is known."
+        return f"{words} needs {count} frames in a row with a value."
     if not tool.landmarks.measures:
-        return "No measures yet: add one under Curves in the panel, such as the distance of two landmarks."
+        return "No measures yet: add one in the panel, such as the distance between two landmarks."
     if not tool.desk.followed.series:
         return (
-            "The measures are being found."
+            "Scan4D is measuring the frames."
             if tool.desk.followed.is_busy
-            else "No measure is known yet: place its landmarks."
+            else "No measure has a value yet: place its landmarks."
         )
     if not tool.shown.curves:
-        return "All measures are hidden: tick some under Curves in the panel."
+        return "All measures are hidden: tick some in the panel."
     if mode == REPEATS and len(tool.times) == 1:
-        return "Nothing repeats in a single frame."
-    return "This takes two measures." if mode == AGAINST else "No peak stands out: lower how much one has to."
+        return "Repeats need several frames."
+    return (
+        "This needs two measures."
+        if mode == AGAINST
+        else "No peak is high enough: lower the least height at the left."
+    )
 
 
 def _draw_bar(tool: Tool, ui: Ui) -> None:
@@ -91,18 +95,18 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         old = chosen_of(curves, getattr(tool.choices, field)).name
         new = _combo(field, old, {name: words + name for name in names})
         if new != old:
-            tool.choose("Choose curve", **{field: new})
+            tool.choose("Choose measure", **{field: new})
     least = settings.least
     if mode == REPEATS:
         imgui.set_next_item_width(_COMBO * em)
         share = imgui.slider_float("##least", 100 * least, 5, 100, "at least %.0f %%")[1]
         least = round(share) / 100
         widgets.tooltip(
-            "How much of its range the curve rises and falls about a peak that counts as a repeat"
+            "Least height of a peak that counts as a repeat, in percent of the range of the curve"
         )
         imgui.same_line()
     bands = imgui.checkbox("±", settings.bands)[1]
-    widgets.tooltip("Two standard deviations to either side; of repeats, one between them")
+    widgets.tooltip("Band of two standard deviations; for repeats, of one")
     imgui.same_line()
     imgui.set_next_item_width(_SLIDER * em)
     points = (
@@ -114,19 +118,24 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
     seconds = imgui.slider_float(
         "##smoothing", settings.seconds, low, _MOST_SMOOTHING, f"%.2f s{points}", logarithmic
     )[1]
-    widgets.tooltip("The window of the smoothing (Savitzky-Golay) for speed, acceleration and numbers")
+    widgets.tooltip("Width of the smoothing window (Savitzky-Golay), for speed, acceleration and numbers")
     imgui.same_line()
     tool.settings = replace(
         settings, mode=mode, order=order, bands=bands, least=least, seconds=float(f"{seconds:.3g}")
     )
     for words, act, about, is_there in (
-        ("Fit", tool.fit, "Show all of the curves; so does a double click", tool.shown.plot is not None),
-        ("Copy", tool.copy, "What is plotted, as a table, into the clipboard", tool.shown.plot is not None),
-        ("Copy numbers", tool.copy_numbers, "Amplitude, onset, peak and duration, as a table", bool(curves)),
+        ("Fit", tool.fit, "Show the whole plot (double click)", tool.shown.plot is not None),
+        ("Copy", tool.copy, "Copy the plotted values as a table", tool.shown.plot is not None),
         (
-            "Save...",
+            "Copy numbers",
+            tool.copy_numbers,
+            "Copy amplitude, onset, peak and duration as a table",
+            bool(curves),
+        ),
+        (
+            "Export plot...",
             tool.ask_to_save,
-            "As a table (CSV) or a picture (PNG, SVG)",
+            "Export a table (CSV) or a picture (PNG, SVG)",
             tool.shown.plot is not None,
         ),
     ):
@@ -265,7 +274,9 @@ def _color(color: int) -> ImVec4:
 def _draw_table(tool: Tool, frame: int, size: ImVec2) -> None:
     """A row for each curve: its value in a frame, and its numbers; a row under the mouse marks the curve."""
     curves, is_against = tool.shown.curves, tool.settings.mode == AGAINST
-    help = {"r": "Pearson's correlation with what it is plotted against"} if is_against else NUMBERS_HELP
+    help = (
+        {"r": "Pearson's correlation with the measure on the horizontal axis"} if is_against else NUMBERS_HELP
+    )
     related = correlations(curves, chosen_of(curves, tool.choices.abscissa)) if is_against else {}
     tool.pointed = None
     if not imgui.begin_table("numbers", 2 + len(help), _TABLE_FLAGS, size):
@@ -305,4 +316,4 @@ def _draw_name(tool: Tool, curve: Curve) -> None:
         tool.desk.seek(nearest(curve.times, curve.movement.peak))
     if imgui.is_item_hovered():
         tool.pointed = curve.name
-    widgets.tooltip("A click goes to its peak")
+    widgets.tooltip("Click to go to the peak")
