@@ -416,6 +416,11 @@ def _commands(entry: Entry[T]) -> Iterator[Command[T]]:
                 yield from _commands(inner)
 
 
+def first_command(entry: Entry[T]) -> Command[T]:
+    """Find the first command of a menu. Raises StopIteration where it has none."""
+    return next(_commands(entry))
+
+
 class Commands:
     """The table: the window's own commands, and those that were added to it.
 

@@ -8,7 +8,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from . import theme, widgets
-from .commands import Command, Entry, Listing, Menu, Toolbar
+from .commands import Command, Entry, Listing, Menu, Toolbar, first_command
 from .keyboard import VIEW
 from .keys import chord
 
@@ -129,12 +129,15 @@ def _text(app: App, item: str | Menu[App], has_words: bool) -> str:
     """The text of a button, and its name after "###"."""
     if isinstance(item, str):
         command = app.commands.of[item]
-        icon, words, name = command.icon, command.short, item
-    elif not item.title:
-        return f"{icons.ICON_FA_CARET_DOWN}###more"
+        icon, words = command.icon, command.short
     else:
-        icon, words, name = item.icon, f"{item.title} {icons.ICON_FA_CARET_DOWN}", item.title
-    return f"{icon}  {words}###{name}" if has_words and icon else f"{icon or words}###{name}"
+        icon, words = item.icon, f"{item.title} {icons.ICON_FA_CARET_DOWN}".lstrip()
+    return f"{f'{icon}  {words}' if has_words and icon else icon or words}###{_name(item)}"
+
+
+def _name(item: str | Menu[App]) -> str:
+    """The name of a button, which no other one of the toolbar has: no two commands have one name."""
+    return item if isinstance(item, str) else f"menu of {first_command(item).name}"
 
 
 def _draw_line() -> None:
@@ -164,10 +167,11 @@ def _draw_drop(app: App, menu: Menu[App], text: str) -> None:
     """A button that a menu drops from; one without a title stands close to the button before it."""
     if not menu.title:
         imgui.same_line(0, 1)
+    popup = f"{_name(menu)} is open"
     if imgui.button(text):
-        imgui.open_popup(f"drop {menu.title}")
+        imgui.open_popup(popup)
     imgui.set_next_window_pos(ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y))
-    if imgui.begin_popup(f"drop {menu.title}"):
+    if imgui.begin_popup(popup):
         _draw_groups(app, menu)
         imgui.end_popup()
 

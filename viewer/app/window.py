@@ -173,6 +173,7 @@ class Window(GlfwWindow):
         imgui.create_context()
         implot.create_context()
         imgui.get_io().set_ini_filename("")
+        imgui.get_io().config_debug_highlight_id_conflicts = False  # tests look for these, users need not
         imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard.value
         imgui.backends.glfw_init_for_opengl(_address(self._window), False)
         imgui.backends.opengl3_init("#version 430")
