@@ -25,7 +25,7 @@ class Pointer:
 
     def __init__(self, viewport: Viewport, playback: Playback, has_details: bool = False) -> None:
         self._viewport, self._playback = viewport, playback
-        self.has_details = has_details
+        self.has_details: bool = has_details
         self.picked: Picked | None = None
         self.words: list[str] = []
         self._told: tuple[Scale, bool] | None = None  # the unit of the words, and whether they have details
