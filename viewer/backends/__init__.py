@@ -176,7 +176,7 @@ class Backend:
 
     @property
     def good_for(self) -> str:
-        """What to choose it for, in a few words."""
+        """Words on what to choose it for."""
         return self.module.GOOD_FOR
 
     @property
