@@ -64,6 +64,8 @@ def test_details_go_from_full_to_few_pixels_and_points(points: int) -> None:
     coarsest = min(step.scale for step in steps)
     assert 0.35 <= coarsest < 0.4
     for step in steps:
+        drawn = step.scale**2 * PIXELS
+        assert step.share == 1 or step.share * points >= drawn / 2, "fewer would leave holes"
         if step.scale == 1:
             assert step.share == 1 or step.share * points >= PIXELS / 2, (
                 "where points are dense, they go first"
@@ -84,8 +86,8 @@ def test_a_slow_picture_now_and_then_changes_nothing() -> None:
 
 
 MACHINES = [
-    (10, 25, 25, DEMO), (5, 30, 60, DEMO), (15, 80, 10, DEMO), (5, 4, 90, DEMO), (5, 45, 3, CRANE),
-    (5, 30, 15, CRANE), (5, 12, 800, MANY), (15, 80, 4000, MANY),
+    (10, 25, 25, DEMO), (5, 30, 40, DEMO), (15, 80, 10, DEMO), (5, 4, 40, DEMO), (5, 45, 3, CRANE),
+    (5, 30, 15, CRANE), (5, 12, 800, MANY), (12, 80, 2000, MANY),
 ]  # fmt: skip
 
 
@@ -142,7 +144,7 @@ def test_there_is_a_floor(points: int) -> None:
 
 def test_what_gains_no_time_is_not_left_out() -> None:
     """Where all is slow, for another program has the machine."""
-    assert play(Budget(), machine(80, 4, 4), 300)[-1].size > 3 * details(DEMO, PIXELS)[-1].size
+    assert play(Budget(), machine(80, 4, 4), 300)[-1].size > 1.5 * details(DEMO, PIXELS)[-1].size
 
 
 def test_another_scan_begins_where_the_one_before_was() -> None:

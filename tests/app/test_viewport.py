@@ -10,6 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 from scenes import sphere
 
 from viewer.app.scene import viewport as viewport_module
@@ -21,6 +22,7 @@ from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import NOTHING, Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
+from viewer.scan.open import DEMO, open_scan
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "sphere", sphere(3000))
@@ -294,6 +296,44 @@ def test_a_picture_at_rest_is_refined_and_any_other_one_begins_anew(viewport: Vi
     np.testing.assert_array_equal(viewport.surface.image(), refined)
     viewport.draw(replace(REQUEST, look=Look(quality="fast")))
     assert viewport.is_refined
+
+
+def test_the_coarsest_preview_shows_the_surface_without_specks() -> None:
+    """Where the full picture is smooth, the preview is about as light: nothing dark shows through gaps."""
+    size = (944, 587)
+    viewport = Viewport(shared_renderer(), (0, 0, *size))
+    with open_scan(DEMO) as timeline:
+        pose, still = timeline.pose(26), timeline.pose(27)
+    camera = Camera.orbit(pose.cloud.bounds(), aspect=size[0] / size[1])
+    request = Request(pose, camera, "surfels")
+    viewport.draw(request)
+    full = luma(shown(viewport)[0])
+    for number in range(4):  # each is too late by far
+        viewport.took(1e4, goal_ms=1.0)
+        viewport.draw(
+            replace(request, pose=still if number % 2 else pose, camera=turned(request).camera), held=True
+        )
+    viewport.draw(request, playing=True)
+    assert viewport.surface is not None
+    assert viewport.surface.size[0] < 0.4 * size[0], "the coarsest"
+    preview = luma(enlarged(shown(viewport)[0], size))
+    around = sliding_window_view(np.pad(full, 7, mode="edge"), (15, 15))
+    smooth = np.ptp(around, axis=(2, 3)) < 25
+    assert smooth.mean() > 0.7
+    assert (np.abs(preview - full)[smooth] < 25).all()
+    viewport.release()
+
+
+def luma(image: np.ndarray) -> np.ndarray:
+    return image[..., :3] @ np.array([0.3, 0.6, 0.1])
+
+
+def enlarged(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A picture at another size: each pixel as the one in which its middle lies."""
+    columns, rows = (
+        (np.arange(new) * 2 + 1) * old // (2 * new) for new, old in zip(size, image.shape[1::-1], strict=True)
+    )
+    return image[rows][:, columns]
 
 
 def test_a_preview_is_not_refined(viewport: Viewport) -> None:

@@ -104,6 +104,7 @@ class Texture(IntEnum):
     # Means of pictures.
     LIGHT = auto()  # of bytes
     ENCODED = auto()  # bytes of light
+    SHADED = auto()  # a picture that is softened, a word a pixel
     # Code words.
     ELEMENTS = auto()  # points in steps of the table
     SHAPES = auto()  # the table

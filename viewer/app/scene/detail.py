@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STEPS = tuple(2 ** (-n / 4) for n in range(1, 100))  # of points, or of pixels
-_DENSE = 0.5  # points for each pixel of the view, of which about as many are covered; more are seen by few
+_DENSE = 0.5  # points for each pixel that is drawn: more are seen by few, fewer leave holes between them
 _SMALLEST = 0.35  # scale; below, fewer points gain more time than they cost of the picture
 _FEWEST = 10_000  # points
 # Where pictures go on from the one before, fewer points cost less of them than pixels do: which scale is gone
-# down to, and then to how many points for each pixel of the view.
-_KEPT = ((0.7, 0.2), (0.5, 0.1))
+# down to, and then to how many points for each pixel that is drawn.
+_KEPT = ((0.7, 0.4), (0.5, 0.4))
 _LATE = {1: 4.0, 3: 2.0, 8: 1.25, 12: 1.0}  # pictures whose median tells by being so many times the goal
 _SOON, _LATEST = 12, 48  # pictures that tell that more can be drawn; and where that was often wrong
 _GAIN = 1.15  # times what the coarsest takes: where that is late too, what gains less is not left out
@@ -43,19 +43,18 @@ class Detail(NamedTuple):
 @cache
 def details(points: int, pixels: int, keeps: bool = False) -> tuple[Detail, ...]:
     """Details for a scan and a view of so many, from full to coarsest: fewer points where they are dense,
-    fewer pixels, fewer points. keeps: whether pictures go on from what the one before shows, so that few
-    points in each suffice: these go before pixels as coarse as any."""
+    fewer pixels, fewer points where they are dense in these. keeps: whether pictures go on from what the one
+    before shows, so that few points in each suffice: these go before pixels as coarse as any."""
     dense = [1.0, *takewhile(lambda share: share * points >= _DENSE * pixels, _STEPS)]
     scales = [*takewhile(lambda scale: scale >= _SMALLEST, (step**0.5 for step in _STEPS))]
     few = [share for share in _STEPS if share < dense[-1] and share * points >= _FEWEST]
     steps = [Detail(share) for share in dense]
-    for least_scale, least_points in (*(_KEPT if keeps else ()), (_SMALLEST, 0.0)):
+    for least_scale, least_points in (*(_KEPT if keeps else ()), (_SMALLEST, _DENSE)):
         share, scale = steps[-1]
         steps += [Detail(share, finer) for finer in scales if least_scale <= finer < scale]
         scale = steps[-1].scale
-        steps += [
-            Detail(fewer, scale) for fewer in few if least_points * pixels <= fewer * points and fewer < share
-        ]
+        least = least_points * scale**2 * pixels
+        steps += [Detail(fewer, scale) for fewer in few if least <= fewer * points and fewer < share]
     return tuple(steps)
 
 

@@ -25,6 +25,7 @@ from ...frame import (
     supersample,
 )
 from ...gpu.present import Presenter
+from ...gpu.soften import soften
 from ...gpu.surface import Surface
 from ...look import SAMPLES
 from ...renderer import Renderer
@@ -49,9 +50,9 @@ class Viewport:
     place: the rectangle: left, bottom, width, height, pixels from the window's lower left; the next picture
     is as large. request: what was drawn last, None before: pose, camera and how it is shown. problem: why it
     could not be drawn, None where it could; the image before stays then. size: of the picture, pixels. While
-    it moves, a picture may be a preview, of fewer points and pixels, which is drawn in full at rest, and then
-    refined (see `refine`). surface: what the picture shows, smaller than `size` where it is a preview.
-    number: of pictures drawn so far.
+    it moves, a picture may be a preview, of fewer points and pixels and softened, which is drawn in full at
+    rest, and then refined (see `refine`). surface: what the picture shows, smaller than `size` where it is a
+    preview. number: of pictures drawn so far.
     shown_at: by the clock, when the last one was there.
     """
 
@@ -128,6 +129,8 @@ class Viewport:
             refinable = render_frame(
                 self.renderer, drawn, surface, wait=False, share=share, moving=moving, before=before
             )
+            if self._detail.scale < 1:
+                soften(surface)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self._is_rough = False

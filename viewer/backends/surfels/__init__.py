@@ -67,6 +67,9 @@ _TWO = ("two", "two_large")  # values of `passes`
 _HIDING = ("one", *_TWO)  # those in which nothing shows through what lies before it
 # A uniform radius of 1.5 times the spacing closes a surface that is evenly covered.
 _RADIUS_PER_SPACING = 1.5
+# Factor on the radius in previews of some points, which lie less evenly than all do: of the demo's pixels in
+# the coarsest preview, 0.01 % show what is behind, 0.4 % without it.
+_UNEVEN = 1.3
 
 
 @dataclass(frozen=True)
@@ -162,6 +165,8 @@ def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         surface.clear()
         return False
     params = _with_passes(params, frame, surface)
+    if frame.moving and frame.share < 1:
+        params = replace(params, radius_scale=_UNEVEN * params.radius_scale)
     instancing = _instancing(params, surface)
     surface.stats.faces_away = params.cull_back
     sizes, known = _sizes(pose, frame, surface)
