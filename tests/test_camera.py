@@ -28,6 +28,34 @@ def pixels(camera: Camera, points: np.ndarray, size: tuple[int, int] = (300, 200
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("aspect", [0.3, 1.0, 2.5])
+def test_framing_shows_all_points_and_touches_two_opposite_edges(projection: str, aspect: float) -> None:
+    """Points in a pyramid, as a depth camera sees them: their box is much larger."""
+    depth = np.random.default_rng(0).uniform(1, 5, 500)
+    points = np.random.default_rng(1).uniform(-0.5, 0.5, (500, 3)) * depth[:, None]
+    points[:, 2] = -depth
+    points += 1e6
+    size = (int(400 * aspect), 400)
+    for azimuth in (0, 33, 120, 270):
+        turned = Camera.orbit(BOX, azimuth, 20, aspect=size[0] / size[1], projection=projection)
+        camera = turned.framing(points, size[0] / size[1])
+        np.testing.assert_allclose(camera.rotation(), turned.rotation(), atol=1e-9)
+        at = View.of(camera, size, np.full(3, 1e6), BOX).project(points - 1e6)[0] / size
+        assert at.min() > 0
+        assert at.max() < 1
+        reached = np.minimum(at.max(axis=0) - 0.5, 0.5 - at.min(axis=0))
+        assert reached.max() > 0.47
+        inner = np.abs(camera.rotation() @ (np.subtract(camera.target, points.mean(axis=0))))
+        assert inner.max() < 3, "it turns about the points"
+
+
+def test_framing_one_point_leaves_room_round_it() -> None:
+    camera = Camera().framing(np.array([[1.0, 2.0, 3.0]]))
+    assert camera.target == (1.0, 2.0, 3.0)
+    assert camera.distance > 0.5
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("aspect", [0.3, 1.0, 2.5])
 def test_fit_shows_the_whole_box_and_wastes_little(projection: str, aspect: float) -> None:
     size = (int(400 * aspect), 400)
     for azimuth in (0, 33, 120, 270):

@@ -215,6 +215,32 @@ class Camera:
         eye = vector(bounds.center + self.rotation()[2] * distance)
         return replace(self, eye=eye, target=vector(bounds.center), height=height)
 
+    def framing(self, points: NDArray[np.float64], aspect: float = 1.0) -> Camera:
+        """Move sideways and along the direction to as near as shows all points, with a small margin.
+
+        It comes nearer than `fit` does where the points do not fill their box, as those that one depth camera
+        sees. points: (N, 3) scan units, at least one. The target is at their median depth.
+        """
+        bounds = Bounds(points.min(axis=0), points.max(axis=0))
+        if _with_extent(bounds) is not bounds:
+            return self.fit(bounds, aspect)
+        axes = self.rotation()
+        x, y, z = axes @ (points - bounds.center).T
+        up = math.tan(math.radians(self.fov_y) / 2) / _FIT_MARGIN
+        perspective = self.projection == "perspective"
+        # The planes through the picture's edges: eye + distance * slope is beyond all points on both sides.
+        places, distances = [], []
+        for across, slope in ((x, up * aspect), (y, up)):
+            lean = z * slope if perspective else 0.0
+            high, low = float((across + lean).max()), float((lean - across).max())
+            places.append((high - low) / 2)
+            distances.append((high + low) / 2 / slope)
+        distance, middle = max(distances), float(np.median(z))
+        height = 2 * _FIT_MARGIN * up * distance if not perspective else self.height
+        target = bounds.center + np.array([*places, middle]) @ axes
+        away = distance - middle if perspective else distance + float(z.max()) - middle
+        return replace(self, eye=vector(target + axes[2] * away), target=vector(target), height=height)
+
     def at_distance(self, distance: float) -> Camera:
         """Move to another distance from the target (scan units), in the same direction."""
         if not (math.isfinite(distance) and distance > 0):

@@ -183,7 +183,7 @@ def test_opens_plays_scrubs_switches_and_saves_what_is_shown(app: RunningApp) ->
         app.see(frame=frame, backend="auto_splats")
     app.screen.do("key", "space")
     app.settle()
-    app.screen.do("key", "Home")
+    app.screen.do("key", "ctrl+Home")
     app.settle()
     drag(app, 1, on_track(0.1), on_track(0.95))
     app.see(frame=4, backend="auto_splats")

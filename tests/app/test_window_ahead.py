@@ -70,7 +70,7 @@ def test_no_frame_is_shown_as_points(app: RunningApp, backend: str) -> None:
     app.screen.do("key", "space")
     app.see(is_playing=True)
     app.see(lambda state: len(set(frames_of(app.pictures(first.pictures)))) == FRAMES)
-    app.screen.do("key", "End", "key", "Home", "key", "space")
+    app.screen.do("key", "End", "key", "ctrl+Home", "key", "space")
     assert not app.settle().is_preview, "at rest it is drawn in full"
     played = app.pictures(first.pictures)
     assert {state.backend for state in played} == {backend}
@@ -131,7 +131,7 @@ def test_jumping_about_drops_what_was_queued(app: RunningApp) -> None:
     screen.do("key", "bracketleft", "key", "bracketleft", "key", "bracketleft", "key", "space")
     app.see(is_playing=True)
     for _ in range(10):
-        screen.do("key", "End", "sleep", 0.05, "key", "Home", "sleep", 0.05)
+        screen.do("key", "End", "sleep", 0.05, "key", "ctrl+Home", "sleep", 0.05)
     screen.do("key", "space", "key", "End")
     state = app.settle()
     assert (state.frame, state.backend, state.jobs) == (FRAMES - 1, "surfels", 0)

@@ -197,7 +197,7 @@ def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
         path = saved_session(app, "mine")
         assert path == tmp_path / "mine.scan4d.json"
         done = app.settle()
-        hands.press("ctrl+4", "b", "Home")
+        hands.press("ctrl+4", "b", "ctrl+Home")
         changed = app.settle().document
         app.drop(path)
         assert app.see(document=done.document, frame=1).undoes == "Open session"
@@ -238,7 +238,7 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         measured["all"][0]["note"] = "left"
         data["document"]["backend"] = "cubist"
         path.write_text(json.dumps(data))
-        hands.press("Home", "ctrl+4")
+        hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
         app.told("these cannot be read: parts.measurements")
         app.told("This Scan4D has no renderer 'cubist': .* draws in its place")

@@ -144,7 +144,7 @@ def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: 
     width, height = app.view()[2:]
     assert frames[0].shape[:2] == (height + height % 2, width + width % 2)
     assert (np.abs(frames[0][-60:, :90].astype(int) - INK[:3]).max(axis=2) < 60).any(), "the scale bar"
-    app.screen.do("key", "Home", "key", "Escape")
+    app.screen.do("key", "ctrl+Home", "key", "Escape")
     app.settle()
     for path in (recording, out):
         path.unlink()
@@ -152,7 +152,9 @@ def test_what_was_recorded_becomes_a_film_by_one_click(app: RunningApp, folder: 
 
 @pytest.mark.slow
 def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, folder: Path) -> None:
-    app.screen.do("key", "Home", "key", "Right", "key", "i", "key", "Right", "key", "Right", "key", "shift+i")
+    app.screen.do(
+        "key", "ctrl+Home", "key", "Right", "key", "i", "key", "Right", "key", "Right", "key", "shift+i"
+    )
     assert app.settle().document["span"] == [1, 3]
     before = app.state.pictures
     app.screen.do("key", "space")
@@ -169,7 +171,7 @@ def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, fo
     app.told(r"Saved 3 pictures, .*chosen_0002.png to chosen_0004.png")
     for path in folder.glob("chosen_*.png"):
         path.unlink()
-    app.screen.do("key", "alt+i", "key", "Home", "key", "Escape")
+    app.screen.do("key", "alt+i", "key", "ctrl+Home", "key", "Escape")
     assert app.settle().document["span"] is None
 
 

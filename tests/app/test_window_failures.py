@@ -73,7 +73,7 @@ def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
         app.told("Frame 1 has no 'q' to colour by")
         screen.do("key", "Page_Up")
         app.see(scan=str(lacking))
-        screen.do("key", "Home")
+        screen.do("key", "ctrl+Home")
         app.settle()
         assert saved(app, "p").entries[0].look.color_by == "q"
         close(app)

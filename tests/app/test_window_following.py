@@ -54,18 +54,18 @@ def test_the_first_view_and_f_hold_all_frames(app: RunningApp) -> None:
     app.see(holds_all)
     assert app.settle().undoes is None, "nobody did anything"
     keys(app, "ctrl+3")
-    for names in (("ctrl+1",), ("End", "f"), ("Home", "f")):
+    for names in (("ctrl+1",), ("End", "f"), ("ctrl+Home", "f")):
         assert holds_all(keys(app, *names))
 
 
 def test_the_view_goes_with_the_subject(app: RunningApp) -> None:
-    keys(app, "Home", "ctrl+1")
+    keys(app, "ctrl+Home", "ctrl+1")
     before = Camera.from_json(keys(app, "shift+f").camera)
     after = keys(app, "End")
     assert Camera.from_json(after.camera).rotation() == pytest.approx(before.rotation())
     moved = np.subtract(Camera.from_json(after.camera).target, before.target)
     assert moved == pytest.approx([FRAMES - 1, 0, 0], abs=0.02)
-    assert Camera.from_json(keys(app, "Home").camera).target == pytest.approx(before.target, abs=1e-3)
+    assert Camera.from_json(keys(app, "ctrl+Home").camera).target == pytest.approx(before.target, abs=1e-3)
     near = Camera.from_json(keys(app, "f").camera)
     assert near.distance < before.distance / 3, "the subject alone"
     stays = Camera.from_json(keys(app, "shift+f").camera)
@@ -73,7 +73,7 @@ def test_the_view_goes_with_the_subject(app: RunningApp) -> None:
 
 
 def test_where_nothing_is_seen_the_way_back_is_told(app: RunningApp) -> None:
-    keys(app, "Home", "f")
+    keys(app, "ctrl+Home", "f")
     left, top, width, height = app.view()
     x, y = left + width // 2, top + height // 2
     for _ in range(3):

@@ -16,7 +16,7 @@ SECOND = 1.0
 KEYS = {
     "view": ("ctrl+1", "ctrl+2", "ctrl+3", "ctrl+4", "ctrl+5", "ctrl+6", "o", "f", "ctrl+b", "n", "z"),
     "look": ("g", "b", "shift+b", "ctrl+r"),
-    "frames": ("Right", "Left", "End", "Home", "i", "shift+i", "alt+i"),
+    "frames": ("Right", "Left", "End", "ctrl+Home", "Home", "i", "shift+i", "alt+i"),
     "history": ("ctrl+z", "ctrl+z", "ctrl+y"),
 }
 LISTS = {

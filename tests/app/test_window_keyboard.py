@@ -124,7 +124,7 @@ def test_the_timeline_plays_and_pauses_by_its_button(app: RunningApp) -> None:
     app.see(is_playing=True)
     app.screen.do("key", "Return")
     app.see(is_playing=False)
-    app.screen.do("key", "Escape", "key", "Home", "key", "space")
+    app.screen.do("key", "Escape", "key", "ctrl+Home", "key", "space")
     app.see(is_playing=True)
     app.screen.do("key", "space")
     app.see(is_playing=False)

@@ -153,7 +153,7 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
 
         state = press(app, "shift+x")
         assert state.landmarks["Landmark 1"][0] == "not visible in this frame"
-        state = press(app, "Home")
+        state = press(app, "ctrl+Home")
         assert state.landmarks["Landmark 1"][0] == "placed"
 
         app.act(PANEL, ("item_input_value", "##name", "mouth"))

@@ -193,7 +193,7 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
         screen.do("key", "End")
         app.told("Not all frames have the same points")
         expect_reading(app, distance, motion="fixed in space")
-        screen.do("key", "Home")
+        screen.do("key", "ctrl+Home")
         app.see(frame=0)
 
         before = app.settle()

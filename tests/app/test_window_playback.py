@@ -133,7 +133,7 @@ def test_without_loop_it_stops_at_either_end(app: RunningApp) -> None:
     screen = app.screen
     screen.do("key", "l")
     app.see(loop=False)
-    screen.do("key", "Home", "key", "space")
+    screen.do("key", "ctrl+Home", "key", "space")
     app.see(is_playing=True)
     app.settle()
     assert app.frames()[-1] == COUNT - 1

@@ -84,7 +84,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
             app.settle()
         _, first = recorded(app)
         assert [entry.pose for entry in first] == sorted(entry.pose for entry in first)
-        press(app, "Home")
+        press(app, "ctrl+Home")
         press(app, "shift", "b")
         app.see(frame=0, backend="auto_splats")
         app.settle()

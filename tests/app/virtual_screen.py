@@ -247,7 +247,7 @@ class RunningApp:
         press_while("t", lambda state: state.theme != first.theme)
         press_while("o", lambda state: state.camera["projection"] != first.camera["projection"])
         press_while("b", lambda state: state.backend != first.backend)
-        self.screen.do("key", "Home", "key", "ctrl+1", "key", "f", "key", "BackSpace", "key", "Escape")
+        self.screen.do("key", "ctrl+Home", "key", "ctrl+1", "key", "f", "key", "BackSpace", "key", "Escape")
         width, height = first.size
         self.screen.do("mousemove", width - 1, height - 1)
         self.settle()

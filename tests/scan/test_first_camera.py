@@ -11,7 +11,7 @@ from range_scenes import shape_view, sphere_view
 from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.geometry import up_vector
-from viewer.scan.pods import first_camera
+from viewer.scan.pods import first_camera, subject_of
 from viewer.scan.range_view import RangeView
 from viewer.scan.upright import Upright
 from viewer.view import View
@@ -51,6 +51,23 @@ def test_it_turns_about_what_is_in_the_middle() -> None:
     empty[10:-10, 10:-10] = np.nan
     camera = first_camera([replace(pod, depth=empty)], BALL, 1.0)
     assert camera.distance == np.median(empty[pod.valid() & np.isfinite(empty)])
+
+
+def test_the_subject_of_one_pod_is_without_the_background() -> None:
+    pod = sphere_view((1.0, 2.0, 3.0))
+    depth = np.where(pod.valid(), pod.depth, 40.0).astype(np.float32)
+    pod = replace(pod, depth=depth, mask=np.ones_like(pod.mask))
+    points = pod.positions()
+    whole = Bounds(points.min(axis=0), points.max(axis=0))
+    found = subject_of([pod], points, whole)
+    assert found is not None
+    is_ball = np.linalg.norm(points, axis=1) < 1.01
+    np.testing.assert_array_equal(found, points[is_ball])
+    assert whole.radius > 5
+    others = [from_aside(-27.5), from_aside(27.5)]
+    for views in ([], others, [shape_view("plane", "height")[0]]):
+        assert subject_of(views, points, whole) is None, "such a scan is shown whole"
+    assert subject_of([pod], points + 1e4, whole) is None, "without a point there"
 
 
 def test_several_are_looked_between_and_the_scan_is_shown_whole() -> None:

@@ -265,12 +265,16 @@ _MOVE: Menu[App] = Menu("Move", (
     tuple(_nudge("pan", f"Shift {side}", side, f"Shift+{side.capitalize()}") for side in _WAYS),
     (_nudge("zoom", "Nearer", "up", "="), _nudge("zoom", "Farther", "down", "-")),
 ))  # fmt: skip
+_OPENING_VIEW: Command[App] = Command(
+    "opening_view", "Opening view", lambda app: app.steering.open_view(), "Home", can=_has_camera
+)
 _VIEW: Menu[App] = Menu("View", (
     (
         Command(
             "fit", "Fit", lambda app: app.steering.fit(), "F", can=_has_camera, short="Fit",
             icon=icons.ICON_FA_EXPAND,
         ),
+        _OPENING_VIEW,
         Command("center", "Centre on the point under the mouse",
             lambda app: app.steering.center(), "Z", can=_has_camera),
         Command(
@@ -346,8 +350,8 @@ _PLAYBACK: Menu[App] = Menu("Playback", (
         ),
         Command("next", "Next frame", lambda app: app.step(1), "Right .", repeats=True, can=_has_frames),
         Command("back", "Previous frame", lambda app: app.step(-1), "Left ,", repeats=True, can=_has_frames),
-        Command("first", "First frame", lambda app: app.seek(0), "Home", can=_has_frames),
-        Command("last", "Last frame", lambda app: app.seek(-1), "End", can=_has_frames),
+        Command("first", "First frame", lambda app: app.seek(0), "Ctrl+Home", can=_has_frames),
+        Command("last", "Last frame", lambda app: app.seek(-1), "Ctrl+End End", can=_has_frames),
     ),
     (
         Command("slower", "Slower", lambda app: app.change_speed(-1), "[", repeats=True, can=_has_frames),
@@ -395,7 +399,11 @@ _HELP: Menu[App] = Menu("Help", (
 _MENUS: tuple[Menu[App], ...] = (_FILE, _EDIT, _VIEW, _TOOLS, _HELP)
 # Before what tools put there, and after it.
 _TOOLBAR_BEGIN: Toolbar = (
-    ("open", "fit", Menu("View", (*_FROM.groups, (_TURNTABLE, _BOOKMARKS)), icon=icons.ICON_FA_EYE)),
+    (
+        "open",
+        "fit",
+        Menu("View", ((_OPENING_VIEW,), *_FROM.groups, (_TURNTABLE, _BOOKMARKS)), icon=icons.ICON_FA_EYE),
+    ),
 )
 _TOOLBAR_END: Toolbar = (("screenshot", "export", "record"), ("undo", "redo"))
 _MOUSE: tuple[tuple[str, str], ...] = (

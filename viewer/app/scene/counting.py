@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...task import Task, in_background
 
 if TYPE_CHECKING:
@@ -16,10 +18,12 @@ _REST = 0.3  # seconds after the last picture
 
 
 class Counting:
-    """counts: `Surface.point_counts` of the picture that is shown; None until they are there."""
+    """counts: `Surface.point_counts` of the picture that is shown; None until they are there. is_blank:
+    whether the picture shows nothing, neither points nor filled pixels."""
 
     def __init__(self) -> None:
         self.counts: dict[str, int] | None = None
+        self.is_blank = False
         self._picture = 0  # number of the one that is counted
         self._task: Task | None = None
         self._future: Future[dict[str, int]] | None = None
@@ -29,11 +33,14 @@ class Counting:
         had = self.counts
         if viewport.number != self._picture:
             self.cancel()
-            self.counts = None
+            self.counts, self.is_blank = None, False
             if at_rest and viewport.is_complete and now > viewport.shown_at + _REST:
                 self._begin(viewport)
         if self._future is not None and self._future.done():
             self.counts, self._future = self._future.result(), None
+            surface = viewport.surface
+            assert surface is not None
+            self.is_blank = not self.counts["drawn"] and not np.isfinite(surface.depth).any()
         return self.counts is not had
 
     def _begin(self, viewport: Viewport) -> None:

@@ -15,6 +15,7 @@ from ...scan.times import frame_in_words
 from ..playing.playback import Playback
 from ..session import Session, edit_name
 
+_LEVEL = "level_"  # begins the names of switches that show levels
 FIRST_GOAL = Goal("time", 50.0)  # ms
 
 
@@ -135,6 +136,12 @@ class Rendering:
     def switches(self) -> dict[str, bool]:
         """The switches among the backend's parameters, see `params.switches`; none before the first pose."""
         return {} if self._params is None else switches(self._params)
+
+    @property
+    def levels(self) -> dict[int, bool]:
+        """Whether the backend shows each level, 0: what was measured; empty where it has no such switches."""
+        switches = self.switches.items()
+        return {int(name[len(_LEVEL) :]): is_on for name, is_on in switches if name.startswith(_LEVEL)}
 
     def switch(self, name: str) -> None:
         """Switch one of `switches` on or off."""

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ...bounds import Bounds
 from ...camera import Camera
 from ...geometry import AXES, UP, vector
-from ...scan.pods import first_camera
+from ...scan.pods import first_camera, subject_of
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
-from ...scan.upright import upright_camera
+from ...scan.upright import Upright, upright_camera
 from ..playing.playback import Playback
 from ..session import Session
 from . import navigation, orientation
@@ -88,27 +88,41 @@ class Steering:
         return self.bounds(pose) if is_moved or self.follows else self.extent.around(self.bounds(pose))
 
     def fit(self) -> None:
-        """Show all of the scan, from the same side."""
+        """Show the subject from the same side: all of the scan, or of one depth camera's what it looks at."""
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
-            fitted = camera.fit(self.whole(pose), self._viewport.aspect)
-            self._session.change("Fit", camera=fitted, pivot=None)
+            self._session.change("Fit", camera=self._framing(camera, pose), pivot=None)
+
+    def open_view(self) -> None:
+        """Show the frame as a scan is first shown: as its pods see it, or from the front."""
+        if pose := self._playback.pose:
+            self._first = self._first_camera(pose)
+            self._session.change("Opening view", camera=self._first, pivot=None)
+
+    def _framing(self, camera: Camera, pose: Pose) -> Camera:
+        """Move a camera, in the same direction, to where it shows the subject."""
+        whole, place = self.whole(pose), self._session.laid.layers(pose).place
+        subject = subject_of(pose.views, pose.sample + pose.origin, whole, self._upright(pose))
+        if subject is None:
+            return camera.fit(whole, self._viewport.aspect)
+        return camera.framing(place.points(subject), self._viewport.aspect)
 
     def look_from(self, azimuth: float, elevation: float) -> None:
-        """Show all of the scan from a direction in degrees, such as those of `navigation.VIEWS`."""
+        """Show the subject from a direction in degrees, such as those of `navigation.VIEWS`."""
         pose, camera = self._playback.pose, self._session.document.camera
         if pose and camera:
             bounds, aspect = self.whole(pose), self._viewport.aspect
             azimuth += self._session.document.front
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
-            self._session.change("Look from side", camera=turned, pivot=None)
+            self._session.change("Look from side", camera=self._framing(turned, pose), pivot=None)
 
     def set_up(self, up: str) -> None:
-        """Say what is up in the scan, as `up_vector` takes it, and show all of it upright, from the front."""
+        """Say what is up, as `up_vector` takes it, and show the subject upright, from the front."""
         pose, camera = self._playback.pose, self._session.document.camera
         look = replace(self._session.document.look, up=up)
         if pose and camera:
-            camera = upright_camera(camera, self.whole(pose), self._viewport.aspect, up)
+            turned = upright_camera(camera, self.whole(pose), self._viewport.aspect, up)
+            camera = self._framing(turned, pose)
         self._session.change("Turn upright", look=look, camera=camera, pivot=None, front=0.0)
 
     def set_front(self) -> None:
@@ -223,8 +237,11 @@ class Steering:
         """The camera that a scan is first shown with."""
         is_moved = not self._session.laid.layers(pose).place.is_identity
         views = () if is_moved else pose.views
-        upright = replace(pose.upright, up=self._up, front=self._session.document.front)
-        return first_camera(views, self.whole(pose), self._viewport.aspect, upright)
+        return first_camera(views, self.whole(pose), self._viewport.aspect, self._upright(pose))
+
+    def _upright(self, pose: Pose) -> Upright:
+        """What is up, and the front, as the user has it."""
+        return replace(pose.upright, up=self._up, front=self._session.document.front)
 
     def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
         """Move the camera, and what it turns about, as far as the subject has gone since another pose."""

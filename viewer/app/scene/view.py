@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
@@ -165,11 +166,32 @@ def words_over(app: App) -> str | None:
 
 
 def _words_on_nothing(app: App) -> str | None:
-    """The words over a picture at rest that shows no point at all: how to come back."""
-    counts, key = app.counting.counts, app.keys.of["fit"]
-    if counts is None or counts["drawn"] or app.playback.pose is None or not app.playback.pose.count:
+    """The words over a picture at rest that shows nothing: why, and which key helps."""
+    counts = app.counting.counts
+    if (
+        counts is None
+        or not app.counting.is_blank
+        or app.playback.pose is None
+        or not app.playback.pose.count
+    ):
         return None
+    if counts["drawn"] + counts["hidden"] and not app.rendering.levels.get(0, True):
+        return words_on_levels(app.rendering.levels, app.keys.of["switch_level_0"])
+    key = app.keys.of["fit"]
     return "Nothing is in view" + (f": press {key} to show all" if key else "")
+
+
+def words_on_levels(levels: Mapping[int, bool], key: str) -> str:
+    """Say that the levels that a renderer shows have no data in view. levels: whether each is shown. key:
+    that shows what was measured."""
+    shown = [f"{level}" for level, is_shown in levels.items() if is_shown]
+    if not shown:
+        what = "All levels are off"
+    elif len(shown) == 1:
+        what = f"Level {shown[0]} has no data here"
+    else:
+        what = f"Levels {', '.join(shown[:-1])} and {shown[-1]} have no data here"
+    return what + (f"; press {key}" if key else "")
 
 
 def _draw_note(text: str, size: ImVec2) -> float:
