@@ -240,7 +240,7 @@ class Steering:
         return first_camera(views, self.whole(pose), self._viewport.aspect, self._upright(pose))
 
     def _upright(self, pose: Pose) -> Upright:
-        """What is up, and the front, as the user has it."""
+        """The up axis and the front that the user has chosen, or the scan itself tells."""
         return replace(pose.upright, up=self._up, front=self._session.document.front)
 
     def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
