@@ -79,6 +79,7 @@ class Observer:
             "problem": self._problem,
             "is_idle": is_idle(app),
             "notes": notes,
+            "shown_notes": [note.text for note in app.notices.shown(time.monotonic())],
             "fields": self._fields[1] if self._fields[0] == imgui.get_frame_count() else {},
             **shown(app),
         }
@@ -147,6 +148,9 @@ def shown(app: App) -> dict[str, Any]:
         "is_replaying": app.replayer.replaying is not None,
         "is_welcomed": app.welcome.is_over,
         "is_browser_open": app.browser.is_open,
+        "pages": app.help.open,
+        "lists": imgui.get_current_context().open_popup_stack.size(),
+        "works": [task.name for task in app.tasks.shown],
         "refusal": app.browser.refusal,
         "is_export_open": app.exporting.is_open,
         "is_saving": app.capture.task is not None,

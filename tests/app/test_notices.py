@@ -45,15 +45,18 @@ def test_a_problem_told_again_is_shown_once_and_logged_twice() -> None:
     assert len(notices.all) == notices.count == 2
 
 
-def test_problems_are_sent_away_one_by_one_or_all_by_escape() -> None:
+def test_problems_are_sent_away_by_their_cross_or_the_latest_by_escape() -> None:
     notices = Notices()
     for text in ("one", "two", "three"):
         notices.tell(Problem(text))
     now = time.monotonic()
     notices.send_away(notices.shown(now)[1])
     assert texts(notices, now) == ["one", "three"]
-    notices.on_escape()
+    assert notices.on_escape()
+    assert texts(notices, now) == ["one"]
+    assert notices.on_escape()
     assert texts(notices, now) == []
+    assert not notices.on_escape()
     assert [notice.text for notice in notices.all] == ["one", "two", "three"]
 
 

@@ -91,7 +91,7 @@ class Person:
 
     def look(self) -> Screenshot:
         shot = Screenshot(self.app)
-        self.app.screen.do("key", "Escape")  # away with the note
+        self.app.send_notes_away()
         self.app.settle()
         return shot
 

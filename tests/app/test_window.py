@@ -148,7 +148,7 @@ def assert_true_picture(app: RunningApp) -> Screenshot:
     app.screen.do("mousemove", *(v - 1 for v in SIZE))  # the pointer is part of the screen's picture
     app.settle()
     shot = Screenshot(app)
-    app.screen.do("key", "Escape")  # away with the note that it was saved
+    app.send_notes_away()
     app.settle()
     assert difference(bare(shown(app)), bare(shot.pixels)) <= 1
     assert difference(shot.drawn_headless(), shot.pixels) <= 1
@@ -308,7 +308,7 @@ def test_views_and_projection_by_keys(app: RunningApp) -> None:
 
 @pytest.mark.slow
 def test_idle_it_draws_nothing_and_takes_no_processor_time(app: RunningApp) -> None:
-    app.screen.do("key", "Escape")  # notes would go by themselves
+    app.send_notes_away()  # they would go by themselves
     app.screen.do("mousemove", 470, 310)  # over the scan: a paused mouse asks for nothing new
     app.settle()
     app.see(counted=True)

@@ -78,7 +78,7 @@ def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     expect_full(app)
 
     path, again = saved(app)
-    screen.do("key", "Escape")  # away with the notes
+    app.send_notes_away()
     app.settle()
     left, top, width, height = app.view()
     shown = screen.picture()[top : top + height, left : left + width]

@@ -78,15 +78,21 @@ def test_opening_is_cancelled_replaced_and_done(app: RunningApp, folder: Path) -
 def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningApp, folder: Path) -> None:
     go_to(app, folder / "2_bare.npz")
     app.see(frame=0, backend="auto_splats")
-    app.screen.do("mousemove", *(v - 1 for v in SIZE), "key", "Escape")  # away with the notes
+    app.screen.do("mousemove", *(v - 1 for v in SIZE))
+    app.send_notes_away()
     app.settle()
     left, top, width, height = app.view()
     part = np.s_[top + 200 : top + height - 100, left : left + width]  # without marks
     before, pictures = app.screen.picture()[part], app.state.pictures
     app.choose(PANEL, "##backend", "###surfels")
-    app.see(lambda state: state.jobs)
-    press_until(app, "Escape", "Cancelled: Estimating normals")
-    app.screen.do("key", "Escape")  # away with the note
+    app.see(lambda state: any("normals" in name for name in state.works))
+    app.screen.do(
+        "key", "Escape", "key", "Escape", "sleep", 0.3, "key", "Escape"
+    )  # meant for anything but the work
+    app.act("timeline", ("item_click", "###cancel"))
+    assert app.told("Cancelled")[0]
+    assert app.notes[-1] == "Cancelled: Estimating normals."
+    app.send_notes_away()
     after = app.settle()
     assert (after.frame, after.backend) == (0, "auto_splats")
     assert {state.backend for state in app.pictures(pictures)} <= {"auto_splats"}, "which stays meanwhile"

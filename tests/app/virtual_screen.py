@@ -241,7 +241,7 @@ class RunningApp:
 
         first = next(state for state in self.states if state.pictures)
         press_while("space", lambda state: state.is_playing)
-        press_while("Escape", lambda state: state.clicking or state.is_export_open)
+        press_while("Escape", lambda state: state.clicking or state.is_export_open or state.shown_notes)
         for keys, field in (("e", "every_frame"), ("l", "loop"), ("shift+space", "reverse")):
             press_while(keys, lambda state: getattr(state, field) != getattr(first, field))  # noqa: B023
         press_while("t", lambda state: state.theme != first.theme)
@@ -251,6 +251,11 @@ class RunningApp:
         width, height = first.size
         self.screen.do("mousemove", width - 1, height - 1)
         self.settle()
+
+    def send_notes_away(self) -> None:
+        """Press Escape until no message is over the view."""
+        while self.settle().shown_notes:
+            self.screen.do("key", "Escape")
 
     def pictures(self, since: int = 0) -> list[State]:
         """The states that drew another picture; since: the number of the one before."""

@@ -1,4 +1,9 @@
-"""What Escape ends: one thing a press, the uppermost first."""
+"""What Escape ends: one thing a press, the uppermost first.
+
+From the top: a list, menu or submenu; a dialog or a page of the help, with the field in it; a field or drag
+elsewhere; the keyboard in another part of the window; the tool that has the clicks; a replay; a message over
+the view; a scan that is being opened; the view alone. Work in the status bar is never ended by Escape.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +38,8 @@ def _close_list() -> None:
     top = popups[last].window
     if top is not None and not top.flags & imgui.WindowFlags_.modal:
         imgui.internal.close_popup_to_level(last, True)
+        # Else a mouse that rests on the submenu's title would open it again at once.
+        imgui.get_current_context().nav_highlight_item_under_nav = True
         # So that the dialog below does not see it as well.
         lock = imgui.internal.InputFlagsPrivate_.lock_this_frame
         imgui.internal.set_key_owner(imgui.Key.escape, _OWNER, lock)

@@ -26,24 +26,34 @@ Section = tuple[str, Sequence[tuple[str, str]]]  # its title and rows
 class Help:
     """Windows with all commands, all messages and what this is.
 
-    open: the pages that are. focused: the one of them that has the focus, None where none has.
+    open: the pages that are, the one opened last at the end. focused: the one of them that has the focus,
+    None where none has.
     """
 
     def __init__(self, commands: Commands, keys: Keys, notices: Notices, gpu: Gpu) -> None:
         self._commands, self._keys, self._notices, self._gpu = commands, keys, notices, gpu
-        self.open: set[str] = set()
+        self.open: list[str] = []
         self.focused: str | None = None
         self._searched = ""
 
     def toggle(self, page: str) -> None:
         """Open or close one of the pages."""
         assert page in _PAGES
-        self.open ^= {page}
+        if page in self.open:
+            self.open.remove(page)
+        else:
+            self.open.append(page)
 
     def on_escape(self) -> bool:
         """Close the page that has the focus; whether one has."""
-        self.open.discard(self.focused or "")
-        return self.focused is not None
+        focused, self.focused = self.focused, None
+        if focused in self.open:
+            self.open.remove(focused)
+        return focused is not None
+
+    def close_last(self) -> bool:
+        """Close the page that was opened last; whether one was open."""
+        return self.open.pop() is not None if self.open else False
 
     def draw(self) -> None:
         """Declare the windows of the open pages."""
@@ -58,11 +68,12 @@ class Help:
             imgui.set_next_window_pos((display - size) * 0.5, imgui.Cond_.appearing)
             flags = imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
             _, stays = imgui.begin(page, True, flags)
-            if imgui.is_window_focused():
+            if imgui.is_window_focused(imgui.FocusedFlags_.child_windows):
                 self.focused = page
+            is_ended = self.focused == page and imgui.is_key_pressed(imgui.Key.escape)  # in its field
             draw_page()
             imgui.end()
-            if not stays:
+            if is_ended or not stays:
                 self.toggle(page)
 
     def _draw_keys(self) -> None:

@@ -36,13 +36,13 @@ def draw(app: App) -> Place:
     app.keys.handle(app)
     with told("Escape"):
         escape.handle((
-            app.help.on_escape, app.keyboard.on_escape, app.tools.on_escape, app.replayer.on_escape,
-            app.tasks.on_escape, app.full_view.on_escape, app.notices.on_escape,
+            app.welcome.on_escape, app.help.on_escape, app.keyboard.on_escape, app.tools.on_escape,
+            app.replayer.on_escape, app.help.close_last, app.notices.on_escape, app.tasks.on_escape,
+            app.full_view.on_escape,
         ))  # fmt: skip
-    place, head = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
+    place = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
     for name, draw_part in (
         ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken, app.keyboard)),
-        ("The list of work", lambda: app.tasks.draw(place, head)),
         ("Help", app.help.draw),
         ("The first card", lambda: app.welcome.draw(*place[:3])),
         ("The dialog that opens scans", lambda: app.browser.draw(app.palette.broken)),
@@ -55,12 +55,15 @@ def draw(app: App) -> Place:
     return place
 
 
-def _draw_view_alone(app: App) -> tuple[Place, float]:
+def _draw_view_alone(app: App) -> Place:
     whole = imgui.get_io().display_size
-    return _draw_view(app, 0, int(whole.x), int(whole.y))
+    place = _draw_view(app, 0, int(whole.x), int(whole.y))
+    with app.failures.told("The list of work"):
+        app.tasks.draw_alone(place)
+    return place
 
 
-def _draw_parts(app: App) -> tuple[Place, float]:
+def _draw_parts(app: App) -> Place:
     whole = imgui.get_io().display_size
     top = 0
     with app.failures.told("The menu"):
@@ -76,7 +79,7 @@ def _draw_parts(app: App) -> tuple[Place, float]:
     )
     bottom = int(below - min(_BAR_HEIGHT * em, 0.5 * whole.y))
     height = max(1, bottom - top)
-    view_and_head = _draw_view(app, top, width, height)
+    place = _draw_view(app, top, width, height)
     with app.failures.told("The panel"):
         _place_grip("grip", width, top, grip, height)
         app.panel.draw_grip(height)
@@ -97,19 +100,18 @@ def _draw_parts(app: App) -> tuple[Place, float]:
             _place("drawer", 0, below + grip, whole.x, whole.y - below - grip)
             app.drawer.draw(app.keyboard, Ui(app.keys))
             imgui.end()
-    return view_and_head
+    return place
 
 
-def _draw_view(app: App, top: int, width: int, height: int) -> tuple[Place, float]:
-    """Declare the view; returns where it is, and how much of its top notes take."""
-    head = 0.0
+def _draw_view(app: App, top: int, width: int, height: int) -> Place:
+    """Declare the view; returns where it is."""
     with app.failures.told("The view"):
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
         _place("view", 0, top, width, height)
         imgui.pop_style_var()
-        head = view.draw(app)
+        view.draw(app)
         imgui.end()
-    return (0, top, width, height), head
+    return 0, top, width, height
 
 
 def _draw_head(app: App, width: float) -> int:

@@ -103,9 +103,11 @@ class Notices:
         self.all = [self._gone(notice) if notice is gone else notice for notice in self.all]
 
     def on_escape(self) -> bool:
-        """Show none of them any longer."""
-        self.all = [self._gone(notice) for notice in self.all]
-        return True
+        """Send away the latest of those shown; whether one was."""
+        shown = self.shown(time.monotonic())
+        if shown:
+            self.send_away(max(shown, key=lambda notice: notice.at))
+        return bool(shown)
 
     def _gone(self, notice: Notice) -> Notice:
         return replace(notice, until=0.0)

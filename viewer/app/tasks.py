@@ -1,4 +1,4 @@
-"""What takes a while, over the picture: its name, how far it is, and a button that cancels it."""
+"""Work that takes a while, in the status bar: its name, how far it is, and a button that cancels it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..task import Task
 from . import widgets
@@ -19,7 +20,8 @@ from .toolbox import Toolbox
 
 _PATIENCE = 0.3  # seconds that work may take before it is shown,
 _PLAYING_PATIENCE = 2.0  # and on a pose while others are shown
-_WIDTH = 28.0  # in heights of the font
+_WIDTH = 20.0  # of a bar in the list, in heights of the font
+_LINE = 0.12  # height of the line that shows how far work is, in heights of the font
 _TICK = 0.1  # seconds between changes of what is shown
 _FLAGS = (
     imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
@@ -44,6 +46,7 @@ class Tasks:
         self._session, self._playback, self._viewport = session, playback, viewport
         self._opening, self._tools, self._exporting, self._note = opening, tools, exporting, note
         self._capture = capture
+        self._corner = ImVec2(0, 0)  # lower left one of the list
 
     @property
     def all(self) -> list[Task]:
@@ -69,18 +72,14 @@ class Tasks:
         """A value that changes when something else is to be shown."""
         return [(task.name, int(task.seconds / _TICK)) for task in self.shown]
 
-    @property
-    def ended_by_escape(self) -> list[Task]:
-        """The work shown that Escape cancels: not what may have taken long, since it is pressed for other
-        reasons too."""
-        return [task for task in self.shown if task is not self._exporting.task]
-
     def on_escape(self) -> bool:
-        """Cancel the latest work that Escape cancels; whether there is any."""
-        lightly = self.ended_by_escape
-        if lightly:
-            self.cancel(lightly[-1])
-        return bool(lightly)
+        """Cancel opening a scan, which stands over the view; whether one is being opened. Work in the status
+        bar goes on: whoever presses Escape means something else."""
+        task = self._opening.task
+        if task is None or task not in self.shown:
+            return False
+        self.cancel(task)
+        return True
 
     def cancel(self, task: Task) -> None:
         """Stop a piece of the work; what was shown before it stays."""
@@ -105,36 +104,74 @@ class Tasks:
             before = replace(self._session.document.drawn_by(str(request.backend)), look=look)
             self._session.history.change("Cancel preparing", before)
 
-    def draw(self, place: tuple[float, float, float, float], head: float) -> None:
-        """Declare the work over the top of the 3D view.
+    def draw_alone(self, place: tuple[float, float, float, float]) -> None:
+        """Declare the work in a corner of the 3D view, where there is no status bar.
 
-        place: of the view: left, top, width, height. head: how much of its top is taken by notes.
+        place: left, top, width, height of the view.
         """
-        tasks = self.shown
-        if not tasks:
+        if not self.shown:
             return
-        left, top, width, _ = place
-        em = imgui.get_font_size()
-        own_width = min(_WIDTH * em, 0.9 * width)
-        imgui.set_next_window_pos(ImVec2(left + (width - own_width) / 2, top + head + em))
-        imgui.set_next_window_size_constraints(ImVec2(own_width, 0), ImVec2(own_width, 1e4))
-        imgui.begin("tasks", flags=_FLAGS)
-        for task in tasks:
-            self._draw_task(task)
+        left, top, width, height = place
+        corner = ImVec2(left + width, top + height) - imgui.get_style().window_padding
+        imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(1, 1))
+        imgui.begin("work", flags=_FLAGS)
+        self.draw(0.5 * width)
         imgui.end()
 
-    def _draw_task(self, task: Task) -> None:
-        gap = imgui.get_style().item_spacing.x
-        width = imgui.get_content_region_avail().x
-        imgui.text_unformatted(widgets.fitted(task.name, width))
-        button = imgui.calc_text_size("Cancel").x + 2 * imgui.get_style().frame_padding.x
-        size = ImVec2(width - button - gap, imgui.get_frame_height())
-        words = f"{task.seconds:.0f} s"
-        if task.progress is None:
-            imgui.progress_bar(-task.seconds, size, words)  # a negative share: it only moves
+    def draw(self, width: float) -> None:
+        """Declare the latest work in a line of at most this width; nothing while there is no work.
+
+        A click on it shows all work in a list, the cross cancels it.
+        """
+        tasks = self.shown
+        if tasks:
+            self._draw_latest(tasks, width)
+        imgui.set_next_window_pos(self._corner, imgui.Cond_.always, ImVec2(0, 1))
+        if imgui.begin_popup("list of work"):
+            for task in tasks:
+                self._draw_task(task)
+            if not tasks:
+                imgui.close_current_popup()
+            imgui.end_popup()
+
+    def _draw_latest(self, tasks: list[Task], width: float) -> None:
+        task, padding = tasks[-1], imgui.get_style().frame_padding.x
+        others = f", {len(tasks) - 1} more" if len(tasks) > 1 else ""
+        cross = imgui.calc_text_size(icons.ICON_FA_XMARK).x + 4 * padding
+        end = f"  {_how_far(task)}{others}"
+        room = width - imgui.calc_text_size(end).x - cross - 2 * padding
+        name = widgets.unhidden(widgets.fitted(task.name, room))
+        if imgui.small_button(f"{name}{end}###work"):
+            imgui.open_popup("list of work")
+        widgets.tooltip(f"{task.name}. Click for all that goes on")
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        line = ImVec2(low.x, high.y - _LINE * imgui.get_font_size())
+        full = high.x - low.x
+        if task.progress is None:  # a part of the line that goes round
+            start = low.x + full * (0.5 * task.seconds % 1.0)
+            line, high = ImVec2(start, line.y), ImVec2(min(start + 0.2 * full, high.x), high.y)
         else:
-            imgui.progress_bar(task.progress, size, f"{100 * task.progress:.0f} %, {words}")
+            high = ImVec2(low.x + full * min(task.progress, 1.0), high.y)
+        color = imgui.get_color_u32(imgui.Col_.check_mark)
+        imgui.get_window_draw_list().add_rect_filled(line, high, color)
+        self._corner = ImVec2(low.x, low.y - padding)
+        imgui.same_line(0, padding)
+        if imgui.small_button(f"{icons.ICON_FA_XMARK}###cancel"):
+            self.cancel(task)
+        widgets.tooltip(f"Cancel: {task.name}" + (" (Esc)" if task is self._opening.task else ""))
+
+    def _draw_task(self, task: Task) -> None:
+        width = _WIDTH * imgui.get_font_size()
+        imgui.text_unformatted(widgets.fitted(task.name, width))
+        size = ImVec2(width, imgui.get_frame_height())
+        # Of a negative share ImGui draws a bar that only moves.
+        imgui.progress_bar(-task.seconds if task.progress is None else task.progress, size, _how_far(task))
         imgui.same_line()
         if imgui.button(f"Cancel##{id(task)}"):
             self.cancel(task)
-        widgets.tooltip("Cancel (Esc)" if task in self.ended_by_escape else "Cancel")
+
+
+def _how_far(task: Task) -> str:
+    """The share that is done, where it is known, and for how long the work has gone on."""
+    done = "" if task.progress is None else f"{100 * task.progress:.0f} %, "
+    return f"{done}{task.seconds:.0f} s"

@@ -29,10 +29,20 @@ class Welcome:
         self._session = session
         self.is_over = is_over
 
+    @property
+    def _is_shown(self) -> bool:
+        return not self.is_over and self._session.scan == DEMO
+
+    def on_escape(self) -> bool:
+        """Send the card away; whether it was there."""
+        was_shown = self._is_shown
+        self.is_over = self.is_over or was_shown
+        return was_shown
+
     def draw(self, left: float, top: float, width: float) -> None:
         """Declare it at the top of the 3D view, where the demo is shown, until the first act, which is done
         as without it. left, top, width: of the view."""
-        if self.is_over or self._session.scan != DEMO:
+        if not self._is_shown:
             return
         if _is_act():
             self.is_over = True

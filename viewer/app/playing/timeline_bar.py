@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..app import App
     from ..notices import Notices
     from ..scene.pointed import Pointer
+    from ..tasks import Tasks
     from .playback import Playback
 
 _SPEED_WIDTH = 4.6  # in heights of the font
@@ -32,6 +33,7 @@ _GRAB = 1.5  # of that, how near the mouse has to be
 _FIRST, _LAST = 1, 2
 _TICK_TEXT = 0.75  # heights of the font
 _TICK_ROOM = 7.0  # from one to the next at least, in heights of their text
+_WORK_SHARE = 0.4  # of the status bar's width, for work that goes on
 _GAP = "    "  # between what is said of the place under the mouse
 
 
@@ -56,7 +58,7 @@ def draw(app: App) -> None:
             "How many frames per second you see, and how many the scan has at this speed. "
             "Scan4D skips frames that it cannot load or draw in time"
         )
-    _draw_status(app.playback, app.pointer, app.notices)
+    _draw_status(app.playback, app.pointer, app.notices, app.tasks)
 
 
 def _draw_steps(app: App) -> None:
@@ -273,16 +275,21 @@ def _pointed(words: list[str], room: float) -> str:
     return text if words else ""
 
 
-def _draw_status(playback: Playback, pointer: Pointer, notices: Notices) -> None:
-    """Tell what is under the mouse, else the latest message; the names of scan and frame."""
+def _draw_status(playback: Playback, pointer: Pointer, notices: Notices, tasks: Tasks) -> None:
+    """Show the work that goes on, what is under the mouse, else the latest message; the names of scan and
+    frame."""
     imgui.spacing()
     width, gap = imgui.get_content_region_avail().x, 2 * imgui.get_font_size()
     names = playback.timeline.name, playback.timeline.label(playback.session.index)
     name = "   ".join(widgets.fitted(one, width / 4) for one in names)
     left = width - imgui.calc_text_size(name).x
-    text = _pointed(pointer.words, left - gap)
+    tasks.draw(_WORK_SHARE * width)
+    if tasks.shown:
+        imgui.same_line(0, gap)
+    room = left - gap - (imgui.get_cursor_pos_x() - imgui.get_cursor_start_pos().x)
+    text = _pointed(pointer.words, room)
     if not text and notices.all:
-        text = widgets.fitted(notices.all[-1].text, left - gap)
+        text = widgets.fitted(notices.all[-1].text, room)
     imgui.text_disabled(text)
     imgui.same_line()
     imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)

@@ -30,8 +30,8 @@ _BUTTONS = (
 _RED = 0xE0483E  # 0xRRGGBB
 
 
-def draw(app: App) -> float:
-    """Declare the view in the current ImGui window, which it fills; returns where notes at its top end."""
+def draw(app: App) -> None:
+    """Declare the view in the current ImGui window, which it fills."""
     size, told = imgui.get_content_region_avail(), app.failures.told
     the_cube, has_cube = app.steering.cube, app.steering.cube.is_shown and not app.full_view.is_on
     camera = app.document.camera and app.glide.seen(app.document.camera)  # that the picture shows
@@ -59,11 +59,13 @@ def draw(app: App) -> float:
     with told("Scale bar and colour bar"):
         app.marks.draw(size)
     text = printable(words_over(app) or "")
-    head = _draw_note(text, size) if text else _draw_prompt(app.tools.prompt, size)
+    if text:
+        _draw_note(text, size)
+    else:
+        _draw_prompt(app.tools.prompt, size)
     app.notices.draw(size)
     if app.capture.recorder is not None:
         _draw_recording_mark()
-    return head
 
 
 def _move(app: App, pose: Pose, size: ImVec2) -> None:
@@ -194,24 +196,21 @@ def words_on_levels(levels: Mapping[int, bool], key: str) -> str:
     return what + (f"; press {key}" if key else "")
 
 
-def _draw_note(text: str, size: ImVec2) -> float:
-    """Say something at the top of the view; returns where it ends."""
+def _draw_note(text: str, size: ImVec2) -> None:
+    """Say something at the top of the view."""
     em = imgui.get_font_size()
     wrap = max(10 * em, min(0.7 * size.x, 40 * em))
     extent = imgui.calc_text_size(text, wrap_width=wrap)
     corner = ImVec2((size.x - extent.x) / 2, 2 * em)
     notices.draw_text(text, corner, extent, wrap, ImVec2(em, 0.6 * em))
-    return corner.y + extent.y + 0.6 * em
 
 
-def _draw_prompt(text: str, size: ImVec2) -> float:
-    """Say what a click does; returns where that ends, 0 where there is nothing to say."""
-    if not text:
-        return 0.0
-    em, extent = imgui.get_font_size(), imgui.calc_text_size(text)
-    corner = ImVec2((size.x - extent.x) / 2, 0.9 * em)
-    notices.draw_text(text, corner, extent, extent.x + em, ImVec2(0.8 * em, 0.4 * em))
-    return corner.y + extent.y + 0.4 * em
+def _draw_prompt(text: str, size: ImVec2) -> None:
+    """Say what a click does, where there is something to say."""
+    if text:
+        em, extent = imgui.get_font_size(), imgui.calc_text_size(text)
+        corner = ImVec2((size.x - extent.x) / 2, 0.9 * em)
+        notices.draw_text(text, corner, extent, extent.x + em, ImVec2(0.8 * em, 0.4 * em))
 
 
 def _draw_recording_mark() -> None:
