@@ -1,20 +1,42 @@
-"""Tables as comma separated values, RFC 4180."""
+"""Tables as comma separated values, RFC 4180, whose texts no spreadsheet takes for formulas.
+
+A spreadsheet computes what begins with one of =+-@, and what has that behind a tab or a line break. Names
+come from files, so such a text gets an apostrophe in front, which spreadsheets take for the mark of a text.
+Readers take it off again with `text_of`.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from .files import whole_file
 
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")  # also a text that begins like one with an apostrophe
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
 
 def to_text(rows: Iterable[Iterable[object]], separator: str = ",") -> str:
-    """The rows as RFC 4180 has them."""
+    """The rows as RFC 4180 has them; None is an empty cell."""
     text = io.StringIO()
-    csv.writer(text, delimiter=separator).writerows(rows)
+    csv.writer(text, delimiter=separator).writerows(map(_cell, row) for row in rows)
     return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    """A cell as it is written."""
+    if value is None or isinstance(value, int | float):
+        return value
+    text = str(value)
+    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
+
+
+def text_of(cell: str) -> str:
+    """The text that was written as a cell."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def save_rows(path: Path, rows: Iterable[Iterable[object]]) -> None:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from many_landmarks import left_open
 from scenes import sphere
 from test_window_measuring import ctrl
 from virtual_screen import PANEL, RunningApp, Screen, running_app
 
 from viewer.scan import formats
+
+HOSTILE = "%s%s%s%s%s%s"
 
 
 @pytest.fixture
@@ -78,3 +82,18 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     assert app.settle().document["shown_unit"] is None
     ctrl(app.screen, "z")
     app.see(unit="units")
+
+
+def test_a_unit_that_is_no_word_ends_nothing(screen: Screen, tmp_path: Path) -> None:
+    """Of a document that was kept, with a measure, whose row of the panel has a format with the unit."""
+    scan = left_open(tmp_path, frames=1, landmarks=2, measures=1)
+    (file,) = (tmp_path / "config" / "scan4d" / "scans").iterdir()
+    kept = json.loads(file.read_text())
+    kept["document"] |= {"unit": HOSTILE, "goal": {"kind": "error", "bound": 0.5, "unit": HOSTILE}}
+    file.write_text(json.dumps(kept))
+    with running_app(screen, tmp_path, scan) as app:
+        app.act(PANEL, ("mouse_move", "##noise"))
+        app.told("these cannot be read: (goal, unit|unit, goal)")
+        state = app.settle()
+        assert (state.unit, len(state.landmarks)) == ("units", 2)
+        assert "Traceback" not in app.log()

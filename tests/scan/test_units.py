@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from range_scenes import sphere_view
 
 from viewer.bounds import Bounds
@@ -30,12 +32,35 @@ def save(path: Path, saved: tuple[RangeView, ...]) -> None:
     formats.write(path, merge(saved), saved)
 
 
-@pytest.mark.parametrize("name", ["mm", "µm", "Zoll (alt)", "x" * 40])
+@pytest.mark.parametrize("name", ["mm", "µm", "\u03bcm", "US-ft", "m/s", "x" * 16])
 def test_names_that_can_be_shown(name: str) -> None:
     assert checked_unit(name) == usable_unit(name) == name
 
 
-@pytest.mark.parametrize("name", ["", "  ", "x" * 41, "m" * 5000, "\x1b[31mmm", "a\nb", "m\u202e"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "  ",
+        "x" * 17,
+        "m" * 5000,
+        "\x1b[31mmm",
+        "a\nb",
+        "m\u202e",
+        "%s%s%s%s%s%s",
+        "m%n",
+        "##m",
+        "m###x",
+        "=1+1",
+        "-m",
+        "+m",
+        "@m",
+        "<b>m</b>",
+        "m\t",
+        "two words",
+        "12",
+    ],
+)
 def test_names_that_cannot_be_shown(name: str) -> None:
     with pytest.raises(InputError, match=r"is no unit of length\. Use a short name such as mm") as caught:
         checked_unit(name)
@@ -115,3 +140,21 @@ def test_a_unit_is_guessed_of_the_size(edges: tuple[float, float, float], up: st
     half = np.array(edges) / 2
     found = guess_unit(Bounds(-half, half), up)
     assert (found and found[0]) == guess
+
+
+@pytest.mark.parametrize("name", ["%s%s%s%s%s%s", "m\x1b[31m", "=1+1", "##m"])
+def test_a_unit_that_is_no_word_is_told_of_any_file_and_is_none(tmp_path: Path, name: str) -> None:
+    rig, pods, arrays = tmp_path / "exr", tmp_path / "pods", tmp_path / "arrays.npz"
+    rig.mkdir(), pods.mkdir()
+    save(rig / "f.exr", tuple(replace(view, unit=name) for view in views("m")))
+    np.savez(arrays, depth=np.ones((4, 4), np.float32), fx=4, fy=4, cx=1.5, cy=1.5, unit=name)
+    camera = {"fx": 4, "fy": 4, "cx": 1.5, "cy": 1.5, "depth_scale": 1000}
+    told = {"unit": name, "pods": [{"name": "left", "range": "left_*.png"} | camera]}
+    (pods / "pods.json").write_text(json.dumps(told))
+    Image.fromarray(np.full((4, 4), 500, np.uint16)).save(pods / "left_1.png")
+    for path in (rig, pods, arrays):
+        with open_scan(path) as scan:
+            assert scan.unit == scan.pose(0).views[0].unit == "units", path
+            assert [notice.kind for notice in scan.messages if "unit" in notice.text] == ["unit"], path
+        with open_scan(path, unit="mm") as scan:
+            assert scan.unit == "mm"

@@ -167,7 +167,7 @@ def _draw_drop(app: App, menu: Menu[App], text: str) -> None:
     """A button that a menu drops from; one without a title stands close to the button before it."""
     if not menu.title:
         imgui.same_line(0, 1)
-    popup = f"{_name(menu)} is open"
+    popup = f"##drop {_name(menu)}"
     if imgui.button(text):
         imgui.open_popup(popup)
     imgui.set_next_window_pos(ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y))
@@ -180,7 +180,9 @@ def _draw(app: App, entry: Entry[App]) -> None:
     if isinstance(entry, Command):
         is_on = entry.is_on is not None and entry.is_on(app)
         title = entry.title_now(app) if entry.title_now else entry.title
-        if imgui.menu_item(f"{title}###{entry.name}", app.keys.of[entry.name], is_on, entry.can(app))[0]:
+        if imgui.menu_item(widgets.named(title, entry.name), app.keys.of[entry.name], is_on, entry.can(app))[
+            0
+        ]:
             with app.failures.told(entry.title):
                 entry.act(app)
     elif (isinstance(entry, Listing) or entry.is_there(app)) and imgui.begin_menu(entry.title):
@@ -202,7 +204,7 @@ def _draw_groups(app: App, menu: Menu[App]) -> None:
 def _draw_items(app: App, listing: Listing[App]) -> None:
     items = list(listing.items(app))
     for number, (title, act, is_on) in enumerate(items):
-        if imgui.menu_item(f"{title}##{number}", "", is_on)[0]:
+        if imgui.menu_item(widgets.named(title, number), "", is_on)[0]:
             act()
     if not items:
         imgui.text_disabled("none")

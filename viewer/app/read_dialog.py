@@ -12,6 +12,7 @@ from imgui_bundle import ImVec2, imgui
 from ..errors import InputError
 from ..files import absolute, printable
 from ..task import Task, in_background
+from . import widgets
 from .path_dialog import PathDialog
 
 _ROWS = 8  # of the list, that are shown at once
@@ -51,7 +52,7 @@ class ReadDialog(PathDialog):
         imgui.begin_child("files", ImVec2(0, height), flags)
         for name in self._files:
             chosen = imgui.selectable(
-                printable(name), False, imgui.SelectableFlags_.no_auto_close_popups.value
+                widgets.unhidden(printable(name)), False, imgui.SelectableFlags_.no_auto_close_popups.value
             )
             if chosen[0]:
                 self._path = os.path.join(self._listed, name)

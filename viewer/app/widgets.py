@@ -173,8 +173,7 @@ def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, st
     titles = titles or {}
     if imgui.begin_combo(f"##{name}", unhidden(titles.get(current, current))):
         for word in words:
-            label = f"{unhidden(titles.get(word, word))}###{unhidden(word)}"
-            if imgui.selectable(label, word == current)[0]:
+            if imgui.selectable(named(titles.get(word, word), word), word == current)[0]:
                 current = word
         imgui.end_combo()
     return current
@@ -203,30 +202,36 @@ def _edit(parameter: Parameter, value: Any, words: Mapping[str, str] | None = No
     return _edit_number(name, parameter, value)
 
 
+def number_format(digits: str, unit: str = "") -> str:
+    """The format of a number's field: the digits as C has them, such as "%.3g", and a unit, which may be any
+    text. ImGui reads memory by what stands in formats, so no other text gets there."""
+    return f"{digits} {unit.replace('%', '%%')}" if unit else digits
+
+
 def _edit_number(name: str, parameter: Parameter, value: Any) -> Any:
     low = -math.inf if parameter.low is None else parameter.low
     high = math.inf if parameter.high is None else parameter.high
     edit_one = _edit_whole if parameter.type is int else _edit_real
-    changed, new = edit_one(name, value, low, high, f" {parameter.unit}" if parameter.unit else "")
+    changed, new = edit_one(name, value, low, high, parameter.unit)
     return parameter.type(min(max(new, low), high)) if changed else value
 
 
 def _edit_whole(name: str, value: int, low: float, high: float, unit: str) -> tuple[bool, int]:
     if math.isfinite(high - low):
-        return imgui.slider_int(name, value, int(low), int(high), f"%d{unit}")
-    return imgui.drag_int(name, value, 0.1, format=f"%d{unit}")
+        return imgui.slider_int(name, value, int(low), int(high), number_format("%d", unit))
+    return imgui.drag_int(name, value, 0.1, format=number_format("%d", unit))
 
 
 def _edit_real(name: str, value: float, low: float, high: float, unit: str) -> tuple[bool, float]:
     if not math.isfinite(high - low):
         speed = max(abs(value), 1.0) * _DRAG_SPEED
-        changed, new = imgui.drag_float(name, value, speed, format=f"%.5g{unit}")
+        changed, new = imgui.drag_float(name, value, speed, format=number_format("%.5g", unit))
     elif low > 0 and high / low > _DECADES:
         logarithmic = imgui.SliderFlags_.logarithmic.value
-        changed, new = imgui.slider_float(name, value, low, high, f"%.3g{unit}", logarithmic)
+        changed, new = imgui.slider_float(name, value, low, high, number_format("%.3g", unit), logarithmic)
     else:
         decimals = min(max(2 - math.floor(math.log10(high - low)), 0), 6)
-        changed, new = imgui.slider_float(name, value, low, high, f"%.{decimals}f{unit}")
+        changed, new = imgui.slider_float(name, value, low, high, number_format(f"%.{decimals}f", unit))
     return changed, float(f"{new:.6g}")  # ImGui's float32 has no more digits
 
 
@@ -264,6 +269,11 @@ def dot(middle: ImVec2, color: int | None) -> None:
         draw_list.add_circle(middle, radius, imgui.get_color_u32(imgui.Col_.text_disabled))
     else:
         draw_list.add_circle_filled(middle, radius, theme.packed(color))
+
+
+def named(text: str, name: object) -> str:
+    """The label of a widget that shows a text and is known by a name, whatever is in these."""
+    return f"{unhidden(text)}###{unhidden(str(name))}"
 
 
 def unhidden(text: str) -> str:

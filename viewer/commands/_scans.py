@@ -13,8 +13,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..bounds import Bounds
+from ..csv_text import save_rows, text_of
 from ..errors import InputError
-from ..files import absolute, printable, whole_file
+from ..files import absolute, printable
 from ..output.export import is_pattern, numbered
 from ..scan import formats
 from ..scan.open import entries, open_scan
@@ -174,8 +175,7 @@ def frame_files(out: Path) -> Iterator[Callable[[Pose], Path]]:
     yield file_of
     if is_pattern(out):
         times_file = out.with_name(TIMES_FILE)
-        with whole_file(times_file) as path, open(path, "w", newline="", encoding="utf-8") as stream:
-            csv.writer(stream).writerows([("file", "time"), *rows])
+        save_rows(times_file, [("file", "time"), *rows])
 
 
 def _check_times_file(path: Path, names: set[str]) -> None:
@@ -184,7 +184,7 @@ def _check_times_file(path: Path, names: set[str]) -> None:
         return
     try:
         with open(path, newline="", encoding="utf-8") as stream:
-            told = {row[0] for row in csv.reader(stream) if row}
+            told = {text_of(row[0]) for row in csv.reader(stream) if row}
     except (OSError, UnicodeDecodeError, csv.Error):
         told = {"?"}
     if told - names - {"file"}:

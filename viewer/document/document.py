@@ -19,6 +19,7 @@ from ..geometry import UP, Vector, up_vector
 from ..look import Look
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Pose
+from ..scan.units import usable_unit
 from .part import Part
 from .schema import (
     DAMAGED,
@@ -83,7 +84,9 @@ def _is_unreadable(kind: type | None, value: Any) -> bool:
 
 def _read_goal(data: Any) -> Goal | None:
     goal = None if data is None else structured(Goal, data)
-    if goal is None or (goal.kind in ("time", "error") and 0 < goal.bound < math.inf and goal.unit):
+    if goal is None or (
+        goal.kind in ("time", "error") and 0 < goal.bound < math.inf and usable_unit(goal.unit)
+    ):
         return goal
     raise InputError(f"is no bound of a time or an error but {shortened(data)}", hint=DAMAGED)
 

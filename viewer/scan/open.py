@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from . import formats
 from .points import UNKNOWN_UNIT
 from .range_folders import find_range_frames, lacking_part, pods
 from .sources import FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times, times_in_names
-from .units import checked_unit
+from .units import checked_unit, usable_unit
 
 DEMO = "demo"
 _PICTURES = {  # beside which text tables are no points
@@ -54,8 +54,12 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
     if recorded is None or (fps is not None and not measured):
         recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
-    timeline = Timeline(source, recorded, unit or source.unit or UNKNOWN_UNIT)
+    told = source.unit
+    timeline = Timeline(source, recorded, unit or usable_unit(told) or UNKNOWN_UNIT)
     timeline.is_measured = measured
+    if told and not usable_unit(told):
+        what = f"the scan names '{shortened(told)}' as its unit of length, which is no short word such as mm"
+        timeline.messages.append(ScanMessage("unit", f"{what}: its unit is not set"))
     if measured and fps is not None:
         timeline.messages.append(
             ScanMessage("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used")

@@ -32,7 +32,7 @@ class FrameSource(Protocol):
 
     @property
     def unit(self) -> str | None:
-        """The name of its unit of length, or None where the scan does not tell."""
+        """The name of its unit of length as its files tell it, perhaps any text; None where none does."""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -64,7 +64,7 @@ class FileSequence:
 
     @cached_property
     def unit(self) -> str | None:
-        """The unit that the first file tells, where its format knows units."""
+        """The unit as the first file tells it, where its format knows units."""
         try:
             return formats.read_unit(self.files[0])
         except InputError:  # asking for its pose will tell

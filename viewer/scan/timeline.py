@@ -26,6 +26,7 @@ from .pose import Pose
 from .range_view import RangeView, in_one_unit
 from .sources import FrameSource
 from .times import frame_in_words
+from .units import usable_unit
 
 _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 
@@ -36,7 +37,8 @@ class ScanMessage:
 
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
     coordinate were left out), "shortened" (splats far larger than the scan were), "unit" (lengths in
-    another unit than the scan's), "assumed" (what of range views nothing tells) or "times". index: the
+    another unit than the scan's, or a name of it that is no unit), "assumed" (what of range views nothing
+    tells) or "times". index: the
     frame; None where it concerns all.
     """
 
@@ -421,7 +423,7 @@ class Timeline:
 
     def _in_unit(self, index: int, views: tuple[RangeView, ...]) -> tuple[RangeView, ...]:
         """The views in the unit that the scan tells, where they have another one; told once."""
-        unit = self.source.unit or UNKNOWN_UNIT
+        unit = usable_unit(self.source.unit) or UNKNOWN_UNIT
         converted = in_one_unit(views, unit)
         others = [before.unit for before in views if before.unit != unit]
         if others:

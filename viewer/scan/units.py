@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from ..errors import InputError, shortened
 
-LONGEST_NAME = 40  # characters
+# A short word: letters first, then also digits and the signs of powers and fractions, such as in µm or US-ft.
+_WORD = re.compile(r"[^\W\d_][\w./·^°-]{0,15}")
 # Units to choose from, as people call them.
 UNIT_WORDS = {"µm": "µm", "mm": "mm", "cm": "cm", "m": "m", "km": "km", "in": "inch", "ft": "foot"}
 
@@ -17,16 +19,15 @@ _METRES = {
 
 
 def checked_unit(name: str, where: object = None) -> str:
-    """The name of a unit as a user gives it. Raises InputError where it is none that can be shown."""
+    """The name of a unit as a user gives it. Raises InputError where it is no short word."""
     if usable_unit(name) is None:
         raise InputError(f"'{shortened(name)}' is no unit of length", where, "Use a short name such as mm")
     return name
 
 
 def usable_unit(name: str | None) -> str | None:
-    """The name of a unit as a file tells it; None where it is none that can be shown."""
-    fits = name is not None and name.strip() and name.isprintable() and len(name) <= LONGEST_NAME
-    return name if fits else None
+    """The name of a unit as a file tells it; None where it is no short word."""
+    return name if name is not None and _WORD.fullmatch(name) else None
 
 
 def is_length(name: str) -> bool:

@@ -140,7 +140,6 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
         (json.dumps(CAMERA | {"depth_scale": None}), "depth_scale is None"),
         (json.dumps(CAMERA | {"kind": "disparity"}), "unknown kind of depth"),
         (json.dumps(CAMERA | {"kind": []}), "unknown kind of depth"),
-        (json.dumps(CAMERA | {"unit": 3}), "no unit"),
         (
             json.dumps(CAMERA | {"width": 640, "height": 480}),
             "6 x 4 pixels, its calibration is for 640",

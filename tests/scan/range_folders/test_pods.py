@@ -153,7 +153,6 @@ def test_pods_that_cannot_be_used(changes: dict[str, object], reason: str, tmp_p
         ("{}", "names no pods"),
         ('{"pods": []}', "names 0 pods"),
         ('{"pods": [3]}', "pod0 is no JSON object"),
-        ('{"pods": [{}], "unit": "\\u001b"}', "is no unit of length"),
     ],
 )
 def test_files_that_tell_no_pods(text: str, reason: str, tmp_path: Path) -> None:

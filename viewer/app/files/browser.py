@@ -289,9 +289,9 @@ class Browser:
         """Declare the places to look in, and the lists of what can be opened at once, wherever it is."""
         imgui.text_disabled("Places")
         for place in self._places:
-            if imgui.selectable(f"{place.icon}  {place.title}###{place.title}", place.folder == self._folder)[
-                0
-            ]:
+            if imgui.selectable(
+                widgets.named(f"{place.icon}  {place.title}", place.title), place.folder == self._folder
+            )[0]:
                 self._go(place.folder)
             widgets.tooltip(printable(str(place.folder)))
         is_open = self._session.scan == DEMO
@@ -310,7 +310,7 @@ class Browser:
         for number, scan in enumerate(scans):
             name = widgets.fitted(title(scan), imgui.get_content_region_avail().x)
             is_open = known_as(scan) == known_as(self._session.scan)
-            if imgui.selectable(f"{name}##{number}", is_open)[0]:
+            if imgui.selectable(widgets.named(name, number), is_open)[0]:
                 self._open_known(scan)
             widgets.tooltip(printable(scan))
         if not scans:

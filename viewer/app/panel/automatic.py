@@ -69,7 +69,9 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
     low, high = _TIMES if kind == "ms" else (_ERRORS[0] * pixel, _ERRORS[1] * pixel)
     widgets.label("Maximum", "For one full picture. At rest, Scan4D goes on refining it")
     flags = imgui.SliderFlags_.logarithmic.value
-    edited, bound = imgui.slider_float("##most", goal.bound, low, high, f"%.3g {kind}", flags)
+    edited, bound = imgui.slider_float(
+        "##most", goal.bound, low, high, widgets.number_format("%.3g", kind), flags
+    )
     return Goal(goal.kind, float(f"{bound:.3g}"), goal.unit) if edited and bound > 0 else goal
 
 

@@ -38,7 +38,6 @@ from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
 from ..times import frame_in_words
-from ..units import usable_unit
 from ._admission import admit
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
@@ -88,14 +87,13 @@ def read_times(path: Path | str) -> NDArray[np.float64] | None:
 
 
 def read_unit(path: Path | str) -> str | None:
-    """The name of the unit of length that the file tells, or None where it tells none that can be shown.
-
-    Raises InputError.
+    """The name of the unit of length as the file tells it, which may be any text (see `usable_unit`); None
+    where it tells none. Raises InputError.
     """
     path = Path(path)
     module = _readable(path)
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        return usable_unit(module.read_unit(path)) if hasattr(module, "read_unit") else None
+        return module.read_unit(path) if hasattr(module, "read_unit") else None
 
 
 def read(path: Path | str, frame: int = 0) -> Scanned:

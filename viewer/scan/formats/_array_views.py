@@ -95,12 +95,16 @@ def unit_of_arrays(arrays: _Arrays, held: int) -> str | None:
     The heights of a terrain are read where they tell whether its ground is in degrees.
     """
     if "unit" in arrays or _source(arrays) != "elevation":
-        return _unit(arrays)
-    return usable_unit(view_of_arrays(arrays, held).unit)
+        return _told_unit(arrays)
+    return view_of_arrays(arrays, held).unit
 
 
 def _unit(arrays: _Arrays) -> str | None:
-    return usable_unit(_word(arrays, "unit", "")) if "unit" in arrays else None
+    return usable_unit(_told_unit(arrays))
+
+
+def _told_unit(arrays: _Arrays) -> str | None:
+    return _word(arrays, "unit", "") if "unit" in arrays else None
 
 
 def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:

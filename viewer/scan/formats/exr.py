@@ -151,7 +151,7 @@ def _name(header: dict[str, Any], number: int) -> str:
 
 
 def _unit(header: dict[str, Any]) -> str | None:
-    return usable_unit(str(header["unit"])) if "unit" in header else None
+    return str(header["unit"]) if "unit" in header else None
 
 
 def _check_flat(header: dict[str, Any], name: str) -> None:
@@ -237,7 +237,7 @@ def _view(header: dict[str, Any], pixels: dict[str, NDArray], name: str) -> Rang
         distortion=tuple(_number(header[key]) for key in _LENS if key in header),
         world_to_camera=_turned(np.asarray(to_camera, np.float64).reshape(4, 4).T),
         name=name,
-        unit=_unit(header) or UNKNOWN_UNIT,
+        unit=usable_unit(_unit(header)) or UNKNOWN_UNIT,
         assumed=str(header.get("assumed", "")),
     )
 

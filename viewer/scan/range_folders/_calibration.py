@@ -12,7 +12,6 @@ import numpy as np
 
 from ...errors import InputError, shortened, unknown_name
 from ..range_view import DepthKind
-from ..units import checked_unit
 from ._texts import object_of, text_of
 
 FILES = ("camera.json", "camera.txt")  # beside the pictures
@@ -26,9 +25,9 @@ _FORM = "It should have fx, fy, cx and cy in pixels, and for depth pictures dept
 class Calibration:
     """A pinhole, its lens, and what the numbers of its depth pictures mean.
 
-    fx, fy, cx, cy, distortion, kind, unit: as `RangeView` has them. depth_scale: how many of the numbers are
-    one unit, for example 1000 for millimetres where the unit is m. width, height: of the pictures that it is
-    for, None: of any.
+    fx, fy, cx, cy, distortion, kind: as `RangeView` has them. unit: as the file tells it, perhaps any text.
+    depth_scale: how many of the numbers are one unit, for example 1000 for millimetres where the unit is m.
+    width, height: of the pictures that it is for, None: of any.
     """
 
     fx: float
@@ -129,7 +128,7 @@ def _checked(told: dict[str, Any], default: Calibration | None) -> Calibration:
     if "kind" in given and given["kind"] not in (kinds := get_args(DepthKind)):
         raise unknown_name("kind of depth", shortened(given["kind"]), kinds)
     if "unit" in given:
-        checked_unit(given["unit"] if isinstance(given["unit"], str) else "")
+        given["unit"] = str(given["unit"])
     given["cx"], given["cy"] = given["cx"] + _CENTER, given["cy"] + _CENTER
     return Calibration(**given) if default is None else replace(default, **given)
 

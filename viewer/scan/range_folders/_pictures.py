@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from ...errors import InputError, Scan4DError
 from ..formats._admission import opened
 from ..formats._pictures import COLOR_KINDS, DEPTH_KINDS, numbers_of_picture, opened_picture, srgb_of_picture
+from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, mask_of
+from ..units import usable_unit
 from ._calibration import Calibration
 
 COLOR_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -100,7 +102,7 @@ def depth_view(
         distortion=calibration.distortion,
         world_to_camera=world_to_camera,
         name=name,
-        unit=calibration.unit,
+        unit=usable_unit(calibration.unit) or UNKNOWN_UNIT,
     )
 
 

@@ -20,7 +20,8 @@ class RangeFrames:
     """Frames of range views, each of them in files of its own.
 
     name: the scan's. labels: a file's name for each frame, at least one. read: the views of a frame, which
-    may raise anything. files: all that is read, calibration and poses among them. unit: that of all views.
+    may raise anything. files: all that is read, calibration and poses among them. unit: of all views, as
+    the files tell it.
     recorded: the times that were stored with the frames, (T,) seconds, or None.
     """
 

@@ -25,7 +25,7 @@ _BAR_STEPS = 16  # of the bar of colours
 def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     words = "Hide plot" if tool.is_below() else "Plot measures"
-    if imgui.button(f"{words}###curves", ui.button_size(1)):
+    if imgui.button(widgets.named(words, "curves"), ui.button_size(1)):
         tool.toggle()
     ui.tooltip("Plot the measures of all frames under the timeline", "curves")
     _draw_measures(tool)
@@ -36,7 +36,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         ui.tooltip("Draw each measure in the view, with its value", "measure_lines")
         _draw_noise(tool)
     words = "Stop" if tool.lasso.is_drawn else "Outline a region"
-    if imgui.button(f"{words}###region", ui.button_size(2)):
+    if imgui.button(widgets.named(words, "region"), ui.button_size(2)):
         tool.lasso.toggle()
     ui.tooltip("Draw round a part of the surface to measure its area and perimeter", "lasso")
     imgui.same_line()
@@ -86,7 +86,9 @@ def _draw_noise(tool: Tool) -> None:
         "Standard deviation of a coordinate. Scan4D adds it to the uncertainty of measures",
     )
     low, high, speed = 0.0, 1e9, 0.01
-    changed, new = imgui.drag_float("##noise", scale.factor * noise, speed, low, high, f"%.3g {scale.unit}")
+    changed, new = imgui.drag_float(
+        "##noise", scale.factor * noise, speed, low, high, widgets.number_format("%.3g", scale.unit)
+    )
     if changed:
         tool.choose("Set scanner noise", noise=max(float(f"{new / scale.factor:.6g}"), 0.0))
 

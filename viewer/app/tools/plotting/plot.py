@@ -116,7 +116,12 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
     )
     low, logarithmic = 0.02, imgui.SliderFlags_.logarithmic.value
     seconds = imgui.slider_float(
-        "##smoothing", settings.seconds, low, _MOST_SMOOTHING, f"%.2f s{points}", logarithmic
+        "##smoothing",
+        settings.seconds,
+        low,
+        _MOST_SMOOTHING,
+        widgets.number_format("%.2f", f"s{points}"),
+        logarithmic,
     )[1]
     widgets.tooltip("Width of the smoothing window (Savitzky-Golay), for speed, acceleration and numbers")
     imgui.same_line()
@@ -197,12 +202,12 @@ def _draw_plot(tool: Tool, plot: CurvePlot, size: ImVec2) -> int | None:
 
 
 def _set_axes(plot: CurvePlot) -> None:
-    implot.setup_axis(_X, None if plot.x_unit == "s" else f"{widgets.unhidden(plot.x_label)} [{plot.x_unit}]")
+    implot.setup_axis(_X, None if plot.x_unit == "s" else widgets.unhidden(f"{plot.x_label} [{plot.x_unit}]"))
     if plot.x_unit == "s":
         implot.setup_axis_format(_X, "%g s")
     for number, unit in enumerate(plot.units):
         flags = implot.AxisFlags_.aux_default.value if number else 0
-        implot.setup_axis(_Y[number], unit, flags)
+        implot.setup_axis(_Y[number], widgets.unhidden(unit), flags)
     implot.setup_finish()
 
 
