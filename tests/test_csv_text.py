@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import viewer
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
-from viewer.csv_text import save_rows, text_of, to_text
+from viewer.csv_text import save_rows, text_of_cell, to_text
 from viewer.scan.times import read_times_csv
 
 FORMULAS = ("=1+1", "+1+1", "-1-cmd", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "=cmd|' /C calc'!A0", "-", "+")
@@ -32,7 +32,7 @@ def cells(rows: list[list[object]], separator: str = ",") -> list[list[str]]:
 def test_no_text_begins_like_a_formula(separator: str) -> None:
     (row,) = cells([list(FORMULAS)], separator)
     assert not [cell for cell in row if cell[0] in "=+-@\t\r\n"]
-    assert [text_of(cell) for cell in row] == list(FORMULAS)
+    assert [text_of_cell(cell) for cell in row] == list(FORMULAS)
 
 
 def test_numbers_and_other_texts_stay_as_they_are() -> None:
@@ -54,7 +54,7 @@ def test_numbers_and_other_texts_stay_as_they_are() -> None:
 @given(st.text(st.sampled_from("'=+-@\t\r\n1.e x"), max_size=6))
 def test_every_text_reads_back_as_it_was(text: str) -> None:
     ((cell,),) = cells([[text]]) or [[""]]
-    assert text_of(cell) == text
+    assert text_of_cell(cell) == text
 
 
 def test_names_of_landmarks_come_back_from_tables(tmp_path: Path) -> None:

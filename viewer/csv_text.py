@@ -2,7 +2,7 @@
 
 A spreadsheet computes what begins with one of =+-@, and what has that behind a tab or a line break. Names
 come from files, so such a text gets an apostrophe in front, which spreadsheets take for the mark of a text.
-Readers take it off again with `text_of`.
+Readers take it off again with `text_of_cell`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def _cell(value: object) -> object:
     return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
 
 
-def text_of(cell: str) -> str:
+def text_of_cell(cell: str) -> str:
     """The text that was written as a cell."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 

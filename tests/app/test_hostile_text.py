@@ -17,7 +17,7 @@ APP = Path(widgets.__file__).parent
 MODULES = {"imgui": imgui, "implot": implot}
 FORMATS = {"format", "format_max", "float_format"}  # parameters that ImGui reads memory by
 LABELS = {"label", "str_id", "name", "label_id", "title_id", "preview_value", "overlay"}  # that end at "##"
-GUARDS = {"format": {"number_format"}, "label": {"named", "unhidden", "id"}}
+GUARDS = {"format": {"number_format"}, "label": {"labelled", "unhidden", "id"}}
 # Texts that stand in the program.
 DECLARED = {"menu.title", "entry.title", "entry.name", "parameter.name", "parameter.group"}
 HOSTILE = "%s%s%s%s%s%s%n##hidden###other"
@@ -126,7 +126,7 @@ def test_such_calls_are_found(call: str) -> None:
 def test_what_is_guarded_is_not() -> None:
     calls = (
         'imgui.drag_float("##a", 1.0, 0.1, 0.0, 1.0, widgets.number_format("%.3g", unit))',
-        'imgui.button(widgets.named(unit, "press"))',
+        'imgui.button(widgets.labelled(unit, "press"))',
     )
     assert not unguarded("def draw(unit):\n    " + "; ".join(calls) + "\n")
 
@@ -173,8 +173,8 @@ def test_texts_of_imgui_are_no_formats() -> None:
 
 @pytest.mark.usefixtures("frame")
 def test_a_label_shows_all_of_its_text_and_has_its_own_name() -> None:
-    label = widgets.named(HOSTILE, "press")
+    label = widgets.labelled(HOSTILE, "press")
     visible = imgui.calc_text_size(label, hide_text_after_double_hash=True).x
     assert visible == imgui.calc_text_size(HOSTILE.replace("#", "#\u200b")).x
     assert imgui.get_id(label) == imgui.get_id("###press")
-    assert imgui.get_id(widgets.named("a", HOSTILE)) != imgui.get_id(widgets.named("a", "other"))
+    assert imgui.get_id(widgets.labelled("a", HOSTILE)) != imgui.get_id(widgets.labelled("a", "other"))

@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..csv_text import text_of
+from ..csv_text import text_of_cell
 from ..errors import InputError, explained
 from ..files import open_plain, read_text
 from ..geometry import vector
@@ -67,7 +67,7 @@ def read_measurements(
             where = f"{path}, line {rows.line_num}"
             if None in row or None in row.values() or not row.keys() >= set(COLUMNS):
                 raise InputError("a column is missing, or one too many", where, _HINT)
-            if (name := text_of(row["scan"])) != scan:
+            if (name := text_of_cell(row["scan"])) != scan:
                 others.add(name)
             elif row["measurement"] not in found:  # further rows: how it stands in other frames
                 found[row["measurement"]] = _measurement(row, where, unit, count)

@@ -180,9 +180,9 @@ def _draw(app: App, entry: Entry[App]) -> None:
     if isinstance(entry, Command):
         is_on = entry.is_on is not None and entry.is_on(app)
         title = entry.title_now(app) if entry.title_now else entry.title
-        if imgui.menu_item(widgets.named(title, entry.name), app.keys.of[entry.name], is_on, entry.can(app))[
-            0
-        ]:
+        if imgui.menu_item(
+            widgets.labelled(title, entry.name), app.keys.of[entry.name], is_on, entry.can(app)
+        )[0]:
             with app.failures.told(entry.title):
                 entry.act(app)
     elif (isinstance(entry, Listing) or entry.is_there(app)) and imgui.begin_menu(entry.title):
@@ -204,7 +204,7 @@ def _draw_groups(app: App, menu: Menu[App]) -> None:
 def _draw_items(app: App, listing: Listing[App]) -> None:
     items = list(listing.items(app))
     for number, (title, act, is_on) in enumerate(items):
-        if imgui.menu_item(widgets.named(title, number), "", is_on)[0]:
+        if imgui.menu_item(widgets.labelled(title, number), "", is_on)[0]:
             act()
     if not items:
         imgui.text_disabled("none")

@@ -140,8 +140,7 @@ class Tasks:
         cross = imgui.calc_text_size(icons.ICON_FA_XMARK).x + 4 * padding
         end = f"  {_how_far(task)}{others}"
         room = width - imgui.calc_text_size(end).x - cross - 2 * padding
-        name = widgets.unhidden(widgets.fitted(task.name, room))
-        if imgui.small_button(f"{name}{end}###work"):
+        if imgui.small_button(widgets.labelled(widgets.fitted(task.name, room) + end, "work")):
             imgui.open_popup("list of work")
         widgets.tooltip(f"{task.name}. Click for all that goes on")
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
@@ -165,7 +164,8 @@ class Tasks:
         imgui.text_unformatted(widgets.fitted(task.name, width))
         size = ImVec2(width, imgui.get_frame_height())
         # Of a negative share ImGui draws a bar that only moves.
-        imgui.progress_bar(-task.seconds if task.progress is None else task.progress, size, _how_far(task))
+        share = -task.seconds if task.progress is None else task.progress
+        imgui.progress_bar(share, size, widgets.unhidden(_how_far(task)))
         imgui.same_line()
         if imgui.button(f"Cancel##{id(task)}"):
             self.cancel(task)

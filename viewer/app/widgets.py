@@ -173,7 +173,7 @@ def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, st
     titles = titles or {}
     if imgui.begin_combo(f"##{name}", unhidden(titles.get(current, current))):
         for word in words:
-            if imgui.selectable(named(titles.get(word, word), word), word == current)[0]:
+            if imgui.selectable(labelled(titles.get(word, word), word), word == current)[0]:
                 current = word
         imgui.end_combo()
     return current
@@ -271,7 +271,7 @@ def dot(middle: ImVec2, color: int | None) -> None:
         draw_list.add_circle_filled(middle, radius, theme.packed(color))
 
 
-def named(text: str, name: object) -> str:
+def labelled(text: str, name: object) -> str:
     """The label of a widget that shows a text and is known by a name, whatever is in these."""
     return f"{unhidden(text)}###{unhidden(str(name))}"
 

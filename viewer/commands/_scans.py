@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..bounds import Bounds
-from ..csv_text import save_rows, text_of
+from ..csv_text import save_rows, text_of_cell
 from ..errors import InputError
 from ..files import absolute, printable
 from ..output.export import is_pattern, numbered
@@ -184,7 +184,7 @@ def _check_times_file(path: Path, names: set[str]) -> None:
         return
     try:
         with open(path, newline="", encoding="utf-8") as stream:
-            told = {text_of(row[0]) for row in csv.reader(stream) if row}
+            told = {text_of_cell(row[0]) for row in csv.reader(stream) if row}
     except (OSError, UnicodeDecodeError, csv.Error):
         told = {"?"}
     if told - names - {"file"}:

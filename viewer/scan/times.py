@@ -13,7 +13,7 @@ from pathlib import Path, PurePath
 import numpy as np
 from numpy.typing import NDArray
 
-from ..csv_text import text_of
+from ..csv_text import text_of_cell
 from ..errors import InputError, shortened
 from ..files import open_plain
 
@@ -136,7 +136,7 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
         with open_plain(path) as file:
             reader = csv.reader(TextIOWrapper(file, "utf-8-sig", newline=""))
             for row in reader:
-                cells = [text_of(cell.strip()) for cell in row]
+                cells = [text_of_cell(cell.strip()) for cell in row]
                 if any(cells):
                     yield reader.line_num, cells
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -290,7 +290,7 @@ class Browser:
         imgui.text_disabled("Places")
         for place in self._places:
             if imgui.selectable(
-                widgets.named(f"{place.icon}  {place.title}", place.title), place.folder == self._folder
+                widgets.labelled(f"{place.icon}  {place.title}", place.title), place.folder == self._folder
             )[0]:
                 self._go(place.folder)
             widgets.tooltip(printable(str(place.folder)))
@@ -310,7 +310,7 @@ class Browser:
         for number, scan in enumerate(scans):
             name = widgets.fitted(title(scan), imgui.get_content_region_avail().x)
             is_open = known_as(scan) == known_as(self._session.scan)
-            if imgui.selectable(widgets.named(name, number), is_open)[0]:
+            if imgui.selectable(widgets.labelled(name, number), is_open)[0]:
                 self._open_known(scan)
             widgets.tooltip(printable(scan))
         if not scans:

@@ -72,7 +72,7 @@ class ScanSection:
         room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height()
         if imgui.begin_combo("##scan", widgets.unhidden(widgets.fitted(title(self.session.scan), room))):
             for number, (name, act, is_open) in enumerate(self.scans.items(self.scans.listed)):
-                if imgui.selectable(widgets.named(name, number), is_open)[0]:
+                if imgui.selectable(widgets.labelled(name, number), is_open)[0]:
                     act()
             imgui.end_combo()
         widgets.tooltip(printable(self.session.scan))
@@ -106,7 +106,7 @@ class ScanSection:
         guess = guess_unit(self.steering.bounds(pose), document.look.up)
         if told == UNKNOWN_UNIT and document.unit is None and guess is not None:
             widgets.label("")
-            if imgui.button(widgets.named(f"Set to {_PLURALS[guess[0]]}?", "accept"), ImVec2(-1, 0)):
+            if imgui.button(widgets.labelled(f"Set to {_PLURALS[guess[0]]}?", "accept"), ImVec2(-1, 0)):
                 chosen = guess[0]
             widgets.tooltip(f"In {guess[0]}, the scan is as large as {guess[1]}. Click to set this unit.")
         if chosen != (document.unit or _OWN):

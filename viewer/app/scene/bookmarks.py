@@ -113,7 +113,7 @@ class Bookmarks:
         room = imgui.get_content_region_avail().x - 2 * (side + gap)
         name = widgets.fitted(bookmark.name, room)
         imgui.align_text_to_frame_padding()
-        if imgui.selectable(widgets.named(name, "go"), self.is_shown(bookmark), 0, ImVec2(room, 0))[0]:
+        if imgui.selectable(widgets.labelled(name, "go"), self.is_shown(bookmark), 0, ImVec2(room, 0))[0]:
             self.go_to(bookmark)
         if name != bookmark.name:
             widgets.tooltip(bookmark.name)

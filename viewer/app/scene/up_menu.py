@@ -34,7 +34,7 @@ def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object
     inset, before = size.x - where[0], imgui.get_cursor_pos()
     imgui.set_cursor_pos(ImVec2(min(where[0] - width / 2, size.x - width - 0.3 * em), _BELOW * inset))
     imgui.push_style_color(imgui.Col_.button, imgui.get_color_u32(imgui.Col_.button, 0.6))
-    is_pressed = imgui.button(widgets.named(text, "up"))
+    is_pressed = imgui.button(widgets.labelled(text, "up"))
     imgui.pop_style_color()
     if is_pressed or (imgui.is_item_hovered() and not imgui.is_popup_open(_MENU)):
         imgui.open_popup(_MENU)
@@ -54,7 +54,7 @@ def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object
 
 def _draw_ways(steering: Steering, pick: Callable[[], object]) -> None:
     for title, act, is_on in steering.ups():
-        if imgui.menu_item(widgets.named(f"{title} is up", title), "", is_on)[0]:
+        if imgui.menu_item(widgets.labelled(f"{title} is up", title), "", is_on)[0]:
             act()
     imgui.separator()
     if imgui.menu_item("Set current view as front###front", "", False)[0]:

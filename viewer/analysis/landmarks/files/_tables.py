@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....csv_text import text_of
+from ....csv_text import text_of_cell
 from ....errors import InputError, shortened
 from ....scan.units import conversion, usable_unit
 from ...track import Known
@@ -121,7 +121,7 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
         if kind_at is not None and row[kind_at].strip().lower() != "landmark":
             continue
         frame = 0 if frame_at is None else _frame(row[frame_at], line)
-        name = str(len(numbers) + 1) if name_at is None else text_of(row[name_at].strip())
+        name = str(len(numbers) + 1) if name_at is None else text_of_cell(row[name_at].strip())
         factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
         place = [number_of(row[axis], line) * factor for axis in axes]
         state = _state(None if state_at is None else row[state_at], place, line)
@@ -171,7 +171,7 @@ def _wide_columns(names: Sequence[str]) -> dict[str, list[int]]:
     found: dict[str, dict[str, int]] = {}
     for number, name in enumerate(names):
         if match := _AXIS.fullmatch(name.strip()):
-            found.setdefault(text_of(match[1]), {}).setdefault(match[2].lower(), number)
+            found.setdefault(text_of_cell(match[1]), {}).setdefault(match[2].lower(), number)
     return {name: [axes[axis] for axis in "xyz"] for name, axes in found.items() if len(axes) == 3}
 
 

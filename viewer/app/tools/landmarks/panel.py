@@ -25,7 +25,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     _draw_template(tool)
     words = "Stop placing" if tool.is_active else "Place"
-    if imgui.button(widgets.named(words, "place"), ui.button_size(3)):
+    if imgui.button(widgets.labelled(words, "place"), ui.button_size(3)):
         tool.toggle()
     ui.tooltip("Click the place of each landmark in the view, one after the other", "landmarks")
     imgui.begin_disabled(not tool.is_active)
@@ -74,7 +74,7 @@ def _draw_template(tool: Tool) -> None:
     chosen = tool.made.template
     if imgui.begin_combo("##template", widgets.unhidden(titles.get(chosen, chosen))):
         for name, title in titles.items():
-            label = widgets.named(title, f"template {name}")
+            label = widgets.labelled(title, f"template {name}")
             if imgui.selectable(label, name == chosen)[0] and name != chosen:
                 tool.begin(known.get(name))
         imgui.separator()
@@ -154,7 +154,7 @@ def _draw_partner(tool: Tool, landmark: Landmark) -> None:
     widgets.label("Mirror partner", "The landmark on the other side, its mirror image")
     if imgui.begin_combo("##partner", widgets.unhidden(landmark.partner or _NONE)):
         for name in ("", *(one.name for one in tool.made.all if one.name != landmark.name)):
-            label = widgets.named(name or _NONE, f"partner {name}")
+            label = widgets.labelled(name or _NONE, f"partner {name}")
             if imgui.selectable(label, name == landmark.partner)[0] and name != landmark.partner:
                 tool.pair(name)
         imgui.end_combo()

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def draw(measuring: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     words = "Stop measuring" if measuring.is_active else "Measure distance"
-    if imgui.button(widgets.named(words, "measure"), ui.button_size(2)):
+    if imgui.button(widgets.labelled(words, "measure"), ui.button_size(2)):
         measuring.toggle()
     ui.tooltip("Click two places in the view to measure their distance", "measure")
     imgui.same_line()
