@@ -13,13 +13,19 @@ def manifold(faces: NDArray[np.integer]) -> tuple[Rows, Rows]:
     """Oriented faces (G, 3) of vertices (V,) that are used, and which of the given ones each of these is a
     copy of.
 
-    faces: (F, 3), of any kind. Left out are those with a corner twice, those that are there twice, what an
-    edge has beyond two, and what a strip with one side only has too much. Faces that run around against
-    those across their edges are turned, the first of each part as it is. A vertex in which several fans of
-    faces meet becomes one for each.
+    faces: (F, 3), of any kind. The result lacks faces with a corner twice, repeated faces, what an edge has
+    beyond two, and one of two faces that run along each other at their edge. Where turning faces leaves fewer
+    of these, those that run against the faces across their edges are turned, the first of each part as it
+    is. A vertex in which several fans of faces meet becomes one for each.
     """
-    kept = _distinct(np.asarray(faces, np.int64).reshape(-1, 3))
-    return _one_fan_a_vertex(_oriented(_two_an_edge(kept)))
+    kept = _two_an_edge(_distinct(np.asarray(faces, np.int64).reshape(-1, 3)))
+    wrong = _conflicts(kept)
+    if len(wrong):
+        turned = _turned(kept)
+        still_wrong = _conflicts(turned)
+        if len(still_wrong) < len(wrong):
+            kept, wrong = turned, still_wrong
+    return _one_fan_a_vertex(np.delete(kept, wrong, axis=0))
 
 
 def across_edges(faces: Rows) -> tuple[Rows, Rows]:
@@ -27,9 +33,10 @@ def across_edges(faces: Rows) -> tuple[Rows, Rows]:
 
     Of an edge with more than two faces, pairs of those that follow each other.
     """
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    same = np.flatnonzero((ends[order[1:]] == ends[order[:-1]]).all(axis=1))
+    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    edge = ends.min(axis=1) * (ends.max(initial=0) + 1) + ends.max(axis=1)
+    order = np.argsort(edge, kind="stable")
+    same = np.flatnonzero(edge[order[1:]] == edge[order[:-1]])
     return order[same], order[same + 1]
 
 
@@ -56,9 +63,9 @@ def _two_an_edge(faces: Rows) -> Rows:
     return np.delete(faces, after[has_before[before]] // 3, axis=0)
 
 
-def _oriented(faces: Rows) -> Rows:
-    """Found by giving each face two sides and joining those across the edges of a tree: where both faces run
-    against each other along the edge, the same ones. Of faces that still run along each other, one goes."""
+def _turned(faces: Rows) -> Rows:
+    """Faces turned to run against those across their edges. Each face gets two sides; a spanning tree of the
+    faces joins these: the same ones where both faces run against each other along the edge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import minimum_spanning_tree
 
@@ -74,9 +81,13 @@ def _oriented(faces: Rows) -> Rows:
     other = np.where(same, g, g + count), np.where(same, g + count, g)
     _, side = joined(np.concatenate([f, f + count]), np.concatenate(other), 2 * count)
     turned = side[:count] > side[count:]
-    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    return np.where(turned[:, None], faces[:, ::-1], faces)
+
+
+def _conflicts(faces: Rows) -> Rows:
+    """Of each two faces that run along each other at their edge, the one of the higher number."""
     before, after = across_edges(faces)
-    return np.delete(faces, after[faces.ravel()[before] == faces.ravel()[after]] // 3, axis=0)
+    return after[faces.ravel()[before] == faces.ravel()[after]] // 3
 
 
 def _one_fan_a_vertex(faces: Rows) -> tuple[Rows, Rows]:

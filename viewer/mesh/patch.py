@@ -13,7 +13,9 @@ from .smoothing import Points, rows_apart
 
 _RADII = (1.0, 1.5, 2.5, 4.0)  # of the balls that are rolled, in distances between points
 _NEAREST = 0.6  # two of the points that make a patch, in the same
-_HOLE = 12  # edges around what the balls have left open, at most
+_GAP = 2.0  # distances between points: radius of a circle without a point that is no chance
+_AROUND, _AROUND_SPACINGS = 6, 1.38  # points whose farthest lies so many distances away, pi d^2 = 6 s^2
+SMALL_HOLE = 12  # edges around a hole that counts as a gap between points, and is closed, at most
 _SAME = 1e-6  # weights below which a place in a face is on its edge
 
 
@@ -52,7 +54,8 @@ class Patch:
         larger balls where they are sparse; those nearer to another than 0.6 of the spacing between them are
         left out.
 
-        normals: (N, 3), all facing out or all facing in.
+        normals: (N, 3), all facing out or all facing in. Faces run around as these say. A face whose corners
+        face to either side of it joins two surfaces that touch, such as lips, and is left out.
         """
         import open3d
 
@@ -62,21 +65,24 @@ class Patch:
         cloud.normals = open3d.utility.Vector3dVector(normals[kept].astype(np.float64))
         radii = open3d.utility.DoubleVector([spacing * radius for radius in _RADII])
         rolled = open3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii)
-        return cls.of(points, kept[np.asarray(rolled.triangles, np.int64).reshape(-1, 3)])._closed()
+        faces = kept[np.asarray(rolled.triangles, np.int64).reshape(-1, 3)]
+        a, b, c = points[faces.T]
+        facing = (normals[faces] * np.cross(b - a, c - a)[:, None]).sum(axis=2)
+        faces = np.where(facing.sum(axis=1)[:, None] < 0, faces[:, ::-1], faces)
+        is_one = (facing > 0).all(axis=1) | (facing < 0).all(axis=1)
+        patch = cls.of(points, faces[is_one & ~_spans_gaps(points, kept, faces)])
+        return patch.closed(np.flatnonzero(np.bincount(patch.holes) <= SMALL_HOLE))
 
-    def _closed(self) -> Patch:
-        """The patch with its small holes closed, each by a vertex in its middle."""
-        half = np.delete(np.arange(self.faces.size), np.concatenate(self.pairs))
-        start, end = self.faces.ravel()[half], np.roll(self.faces, -1, axis=1).ravel()[half]
-        _, loop = joined(start, end, len(self.vertices))
-        loop = loop[start]
-        edges = np.bincount(loop)
-        small = (edges > 0) & (edges <= _HOLE)
-        sums = np.stack([np.bincount(loop, axis) for axis in self.vertices[start].T], axis=1)
-        number = len(self.vertices) - 1 + np.cumsum(small)
-        of_small = small[loop]
-        lids = np.stack([end, start, number[loop]], axis=1)[of_small]
-        middles = sums[small] / edges[small, None]
+    def closed(self, holes: NDArray[np.integer]) -> Patch:
+        """The patch with some of its `holes` closed, by number, each by a vertex in its middle; what is added
+        stands behind the vertices and faces that there are."""
+        start, end = self.border
+        chosen = np.isin(self.holes, holes)
+        start, end = start[chosen], end[chosen]
+        _, number = np.unique(self.holes[chosen], return_inverse=True)
+        sums = np.stack([np.bincount(number, axis) for axis in self.vertices[start].T], axis=1)
+        middles = sums / np.maximum(np.bincount(number), 1)[:, None]
+        lids = np.stack([end, start, len(self.vertices) + number], axis=1)
         return Patch(
             np.concatenate([self.vertices, middles]),
             np.concatenate([self.faces, lids]),
@@ -108,6 +114,24 @@ class Patch:
         return across_edges(self.faces)
 
     @cached_property
+    def border(self) -> tuple[Rows, Rows]:
+        """The edges with one face, from vertices (B,) to others (B,), as their faces run along them."""
+        half = np.delete(np.arange(self.faces.size), np.concatenate(self.pairs))
+        return self.faces.ravel()[half], np.roll(self.faces, -1, axis=1).ravel()[half]
+
+    @cached_property
+    def holes(self) -> Rows:
+        """The number of the closed line that each edge of `border` is of, (B,)."""
+        start, end = self.border
+        part = joined(start, end, len(self.vertices))[1][start]
+        return np.unique(part, return_inverse=True)[1]
+
+    def of_faces(self, numbers: Rows) -> Patch:
+        """The patch of some of the faces, by number."""
+        part = Patch.of(self.vertices, self.faces[numbers])
+        return Patch(part.vertices, part.faces, self.sources[part.sources])
+
+    @cached_property
     def parts(self) -> NDArray[np.int32]:
         """The connected part that each vertex belongs to, (V,)."""
         ends = np.concatenate([self.faces, np.roll(self.faces, -1, axis=1)]).reshape(2, -1)
@@ -127,11 +151,22 @@ class Patch:
     def nearest(self, position: NDArray[np.float64]) -> OnPatch:
         """The place of the patch nearest to another, (3,); of the face of the lowest number where there are
         several. Raises ValueError where the patch has no faces."""
-        weights = nearest_weights(self.corners - position)
-        offsets = np.einsum("fc,cfi->fi", weights, self.corners) - position
+        away = np.linalg.norm(self.vertices - position, axis=1)[self.faces].min(axis=1)
+        near = np.flatnonzero(away - self._longest <= away.min() * (1 + _SAME))
+        corners = self.corners[:, near]
+        weights = nearest_weights(corners - position)
+        offsets = np.einsum("fc,cfi->fi", weights, corners) - position
         squared = (offsets * offsets).sum(axis=1)
-        face = int(squared.argmin())
-        return OnPatch(face, weights[face], position + offsets[face], float(np.sqrt(squared[face])))
+        best = int(squared.argmin())
+        return OnPatch(int(near[best]), weights[best], position + offsets[best], float(np.sqrt(squared[best])))
+
+    @cached_property
+    def _longest(self) -> NDArray[np.float64]:
+        """The longest edge of each face, (F,): no place of it is farther from its nearest corner."""
+        longest: NDArray[np.float64] = np.linalg.norm(
+            self.corners - np.roll(self.corners, 1, axis=0), axis=2
+        ).max(axis=0)
+        return longest
 
     def with_point(self, place: OnPatch) -> tuple[Patch, int]:
         """The patch with a vertex at a place, and its number: a corner that is there, or else a new one that
@@ -159,6 +194,21 @@ class Patch:
             ),
             number,
         )
+
+
+def _spans_gaps(points: Points, kept: Rows, faces: Rows) -> NDArray[np.bool_]:
+    """Whether faces (F, 3) of points (N, 3) span gaps: the circle through their corners is wider than between
+    those kept, by number, that lie around one of the corners."""
+    from scipy.spatial import cKDTree
+
+    away = cKDTree(points[kept]).query(points[kept], min(_AROUND + 1, len(kept)))[0][:, -1]
+    spacing = np.zeros(len(points))
+    spacing[kept] = away / _AROUND_SPACINGS
+    a, b, c = points[faces.T]
+    sides = [np.linalg.norm(one - other, axis=1) for one, other in ((b, c), (c, a), (a, b))]
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    wide: NDArray[np.bool_] = np.prod(sides, axis=0) > 2 * _GAP * spacing[faces].min(axis=1) * doubled
+    return wide
 
 
 def nearest_weights(corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.analysis.measures import Measure
+from viewer.analysis.measures.kinds import kind_of
+from viewer.analysis.measures.surface import Found, PoseSurface, Refused
 from viewer.analysis.track import Known, Track
 from viewer.scan.faces import Faces
 from viewer.scan.points import PointCloud
@@ -25,6 +28,26 @@ def sphere_points(count: int, radius: float, noise: float = 0.0, seed: int = 0) 
 def pose_of(points: np.ndarray, normals: np.ndarray | None = None, index: int = 0) -> Pose:
     """A pose of these points."""
     return Pose.of(index, float(index), "points", PointCloud.from_arrays(points, normals=normals))
+
+
+def compute(surface: PoseSurface, kind: str, places: np.ndarray, **options: str) -> Found | Refused:
+    """What a kind says of a surface and places (K, 3), named "0", "1", ..."""
+    measure = Measure("m", kind, tuple(map(str, range(len(places)))), options)
+    return kind_of(measure).compute(surface, places, options)  # type: ignore[return-value]
+
+
+def found(surface: PoseSurface, kind: str, places: np.ndarray, **options: str) -> Found:
+    """The value that a kind finds."""
+    result = compute(surface, kind, places, **options)
+    assert isinstance(result, Found), result
+    return result
+
+
+def refused(surface: PoseSurface, kind: str, places: np.ndarray, **options: str) -> str:
+    """The reason why a kind finds no value."""
+    result = compute(surface, kind, places, **options)
+    assert isinstance(result, Refused), result
+    return result.told([str(number) for number in range(len(places))])
 
 
 def track_of(positions: Sequence[Sequence[float]], deviation: float = 0.1, gaps: Sequence[int] = ()) -> Track:

@@ -34,7 +34,9 @@ class Series:
     times: (T,) seconds. values: (T,) scan units, their square or cube, or degrees, by quantity; NaN where not
     known. sigmas: (T,) standard deviations of the values; NaN where not known. known: (T,) uint8, the least
     of what is `Known` of its landmarks. lines: frame -> lines along the surface that are measured there, or
-    are around what is, each (P, 3), to be drawn; none of measures of landmarks alone.
+    are around what is, each (P, 3), to be drawn; none of measures of landmarks alone. reasons: frame -> why
+    it is a gap. shares: (T,) of the area within a region's outline that has surface, the rest being openings;
+    NaN where not known, and of other measures; empty: of none.
     """
 
     name: str
@@ -44,3 +46,5 @@ class Series:
     sigmas: NDArray[np.float64]
     known: NDArray[np.uint8]
     lines: Mapping[int, tuple[Line, ...]] = field(default_factory=dict)
+    reasons: Mapping[int, str] = field(default_factory=dict)
+    shares: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))

@@ -152,3 +152,22 @@ def is_within(places: Outline, outline: Outline) -> NDArray[np.bool_]:
             at = start[0] + (y[rises] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
             inside[np.flatnonzero(rises)[x[rises] < at]] ^= True
     return inside
+
+
+def area_of(outline: Outline) -> float:
+    """The area of a closed outline (P, 2) that does not cross itself."""
+    x, y = (outline - outline.mean(axis=0)).T
+    return abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
+
+
+def crosses_itself(outline: Outline) -> bool:
+    """Whether two sides of a closed outline (P, 2) cross each other, away from their ends."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+
+    def sides(places: Outline) -> NDArray[np.float64]:
+        """On which side of each side places are, (P, P): the sign."""
+        along, offset = (end - start)[:, None], places[None] - start[:, None]
+        return np.sign(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0])
+
+    parted = sides(start) * sides(end) < 0
+    return bool((parted & parted.T).any())

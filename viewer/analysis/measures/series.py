@@ -17,8 +17,9 @@ from ...task import checkpoint
 from ..track import Known, Track
 from . import Measure, Series
 from .kinds import MeasureKind, kind_of
-from .surface import PoseSurface
+from .surface import PoseSurface, Refused
 
+_NO_DIRECTION = "its landmarks lie in one place or on a line"
 _DRAWN = 48  # places of a line along the surface that are kept, in each frame
 
 
@@ -26,7 +27,7 @@ _DRAWN = 48  # places of a line along the surface that are kept, in each frame
 class _Asked:
     """A measure with what is known of its landmarks. positions: (T, K, 3). covariances: (T, U, 3, 3), of its
     landmarks, each once. which: (K,), of these. known: (T,). is_left: (T,), whether its
-    surface has yet to be looked at."""
+    surface has yet to be looked at. reasons, shares: as of `Series`."""
 
     measure: Measure
     kind: MeasureKind
@@ -38,6 +39,8 @@ class _Asked:
     sigmas: NDArray[np.float64]
     lines: dict[int, tuple[Line, ...]]
     is_left: NDArray[np.bool_]
+    reasons: dict[int, str]
+    shares: NDArray[np.float64]
 
 
 def series_of(
@@ -116,7 +119,12 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
     known = np.min([track.known for track in own], axis=0).astype(np.uint8)
     covariances = np.stack([track.covariances for track in own], axis=1) + noise**2 * np.eye(3)
     positions = np.stack([track.positions for track in own], axis=1)[:, which]
-    values, sigmas = np.full((2, frames), np.nan)
+    values, sigmas, shares = np.full((3, frames), np.nan)
+    reasons = {
+        int(frame): f"{name} is a gap"
+        for name, track in reversed(list(zip(names, own, strict=True)))
+        for frame in np.flatnonzero(track.known == Known.GAP)
+    }
     return _Asked(
         measure,
         kind,
@@ -128,6 +136,8 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
         sigmas,
         {},
         np.full(frames, kind.needs_surface),
+        reasons,
+        shares,
     )
 
 
@@ -140,7 +150,10 @@ def _series(asked: Sequence[_Asked], tracks: Mapping[str, Track]) -> dict[str, S
         is_open = (known >= Known.TRACKED) & ~np.isfinite(values)
         known[is_open] = np.where(each.is_left[is_open], Known.PENDING, Known.GAP)
         name, quantity = each.measure.name, each.kind.quantity
-        found[name] = Series(name, quantity, times, values, each.sigmas.copy(), known, dict(each.lines))
+        sigmas, shares = each.sigmas.copy(), each.shares.copy()
+        found[name] = Series(
+            name, quantity, times, values, sigmas, known, dict(each.lines), dict(each.reasons), shares
+        )
     return found
 
 
@@ -165,6 +178,7 @@ def _fill_points(asked: _Asked) -> None:
             for side in (step, -step):
                 variance += (value(positions + side) - found) ** 2 / 2
     asked.sigmas[rows] = np.where(told, np.sqrt(variance), np.nan)
+    asked.reasons.update((int(row), _NO_DIRECTION) for row in rows[~np.isfinite(found)])
 
 
 def _roots(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -184,6 +198,8 @@ def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence
         try:
             surface = surface_of(timeline, timeline.visit(frame), faces)
         except InputError:  # told by the timeline
+            for each in asked:
+                each.reasons.setdefault(frame, "the frame cannot be read")
             continue
         for each in asked:
             checkpoint()
@@ -195,13 +211,15 @@ def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence
 def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface) -> None:
     compute: Callable = asked.kind.compute
     found = compute(surface, asked.positions[frame], asked.measure.options)
-    if found is None:
+    if isinstance(found, Refused):
+        asked.reasons[frame] = found.told(asked.measure.landmarks)
         return
     gradient = np.zeros((asked.covariances.shape[1], 3))
     np.add.at(gradient, asked.which, found.gradient)
     variance = np.einsum("ui,uij,uj->", gradient, asked.covariances[frame], gradient)
     asked.values[frame] = found.value
     asked.sigmas[frame] = np.sqrt(max(variance, 0) + found.deviation**2)
+    asked.shares[frame] = found.share
     asked.lines[frame] = tuple(_thinned(line) for line in found.lines)
 
 

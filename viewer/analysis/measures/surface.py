@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...backends.hpr.noise import noise_of
 from ...mesh.geodesic import Geodesics, Line, length_of
+from ...mesh.openings import detour, without_pockets
 from ...mesh.patch import Patch
 from ...mesh.smoothing import Points, moved_to_quadrics, noise_over_faces, smoothing_radius
 from ...scan.estimate import cloud_normals
@@ -24,7 +25,9 @@ _FITTED = 2.0  # spacings in which points tell a normal where there is no noise
 _RIM = 4.0  # spacings that a patch of points reaches farther, as it ends in a ragged rim
 _ASTRAY = 4.0  # spacings, and deviations of noise, that a landmark may lie off the surface
 _LONGER = 1.2  # times the straight line: the path that is looked for first
+_WIDER = 1.2  # times the farthest corner from their middle: where a region is looked for first
 _GROWS = 1.6  # by which what is looked at grows where no path is found
+_DETOUR = 0.05  # of its length, or a spacing: how much longer a path may be as it goes around openings
 _TRIES = 8
 
 
@@ -34,22 +37,38 @@ class Found:
 
     value: scan units, or their square or cube. gradient: (K, 3), its change as each landmark moves.
     deviation: standard deviation by what sampling and noise leave open of the surface. lines: those that were
-    measured, or that are around it, each (P, 3), to be drawn.
+    measured, or that are around it, each (P, 3), to be drawn. share: of the area within the outline of a
+    region that has surface; NaN where the measure has none.
     """
 
     value: float
     gradient: NDArray[np.float64]
     deviation: float
     lines: tuple[Line, ...] = ()
+    share: float = np.nan
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Why a surface gives no value. reason: in words, with {} for each of the landmarks by number."""
+
+    reason: str
+    landmarks: tuple[int, ...] = ()
+
+    def told(self, names: Sequence[str]) -> str:
+        """The reason with the names of landmarks, (K,)."""
+        return self.reason.format(*(names[number % len(names)] for number in self.landmarks))
 
 
 @dataclass(frozen=True, eq=False)
 class Circuit:
-    """Landmarks on a patch, and paths from each to the next. numbers: (K,) of the vertices."""
+    """Landmarks on a patch, and paths from each to the next. numbers: (K,) of the vertices. detour: how much
+    longer the paths are, as they go around openings, scan units."""
 
     patch: Patch
     numbers: tuple[int, ...]
     lines: tuple[Line, ...]
+    detour: float
 
 
 class PoseSurface:
@@ -63,7 +82,7 @@ class PoseSurface:
         self._cloud, self._views, self.spacing = pose.cloud, pose.views, pose.spacing
         self._faces = None if faces is None or not len(faces) else _rows(faces, self._cloud.ids)
         self.origin = self._cloud.origin
-        self._loops: dict[bytes, Circuit | None] = {}
+        self._loops: dict[bytes, Circuit | Refused] = {}
 
     @cached_property
     def noise(self) -> float:
@@ -123,11 +142,12 @@ class PoseSurface:
         place = patch.nearest(local) if len(patch.faces) else None
         return place.position + self.origin if place is not None and place.away <= reach else None
 
-    def path(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> Line | None:
-        """The shortest path over the surface from one place to another, (P, 3); None where they are not on
-        it, or nothing joins them.
+    def path(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> Circuit | Refused:
+        """The shortest path over the surface from one place to another; a reason where they are not on it,
+        nothing joins them, or it goes around an opening.
 
-        It is looked for where paths of its length could be: within the ellipsoid about both places.
+        It is looked for where paths of its length could be: within the ellipsoid about both places. The patch
+        and its line are relative to the origin.
         """
         start, end = start - self.origin, end - self.origin
         reach = _LONGER * float(np.linalg.norm(end - start)) + 2 * _RIM * self.spacing
@@ -138,18 +158,16 @@ class PoseSurface:
 
         for _ in range(_TRIES):
             found = self._joined(self.patch(beyond), [start, end], is_closed=False)
-            length = length_of(found.lines[0]) if found else np.inf
-            if length <= reach:
-                assert found is not None
-                return found.lines[0] + self.origin
-            if beyond(self._points).max() <= 0:
+            length = length_of(found.lines[0]) if isinstance(found, Circuit) else np.inf
+            if length <= reach or beyond(self._points).max() <= 0:
                 break
-            reach = min(length * (1 + 1e-6), _GROWS * reach) if found else _GROWS * reach
-        return None if found is None else found.lines[0] + self.origin
+            reach = min(length * (1 + 1e-6), _GROWS * reach)
+        return self._straight(found)
 
-    def loop(self, corners: NDArray[np.float64]) -> Circuit | None:
+    def loop(self, corners: NDArray[np.float64]) -> Circuit | Refused:
         """The paths from each of some places (K, 3) to the next and back to the first, on a patch that has
-        what is within them; None where they are not on the surface, or nothing joins them.
+        what is within them; a reason where they are not on the surface, nothing joins them, or one goes
+        around an opening.
 
         The patch and its lines are relative to the origin. Found once for each places.
         """
@@ -158,42 +176,56 @@ class PoseSurface:
             self._loops[key] = self._loop(corners - self.origin)
         return self._loops[key]
 
-    def _loop(self, corners: NDArray[np.float64]) -> Circuit | None:
+    def _loop(self, corners: NDArray[np.float64]) -> Circuit | Refused:
         middle = corners.mean(axis=0)
-        reach = _GROWS * float(np.linalg.norm(corners - middle, axis=1).max()) + 2 * _RIM * self.spacing
+        reach = _WIDER * float(np.linalg.norm(corners - middle, axis=1).max()) + 2 * _RIM * self.spacing
 
         def beyond(points: Points) -> NDArray[np.float64]:
             return np.linalg.norm(points - middle, axis=1) - reach
 
         for _ in range(_TRIES):
             found = self._joined(self.patch(beyond), list(corners), is_closed=True)
-            if found and max(beyond(line).max() for line in found.lines) < -_RIM * self.spacing:
-                break
+            if isinstance(found, Circuit):
+                if max(beyond(line).max() for line in found.lines) < -_RIM * self.spacing:
+                    break
             if beyond(self._points).max() <= 0:
                 break
             reach *= _GROWS
-        return found
+        return self._straight(found)
+
+    def _straight(self, found: Circuit | Refused) -> Circuit | Refused:
+        """Paths, or the reason where one goes around an opening by more than the surface leaves open."""
+        if isinstance(found, Refused):
+            return found
+        detours = [detour(found.patch, line) for line in found.lines]
+        for number, (longer, line) in enumerate(zip(detours, found.lines, strict=True)):
+            if longer > max(_DETOUR * length_of(line), self.spacing):
+                return Refused("the path from {} to {} goes around an opening", (number, number + 1))
+        return replace(found, detour=sum(detours))
 
     def _joined(
         self, patch: Patch, corners: Sequence[NDArray[np.float64]], is_closed: bool
-    ) -> Circuit | None:
-        """The paths over a patch from each place to the next."""
+    ) -> Circuit | Refused:
+        """The paths over a patch from each place to the next, without the pockets behind its openings."""
         if not len(patch.faces):
-            return None
-        numbers = []
-        for corner in corners:
-            place = patch.nearest(corner)
+            return Refused("there is no surface near {}", (0,))
+        places = [patch.nearest(corner) for corner in corners]
+        for number, place in enumerate(places):
             if place.away > _ASTRAY * (self.spacing + self.noise):
-                return None
-            patch, number = patch.with_point(place)
+                return Refused("{} is off the surface", (number,))
+        patch, numbers = without_pockets(patch, [place.face for place in places], self.spacing), []
+        for corner in corners:
+            patch, number = patch.with_point(patch.nearest(corner))
             numbers.append(number)
         geodesics, lines = Geodesics(patch), []
-        for start, end in zip(numbers, numbers[1:] + (numbers[:1] if is_closed else []), strict=False):
+        for number, (start, end) in enumerate(
+            zip(numbers, numbers[1:] + (numbers[:1] if is_closed else []), strict=False)
+        ):
             line = geodesics.path(start, end)
             if line is None:
-                return None
+                return Refused("no surface joins {} and {}", (number, number + 1))
             lines.append(line)
-        return Circuit(patch, tuple(numbers), tuple(lines))
+        return Circuit(patch, tuple(numbers), tuple(lines), 0.0)
 
 
 def _rows(faces: Triangles, ids: NDArray[np.uint32] | None) -> NDArray[np.int64]:

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from ....errors import InputError, unknown_name
 from ....mesh.geodesic import Line
 from .. import Measure, Quantity
-from ..surface import Found, PoseSurface
+from ..surface import Found, PoseSurface, Refused
 
 Options = Mapping[str, str]
 OfPoints = Callable[[NDArray[np.float64], Options], NDArray[np.float64]]
 LinesOf = Callable[[NDArray[np.float64], Options], Sequence[Line]]
-OnSurface = Callable[[PoseSurface, NDArray[np.float64], Options], Found | None]
+OnSurface = Callable[[PoseSurface, NDArray[np.float64], Options], Found | Refused]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class MeasureKind:
     name: that files and commands know it by. title: that users read. about: what of its landmarks it is.
     quantity: of its values. least: number of landmarks at least. most: at most; None: any number.
     compute: `OfPoints` takes positions (T, K, 3) and gives values (T,), NaN where they tell none; `OnSurface`
-    takes the surface of one pose and positions (K, 3); None: the surface tells none.
+    takes the surface of one pose and positions (K, 3), and gives a value or the reason why there is none.
     needs_surface: which of both it is. choices: the values that each option may have, the first where it is
     not told. lines: of a kind that needs no surface, takes positions (K, 3) and gives the lines to draw, each
     (P, 3).

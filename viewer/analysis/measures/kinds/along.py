@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,29 +14,30 @@ from ....mesh.geodesic import Line, kinked, length_of
 from ....mesh.patch import Patch
 from ....mesh.smoothing import Points
 from ..planes import PLANES, plane_of
-from ..surface import Found, PoseSurface
+from ..surface import Found, PoseSurface, Refused
 from . import MeasureKind, Options
 
 _STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
 _SLAB = 2.0  # spacings to both sides of a plane
 
 
-def _path(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+def _path(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | Refused:
     closed = options.get("closed") == "yes"
     ends = np.concatenate([positions, positions[:1]]) if closed else positions
-    lines, gradient = [], np.zeros_like(ends)
+    lines, gradient, detour = [], np.zeros_like(ends), 0.0
     for number, (start, end) in enumerate(pairwise(ends)):
-        line = surface.path(start, end)
-        if line is None:
-            return None
+        found = surface.path(start, end)
+        if isinstance(found, Refused):
+            return replace(found, landmarks=tuple(number + each for each in found.landmarks))
+        line = found.lines[0] + surface.origin
         lines.append(line)
+        detour += found.detour
         gradient[number] -= direction(line)
         gradient[number + 1] -= direction(line[::-1])
     if closed:
         gradient[0] += gradient[-1]
-    return Found(
-        sum(map(length_of, lines)), gradient[: len(positions)], off_smooth(surface, lines), tuple(lines)
-    )
+    deviation = off_smooth(surface, lines) + detour
+    return Found(sum(map(length_of, lines)), gradient[: len(positions)], deviation, tuple(lines))
 
 
 def off_smooth(surface: PoseSurface, lines: Sequence[Line]) -> float:
@@ -51,12 +53,12 @@ def direction(line: Line) -> NDArray[np.float64]:
     return (pieces[first] / lengths[first, None]).sum(axis=0)
 
 
-def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | Refused:
     local = positions - surface.origin
     how = options.get("plane", PLANES[0])
     center, normal = plane_of(local, how)
     if not np.isfinite(normal).all():
-        return None
+        return Refused("its landmarks lie on a line and give no plane")
 
     def beyond(points: Points) -> NDArray[np.float64]:
         return np.abs((points - center) @ normal) - _SLAB * surface.spacing
@@ -64,7 +66,7 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     patch = surface.patch(beyond)
     lines = _contours(patch, center, normal, local[0], options)
     if not lines:
-        return None
+        return Refused("the plane of its landmarks meets no surface")
     gradient = np.zeros_like(positions)
     step = _STEP * surface.spacing
     for number in range(len(local)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,8 +11,17 @@ from ....mesh.cutting import Piece, pieces_along
 from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
 from ..planes import THROUGH, plane_of
-from ..prism import Prism, area_through, is_within, near_rim, patch_through, rim_through
-from ..surface import Circuit, Found, PoseSurface
+from ..prism import (
+    Prism,
+    area_of,
+    area_through,
+    crosses_itself,
+    is_within,
+    near_rim,
+    patch_through,
+    rim_through,
+)
+from ..surface import Circuit, Found, PoseSurface, Refused
 from . import MeasureKind, Options
 from .along import direction, off_smooth
 
@@ -19,40 +30,48 @@ DEPTHS = (FRONT, ALL)  # the surface that the landmarks are on, or all that is b
 _STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
 _WIDE_STEP = 1.0  # the same, where all in a prism is measured
 _RIM = 4.0  # spacings off the walls of a prism within which that changes something
+_WHOLE = 0.95  # of the area within an outline that has to have surface, to tell a volume
+_NO_PLANE = "its landmarks lie on a line and give no plane"
+_CROSSES = "its outline crosses itself: check the order of its landmarks"
 _BENT = 3.0  # of the squared angles at a face's edges, by which it is smaller than what it stands for
 
 
-def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
+def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | Refused:
     if options.get("depth") == ALL:
         return _through(surface, positions, is_rim=True)
     loop = surface.loop(positions)
-    if loop is None:
-        return None
+    if isinstance(loop, Refused):
+        return loop
     gradient = -np.array([direction(line) for line in loop.lines])
     gradient -= np.roll([direction(line[::-1]) for line in loop.lines], 1, axis=0)
+    deviation = off_smooth(surface, loop.lines) + loop.detour
+    return Found(sum(map(length_of, loop.lines)), gradient, deviation, _absolute(surface, loop))
+
+
+def _area(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | Refused:
+    if options.get("depth") == ALL:
+        return _through(surface, positions, is_rim=False)
+    region = _region(surface, positions)
+    if isinstance(region, Refused):
+        return region
+    loop, piece = region.loop, region.piece
+    deviation = float((piece.areas * loop.patch.bends[piece.sources]).sum()) / _BENT + _beside(loop)
     return Found(
-        sum(map(length_of, loop.lines)), gradient, off_smooth(surface, loop.lines), _absolute(surface, loop)
+        float(piece.areas.sum()), _widening(loop), deviation, _absolute(surface, loop), region.share
     )
 
 
-def _area(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | None:
-    if options.get("depth") == ALL:
-        return _through(surface, positions, is_rim=False)
-    loop = surface.loop(positions)
-    piece = None if loop is None else region_within(loop)
-    if loop is None or piece is None:
-        return None
-    deviation = float((piece.areas * loop.patch.bends[piece.sources]).sum()) / _BENT
-    return Found(float(piece.areas.sum()), _widening(loop), deviation, _absolute(surface, loop))
-
-
-def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bool) -> Found | None:
+def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bool) -> Found | Refused:
     """The area, or the rim, of all of a surface in the prism over the polygon of landmarks."""
     prism = Prism.over(positions - surface.origin)
-    patch = None if prism is None else patch_through(surface, prism)
-    lines = rim_through(patch, prism) if prism is not None and patch is not None and len(patch.faces) else []
-    if prism is None or patch is None or not lines:
-        return None
+    if prism is None:
+        return Refused(_NO_PLANE)
+    if crosses_itself(prism.corners):
+        return Refused(_CROSSES)
+    patch = patch_through(surface, prism)
+    lines = rim_through(patch, prism) if len(patch.faces) else []
+    if not lines:
+        return Refused("there is no surface before or behind its outline")
     if is_rim:
         value, deviation = sum(map(length_of, lines)), off_smooth(surface, lines)
     else:
@@ -84,16 +103,16 @@ def _gradient_through(rim: Patch, prism: Prism, spacing: float, is_rim: bool) ->
     return gradient
 
 
-def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | None:
-    loop = surface.loop(positions)
-    piece = None if loop is None else region_within(loop)
-    if loop is None or piece is None:
-        return None
+def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | Refused:
+    region = _region(surface, positions)
+    if isinstance(region, Refused):
+        return region
+    if region.share < _WHOLE:
+        return Refused(f"only {100 * region.share:.0f} % of the area within its outline has surface")
+    loop, piece = region.loop, region.piece
     edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]
     around = np.concatenate(edges)
     center, normal = _facing(piece, around)
-    if not np.isfinite(normal).all():
-        return None
     value = _below(piece, center, normal)
     normals = _upright(loop.patch, around)  # across which nothing moves: the outline stays on the surface
     gradient, step = np.zeros_like(positions), _STEP * surface.spacing
@@ -108,23 +127,47 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
     sag = np.sqrt(piece.areas * loop.patch.bends[piece.sources]) / 8
     noise = surface.noise * surface.spacing * np.sqrt(flat.sum())
     deviation = float(np.hypot((flat * sag).sum(), noise))
-    return Found(value, gradient, deviation, _absolute(surface, loop))
+    deviation += (1 - min(region.share, 1)) * abs(value) + _beside(loop) * np.abs(value) / piece.areas.sum()
+    return Found(value, gradient, float(deviation), _absolute(surface, loop), region.share)
 
 
 def _absolute(surface: PoseSurface, loop: Circuit) -> tuple[Line, ...]:
     return tuple(line + surface.origin for line in loop.lines)
 
 
-def region_within(loop: Circuit) -> Piece | None:
+@dataclass(frozen=True, eq=False)
+class Region:
+    """What lies within a loop. share: of the area within the loop, as seen against its normal, that has
+    surface; the rest is openings."""
+
+    loop: Circuit
+    piece: Piece
+    share: float
+
+
+def _region(surface: PoseSurface, positions: NDArray[np.float64]) -> Region | Refused:
+    loop = surface.loop(positions)
+    return loop if isinstance(loop, Refused) else region_within(loop)
+
+
+def region_within(loop: Circuit) -> Region | Refused:
     """The piece of a patch that a loop goes around: of those on its sides, what lies within it as seen across
-    its plane. None where it goes around none."""
+    its plane. A reason where it goes around none.
+
+    By Stokes' theorem a surface has, seen against a normal, the area of its outline less that of its openings,
+    however it bends.
+    """
     pieces = pieces_along(loop.patch, loop.lines)
     around = np.concatenate([line[:-1] for line in loop.lines])
     center, normal = plane_of(around, THROUGH)
-    if len(pieces) < 2 or not np.isfinite(normal).all():
-        return None
+    if not np.isfinite(normal).all():
+        return Refused(_NO_PLANE)
     axes = np.linalg.svd(normal[None])[2][1:]
     outline = (around - center) @ axes.T
+    if len(pieces) > 2 and crosses_itself(outline):
+        return Refused(_CROSSES)
+    if len(pieces) < 2:
+        return Refused("its outline goes around nothing")
     shares = []
     for piece in pieces:
         within = is_within((piece.corners.mean(axis=0) - center) @ axes.T, outline)
@@ -132,11 +175,21 @@ def region_within(loop: Circuit) -> Piece | None:
     most = max(shares)
     chosen = [piece for piece, share in zip(pieces, shares, strict=True) if share > 0.5 or share == most]
     counts = np.cumsum([0, *(len(piece.vertices) for piece in chosen)])
-    return Piece(
+    piece = Piece(
         np.concatenate([piece.vertices for piece in chosen]),
         np.concatenate([piece.faces + before for piece, before in zip(chosen, counts, strict=False)]),
         np.concatenate([piece.sources for piece in chosen]),
     )
+    share = abs(float(_across(piece, normal).sum())) / area_of(outline)
+    area, length = float(piece.areas.sum()), sum(map(length_of, loop.lines))
+    if area > length**2 / (2 * np.pi) and _below(piece, *_facing(piece, around)) < 0:
+        return Refused("the surface within its outline goes in behind an opening or a fold")
+    return Region(loop, piece, min(share, 1.0))
+
+
+def _beside(loop: Circuit) -> float:
+    """The area that may lie between paths that go around openings and straight ones, squared scan units."""
+    return loop.detour * max(map(length_of, loop.lines)) / 2
 
 
 def _widening(loop: Circuit) -> NDArray[np.float64]:

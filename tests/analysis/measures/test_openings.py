@@ -1,0 +1,163 @@
+"""Measures over holes, openings, folds and borders: right, or refused with the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from shapes import found, pose_of, refused
+
+from viewer.analysis.measures.surface import PoseSurface
+
+UP = np.array([0.0, 0, 1])
+
+
+def sheet(width: float, height: float, seed: int = 0) -> np.ndarray:
+    """Places of a rectangle about the origin, a unit apart and moved about, (N, 2)."""
+    places = np.stack(np.meshgrid(np.arange(0, width + 1), np.arange(0, height + 1)), axis=-1).reshape(-1, 2)
+    shift = np.random.default_rng(seed).uniform(-0.25, 0.25, places.shape)
+    return places + shift - np.array([width, height]) / 2
+
+
+def flat(places: np.ndarray) -> PoseSurface:
+    """The surface of points in the plane z = 0, from places (N, 2)."""
+    points = np.pad(places, ((0, 0), (0, 1)))
+    return PoseSurface(pose_of(points, normals=np.tile(UP, (len(points), 1))))
+
+
+def ring(radius: float, count: int = 24, z: float = 0.0) -> np.ndarray:
+    """Places on a circle about the z axis, (K, 3)."""
+    turns = 2 * np.pi * np.arange(count) / count
+    return np.stack([radius * np.cos(turns), radius * np.sin(turns), np.full(count, z)], axis=1)
+
+
+def polygon(radius: float, count: int = 24) -> float:
+    """The area of the polygon through such a ring."""
+    return count / 2 * radius**2 * np.sin(2 * np.pi / count)
+
+
+def turned(profile: Sequence[tuple[float, float]], count: int = 72) -> PoseSurface:
+    """The faces that a profile of (radius, z) makes as it turns about the z axis."""
+    turns = 2 * np.pi * np.arange(count) / count
+    points = np.array([(r * np.cos(t), r * np.sin(t), z) for r, z in profile for t in turns])
+    i, j = (each.ravel() for each in np.mgrid[: len(profile) - 1, :count])
+    a, b = i * count + j, i * count + (j + 1) % count
+    faces = np.concatenate([np.stack([a, b, a + count], axis=1), np.stack([b, b + count, a + count], axis=1)])
+    return PoseSurface(pose_of(points), faces.astype(np.uint32))
+
+
+def arc(radius: float, start: float, end: float, z: float, count: int = 24) -> list[tuple[float, float]]:
+    """A profile of a sphere about (0, z) between two angles from its pole, degrees."""
+    angles = np.radians(np.linspace(start, end, count))
+    return [(radius * np.sin(angle), z + radius * np.cos(angle)) for angle in angles]
+
+
+@pytest.fixture(scope="module")
+def holed() -> PoseSurface:
+    places = sheet(44, 44)
+    return flat(places[np.linalg.norm(places, axis=1) > 6])
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_region_around_a_hole_is_a_ring(holed: PoseSurface, order: int) -> None:
+    corners = ring(13)[::order]
+    ring_area = polygon(13) - np.pi * 6**2
+    area = found(holed, "area", corners)
+    assert area.value == pytest.approx(ring_area, rel=0.03)
+    assert area.share == pytest.approx(ring_area / polygon(13), abs=0.02)
+    outline = found(holed, "perimeter", corners)
+    assert outline.value == pytest.approx(24 * 26 * np.sin(np.pi / 24), rel=5e-3)
+    assert "% of the area within its outline has surface" in refused(holed, "volume", corners)
+
+
+def test_paths_around_a_hole_are_refused_and_those_beside_it_are_not(holed: PoseSurface) -> None:
+    reason = "the path from 0 to 1 goes around an opening"
+    across = np.array([[-10.0, 0, 0], [10, 0, 0]])
+    assert refused(holed, "path", across) == reason
+    assert refused(holed, "path", across[::-1]) == reason
+    assert refused(holed, "path", np.array([[0.0, 10, 0], *across])).startswith("the path from 1 to 2 goes")
+    beside = np.array([[-10.0, 8, 0], [10, 8, 0]])
+    assert found(holed, "path", beside).value == pytest.approx(20, rel=2e-3)
+    corners = np.array([[-10.0, 0, 0], [10, 0, 0], [0, 12, 0]])
+    for kind in ("area", "perimeter", "volume"):
+        assert refused(holed, kind, corners) == reason
+
+
+def test_a_path_that_touches_a_hole_tells_how_much_longer_that_may_make_it(holed: PoseSurface) -> None:
+    path = found(holed, "path", np.array([[-14.0, 5.6, 0], [14, 5.6, 0]]))
+    assert path.value - 28 < 2 * path.deviation
+    assert path.value == pytest.approx(28, rel=0.02)
+
+
+def test_two_lips_apart_are_no_region() -> None:
+    """Two sheets with a gap of four spacings between, joined at one end or at none."""
+    places = sheet(40, 24)
+    apart = flat(places[np.abs(places[:, 1]) > 2.6])
+    corners = np.array([[-10.0, -6, 0], [10, -6, 0], [10, 6, 0], [-10, 6, 0]])
+    for kind in ("area", "perimeter", "volume"):
+        assert refused(apart, kind, corners) == "no surface joins 1 and 2"
+    joined = flat(places[(np.abs(places[:, 1]) > 2.6) | (places[:, 0] < -15)])
+    for kind in ("area", "perimeter", "volume"):
+        assert refused(joined, kind, corners) == "the path from 1 to 2 goes around an opening"
+
+
+def test_a_cylinder_with_a_slit() -> None:
+    """The slit runs along it; paths over it are refused, those beside it are helices."""
+    radius, places = 20.0, sheet(80, 60)
+    places = places[(np.abs(places[:, 0]) > 2.6) | (np.abs(places[:, 1]) > 14)]
+    turn = places[:, 0] / radius
+    normals = np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
+    surface = PoseSurface(pose_of(radius * normals + places[:, [1]] * [0, 1, 0], normals=normals))
+
+    def at(*unrolled: tuple[float, float]) -> np.ndarray:
+        x, y = np.array(unrolled).T
+        return np.stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)], axis=1)
+
+    assert refused(surface, "path", at((-8, 0), (8, 0))).endswith("goes around an opening")
+    assert found(surface, "path", at((-8, 18), (8, 20))).value == pytest.approx(np.hypot(16, 2), rel=5e-3)
+    corners = at((-10, -20), (0, -20), (10, -20), (10, 0), (10, 20), (0, 20), (-10, 20), (-10, 0))
+    area = found(surface, "area", corners)
+    assert area.value == pytest.approx(20 * 40 - 5.2 * 28, rel=0.03)
+    assert area.share == pytest.approx(1 - 5.2 * 28 / 800, abs=0.03)
+
+
+MOUTH = [*arc(30, 60, 12, -20), *arc(14, 30, 175, -4)]  # a ball's cap, and the bag behind the opening in it
+
+
+def test_what_lies_behind_an_opening_is_no_part_of_a_region() -> None:
+    """The neck of a bag is an opening, wherever the bag ends."""
+    surface = turned(MOUTH)
+    neck, rim = np.radians(12), np.radians(40)
+    corners = ring(30 * np.sin(rim), 24, 30 * np.cos(rim) - 20)
+    area = found(surface, "area", corners)
+    cap = 2 * np.pi * 900 * (np.cos(neck) - np.cos(rim))
+    assert area.value == pytest.approx(cap, rel=0.03)
+    assert area.share == pytest.approx(1 - np.sin(neck) ** 2 / np.sin(rim) ** 2, abs=0.03)
+    across = ring(11, 2, np.sqrt(900 - 121) - 20)
+    assert refused(surface, "path", across) == "the path from 0 to 1 goes around an opening"
+
+
+def test_what_bulges_is_part_of_a_region() -> None:
+    """A ball on a stalk has its neck as well, and all of it is within an outline around that."""
+    surface = turned([*((r, 0.0) for r in np.linspace(30, 4, 20)), *arc(10, 156, 2, 9.2)])
+    corners = ring(20)
+    area = found(surface, "area", corners)
+    ball = 2 * np.pi * 100 * (1 - np.cos(np.radians(156)))
+    assert area.value == pytest.approx(polygon(20) - np.pi * 16 + ball, rel=0.03)
+
+
+def test_an_outline_that_crosses_itself_is_refused(holed: PoseSurface) -> None:
+    corners = np.array([[8.0, 8, 0], [18, 18, 0], [18, 8, 0], [8, 18, 0]])
+    for kind, options in (("area", {}), ("volume", {}), ("area", {"depth": "through"})):
+        assert "crosses itself" in refused(holed, kind, corners, **options)
+
+
+def test_beyond_the_border_there_is_no_region() -> None:
+    """A notch in the border, as deep as the region; a corner that lies beyond."""
+    places = sheet(40, 40)
+    notched = flat(places[(np.abs(places[:, 0]) > 4) | (places[:, 1] < 4)])
+    corners = np.array([[-12.0, -8, 0], [12, -8, 0], [12, 12, 0], [-12, 12, 0]])
+    assert refused(notched, "area", corners) == "the path from 2 to 3 goes around an opening"
+    assert refused(notched, "perimeter", corners + np.array([16, 0, 0])) == "1 is off the surface"
+    assert found(notched, "area", corners - np.array([0, 9, 0])).value == pytest.approx(480, rel=0.02)
