@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .geodesic import Line
 from .manifold import Rows, joined
-from .patch import Patch, nearest_weights
+from .patch import Patch
 from .smoothing import Points
 
 _SAME = 1e-7  # weights below which a place in a face is on its edge, and shares of an edge that are none
@@ -32,6 +32,16 @@ class Piece:
     vertices: Points
     faces: Rows
     sources: Rows
+
+    @classmethod
+    def joined(cls, pieces: Sequence[Piece]) -> Piece:
+        """Pieces of one patch as one, at least one."""
+        counts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+        return cls(
+            np.concatenate([piece.vertices for piece in pieces]),
+            np.concatenate([piece.faces + before for piece, before in zip(pieces, counts, strict=False)]),
+            np.concatenate([piece.sources for piece in pieces]),
+        )
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -58,13 +68,9 @@ def pieces_along(patch: Patch, lines: Sequence[Line]) -> list[Piece]:
     names = np.concatenate([whole, np.arange(len(patch.faces), len(patch.faces) + len(polygons))])
     _, part = joined(one, other, len(patch.faces) + len(polygons))
     beside = np.unique([part[len(patch.faces) + n] for n in range(len(polygons))])
-    edges = [face for edge in blocked for face in _faces_at(patch, edge)]
+    edges = [face for edge in blocked for face in patch.faces_at(*edge).tolist()]
     beside = np.union1d(beside, [part[face] for face in edges if face not in chords]).astype(int)
     return [_piece(patch, names[part[names] == number], polygons) for number in beside]
-
-
-def _faces_at(patch: Patch, edge: tuple[int, int]) -> list[int]:
-    return np.flatnonzero(np.isin(patch.faces, edge).sum(axis=1) == 2).tolist()
 
 
 def _chords(
@@ -72,49 +78,33 @@ def _chords(
 ) -> tuple[dict[int, list[Chord]], dict[tuple[int, int], list[tuple[float, float]]]]:
     """Face -> the lines' pieces that cross it, as weights of its corners; and edge -> what of it lines run
     along, from and to shares of it."""
+    from .cutting_kernels import faces_under
+
     chords: dict[int, list[Chord]] = defaultdict(list)
     along: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
-    around = _faces_around(patch)
+    order = np.argsort(patch.faces.ravel(), kind="stable")
+    firsts = np.searchsorted(patch.faces.ravel()[order], np.arange(len(patch.vertices) + 1))
     for line in lines:
-        place = {int(np.argmin(np.linalg.norm(patch.vertices - line[0], axis=1)))}
-        for start, end in pairwise(line):
-            if (start == end).all():
+        found, weights = np.empty(len(line) - 1, np.int64), np.empty((len(line) - 1, 2, 3))
+        faces_under(patch.vertices, patch.faces, firsts, order // 3, line, _SAME, found, weights)
+        for face, ends in zip(found.tolist(), weights, strict=True):
+            if face < 0:
                 continue
-            near = list(set.intersection(*(around[corner] for corner in place)))
-            tried = np.array([(start + end) / 2, end, start])
-            corners = patch.corners[:, near]
-            from_tried = corners[:, None] - tried[:, None]  # one call for all three: most are of few faces
-            weights = nearest_weights(from_tried.reshape(3, -1, 3)).reshape(3, -1, 3)
-            off = np.linalg.norm(np.einsum("pfc,cpfi->pfi", weights, from_tried), axis=2)
-            best = int(np.argmin(off[0] + off[1]))
-            face, ends = near[best], []
-            for found in (weights[2, best], weights[1, best]):
-                found = np.where(found < _SAME, 0.0, found)
-                ends.append(found / found.sum())
-            place = {int(corner) for corner in patch.faces[face][ends[1] > 0]}
-            empty = np.flatnonzero((ends[0] == 0) & (ends[1] == 0))
+            empty = np.flatnonzero((ends == 0).all(axis=0))
             if len(empty):
-                low, high = sorted(int(corner) for corner in np.delete(patch.faces[face], empty[0]))
-                share = sorted(float(found[patch.faces[face] == high][0]) for found in ends)
+                low, high = sorted(np.delete(patch.faces[face], empty[0]).tolist())
+                share = sorted(ends[:, patch.faces[face] == high].ravel().tolist())
                 along[low, high].append((share[0], share[1]))
             else:
                 chords[face].append((ends[0], ends[1]))
     return chords, along
 
 
-def _faces_around(patch: Patch) -> list[set[int]]:
-    """The faces at each vertex."""
-    around: list[set[int]] = [set() for _ in patch.vertices]
-    for face, corners in enumerate(patch.faces.tolist()):
-        for corner in corners:
-            around[corner].add(face)
-    return around
-
-
 def _side(chord: Chord, place: Weights) -> float:
     """How far a place of the same face is off a chord, by weights; the sign tells on which side."""
-    volume = float(np.linalg.det(np.stack([chord[0], chord[1], place])))
-    return volume / float(np.linalg.norm(chord[1] - chord[0]))
+    from .cutting_kernels import side
+
+    return side(*chord, place)
 
 
 def _divided(
@@ -167,20 +157,16 @@ def _links(
     ends = np.sort(np.stack([corner[before], corner[after]], axis=1), axis=1)
     crossed = np.zeros(len(patch.faces), bool)
     crossed[list(chords)] = True
-    edges = set(blocked)
     odd = crossed[before // 3] | crossed[after // 3]
-    odd |= np.array([tuple(pair) in edges for pair in ends.tolist()], bool)
+    for edge in blocked:
+        odd |= (ends == edge).all(axis=1)
+    met = _met(patch, chords)
     one, other = (before // 3)[~odd].tolist(), (after // 3)[~odd].tolist()
     for half, opposite, (low, high) in zip(
         before[odd].tolist(), after[odd].tolist(), ends[odd].tolist(), strict=True
     ):
         faces = half // 3, opposite // 3
-        shares = {0.0, 1.0}
-        for face in faces:
-            for place in (end for chord in chords.get(face, ()) for end in chord):
-                there = dict(zip(patch.faces[face].tolist(), place.tolist(), strict=True))
-                if there[low] + there[high] > 1 - _SAME:
-                    shares.add(there[high])
+        shares = {0.0, 1.0, *met[faces[0], low, high], *met[faces[1], low, high]}
         for start, end in pairwise(sorted(shares)):
             middle = (start + end) / 2
             if end - start < 2 * _SAME or any(a <= middle <= b for a, b in blocked.get((low, high), ())):
@@ -190,6 +176,18 @@ def _links(
                 place += np.where(patch.faces[face] == high, middle, 0.0)
                 links.append(_which(patch, face, place, chords, of_face, polygons))
     return np.array(one, np.int64), np.array(other, np.int64)
+
+
+def _met(patch: Patch, chords: dict[int, list[Chord]]) -> dict[tuple[int, int, int], list[float]]:
+    """Face and edge, by its vertices, the lower first -> the shares of it at which chords of the face end."""
+    met: dict[tuple[int, int, int], list[float]] = defaultdict(list)
+    for face, across in chords.items():
+        corners = patch.faces[face].tolist()
+        for end in (end.tolist() for chord in across for end in chord):
+            ends = sorted((vertex, weight) for vertex, weight in zip(corners, end, strict=True) if weight)
+            if len(ends) == 2:
+                met[face, ends[0][0], ends[1][0]].append(ends[1][1])
+    return met
 
 
 def _which(

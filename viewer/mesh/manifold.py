@@ -33,8 +33,8 @@ def across_edges(faces: Rows) -> tuple[Rows, Rows]:
 
     Of an edge with more than two faces, pairs of those that follow each other.
     """
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    edge = ends.min(axis=1) * (ends.max(initial=0) + 1) + ends.max(axis=1)
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    edge = np.minimum(start, end) * (end.max(initial=0) + 1) + np.maximum(start, end)
     order = np.argsort(edge, kind="stable")
     same = np.flatnonzero(edge[order[1:]] == edge[order[:-1]])
     return order[same], order[same + 1]
@@ -53,7 +53,9 @@ def joined(one: Rows, other: Rows, count: int) -> tuple[int, NDArray[np.int32]]:
 def _distinct(faces: Rows) -> Rows:
     corners = np.sort(faces, axis=1)
     faces, corners = (rows[(corners[:, 1:] != corners[:, :-1]).all(axis=1)] for rows in (faces, corners))
-    return faces[np.sort(np.unique(corners, axis=0, return_index=True)[1])]
+    order = np.lexsort(corners.T)
+    is_first = np.append(True, (np.diff(corners[order], axis=0) != 0).any(axis=1))[: len(order)]
+    return faces[np.sort(order[is_first])]
 
 
 def _two_an_edge(faces: Rows) -> Rows:

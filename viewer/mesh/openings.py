@@ -34,8 +34,8 @@ def without_pockets(patch: Patch, seeds: Sequence[int], spacing: float) -> Patch
     one, other = before // 3, after // 3
     both = is_open[one] & is_open[other]
     _, part = joined(one[both], other[both], len(whole.faces))
-    seeds = np.asarray(seeds)
-    is_front = np.isin(part, part[seeds[is_open[seeds]]])
+    seen = [seed for seed in seeds if is_open[seed]]
+    is_front = np.isin(part, part[np.array(seen, np.intp)])
     behind = ~is_front
     both = behind[one] & behind[other]
     count, part = joined(one[both], other[both], len(whole.faces))
@@ -43,7 +43,7 @@ def without_pockets(patch: Patch, seeds: Sequence[int], spacing: float) -> Patch
     of_rim, is_pocket = part[rim // 3], np.zeros(count, bool)
     for number in np.flatnonzero(np.bincount(of_rim, minlength=count) > SMALL_HOLE):
         faces, edges = np.flatnonzero(part == number), rim[of_rim == number]
-        is_pocket[number] = not np.isin(seeds, faces).any() and _is_pocket(whole, faces, edges)
+        is_pocket[number] = not np.isin(faces, seeds).any() and _is_pocket(whole, faces, edges)
     stays = ~is_pocket[part[: len(patch.faces)]]
     return patch if stays.all() else patch.of_faces(np.flatnonzero(stays))
 
@@ -52,7 +52,9 @@ def _inner_holes(patch: Patch) -> Rows:
     """The holes of a patch by number, but for the longest of each connected part, around which it ends."""
     start, end = patch.border
     count = int(patch.holes.max(initial=-1)) + 1
-    lengths = np.bincount(patch.holes, np.linalg.norm(patch.vertices[end] - patch.vertices[start], axis=1), count)
+    lengths = np.bincount(
+        patch.holes, np.linalg.norm(patch.vertices[end] - patch.vertices[start], axis=1), count
+    )
     part = np.zeros(count, np.int64)
     part[patch.holes] = patch.parts[start]
     order = np.lexsort((lengths, part))
@@ -118,7 +120,7 @@ def _turn(patch: Patch, vertex: int, before: NDArray[np.float64], after: NDArray
     (3,) each: the angle between these over the faces less pi, to the left positive, radians."""
     faces = patch.faces[(patch.faces == vertex).any(axis=1)]
     first = (faces == vertex).argmax(axis=1)[:, None]
-    right, left = np.take_along_axis(faces, (first + [1, 2]) % 3, axis=1).T
+    right, left = np.take_along_axis(faces, (first + np.array([1, 2])) % 3, axis=1).T
     following = dict(zip(right.tolist(), left.tolist(), strict=True))
     fan = [next(iter(following.keys() - set(following.values())))]
     while fan[-1] in following:
@@ -127,7 +129,9 @@ def _turn(patch: Patch, vertex: int, before: NDArray[np.float64], after: NDArray
     wide = _between(edges[:-1], edges[1:])
     angles = []
     for place in (before, after):
-        from_right, from_left = (_between(side, place - patch.vertices[vertex]) for side in (edges[:-1], edges[1:]))
+        from_right, from_left = (
+            _between(side, place - patch.vertices[vertex]) for side in (edges[:-1], edges[1:])
+        )
         face = int(np.argmin(from_right + from_left - wide))
         angles.append(float(wide[:face].sum() + from_right[face]))
     over = angles[1] - angles[0]

@@ -94,6 +94,10 @@ class Patch:
         """The corners of the faces, (3, F, 3)."""
         return self.vertices[self.faces.T]
 
+    def corners_of(self, faces: Rows) -> NDArray[np.float64]:
+        """The corners of some of the faces by number, (3, F', 3)."""
+        return self.vertices[self.faces[faces].T]
+
     @cached_property
     def doubled(self) -> Points:
         """Normals of the faces as long as twice their areas, (F, 3)."""
@@ -103,10 +107,9 @@ class Patch:
     @cached_property
     def vertex_normals(self) -> Points:
         """Normals of the vertices, the sums of those of the faces around each, (V, 3); not of unit length."""
-        normals = np.zeros_like(self.vertices)
-        for corner in self.faces.T:
-            np.add.at(normals, corner, self.doubled)
-        return normals
+        count = len(self.vertices)
+        sums = [sum(np.bincount(corner, axis, count) for corner in self.faces.T) for axis in self.doubled.T]
+        return np.stack(sums, axis=1)
 
     @cached_property
     def pairs(self) -> tuple[Rows, Rows]:
@@ -151,22 +154,34 @@ class Patch:
     def nearest(self, position: NDArray[np.float64]) -> OnPatch:
         """The place of the patch nearest to another, (3,); of the face of the lowest number where there are
         several. Raises ValueError where the patch has no faces."""
-        away = np.linalg.norm(self.vertices - position, axis=1)[self.faces].min(axis=1)
-        near = np.flatnonzero(away - self._longest <= away.min() * (1 + _SAME))
-        corners = self.corners[:, near]
+        offsets = self.vertices - position
+        squared = np.einsum("vi,vi->v", offsets, offsets)
+        is_near = squared <= ((np.sqrt(squared.min()) + self._longest) * (1 + _SAME)) ** 2
+        near = np.flatnonzero(
+            is_near[self.faces[:, 0]] | is_near[self.faces[:, 1]] | is_near[self.faces[:, 2]]
+        )
+        corners = self.corners_of(near)
         weights = nearest_weights(corners - position)
         offsets = np.einsum("fc,cfi->fi", weights, corners) - position
         squared = (offsets * offsets).sum(axis=1)
         best = int(squared.argmin())
-        return OnPatch(int(near[best]), weights[best], position + offsets[best], float(np.sqrt(squared[best])))
+        return OnPatch(
+            int(near[best]), weights[best], position + offsets[best], float(np.sqrt(squared[best]))
+        )
 
     @cached_property
-    def _longest(self) -> NDArray[np.float64]:
-        """The longest edge of each face, (F,): no place of it is farther from its nearest corner."""
-        longest: NDArray[np.float64] = np.linalg.norm(
-            self.corners - np.roll(self.corners, 1, axis=0), axis=2
-        ).max(axis=0)
-        return longest
+    def _longest(self) -> float:
+        """The longest edge: no place of a face, or of parts of it, is farther from a corner."""
+        start, end = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        offsets = self.vertices[end] - self.vertices[start]
+        return float(np.sqrt(np.einsum("ei,ei->e", offsets, offsets).max(initial=0)))
+
+    def faces_at(self, one: int, other: int) -> Rows:
+        """The numbers of the faces at the edge between two vertices."""
+        a, b, c = self.faces.T
+        return np.flatnonzero(
+            ((a == one) | (b == one) | (c == one)) & ((a == other) | (b == other) | (c == other))
+        )
 
     def with_point(self, place: OnPatch) -> tuple[Patch, int]:
         """The patch with a vertex at a place, and its number: a corner that is there, or else a new one that
@@ -175,25 +190,18 @@ class Patch:
         if len(inner) == 1:
             return self, int(corners[inner[0]])
         number = len(self.vertices)
-        if len(inner) == 3:
-            divided = [place.face]
-        else:
-            ends = corners[inner]
-            divided = np.flatnonzero(np.isin(self.faces, ends).sum(axis=1) == 2).tolist()
-        faces = [np.delete(self.faces, divided, axis=0)]
-        for face in divided:
+        split = [place.face] if len(inner) == 3 else self.faces_at(*corners[inner].tolist()).tolist()
+        faces = [np.delete(self.faces, split, axis=0)]
+        for face in split:
             for start in range(3):
                 pair = self.faces[face, [start, (start + 1) % 3]]
                 if len(inner) == 3 or set(pair.tolist()) != set(corners[inner].tolist()):
                     faces.append(np.array([[*pair, number]]))
-        return (
-            Patch(
-                np.vstack([self.vertices, place.position]),
-                np.concatenate(faces),
-                np.append(self.sources, -1),
-            ),
-            number,
+        divided = Patch(
+            np.vstack([self.vertices, place.position]), np.concatenate(faces), np.append(self.sources, -1)
         )
+        divided.__dict__["_longest"] = self._longest  # its edges are no longer
+        return divided, number
 
 
 def _spans_gaps(points: Points, kept: Rows, faces: Rows) -> NDArray[np.bool_]:

@@ -13,8 +13,6 @@ AWAY = np.array([3e5, -2e5, 1e5])
 CAP = 0.6  # radians from its pole to its rim
 
 
-
-
 def rim(count: int) -> np.ndarray:
     """Landmarks around a cap of the sphere, (K, 3)."""
     turns = 2 * np.pi * np.arange(count) / count

@@ -12,13 +12,12 @@ from ...mesh.cutting import plane_section
 from ...mesh.geodesic import Line
 from ...mesh.patch import Patch
 from ...mesh.smoothing import Points
+from .outlines import Outline, is_within
 from .planes import THROUGH, plane_of
 from .surface import PoseSurface
 
 _PARTS = 8  # into which each side of a face on the rim is divided
 _SLAB = 2.0  # spacings around the prism that its patch reaches
-
-Outline = NDArray[np.float64]  # (P, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,34 +139,3 @@ def _between(line: Line, at: NDArray[np.float64], length: float) -> list[Line]:
         if high < 1:
             pieces.append([])
     return [np.array(piece) for piece in pieces if len(piece) > 1]
-
-
-def is_within(places: Outline, outline: Outline) -> NDArray[np.bool_]:
-    """Whether places (N, 2) lie within a closed outline (P, 2): a ray to the right crosses it oddly often."""
-    inside = np.zeros(len(places), bool)
-    x, y = places.T
-    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        rises = (start[1] > y) != (end[1] > y)
-        if rises.any():
-            at = start[0] + (y[rises] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
-            inside[np.flatnonzero(rises)[x[rises] < at]] ^= True
-    return inside
-
-
-def area_of(outline: Outline) -> float:
-    """The area of a closed outline (P, 2) that does not cross itself."""
-    x, y = (outline - outline.mean(axis=0)).T
-    return abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
-
-
-def crosses_itself(outline: Outline) -> bool:
-    """Whether two sides of a closed outline (P, 2) cross each other, away from their ends."""
-    start, end = outline, np.roll(outline, -1, axis=0)
-
-    def sides(places: Outline) -> NDArray[np.float64]:
-        """On which side of each side places are, (P, P): the sign."""
-        along, offset = (end - start)[:, None], places[None] - start[:, None]
-        return np.sign(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0])
-
-    parted = sides(start) * sides(end) < 0
-    return bool((parted & parted.T).any())

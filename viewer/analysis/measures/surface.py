@@ -18,6 +18,7 @@ from ...scan.estimate import cloud_normals
 from ...scan.faces import Triangles
 from ...scan.pose import Pose
 from ...scan.range_view import merged_normals
+from .regions import Refused, Region, region_within
 
 Beyond = Callable[[Points], NDArray[np.float64]]  # how far places (N, 3) are outside, negative within, (N,)
 
@@ -25,7 +26,7 @@ _FITTED = 2.0  # spacings in which points tell a normal where there is no noise
 _RIM = 4.0  # spacings that a patch of points reaches farther, as it ends in a ragged rim
 _ASTRAY = 4.0  # spacings, and deviations of noise, that a landmark may lie off the surface
 _LONGER = 1.2  # times the straight line: the path that is looked for first
-_WIDER = 1.2  # times the farthest corner from their middle: where a region is looked for first
+_WIDER = 1.1  # times the farthest corner from their middle: where a region is looked for first
 _GROWS = 1.6  # by which what is looked at grows where no path is found
 _DETOUR = 0.05  # of its length, or a spacing: how much longer a path may be as it goes around openings
 _TRIES = 8
@@ -48,18 +49,6 @@ class Found:
     share: float = np.nan
 
 
-@dataclass(frozen=True)
-class Refused:
-    """Why a surface gives no value. reason: in words, with {} for each of the landmarks by number."""
-
-    reason: str
-    landmarks: tuple[int, ...] = ()
-
-    def told(self, names: Sequence[str]) -> str:
-        """The reason with the names of landmarks, (K,)."""
-        return self.reason.format(*(names[number % len(names)] for number in self.landmarks))
-
-
 @dataclass(frozen=True, eq=False)
 class Circuit:
     """Landmarks on a patch, and paths from each to the next. numbers: (K,) of the vertices. detour: how much
@@ -69,6 +58,11 @@ class Circuit:
     numbers: tuple[int, ...]
     lines: tuple[Line, ...]
     detour: float
+
+    @cached_property
+    def region(self) -> Region | Refused:
+        """What lies within the paths, which come back to the first landmark."""
+        return region_within(self.patch, self.lines)
 
 
 class PoseSurface:
@@ -122,6 +116,8 @@ class PoseSurface:
         points = self._points[near]
         normals = cloud_normals(self._cloud.of_rows(near)) if self._normals is None else self._normals[near]
         rows = np.flatnonzero(outside[near] <= _RIM * self.spacing)
+        if not self.radius and self._normals is not None:
+            return Patch.of_points(points[rows], normals[rows], self.spacing)
         moved, directions = moved_to_quadrics(points, max(self.radius, _FITTED * self.spacing), normals, rows)
         return Patch.of_points(moved if self.radius else points[rows], directions, self.spacing)
 
@@ -178,16 +174,17 @@ class PoseSurface:
 
     def _loop(self, corners: NDArray[np.float64]) -> Circuit | Refused:
         middle = corners.mean(axis=0)
-        reach = _WIDER * float(np.linalg.norm(corners - middle, axis=1).max()) + 2 * _RIM * self.spacing
+        reach = _WIDER * float(np.linalg.norm(corners - middle, axis=1).max()) + _RIM * self.spacing
 
         def beyond(points: Points) -> NDArray[np.float64]:
-            return np.linalg.norm(points - middle, axis=1) - reach
+            offsets = points - middle
+            return np.sqrt(np.einsum("pi,pi->p", offsets, offsets)) - reach
 
         for _ in range(_TRIES):
             found = self._joined(self.patch(beyond), list(corners), is_closed=True)
-            if isinstance(found, Circuit):
-                if max(beyond(line).max() for line in found.lines) < -_RIM * self.spacing:
-                    break
+            lines = found.lines if isinstance(found, Circuit) else ()
+            if lines and max(beyond(line).max() for line in lines) < -_RIM * self.spacing:
+                break
             if beyond(self._points).max() <= 0:
                 break
             reach *= _GROWS

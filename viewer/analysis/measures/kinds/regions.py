@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ....mesh.cutting import Piece, pieces_along
 from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
-from ..planes import THROUGH, plane_of
-from ..prism import (
-    Prism,
-    area_of,
-    area_through,
-    crosses_itself,
-    is_within,
-    near_rim,
-    patch_through,
-    rim_through,
-)
+from ..outlines import crosses_itself
+from ..prism import Prism, area_through, near_rim, patch_through, rim_through
+from ..regions import CROSSES, NO_PLANE, across, below, facing
 from ..surface import Circuit, Found, PoseSurface, Refused
 from . import MeasureKind, Options
 from .along import direction, off_smooth
@@ -31,8 +20,6 @@ _STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
 _WIDE_STEP = 1.0  # the same, where all in a prism is measured
 _RIM = 4.0  # spacings off the walls of a prism within which that changes something
 _WHOLE = 0.95  # of the area within an outline that has to have surface, to tell a volume
-_NO_PLANE = "its landmarks lie on a line and give no plane"
-_CROSSES = "its outline crosses itself: check the order of its landmarks"
 _BENT = 3.0  # of the squared angles at a face's edges, by which it is smaller than what it stands for
 
 
@@ -51,23 +38,24 @@ def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], options: Op
 def _area(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | Refused:
     if options.get("depth") == ALL:
         return _through(surface, positions, is_rim=False)
-    region = _region(surface, positions)
+    loop = surface.loop(positions)
+    if isinstance(loop, Refused):
+        return loop
+    region = loop.region
     if isinstance(region, Refused):
         return region
-    loop, piece = region.loop, region.piece
+    piece = region.piece
     deviation = float((piece.areas * loop.patch.bends[piece.sources]).sum()) / _BENT + _beside(loop)
-    return Found(
-        float(piece.areas.sum()), _widening(loop), deviation, _absolute(surface, loop), region.share
-    )
+    return Found(float(piece.areas.sum()), _widening(loop), deviation, _absolute(surface, loop), region.share)
 
 
 def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bool) -> Found | Refused:
     """The area, or the rim, of all of a surface in the prism over the polygon of landmarks."""
     prism = Prism.over(positions - surface.origin)
     if prism is None:
-        return Refused(_NO_PLANE)
+        return Refused(NO_PLANE)
     if crosses_itself(prism.corners):
-        return Refused(_CROSSES)
+        return Refused(CROSSES)
     patch = patch_through(surface, prism)
     lines = rim_through(patch, prism) if len(patch.faces) else []
     if not lines:
@@ -104,16 +92,19 @@ def _gradient_through(rim: Patch, prism: Prism, spacing: float, is_rim: bool) ->
 
 
 def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) -> Found | Refused:
-    region = _region(surface, positions)
+    loop = surface.loop(positions)
+    if isinstance(loop, Refused):
+        return loop
+    region = loop.region
     if isinstance(region, Refused):
         return region
     if region.share < _WHOLE:
         return Refused(f"only {100 * region.share:.0f} % of the area within its outline has surface")
-    loop, piece = region.loop, region.piece
+    piece = region.piece
     edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]
     around = np.concatenate(edges)
-    center, normal = _facing(piece, around)
-    value = _below(piece, center, normal)
+    center, normal = facing(piece, around)
+    value = below(piece, center, normal)
     normals = _upright(loop.patch, around)  # across which nothing moves: the outline stays on the surface
     gradient, step = np.zeros_like(positions), _STEP * surface.spacing
     for number, pulled in enumerate(_pulled(edges)):
@@ -121,9 +112,9 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
             sides = []
             for side in (step, -step):
                 moved = around + side * pulled[:, None] * (np.eye(3)[axis] - normals[:, [axis]] * normals)
-                sides.append(_below(piece, *_facing(piece, moved)))
+                sides.append(below(piece, *facing(piece, moved)))
             gradient[number, axis] = (sides[0] - sides[1]) / (2 * step)
-    flat = np.abs(_across(piece, normal))
+    flat = np.abs(across(piece, normal))
     sag = np.sqrt(piece.areas * loop.patch.bends[piece.sources]) / 8
     noise = surface.noise * surface.spacing * np.sqrt(flat.sum())
     deviation = float(np.hypot((flat * sag).sum(), noise))
@@ -133,58 +124,6 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
 
 def _absolute(surface: PoseSurface, loop: Circuit) -> tuple[Line, ...]:
     return tuple(line + surface.origin for line in loop.lines)
-
-
-@dataclass(frozen=True, eq=False)
-class Region:
-    """What lies within a loop. share: of the area within the loop, as seen against its normal, that has
-    surface; the rest is openings."""
-
-    loop: Circuit
-    piece: Piece
-    share: float
-
-
-def _region(surface: PoseSurface, positions: NDArray[np.float64]) -> Region | Refused:
-    loop = surface.loop(positions)
-    return loop if isinstance(loop, Refused) else region_within(loop)
-
-
-def region_within(loop: Circuit) -> Region | Refused:
-    """The piece of a patch that a loop goes around: of those on its sides, what lies within it as seen across
-    its plane. A reason where it goes around none.
-
-    By Stokes' theorem a surface has, seen against a normal, the area of its outline less that of its openings,
-    however it bends.
-    """
-    pieces = pieces_along(loop.patch, loop.lines)
-    around = np.concatenate([line[:-1] for line in loop.lines])
-    center, normal = plane_of(around, THROUGH)
-    if not np.isfinite(normal).all():
-        return Refused(_NO_PLANE)
-    axes = np.linalg.svd(normal[None])[2][1:]
-    outline = (around - center) @ axes.T
-    if len(pieces) > 2 and crosses_itself(outline):
-        return Refused(_CROSSES)
-    if len(pieces) < 2:
-        return Refused("its outline goes around nothing")
-    shares = []
-    for piece in pieces:
-        within = is_within((piece.corners.mean(axis=0) - center) @ axes.T, outline)
-        shares.append(float(piece.areas[within].sum() / max(piece.areas.sum(), np.finfo(float).tiny)))
-    most = max(shares)
-    chosen = [piece for piece, share in zip(pieces, shares, strict=True) if share > 0.5 or share == most]
-    counts = np.cumsum([0, *(len(piece.vertices) for piece in chosen)])
-    piece = Piece(
-        np.concatenate([piece.vertices for piece in chosen]),
-        np.concatenate([piece.faces + before for piece, before in zip(chosen, counts, strict=False)]),
-        np.concatenate([piece.sources for piece in chosen]),
-    )
-    share = abs(float(_across(piece, normal).sum())) / area_of(outline)
-    area, length = float(piece.areas.sum()), sum(map(length_of, loop.lines))
-    if area > length**2 / (2 * np.pi) and _below(piece, *_facing(piece, around)) < 0:
-        return Refused("the surface within its outline goes in behind an opening or a fold")
-    return Region(loop, piece, min(share, 1.0))
 
 
 def _beside(loop: Circuit) -> float:
@@ -225,24 +164,6 @@ def _pulled(edges: list[Line]) -> list[NDArray[np.float64]]:
         parts[number - 1] = parts[number - 1] + shares[number - 1]
         pulled.append(np.concatenate(parts))
     return pulled
-
-
-def _facing(piece: Piece, around: Line) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The plane of an outline, on the side to which the piece faces."""
-    center, normal = plane_of(around, THROUGH)
-    return center, normal if _across(piece, normal).sum() >= 0 else -normal
-
-
-def _across(piece: Piece, normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The areas of faces as seen along a normal, (F,), negative from behind."""
-    a, b, c = piece.corners
-    return np.cross(b - a, c - a) @ normal / 2
-
-
-def _below(piece: Piece, center: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
-    """The volume from a plane to a piece, negative where the piece is beneath."""
-    heights = (piece.corners.mean(axis=0) - center) @ normal
-    return float((heights * _across(piece, normal)).sum())
 
 
 KINDS = (
