@@ -144,6 +144,12 @@ class Look:
         1, "Reach of eye-dome lighting", low=1, high=16, unit="px", group="Light", when=_EYE_DOME
     )
 
+    @property
+    def of_any_scan(self) -> Look:
+        """The look without what suits one scan alone: what colours it, the ends of the colour map, and up."""
+        own = ("color_by", "low", "high", "up")
+        return replace(self, **{name: getattr(type(self)(), name) for name in own})
+
     def __post_init__(self) -> None:
         rgba(self.plain, "plain")
         rgba(self.background, "background")

@@ -4,6 +4,7 @@
 layout(binding = TEXTURE_PICTURE) uniform sampler2D picture;  // sRGB as it is, row 0 at the top
 uniform ivec2 corner;  // of the viewport, pixels from the window's lower left
 uniform ivec2 size;    // of the viewport
+uniform float light;   // factor on the colours
 out vec4 color;
 
 const int CHECK = 12;  // pixels
@@ -13,5 +14,5 @@ void main() {
     vec4 shown = texture(picture, vec2(at.x, 1.0 - at.y));  // the window's rows count from the bottom
     ivec2 cell = ivec2(gl_FragCoord.xy) / CHECK;
     float check = (cell.x + cell.y) % 2 == 0 ? 0.42 : 0.5;
-    color = vec4(mix(vec3(check), shown.rgb, shown.a), 1.0);
+    color = vec4(light * mix(vec3(check), shown.rgb, shown.a), 1.0);
 }

@@ -27,6 +27,7 @@ from viewer.analysis.measure import Measurement, Reading, reading_of
 from viewer.app import run
 from viewer.app.app import App
 from viewer.app.scene.view import words_over
+from viewer.backends import backends
 from viewer.document.measurements import Measurements
 from viewer.document.schema import plain
 
@@ -144,6 +145,9 @@ def shown(app: App) -> dict[str, Any]:
         "pointed": app.pointer.words,
         "unit": app.playback.unit,
         "words": words_over(app),
+        "renderer": backends()[app.rendering.backend].title if app.rendering.backend else None,
+        "renderer_named": app.naming.name,
+        "loading": app.loading.awaited and app.loading.awaited.words,
         "theme": app.theme,
         "is_replaying": app.replayer.replaying is not None,
         "is_welcomed": app.welcome.is_over,

@@ -289,3 +289,29 @@ def test_chosen_frames_that_a_shorter_scan_has_not_are_left_out(started: Callabl
     playback.session.change("Choose", span=(6, 9))
     shown(playback, 1.0)
     assert playback.span == range(4)
+
+
+def test_the_clock_waits_where_no_pose_comes_and_goes_on_from_the_one_that_does(started: Callable) -> None:
+    playback, source = started(count=64)
+    source.gate.release(1000)
+    playback.timeline.prefetch(0)
+    until(lambda: [*map(len, playback.timeline.cached())] == [64])
+    prepared = {0}
+    playback.is_prepared = lambda pose: pose.index in prepared
+    assert shown(playback, 0.0) == 0
+    playback.toggle(0.0)
+    turns = np.arange(0.02, 12, 0.02)
+    for now in turns:
+        assert shown(playback, now) == 0
+        assert playback.is_held == (now > 0.5)
+    waited_for = playback.session.index
+    assert waited_for <= 5, "the frames of half a second at most are past"
+    assert playback.dropped == waited_for - 1
+
+    prepared |= set(range(64))
+    assert shown(playback, 12.0) == waited_for
+    assert [shown(playback, 12.0 + 0.1 * step + 0.05) for step in (1, 2, 3)] == [
+        waited_for + step for step in (1, 2, 3)
+    ]
+    assert not playback.is_held
+    assert playback.dropped == waited_for - 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 
@@ -11,11 +12,12 @@ import pytest
 from viewer.app.playing.playback import Playback
 from viewer.app.scene.rendering import Rendering
 from viewer.app.session import Session, edit_name
+from viewer.app.settings import Settings
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.choice.goal import Goal
 from viewer.choice.ways import DrawingWay
-from viewer.document.document import Bookmark, Document
+from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
 from viewer.look import Look
 from viewer.rigid import STILL, Rigid
@@ -58,12 +60,73 @@ def test_a_scan_is_found_again_where_it_was_left() -> None:
     assert session.index == 2
 
 
-def test_a_scan_begins_drawn_as_the_one_before() -> None:
-    drawn = Document(look=Look(light="flat"), backend="points").with_params("points", LARGE)
-    session = Session("one", replace(drawn, camera=Camera(), bookmarks=(Bookmark("a", Camera()),)))
+SOME = Pose(0, 0.0, "some", PointCloud.from_arrays([[0.0, 0, 0], [1, 1, 0]], normals=[[0.0, 0, 1]] * 2))
+
+
+def rendered(session: Session, pose: Pose = SOME) -> tuple[str, object]:
+    """The renderer of a pose, and its parameters."""
+    return session.document.chosen(pose)
+
+
+def test_a_choice_for_one_scan_says_nothing_of_the_next() -> None:
+    session = Session("one")
+    of_its_own = rendered(session)
+    assert of_its_own[0] == "surfels"
+    session.change("Choose", backend="points", params={"points": LARGE}, goal=Goal("time", 20.0))
+    session.change("Colour", look=Look(light="flat", color_by="#1", low=3.0, high=4.0))
     session.turn_to("two")
-    assert session.document == drawn
-    assert session.history.undoes is None
+    assert rendered(session) == of_its_own
+    assert session.document == Document(look=Look(light="flat")), "how light it is goes with the user"
+    assert Settings.of(session).document == session.document, "after a restart as well"
+    session.turn_to("one")
+    assert session.document.goal == Goal("time", 20.0), "where it was chosen it stays"
+
+
+def rendering_of(session: Session) -> Iterator[Rendering]:
+    with closing(open_scan("demo")) as timeline:
+        playback = Playback(timeline, session)
+        playback.pose = SOME
+        yield Rendering(session, playback, pytest.fail)
+
+
+def test_a_renderer_for_all_scans_is_chosen_and_cleared() -> None:
+    session = Session("one")
+    for rendering in rendering_of(session):
+        assert not rendering.is_for_all
+        rendering.choose("points")
+        rendering.edit_params(LARGE)
+        rendering.toggle_for_all()
+        assert rendering.is_for_all
+        session.turn_to("two")
+        assert rendered(session) == ("points", LARGE)
+        again = Session("three", Settings.of(session).document)
+        assert rendered(again) == ("points", LARGE), "after a restart as well"
+
+        rendering.choose("voxels")
+        assert not rendering.is_for_all
+        assert rendering.others_begin_with == "Points"
+        rendering.clear_for_all()
+        assert rendering.others_begin_with == ""
+        session.turn_to("four")
+        assert rendered(session)[0] == "surfels"
+
+        rendering.aim(Goal("time", 20.0))
+        rendering.toggle_for_all()
+        session.turn_to("five")
+        assert (session.document.goal, session.document.backend) == (Goal("time", 20.0), None)
+        assert rendering.is_for_all
+        rendering.toggle_for_all()
+        session.turn_to("six")
+        assert session.document == Document()
+
+
+def test_a_renderer_for_all_scans_that_cannot_draw_one_is_told() -> None:
+    session = Session("one", Document(backend="laplacian"))
+    told: list[str] = []
+    with closing(open_scan("demo")) as timeline:
+        Rendering(session, Playback(timeline, session), told.append).tell_missing(SOME)
+    assert rendered(session)[0] == "surfels"
+    assert told == ["Merged views cannot draw this scan: Discs draws it instead."]
 
 
 def test_what_is_up_in_one_scan_says_nothing_of_the_next() -> None:
@@ -108,7 +171,7 @@ def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> No
         rendering = Rendering(session, Playback(timeline, session), told.append)
         for _ in range(2):
             rendering.tell_missing(BARE)
-    assert told == ["This Scan4D has no renderer 'gone': Points draws in its place."]
+    assert told == ["This Scan4D has no renderer 'gone': Points draws it instead."]
     assert session.document == document, "it comes back where the renderer is there"
 
 

@@ -174,7 +174,7 @@ def test_whatever_stands_in_the_file_some_settings_come_of_it(data: st.DataObjec
     assert Settings.from_json(json.loads(json.dumps(usable.to_json()))) == usable
 
 
-def test_a_scan_that_was_never_open_is_drawn_as_the_last_one() -> None:
+def test_the_renderer_for_all_scans_and_the_last_look_come_back() -> None:
     session = Session("/scans/b", FULL.document, FULL.pace)
     assert (session.document.backend, session.document.params["points"].point_size) == ("surfels", 7)
     session.change(

@@ -35,6 +35,7 @@ from .failures import Failures
 from .files.browser import Browser
 from .files.changes import Changes
 from .files.keeping import Keeping
+from .files.loading import Loading
 from .files.opening import Opened, Opening, begin, find_facts
 from .files.preview import Previewer
 from .files.scans import Scans, title
@@ -58,6 +59,7 @@ from .scene.counting import Counting
 from .scene.full_view import FullView
 from .scene.glide import Glide
 from .scene.legend import ViewMarks
+from .scene.naming import Naming
 from .scene.pointed import Pointer
 from .scene.rendering import Rendering
 from .scene.steering import Steering
@@ -78,11 +80,11 @@ class App:
     session: what the user has chosen. playback: the scan. ahead: has its poses prepared. pacing: of its
     frames. ranging: of colours, over its frames. thumbnails: of its frames, over the timeline.
     renderer: what is on the GPU. viewport: the 3D view. marks: what lies over it. rendering: which backend
-    draws it. choosing: that one, automatically.
+    draws it. choosing: that one, automatically. naming: it, when the user steps to another one.
     steering: what moves its camera. glide: how the picture follows that. pointer: what the mouse points at in
     it. bookmarks: cameras to go back to. full_view: whether it is alone.
     scans: those to go to without a dialog. browser: the dialog that finds others. sessions: their files.
-    changes: of the open one's files.
+    changes: of the open one's files. loading: what the view waits for.
     keeping: keeps what is to come back at the next start.
     capture: pictures and recordings of what is shown. replayer: shows recordings again. exporting: pictures
     and films at other sizes.
@@ -147,6 +149,7 @@ class App:
         )
         self.pointer: Pointer = Pointer(self.viewport, self.playback, remembered.point_details)
         self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
+        self.naming: Naming = Naming(self.rendering, self.viewport)
         self.choosing: Choosing = Choosing(self.session, self.playback, self.viewport)
         self.steering: Steering = Steering(
             self.session, self.playback, self.viewport, self.pointer, remembered.cube,
@@ -177,6 +180,7 @@ class App:
             self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting,
             self.capture, self.note,
         )  # fmt: skip
+        self.loading: Loading = Loading(self.session, self.playback, self.viewport, self._opening)
         self.browser: Browser = Browser(
             self.session, self.scans, self.sessions, self._opening, self.open, self.replayer.replay,
             self.tools.take_file, Previewer(window.ctx),

@@ -55,7 +55,7 @@ class Command(Generic[T]):
 
 @dataclass(frozen=True)
 class Listing(Generic[T]):
-    """A menu of what is there at the moment."""
+    """A menu of what is there at the moment; without a title its items stand in the menu that it is in."""
 
     title: str
     items: Callable[[T], Iterable[Item]]
@@ -63,12 +63,14 @@ class Listing(Generic[T]):
 
 @dataclass(frozen=True)
 class Menu(Generic[T]):
-    """Groups of entries, with a line between them. is_there: whether it is shown. icon: on the toolbar."""
+    """Groups of entries, with a line between them. is_there: whether it is shown. icon: on the toolbar.
+    title_now: what the toolbar calls it where that changes."""
 
     title: str
     groups: tuple[tuple[Command[T] | Listing[T] | Menu[T], ...], ...]
     is_there: Callable[[T], bool] = _always
     icon: str = ""
+    title_now: Callable[[T], str] | None = None
 
 
 Entry = Command[T] | Listing[T] | Menu[T]
@@ -179,6 +181,17 @@ def _look_switch(parameter: Parameter) -> Command[App]:
 def _renderers(app: App) -> Iterator[Item]:
     for name in app.rendering.choices:
         yield backends()[name].title, partial(app.rendering.choose, name), name == app.rendering.backend
+
+
+def _renderers_and_uses(app: App) -> Iterator[Item]:
+    """The renderers, each with what it is good for."""
+    for (title, act, is_on), name in zip(_renderers(app), app.rendering.choices, strict=True):
+        yield f"{title}: {backends()[name].good_for}", act, is_on
+
+
+def _renderer_name(app: App) -> str:
+    """The name of the renderer that draws."""
+    return "Renderer" if app.rendering.backend is None else backends()[app.rendering.backend].title
 
 
 def _themes(app: App) -> Iterator[Item]:
@@ -372,11 +385,17 @@ _PLAYBACK: Menu[App] = Menu("Playback", (
         _pace("every_frame", "Every frame", "E"),
     ),
 ))  # fmt: skip
-_TOOLS: Menu[App] = Menu("Tools", (
+_RENDERER: Menu[App] = Menu("Renderer", (
     (
-        Listing("Renderer", _renderers),
-        Command("backend", "Next renderer", lambda app: app.rendering.step(1), "B"),
-        Command("backend_before", "Previous renderer", lambda app: app.rendering.step(-1), "Shift+B"),
+        Listing("", _renderers_and_uses),
+    ),
+    (
+        Command("backend", "Next renderer", lambda app: app.naming.step(1), "B"),
+        Command("backend_before", "Previous renderer", lambda app: app.naming.step(-1), "Shift+B"),
+        Command(
+            "renderer_for_all", "Use renderer for all scans", lambda app: app.rendering.toggle_for_all(),
+            is_on=lambda app: app.rendering.is_for_all,
+        ),
         Command(
             "automatic", "Automatic renderer", lambda app: app.rendering.switch_automatic(),
             is_on=lambda app: app.document.goal is not None,
@@ -384,6 +403,9 @@ _TOOLS: Menu[App] = Menu("Tools", (
         ),
         _SWITCHES,
     ),
+))  # fmt: skip
+_TOOLS: Menu[App] = Menu("Tools", (
+    (_RENDERER,),
     (_PLAYBACK,),
 ))  # fmt: skip
 _HELP: Menu[App] = Menu("Help", (
@@ -403,6 +425,7 @@ _TOOLBAR_BEGIN: Toolbar = (
         "open",
         "fit",
         Menu("View", ((_OPENING_VIEW,), *_FROM.groups, (_TURNTABLE, _BOOKMARKS)), icon=icons.ICON_FA_EYE),
+        Menu("Renderer", _RENDERER.groups, icon=icons.ICON_FA_CUBE, title_now=_renderer_name),
     ),
 )
 _TOOLBAR_END: Toolbar = (("screenshot", "export", "record"), ("undo", "redo"))

@@ -43,6 +43,7 @@ def draw(app: App) -> Place:
     place = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
     for name, draw_part in (
         ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken, app.keyboard)),
+        ("What is loaded", lambda: app.loading.draw(place, app.tasks.cancel)),
         ("Help", app.help.draw),
         ("The first card", lambda: app.welcome.draw(*place[:3])),
         ("The dialog that opens scans", lambda: app.browser.draw(app.palette.broken)),

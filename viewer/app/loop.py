@@ -37,6 +37,7 @@ class Loop:
         self._watch = watch
         self._turns = Turns()
         self._reported: Any = None
+        self._announced: Any = None  # the scan and the renderer that were last shown as chosen
         self._told = 0, 0  # how many messages, and how many of them are shown
 
     def run(self) -> None:
@@ -91,6 +92,7 @@ class Loop:
         changes = (
             app.playback.player.until_next(now), app.notices.next_change(now),
             app.steering.turntable.next_change(now), app.glide.next_change(now), app.replayer.until_next(now),
+            app.naming.next_change(now),
         )  # fmt: skip
         playing, viewport = app.playback.player.playing, app.viewport
         return min(look, *changes, viewport.better_at(playing) - now, self._refines_at - now)
@@ -127,6 +129,8 @@ class Loop:
             ("Playing", lambda: app.playback.advance(now)),
             ("Ranging", lambda: app.ranging.advance(now, not (app.moving or app.playback.waiting))),
             ("Picturing frames", lambda: app.thumbnails.advance(not (app.moving or app.playback.waiting))),
+            ("Loading", lambda: app.loading.advance(now)),
+            ("Naming the renderer", lambda: app.naming.advance(now)),
             ("Reading", app.pass_on_messages),
             ("Turning", lambda: app.steering.advance(now)),
             ("Gliding", lambda: app.glide.is_on),
@@ -180,7 +184,7 @@ class Loop:
             with app.failures.told("Showing the picture"):
                 app.window.fill(app.palette.panel)
                 if app.viewport.is_visible and (app.viewport.is_there or app.playback.problem is None):
-                    app.viewport.present()
+                    app.viewport.present(app.loading.awaited is not None or app.viewport.shows_another_scan)
             app.window.end()
         if drew:
             app.viewport.took((time.perf_counter() - start) * 1e3, self._goal_ms)
@@ -191,6 +195,11 @@ class Loop:
         if pose is None:
             return False
         app.steering.settle(pose)
+        chosen = app.playback.timeline, app.rendering.backend
+        if chosen != self._announced:  # its first picture may take seconds: the window says so before
+            self._announced = chosen
+            app.window.touch()
+            return False
         now, playing = time.monotonic(), app.playback.player.playing
         app.rendering.tell_missing(pose)
         request = app.ranging.ranged(app.document.request(pose, app.session.laid.layers(pose)))

@@ -131,7 +131,9 @@ def _text(app: App, item: str | Menu[App], has_words: bool) -> str:
         command = app.commands.of[item]
         icon, words = command.icon, command.short
     else:
-        icon, words = item.icon, f"{item.title} {icons.ICON_FA_CARET_DOWN}".lstrip()
+        title = item.title_now(app) if item.title_now else item.title
+        icon, words = item.icon, f"{title} {icons.ICON_FA_CARET_DOWN}".lstrip()
+        has_words = has_words or item.title_now is not None
     return f"{f'{icon}  {words}' if has_words and icon else icon or words}###{_name(item)}"
 
 
@@ -185,6 +187,8 @@ def _draw(app: App, entry: Entry[App]) -> None:
         )[0]:
             with app.failures.told(entry.title):
                 entry.act(app)
+    elif isinstance(entry, Listing) and not entry.title:
+        _draw_items(app, entry)
     elif (isinstance(entry, Listing) or entry.is_there(app)) and imgui.begin_menu(entry.title):
         if isinstance(entry, Listing):
             _draw_items(app, entry)

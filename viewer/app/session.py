@@ -29,7 +29,8 @@ class Session:
     """The open scan, and those that were open.
 
     scan: as the user named it. index: the frame. history: of the scan's document. laid: what tools lay over
-    its poses. pace: how the scan plays.
+    its poses. pace: how the scan plays. for_all: holds the renderer that the user chose for all scans, with
+    which those begin that were never open; without one, each begins with its own default.
     hash_found: brings the scan's hash (see `fingerprint`), None where it has no files.
     """
 
@@ -44,6 +45,7 @@ class Session:
         self.scan = scan
         self.index = 0 if left is None else left.pose
         self.history = History(left.document if left else document or Document())
+        self.for_all = (document or Document()).renderer_alone
         self.laid = Laid()
         self.pace = pace or Pace()
         self.hash_found: Future[str | None] = Future()
@@ -84,10 +86,10 @@ class Session:
     def turn_to(self, scan: str, left: SavedSession | None = None, up: str | None = None) -> None:
         """Go to another scan, as it was left; what can be undone of one that was open stays.
 
-        left: None where it was never open: it begins drawn as this one. up: its up axis then, where the user
-        tells one.
+        left: None where it was never open: it begins in this one's look, by its own default renderer or the
+        one `for_all`. up: its up axis then, where the user tells one.
         """
-        begun = History(self.document.for_another(up or UP) if left is None else left.document)
+        begun = History(self.document.for_another(self.for_all, up or UP) if left is None else left.document)
         self._left[known_as(self.scan)] = self.history, self.index
         beginning = begun, 0 if left is None else left.pose
         self.history, self.index = self._left.pop(known_as(scan), beginning)

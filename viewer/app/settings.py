@@ -31,7 +31,7 @@ from ..document.schema import (
 )
 from ..errors import InputError
 from ..files import parsed_json, read_text, whole_file
-from ..look import COLOR_BY, Look
+from ..look import Look
 from ..output.marks import Marks
 from ..params import describe
 from . import drawer, theme
@@ -78,8 +78,8 @@ def _read_recent(data: Any) -> tuple[str, ...]:
 class Settings:
     """The choices that outlive the window.
 
-    window: None until it was open once. backend: None for the scan's own default. params: backend ->
-    its `Params`. goal: that it is chosen for automatically. marks: over the view. marks_in_files: whether
+    window: None until it was open once. backend, params, goal: what the user chose for all scans, see
+    `Session.for_all`. marks: over the view. marks_in_files: whether
     saved pictures have them. cube: whether the orientation cube is shown. turn_seconds: of the turntable.
     export, export_marks: of the export dialog. recent: the scans opened last, newest first. places: what
     earlier versions kept here of each scan, whose documents have files of their own now.
@@ -117,12 +117,12 @@ class Settings:
     @classmethod
     def of(cls, session: Session, **others: Any) -> Settings:
         """Settings of what a session holds, and of other fields by name."""
-        now = session.document
+        look, for_all = session.document.look.of_any_scan, session.for_all
         params = {
-            name: of for name, of in now.params.items() if is_dataclass(of)
+            name: of for name, of in for_all.params.items() if is_dataclass(of)
         }  # of backends that are there
         return cls(
-            backend=now.backend, params=params, goal=now.goal, look=now.look, pace=session.pace, **others
+            backend=for_all.backend, params=params, goal=for_all.goal, look=look, pace=session.pace, **others
         )  # fmt: skip
 
     @property
@@ -135,14 +135,14 @@ class Settings:
         data = {"format": FORMAT} | asdict(replace(self, places={}))
         del data["places"]
         data["params"] = {name: chosen(values) for name, values in self.params.items()}
-        data["look"] = chosen(_of_any_scan(self.look))
+        data["look"] = chosen(self.look.of_any_scan)
         return data
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Settings:
         """Use what can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
         read = usable(cls(), {name: value for name, value in data.items() if name != "places"})
-        read = replace(read, look=_of_any_scan(read.look))
+        read = replace(read, look=read.look.of_any_scan)
         return replace(read, places=_places(data.get("places"), read.document))
 
 
@@ -186,13 +186,6 @@ def _put_aside(path: Path, what: str) -> str:
     except OSError as error:
         return str(InputError(f"{what}, and cannot be moved ({error.strerror})", path, "All starts anew"))
     return str(InputError(what, path, f"It is kept as {kept.name}; all starts anew"))
-
-
-def _of_any_scan(look: Look) -> Look:
-    """The look without what only one scan can use: its up axis, range of values and scalars."""
-    default = Look()
-    color_by = look.color_by if look.color_by in COLOR_BY else default.color_by
-    return replace(look, color_by=color_by, up=default.up, low=default.low, high=default.high)
 
 
 def _places(data: Any, document: Document) -> dict[str, SavedSession]:

@@ -138,7 +138,7 @@ class Tasks:
         task, padding = tasks[-1], imgui.get_style().frame_padding.x
         others = f", {len(tasks) - 1} more" if len(tasks) > 1 else ""
         cross = imgui.calc_text_size(icons.ICON_FA_XMARK).x + 4 * padding
-        end = f"  {_how_far(task)}{others}"
+        end = f"  {widgets.how_far(task)}{others}"
         room = width - imgui.calc_text_size(end).x - cross - 2 * padding
         if imgui.small_button(widgets.labelled(widgets.fitted(task.name, room) + end, "work")):
             imgui.open_popup("list of work")
@@ -162,16 +162,5 @@ class Tasks:
     def _draw_task(self, task: Task) -> None:
         width = _WIDTH * imgui.get_font_size()
         imgui.text_unformatted(widgets.fitted(task.name, width))
-        size = ImVec2(width, imgui.get_frame_height())
-        # Of a negative share ImGui draws a bar that only moves.
-        share = -task.seconds if task.progress is None else task.progress
-        imgui.progress_bar(share, size, widgets.unhidden(_how_far(task)))
-        imgui.same_line()
-        if imgui.button(f"Cancel##{id(task)}"):
+        if widgets.progress(task, width):
             self.cancel(task)
-
-
-def _how_far(task: Task) -> str:
-    """The share that is done, where it is known, and for how long the work has gone on."""
-    done = "" if task.progress is None else f"{100 * task.progress:.0f} %, "
-    return f"{done}{task.seconds:.0f} s"

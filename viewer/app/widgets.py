@@ -15,6 +15,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from ..files import printable
 from ..look import rgba
 from ..params import Parameter, describe
+from ..task import Task
 from . import theme
 
 T = TypeVar("T")
@@ -313,6 +314,22 @@ def modal(title: str, is_open: bool) -> Iterator[bool]:
     yield is_drawn
     if is_drawn:
         imgui.end_popup()
+
+
+def how_far(task: Task) -> str:
+    """The share that is done, where it is known, and for how long the work has gone on."""
+    done = "" if task.progress is None else f"{100 * task.progress:.0f} %, "
+    return f"{done}{task.seconds:.0f} s"
+
+
+def progress(task: Task, width: float) -> bool:
+    """Declare a bar of this width that shows how far work has come, and a button that cancels the work;
+    whether the user pressed it."""
+    # Of a negative share ImGui draws a bar that only moves.
+    share = -task.seconds if task.progress is None else task.progress
+    imgui.progress_bar(share, ImVec2(width, imgui.get_frame_height()), unhidden(how_far(task)))
+    imgui.same_line()
+    return imgui.button(f"Cancel##{id(task)}")
 
 
 def flat_button(icon: str, help: str) -> bool:

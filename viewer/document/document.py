@@ -222,11 +222,17 @@ class Document:
         is_upright = above @ up_vector(up) >= _UPRIGHT * np.linalg.norm(above)
         return turned if is_upright else replace(turned, camera=None, pivot=None, front=0.0)
 
-    def for_another(self, up: str = UP) -> Document:
-        """The document that a scan begins with which is opened after this one: drawn alike, all else anew.
-        up: its up axis."""
-        look = replace(self.look, up=up)
-        return Document(look=look, backend=self.backend, params=self.params, goal=self.goal)
+    @property
+    def renderer_alone(self) -> Document:
+        """The document with nothing but how it is drawn: by which renderer, with which parameters, or by one
+        that is chosen for its goal."""
+        return Document(backend=self.backend, params=self.params, goal=self.goal)
+
+    def for_another(self, usual: Document, up: str = UP) -> Document:
+        """The document that a scan begins with which is opened after this one, in the same look as far as
+        that suits any scan. usual: what is drawn with in all scans. up: its up axis."""
+        look = replace(self.look.of_any_scan, up=up)
+        return replace(usual.renderer_alone, look=look)
 
     @property
     def _automatic(self) -> DrawingWay | None:
@@ -235,10 +241,10 @@ class Document:
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and the parameters that it begins with; the pose's
-        default where the one that was chosen is not there."""
+        default where the one that was chosen is not there or cannot draw it."""
         name, defaults = backend_for(pose)
         wanted = self.backend if self._automatic is None else self._automatic.backend
-        is_own = wanted != name and wanted in backends()
+        is_own = wanted != name and wanted in backends() and backends()[wanted].draws(pose)
         return backend_for(pose, wanted) if is_own else (name, defaults)
 
     def chosen(self, pose: Pose) -> tuple[str, Any]:

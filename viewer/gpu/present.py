@@ -18,8 +18,11 @@ class Presenter:
         self._triangle = gpu.ctx.vertex_array(self._program, [])
         self._texture: moderngl.Texture | None = None
 
-    def present(self, surface: Surface, left: int, bottom: int, size: tuple[int, int]) -> None:
+    def present(
+        self, surface: Surface, left: int, bottom: int, size: tuple[int, int], light: float = 1.0
+    ) -> None:
         """Put the picture's lower left corner there, in pixels from the window's, stretched to that size.
+        light: factor on its colours.
 
         The window's framebuffer is bound afterwards.
         """
@@ -28,7 +31,7 @@ class Presenter:
         texture.write(surface.picture)
         texture.filter = (moderngl.NEAREST,) * 2 if surface.size == size else (moderngl.LINEAR,) * 2
         texture.use(Texture.PICTURE)
-        self.gpu.set(self._program, corner=(left, bottom), size=size)
+        self.gpu.set(self._program, corner=(left, bottom), size=size, light=light)
         ctx.screen.use()
         ctx.viewport = (left, bottom, *size)
         ctx.enable_only(moderngl.NOTHING)

@@ -27,6 +27,17 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
     if chosen != name:
         rendering.choose(chosen)
     widgets.faint(backend(chosen).good_for)
+    is_for_all = rendering.is_for_all
+    if imgui.checkbox("Use for all scans", is_for_all)[1] != is_for_all:
+        rendering.toggle_for_all()
+    widgets.tooltip(
+        "Scans that you open for the first time begin with this renderer and its options.\n"
+        "Otherwise each begins with the one that suits it best."
+    )
+    if rendering.others_begin_with and not is_for_all:
+        widgets.faint(f"New scans begin with: {rendering.others_begin_with}")
+        if imgui.button("Clear choice for all scans"):
+            rendering.clear_for_all()
     automatic.draw(session, rendering, choosing, scale)
     name, params = session.document.chosen(pose)
     imgui.push_id("renderer")  # the look has parameters of the same names

@@ -46,7 +46,7 @@ class Ahead:
         if not player.playing:
             return [index]
         late = 0
-        if not session.pace.every_frame:
+        if not (session.pace.every_frame or playback.is_held):
             late = min(math.ceil(self._renderer.latency * player.rate), count - 1)
         steps = [*range(late, min(late + _REACH, count)), *reversed(range(late))]
         frames = [playback.after(index, step) for step in steps]

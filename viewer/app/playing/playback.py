@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,6 +17,7 @@ from .player import Player
 
 _RATE_SPAN = 1.0  # seconds over which shown frames are counted, longer where few are due
 _RATE_FRAMES = 4
+_PATIENCE = 0.5, 2.0  # seconds, and frames, that no other pose comes for until the clock waits for one
 
 
 class Playback:
@@ -25,8 +27,8 @@ class Playback:
     playing, it is the latest one that is there. dropped: readable frames that were not there
     at their time, since playing began; none where every frame is shown. jumps: how often it went elsewhere
     than playing would. is_prepared: whether a pose can be drawn as it is to be; until then the one before
-    stays. player: plays the frames that the document keeps to, `span`. whole: all frames, which steps go
-    through.
+    stays. is_held: whether the clock waits, since no pose has come for a while. player: plays the frames that
+    the document keeps to, `span`. whole: all frames, which steps go through.
     """
 
     def __init__(self, timeline: Timeline, session: Session, first: int = 0) -> None:
@@ -44,6 +46,8 @@ class Playback:
         self.pose: Pose | None = None
         self.dropped = 0
         self._shown: deque[float] = deque()  # when poses were, lately
+        self._moved_at = -math.inf  # when the last pose came, or playing went elsewhere
+        self.is_held = False
         self.session.index = first
         self.jumps += 1
         timeline.request(first)
@@ -85,6 +89,7 @@ class Playback:
         else:
             self.dropped = 0
             self._shown.clear()
+            self._moved_at = now
             self._play(now)
 
     def _play(self, now: float) -> None:
@@ -150,6 +155,7 @@ class Playback:
             return
         self.session.index = index
         self.jumps += 1
+        self._moved_at = now
         self.timeline.request(index)
         self.player.enter(self._in_span(index), now)
 
@@ -162,7 +168,10 @@ class Playback:
         """Take in what time and the timeline's worker have brought."""
         self._keep_to(self._chosen(), now)
         late = self.waiting
-        if late and self.session.pace.every_frame:
+        seconds, frames_long = _PATIENCE
+        patience = max(seconds, frames_long / self.player.rate)
+        self.is_held = late and self.player.playing and now > self._moved_at + patience
+        if late and (self.session.pace.every_frame or self.is_held):
             self.player.enter(self._in_span(self.session.index), now)  # its time begins when it is there
         if frames := [self.span[frame] for frame in self.player.due(now)]:
             missed = ([self.session.index] if late else []) + frames[:-1]
@@ -172,6 +181,7 @@ class Playback:
         pose = self._best_pose()
         if pose is not None and pose is not self.pose:
             self.pose = pose
+            self._moved_at = now
             self._shown.append(now)
         span = max(_RATE_SPAN, _RATE_FRAMES / self.player.rate)
         while self._shown and self._shown[0] < now - span:

@@ -8,6 +8,7 @@ from typing import Any
 
 from ...backends import backends
 from ...choice.goal import Goal
+from ...document.document import Document
 from ...look import Look, drawable
 from ...params import switches
 from ...scan.pose import Pose
@@ -27,14 +28,20 @@ class Rendering:
         self._missed: set[tuple[str, str]] = set()  # scan, and scalar or backend, which were told
 
     def tell_missing(self, pose: Pose) -> None:
-        """Tell, once a scan, that the chosen backend is not there, and that neither the frame nor the backend
-        has the number that the user chose to colour by."""
+        """Tell, once a scan, that the chosen backend is not there or cannot draw it, and that neither frame
+        nor backend has the number that the user chose to colour by."""
         look, chosen_backend = self._session.document.look, self._session.document.backend
         absent = self._session.scan, f"backend {chosen_backend}"
-        if chosen_backend is not None and chosen_backend not in backends() and absent not in self._missed:
+        stand_in = self._session.document.defaults(pose)[0]
+        if chosen_backend not in (None, stand_in) and absent not in self._missed:
             self._missed.add(absent)
-            stand_in = backends()[self._session.document.defaults(pose)[0]].title
-            self._note(f"This Scan4D has no renderer '{chosen_backend}': {stand_in} draws in its place.")
+            known = backends().get(str(chosen_backend))
+            why = (
+                f"{known.title} cannot draw this scan"
+                if known
+                else f"This Scan4D has no renderer '{chosen_backend}'"
+            )
+            self._note(f"{why}: {backends()[stand_in].title} draws it instead.")
         missed = self._session.scan, look.color_by
         names = self._session.laid.layers(pose).names(pose.overview.scalars)
         drawn_by = backends()[self._session.document.chosen(pose)[0]]
@@ -77,6 +84,39 @@ class Rendering:
     def switch_automatic(self) -> None:
         """Have the backend chosen automatically, within a time at first, or not any more."""
         self.aim(FIRST_GOAL if self._session.document.goal is None else None)
+
+    @property
+    def is_for_all(self) -> bool:
+        """Whether scans that were never open begin with the renderer that draws this one."""
+        wanted, usual = self._for_all, self._session.for_all
+        return (wanted.backend, wanted.params, wanted.goal) == (usual.backend, usual.params, usual.goal)
+
+    @property
+    def _for_all(self) -> Document:
+        document = self._session.document
+        name = None if document.goal else self.backend
+        return Document(
+            backend=name,
+            params={of: params for of, params in document.params.items() if of == name},
+            goal=document.goal,
+        )
+
+    def toggle_for_all(self) -> None:
+        """Have scans that were never open begin with the renderer and the parameters of this one, or each
+        with its own default again."""
+        self._session.for_all = Document() if self.is_for_all else self._for_all
+
+    def clear_for_all(self) -> None:
+        """Have each scan that was never open begin with its own default."""
+        self._session.for_all = Document()
+
+    @property
+    def others_begin_with(self) -> str:
+        """Words on the renderer that scans which were never open begin with; empty: each with its own."""
+        usual = self._session.for_all
+        if usual.goal is not None:
+            return f"automatic, within {usual.goal}"
+        return backends()[usual.backend].title if usual.backend in backends() else ""
 
     def reset(self) -> None:
         """Draw as a scan is drawn that was never open: renderer, its parameters and look."""

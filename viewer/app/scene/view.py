@@ -12,7 +12,6 @@ from ...camera import Camera
 from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
-from ...scan.times import frame_in_words
 from .. import notices, theme, widgets
 from . import cube, navigation, up_menu
 from .canvas import ViewPlace
@@ -59,6 +58,8 @@ def draw(app: App) -> None:
     with told("Scale bar and colour bar"):
         app.marks.draw(size)
     text = printable(words_over(app) or "")
+    if app.naming.name is not None:
+        text = "\n".join(filter(None, (app.naming.name, text)))
     if text:
         _draw_note(text, size)
     else:
@@ -161,10 +162,7 @@ def words_over(app: App) -> str | None:
         return str(playback.problem) if playback.problem else None
     if playback.player.playing or playback.pose.index == app.session.index:
         return _words_on_nothing(app)
-    if playback.problem:
-        return f"{playback.problem}\n{playback.pose.label} is shown instead."
-    doing = "Loading" if playback.timeline.ready(app.session.index) is None else "Preparing"
-    return f"{doing} {frame_in_words(app.session.index)} ..."
+    return f"{playback.problem}\n{playback.pose.label} is shown instead." if playback.problem else None
 
 
 def _words_on_nothing(app: App) -> str | None:

@@ -38,6 +38,7 @@ from .motion import Motion
 log = logging.getLogger(__name__)
 _RATE_SPAN = 1.0  # seconds over which pictures are counted
 _PREPARED_LATER = 0.1  # seconds until drawing again may find what a worker prepares
+_DIMMED = 0.3  # of the light of an image
 _UPLOAD_MS = 20.0  # that one turn of the window's loop may spend on uploading a pose
 
 
@@ -270,10 +271,16 @@ class Viewport:
         """Whether there is an image to show: where the last request was not drawn, the one before."""
         return self.surface is not None
 
-    def present(self) -> None:
-        """Copy it to its place in the window."""
+    @property
+    def shows_another_scan(self) -> bool:
+        """Whether nothing of the open scan was drawn yet, so that an image is of the one before."""
+        return self.request is None
+
+    def present(self, dimmed: bool = False) -> None:
+        """Copy it to its place in the window. dimmed: as what is not what was asked for."""
         if self.surface is not None:
-            self._presenter.present(self.surface, *self.place[:2], self.size)
+            light = _DIMMED if dimmed else 1.0
+            self._presenter.present(self.surface, *self.place[:2], self.size, light)
 
     def pick(self, pixel: tuple[int, int]) -> Picked | None:
         """The place that a pixel shows, without its spacing, never through a gap (`before_gap`).

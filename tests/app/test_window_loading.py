@@ -1,0 +1,71 @@
+"""The picture is dimmed, and says what comes, while it is not the one that the window asks for."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from scenes import sphere
+from virtual_screen import RunningApp, Screen, running_app
+
+from viewer.scan import formats
+
+# Reading waits while one file is there, and frames but the first count as unprepared while another is.
+GATES = """
+import os, time
+from viewer.app.playing.ahead import Ahead
+from viewer.scan.timeline import Timeline
+read, prepared = Timeline._read, Ahead.is_prepared
+def slow_read(self, index):
+    while os.path.exists("unread"):
+        time.sleep(0.01)
+    return read(self, index)
+Timeline._read = slow_read
+def slow_prepared(self, pose):
+    return not (pose.index and os.path.exists("unprepared")) and prepared(self, pose)
+Ahead.is_prepared = slow_prepared
+"""
+
+
+def brightness(app: RunningApp) -> float:
+    """The mean of the view's lower left quarter, where neither the cube nor the middle is."""
+    left, top, width, height = app.view()
+    shown = app.screen.picture()[top + height // 2 : top + height, left + width // 4 : left + width // 2]
+    return float(shown.mean())
+
+
+def test_no_picture_passes_for_another_scan_or_frame(screen: Screen, tmp_path: Path) -> None:
+    scan = tmp_path / "ball.npz"
+    formats.write(scan, sphere(2000))
+    unread, unprepared = tmp_path / "unread", tmp_path / "unprepared"
+    with running_app(screen, tmp_path, "demo", scan, before=GATES) as app:
+        app.settle()
+        bright = brightness(app)
+        unprepared.touch()
+        screen.do("key", "space")
+        waited_for = app.see(lambda state: state.loading).loading
+        assert waited_for.startswith("Preparing frame ")
+        dropped = app.state.dropped
+        assert dropped <= 15, "frames of half a second, as the clock waits"
+        time.sleep(1)
+        assert (app.state.dropped, app.state.loading) == (dropped, waited_for)
+        assert brightness(app) < 0.6 * bright
+        unprepared.unlink()
+        app.see(lambda state: state.frame > dropped and state.loading is None)
+        screen.do("key", "space", "key", "BackSpace")
+        app.settle()
+
+        unread.touch()
+        screen.do("key", "Next")
+        assert app.see(lambda state: state.loading).loading == "Loading ball.npz"
+        assert app.state.scan == "demo"
+        app.see()
+        assert brightness(app) < 0.6 * bright
+        before = len(app.states)
+        unread.unlink()
+        app.see(lambda state: state.scan == str(scan) and hasattr(state, "frame"))
+        app.settle()
+        new = [state for state in app.states[before:] if state.scan == str(scan)]
+        assert not hasattr(new[0], "frame"), "it is said before it is drawn"
+        assert all(hasattr(state, "frame") or state.loading == "Loading ball.npz" for state in new)
+        assert app.state.loading is None

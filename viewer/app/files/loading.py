@@ -1,0 +1,88 @@
+"""What the view waits for, said over the picture, which is dimmed meanwhile."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from imgui_bundle import ImVec2, imgui
+
+from ...files import printable
+from ...scan.times import frame_in_words
+from ...task import Task
+from .. import widgets
+from ..playing.playback import Playback
+from ..scene.viewport import Viewport
+from ..session import Session
+from .opening import Opening
+from .scans import title
+
+_PATIENCE = 0.3  # seconds that may pass before a wait is told
+_WIDTH = 24.0  # in heights of the font
+_FLAGS = (
+    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
+)  # fmt: skip
+
+
+class Awaited(NamedTuple):
+    """What the view waits for. words: as users read it. task: how far that is, None where nobody can tell."""
+
+    words: str
+    task: Task | None
+
+
+class Loading:
+    """Says that the picture is of another scan, or of another frame, than the one that is asked for.
+
+    awaited: what is waited for, None where the picture is the right one, or has not been wrong for long.
+    """
+
+    def __init__(self, session: Session, playback: Playback, viewport: Viewport, opening: Opening) -> None:
+        self._session, self._playback, self._viewport = session, playback, viewport
+        self._opening = opening
+        self._since = math.inf  # by the clock, when the frame that is asked for began to be missed
+        self.awaited: Awaited | None = None
+
+    def advance(self, now: float) -> bool:
+        """Look at what is missed; whether something else is to be said. now: by the clock."""
+        before = self.awaited
+        is_missed = self._playback.waiting and (self._playback.is_held or not self._playback.player.playing)
+        self._since = min(self._since, now) if is_missed else math.inf
+        self.awaited = self._find(now)
+        return self.awaited != before
+
+    def _find(self, now: float) -> Awaited | None:
+        opening, playback = self._opening, self._playback
+        if opening.scan is not None and opening.task is not None and opening.task.seconds > _PATIENCE:
+            return Awaited(f"Loading {title(opening.scan)}", opening.task)
+        if playback.problem is not None or self._viewport.problem is not None:
+            return None
+        task = playback.timeline.reading or self._viewport.renderer.preparing
+        if self._viewport.shows_another_scan:
+            return Awaited(f"Loading {title(self._session.scan)}", task)
+        if now <= self._since + _PATIENCE:
+            return None
+        is_read = playback.timeline.ready(self._session.index) is not None
+        doing = "Preparing" if is_read else "Loading"
+        return Awaited(f"{doing} {frame_in_words(self._session.index)}", task)
+
+    def draw(self, place: tuple[float, float, float, float], cancel: Callable[[Task], object]) -> None:
+        """Declare it in the middle of the view. place: of the view: left, top, width, height."""
+        if self.awaited is None:
+            return
+        words, task = self.awaited
+        left, top, width, height = place
+        own_width = min(_WIDTH * imgui.get_font_size(), 0.9 * width)
+        middle = ImVec2(left + width / 2, top + height / 2)
+        imgui.set_next_window_pos(middle, imgui.Cond_.always, ImVec2(0.5, 0.5))
+        imgui.set_next_window_size_constraints(ImVec2(own_width, 0), ImVec2(own_width, 1e4))
+        imgui.begin("loading", flags=_FLAGS)
+        room = imgui.get_content_region_avail().x
+        imgui.text_unformatted(widgets.fitted(printable(words), room))
+        style = imgui.get_style()
+        button = imgui.calc_text_size("Cancel").x + 2 * style.frame_padding.x + style.item_spacing.x
+        if task is not None and widgets.progress(task, room - button):
+            cancel(task)
+        imgui.end()
