@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,7 +14,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError, explained
+from .errors import InputError, explained, shortened
 from .unfinished import temporary_file
 
 
@@ -98,6 +99,20 @@ def parsed_toml(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def named_inside(folder: Path, name: str, where: object) -> Path:
+    """The file in a folder that another file names: the rule for every path that stands in a scan's files.
+
+    where: the file that names it. Raises InputError, which names that, where the name leads out of the folder
+    or cannot be one. Links that stand in the folder are the user's own, and may lead out.
+    """
+    path = Path(name)
+    leads_out = path.is_absolute() or path.drive or path.root or ".." in re.split(r"[\\/]", name)
+    if leads_out or not name or not name.isprintable():
+        hint = "Put that file into the folder, and name it from there"
+        raise InputError(f"names '{shortened(name)}', which is no file in its folder", where, hint)
+    return folder / path
 
 
 def free_file(folder: Path, suffix: str) -> Path:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import os
+import shutil
 import time
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
+from zipfile import ZIP_STORED, ZipFile
 
 import lzf
 import numpy as np
 import OpenEXR
 from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
+from whole_folders import FOLDERS
 
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
@@ -38,12 +43,14 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.output.export import write_png
 from viewer.scan import formats
+from viewer.scan.listing import list_folder
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView, merge
 from viewer.scan.times import TIMES_FILE
 
+FOLDER = ".folder"  # how the kinds end that are folders, packed
 MOST_SEED = 20_000  # bytes of a real file that is worth damaging
 SIZE = (48, 32)
 _PCD = (
@@ -88,6 +95,11 @@ def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
     found: dict[str, list[bytes]] = {}
     for path in sorted(folder.iterdir()):
         found.setdefault(kind_of(path.name), []).append(path.read_bytes())
+    for name, make in FOLDERS.items():
+        place = folder / name
+        place.mkdir()
+        make(place)
+        found[f"{name}{FOLDER}"] = [packed_folder(place)]
     for path in sorted((data_dir / "odd").rglob("*")) if data_dir else ():
         # LAZ is unpacked in a process of its own: too slow to be damaged by the thousand.
         known = path.suffix in formats.known_suffixes() and path.suffix != ".laz"
@@ -209,6 +221,27 @@ def _open(path: Path) -> None:
             assert all(len(values) == len(cloud) for values in cloud.scalars.values())
 
 
+def _open_folder(path: Path, drawn: bool) -> None:
+    """Unpack a folder, and do with it what is done with a scan; `info` looks at it first."""
+    place = path.with_name("unpacked")
+    shutil.rmtree(place, ignore_errors=True)
+    with ZipFile(path) as archive:
+        archive.extractall(place)
+    scans = list_folder(place)
+    assert scans is not None
+    (_draw if drawn else _open)(place)
+
+
+def packed_folder(place: Path) -> bytes:
+    """The files of a folder as a ZIP archive, stored as they are: a folder to be damaged."""
+    packed = io.BytesIO()
+    with ZipFile(packed, "w", ZIP_STORED) as archive:
+        for file in sorted(place.rglob("*")):
+            if file.is_file():
+                archive.write(file, file.relative_to(place).as_posix())
+    return packed.getvalue()
+
+
 def _draw(path: Path) -> None:
     """Draw its first frame with each renderer, as small as can be."""
     renderer = shared_renderer()
@@ -293,17 +326,21 @@ _CHOICES: dict[str, Callable[[Path], Any]] = {
 
 def use(kind: str, drawn: bool) -> Callable[[Path], Any]:
     """What the project does with a file of a kind. drawn: scans are drawn, too."""
+    if kind.endswith(FOLDER):
+        return partial(_open_folder, drawn=drawn)
     return _CHOICES.get(kind, _draw if drawn else _open)
 
 
 def file_name(kind: str) -> str:
     """What a file of a kind is called."""
-    return kind if kind in _CHOICES else f"input{kind}"
+    return kind if kind in _CHOICES or kind.endswith(FOLDER) else f"input{kind}"
 
 
 def kind_of(name: str) -> str:
     """The kind of a file of the corpus: `camera_1.json` is a camera, `1.npy` a scan."""
     word, suffix = Path(name).stem.split("_")[0], Path(name).suffix
+    if suffix == FOLDER:
+        return next(f"{kind}{FOLDER}" for kind in FOLDERS if name.startswith(kind))
     return f"{word}{suffix}" if f"{word}{suffix}" in _CHOICES else suffix
 
 

@@ -157,11 +157,90 @@ def rejson(data: bytes, rng: Random) -> bytes:
     return text.encode()
 
 
+def refolder(data: bytes, rng: Random) -> bytes:
+    """Damage a file of a packed folder, or how its files name one another."""
+    try:
+        with ZipFile(io.BytesIO(data)) as archive:
+            files = {each.filename: archive.read(each) for each in archive.infolist()}
+    except (BadZipFile, ValueError, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error):
+        return data
+    name = rng.choice(sorted(files))
+    texts = [each for each in files if each.endswith((".txt", ".conf", ".match", ".log", ".json"))]
+    pictures = [each for each in files if each.endswith(".png")]
+    choice = rng.random()
+    if choice < 0.5:
+        files[name] = damaged(files[name], name[name.rindex(".") :], rng)
+    elif choice < 0.6:
+        files[rng.choice(sorted(files))] = files[name]
+    elif choice < 0.65:
+        del files[name]
+    elif choice < 0.8 and texts:
+        name = rng.choice(texts)
+        files[name] = rng.choice((_repeated, _led_out, _renamed))(files[name], rng)
+    elif choice < 0.9 and pictures:
+        width, height = (rng.choice((1, 100, 1000, 4000)) for _ in range(2))
+        files[rng.choice(pictures)] = flat_picture(width, height)
+    else:
+        files[name] = mutate(files[name], rng)
+    packed = io.BytesIO()
+    with ZipFile(packed, "w", ZIP_STORED) as archive:
+        for each, content in files.items():
+            archive.writestr(each, content)
+    return packed.getvalue()
+
+
+def _repeated(text: bytes, rng: Random) -> bytes:
+    """A line, or an element of a list, many times over: with another number at its beginning, or not."""
+    if b'"pods": [' in text and rng.random() < 0.7:
+        value = json.loads(text)
+        number = rng.choice((3, 64, 65))
+        value["pods"] = [{**value["pods"][0], "name": str(n)} for n in range(number)]
+        return json.dumps(value).encode()
+    lines = text.splitlines() or [b""]
+    line, count = rng.choice(lines), rng.choice((10, 300, 6000))
+    words, step = line.split(), rng.choice((0.0, 1e-6, 0.04))
+    if step and words and re.fullmatch(rb"[0-9.]+", words[0]):
+        rest = b" ".join(words[1:])
+        lines += [b"%.6f %b" % (float(words[0]) + n * step, rest) for n in range(count)]
+    else:
+        lines += [line] * count
+    return b"\n".join(lines)
+
+
+def _led_out(text: bytes, rng: Random) -> bytes:
+    """A name that leads out of the folder."""
+    names = list(re.finditer(rb"[\w/*-]+\.(png|jpg|ply|npz|tif)", text))
+    if not names:
+        return text
+    old = rng.choice(names)
+    out = (b"../", b"/", b"/etc/", b"a/../../", b"./", b"\\\\host\\", b"C:/")
+    return text[: old.start()] + rng.choice(out) + text[old.start() :]
+
+
+def _renamed(text: bytes, rng: Random) -> bytes:
+    """All names of files are one of them."""
+    names = [each[0] for each in re.finditer(rb"[\w/*-]+\.(png|jpg|ply|npz|tif)", text)]
+    return re.sub(rb"[\w/*-]+\.(png|jpg|ply|npz|tif)", rng.choice(names), text) if names else text
+
+
+def flat_picture(width: int, height: int) -> bytes:
+    """A 16-bit grey PNG of one depth, which packs to a thousandth."""
+    head = struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0)
+    rows = zlib.compress((b"\0" + b"\3\xe8" * width) * height, 9)
+    chunks = ((b"IHDR", head), (b"IDAT", rows), (b"IEND", b""))
+    packed = (struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
+
+
 _MUTATIONS: tuple[Mutation, ...] = (cut, flip, splice, repeat, renumber, reword, rebinary)
 
 
 def damaged(data: bytes, suffix: str, rng: Random) -> bytes:
     """A damaged form of a file of this kind: more than half of the time by what knows its layout."""
+    if suffix == ".folder":  # damage to the archive itself says nothing of folders
+        for _ in range(rng.choice((1, 1, 2, 3))):
+            data = refolder(data, rng)
+        return data
     aware = {".npz": repack, ".svo": reseal, ".json": rejson}.get(suffix)
     if aware is not None and rng.random() < 0.6:
         data = aware(data, rng)

@@ -11,6 +11,7 @@ import json
 import os
 import resource
 import sys
+import time
 import traceback
 import warnings
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from typing import Any, NamedTuple
 
 SPARE = 200 << 20  # bytes that any file may take
 PER_BYTE = 10  # the same for each byte of it
+SLOW = 5.0  # seconds of processor time that one input may take
 _WARM = 2  # files of each kind that are tried before
 DRAWN = 0.04  # of the scans, which takes fifty times as long as reading them
 OUR_OWN_FAULT = (AttributeError, NameError, LookupError, RecursionError, AssertionError)  # and no library's
@@ -42,6 +44,7 @@ def main() -> None:
     os.dup2(output, 1)
     os.dup2(output, 2)
 
+    sys.path.append(str(Path(__file__).parents[1]))  # where the tests' helpers are
     from kinds import corpus, data_folder, file_name, seeds
 
     (folder / "seeds").mkdir(exist_ok=True)
@@ -49,10 +52,11 @@ def main() -> None:
     warned: list[str] = []
     warnings.simplefilter("always")
     warnings.showwarning = lambda message, category, *_: warned.append(f"{category.__name__}: {message}")
-    for kind, files in sorted(whole.items()):  # so that what libraries need is there before memory is limited
-        for data in files[:_WARM]:
+    kinds = sys.argv[5:] or sorted(whole)
+    for kind in kinds:  # so that what libraries need is there before memory is limited
+        for data in whole[kind][:_WARM]:
             _run(Input(kind, data, drawn=True), folder)
-    of = damaged_seeds(int(source), whole, sys.argv[5:]) if source.isdecimal() else corpus(Path(source))
+    of = damaged_seeds(int(source), whole, kinds) if source.isdecimal() else corpus(Path(source))
     said_before = os.fstat(output).st_size
     warned.clear()
     print(json.dumps({"ready": True}), file=said)
@@ -60,7 +64,10 @@ def main() -> None:
         each = Input(*of(number))
         print(json.dumps({"begins": number, "kind": each.kind, "drawn": each.drawn}), file=said)
         _limit_memory(SPARE + PER_BYTE * len(each.data))
+        began = time.process_time()
         outcome, wrong = _run(each, folder)
+        if (taken := time.process_time() - began) > SLOW:
+            wrong = wrong or f"slow: {taken:.0f} s of processor time"
         _limit_memory(None)
         if warned:
             wrong = wrong or f"warning: {warned[0]}"
@@ -83,7 +90,7 @@ def damaged_seeds(
 
     def of(number: int) -> tuple[str, bytes, bool]:
         rng = Random(f"{seed} {number}")
-        kind = rng.choice(kinds or sorted(whole))
+        kind = rng.choice(kinds)
         data = damaged(rng.choice(whole[kind]), kind[kind.rindex(".") :], rng)
         return kind, data, rng.random() < DRAWN
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..codewords.stream import SUFFIX, WordStream, read_stream
 from ..codewords.words import FIELDS, decode_words
 from ..errors import shortened
-from ..scan.points import PointCloud
+from ..scan.points import PointCloud, finite_rows
 from ..scan.pose import Pose
 from ..scan.range_view import RangeView
 from ..scan.timeline import Timeline
@@ -41,10 +41,14 @@ def run(args: Namespace) -> int:
 
 
 def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
-    """Facts of a scan from one pose, as plain values. Lengths in scan units, times in seconds."""
-    cloud, times = pose.cloud, timeline.times
-    steps = np.diff(times)
-    low, high = ([float(f(column)) for column in cloud.positions.T] for f in (np.min, np.max))
+    """Facts of a scan from one pose, as plain values. Lengths in scan units, times in seconds.
+
+    Range views are looked at in parts: their points are not merged.
+    """
+    times = timeline.times
+    steps, found = np.diff(times), _Found(_attributes(pose.overview))
+    for positions, attributes in _parts(pose):
+        found.add(positions, attributes)
     return {
         "name": timeline.name,
         "poses": len(timeline),
@@ -56,17 +60,51 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         },
         "pose": pose.index,
         "label": pose.label,
-        "points": len(cloud),
-        "dropped": cloud.dropped,
+        "points": found.count,
+        "dropped": pose.dropped + found.dropped,
         "bytes": pose.nbytes,
         "views": [_view_facts(view) for view in pose.views],
-        "origin": cloud.origin.tolist(),
-        "bounds": {"low": (cloud.origin + low).tolist(), "high": (cloud.origin + high).tolist()},
+        "origin": pose.origin.tolist(),
+        "bounds": {"low": (pose.origin + found.low).tolist(), "high": (pose.origin + found.high).tolist()},
         "attributes": {
-            name: {"type": str(values.dtype), "columns": values[:1].size, "range": _range(values)}
-            for name, values in _attributes(cloud).items()
+            name: {"type": str(values.dtype), "columns": values[:1].size, "range": found.ranges[name]}
+            for name, values in _attributes(pose.overview).items()
         },
     }  # fmt: skip
+
+
+class _Found:
+    """What the parts of a pose add up to.
+
+    count, dropped: of points with finite coordinates, and of others. low, high: (3,) relative to the origin.
+    ranges: of each attribute.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.count = self.dropped = 0
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+        self.ranges: dict[str, list[float] | None] = dict.fromkeys(names)
+
+    def add(self, positions: NDArray[np.float32], attributes: Mapping[str, NDArray]) -> None:
+        """Add points, (n, 3), and their attributes."""
+        keep = finite_rows(positions)
+        kept = positions if keep is None else positions[keep]
+        self.count, self.dropped = self.count + len(kept), self.dropped + len(positions) - len(kept)
+        self.low = np.minimum(self.low, kept.min(axis=0, initial=np.inf))
+        self.high = np.maximum(self.high, kept.max(axis=0, initial=-np.inf))
+        for name, values in attributes.items():
+            both = [self.ranges[name], _range(values if keep is None else values[keep])]
+            self.ranges[name] = _range(np.array([span for span in both if span is not None]))
+
+
+def _parts(pose: Pose) -> Iterator[tuple[NDArray[np.float32], dict[str, NDArray]]]:
+    """The points of a pose, relative to the origin, and their attributes, a part at a time."""
+    if isinstance(pose.points, PointCloud):
+        yield pose.cloud.positions, _attributes(pose.cloud)
+        return
+    names = _attributes(pose.overview)
+    for samples, positions in pose.points.parts():
+        yield positions, {name: pose.points.of_samples(name, samples) for name in names}
 
 
 def stream_facts(path: str, stream: WordStream) -> dict[str, Any]:

@@ -443,14 +443,22 @@ def places_of(scan: str, recording: Path) -> list[str]:
 
 
 def places_to_open(scan: str, recording: Path) -> list[str]:
-    """Places of a scan that a recording names, checked before anything there is opened.
+    """Places of a scan that a recording or a session names, checked before anything there is opened.
 
-    Raises InputError where that would search through folders for whoever wrote the recording.
+    The scan may lie anywhere on this machine, since the user sees which one is opened. Raises InputError
+    where opening it would search through folders, or ask another machine, for whoever wrote the recording.
     """
-    if searches_folders(scan):
+    if where := far_place(scan):
         hint = "If it is the right one, open it first, or name it: scan4d render SCAN --replay ..."
-        raise InputError(f"names its scan as '{shortened(scan)}', all over the folders", recording, hint)
+        raise InputError(f"names its scan as '{shortened(scan)}', {where}", recording, hint)
     return places_of(scan, recording)
+
+
+def far_place(scan: str) -> str:
+    """Words on where a scan may be that only the user may name; "" where a recording may."""
+    if scan.startswith(("//", "\\\\")):
+        return "on another machine"
+    return "all over the folders" if searches_folders(scan) else ""
 
 
 def place_of(scan: str, recording: Path) -> str:

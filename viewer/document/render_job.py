@@ -19,10 +19,9 @@ from ..files import printable
 from ..folders import new_file, new_folder
 from ..helper import start_python
 from ..output.export import numbered
-from ..scan.open import searches_folders
 from ..task import Task
 from ..unfinished import temporary_folder
-from .recording import Recording
+from .recording import Recording, far_place
 
 _SAID = "scan4d: "  # before each line of warnings and errors
 _PROGRAM = __name__.partition(".")[0]  # which a process of its own runs, as `python -m` does
@@ -62,7 +61,7 @@ def make(
         arguments = ["render", "--replay", str(told_once), "-o", str(made / out.name)]
         arguments += ["--fps", f"{fps:.17g}", "--progress", *(["--anonymous"] if anonymous else [])]
         scan = recording.entries[0].scan
-        if scan is not None and searches_folders(scan):  # which a recording may not ask for
+        if scan is not None and far_place(scan):  # which a recording may not ask for
             arguments += ["--", scan]
         device, code, text = _run(task, arguments, folder / "said", told_once)
         for inner in (made, folder):  # as it says them, also where they are no UTF-8

@@ -123,9 +123,9 @@ def test_a_pod_may_miss_a_frame_but_not_its_texture(tmp_path: Path) -> None:
     [
         ({"range": None}, "pod 'left' has the range None, expected a file name"),
         ({"range": "a_*_*.tif"}, "with one . at most"),
-        ({"range": "../x.tif"}, "which is no file in this folder"),
-        ({"range": "/etc/passwd"}, "which is no file in this folder"),
-        ({"range": "*/x.tif"}, "which is no file in this folder"),
+        ({"range": "../x.tif"}, r"pod 'left' names '../x.tif', which is no file in its folder"),
+        ({"range": "/etc/passwd"}, "which is no file in its folder"),
+        ({"range": "*/x.tif"}, "with one . at most"),
         ({"range": "none.tif"}, r"there is no range image none\.tif"),
         ({"mask": 3}, "has the mask 3, expected a file name"),
         ({"fx": None}, "pod 'left' is no calibration: fx is None"),

@@ -7,6 +7,9 @@ replaces all that by a number of megabytes.
 
 What is held at a time counts, copies and conversions included. A reader that needs more for honest files
 should hold less, not ask for more.
+
+Where a frame has several files, they share one budget (see `shared`): what was read of the frame counts when
+the next file asks, and a file that is named again brings no more bytes.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
@@ -36,6 +41,38 @@ _RATIO = 10  # of the memory that reading takes to the size of the file
 _FREE = 180 << 20  # bytes that reading any file may take
 
 
+@dataclass
+class Budget:
+    """What the files of one frame may take together.
+
+    sizes: bytes of the files read so far, each once, by what tells it from all others. kept: bytes that hold
+    what was read of them.
+    """
+
+    sizes: dict[tuple[int, int], int] = field(default_factory=dict)
+    kept: int = 0
+
+    @property
+    def held(self) -> int:
+        """Bytes of all files read so far."""
+        return sum(self.sizes.values())
+
+
+_shared: ContextVar[Budget | None] = ContextVar("budget", default=None)  # of the frame that is read
+
+
+@contextmanager
+def shared() -> Iterator[Budget]:
+    """Have all files that are read meanwhile share one budget; who keeps what was read adds it to `kept`."""
+    token = _shared.set(Budget())
+    try:
+        budget = _shared.get()
+        assert budget is not None
+        yield budget
+    finally:
+        _shared.reset(token)
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
     """A file, open to be read. Raises OSError, also where it is no plain file.
@@ -44,6 +81,9 @@ def opened(path: Path) -> Iterator[BinaryIO]:
     """
     with open_plain(path) as stream:
         held = size_of(stream)
+        if (budget := _shared.get()) is not None:
+            found = os.fstat(stream.fileno())
+            budget.sizes[found.st_dev, found.st_ino] = held
         yield stream
         if size_of(stream) < held:
             raise InputError("was cut short while it was read", hint="Open it again when it is whole")
@@ -70,8 +110,10 @@ def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
     """Raise InputError, before anything is allocated, where a file would take more memory than it may.
 
     held: the bytes of the file. needed: those that reading it takes at most at a time. ratio: what it may
-    take for each byte.
+    take for each byte. Of a frame of several files, both are those of all (see `shared`).
     """
+    if (budget := _shared.get()) is not None:
+        held, needed = max(held, budget.held), needed + budget.kept
     if needed > most_memory(held, ratio):
         what = f"reading its {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
         hint = f"Where you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"

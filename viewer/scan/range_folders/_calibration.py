@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import InputError, shortened, unknown_name
 from ..range_view import DepthKind
-from ._texts import object_of, text_of
+from ._texts import object_of, rows_of
 
 FILES = ("camera.json", "camera.txt")  # beside the pictures
 
@@ -76,7 +76,7 @@ def read_calibration(path: Path, default: Calibration | None = None) -> Calibrat
     """
     try:
         is_json = path.suffix.lower() == ".json"
-        return _checked(_from_json(object_of(path)) if is_json else _from_text(text_of(path)), default)
+        return _checked(_from_json(object_of(path)) if is_json else _from_text(rows_of(path)), default)
     except InputError as error:
         raise InputError(error.what, path, error.hint or _FORM) from error
     except ValueError as error:
@@ -99,10 +99,9 @@ def _from_json(stored: dict[str, Any]) -> dict[str, Any]:
     return told
 
 
-def _from_text(text: str) -> dict[str, Any]:
-    rows = [line.split() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    numbers = [float(word) for row in rows for word in row]
-    if [len(row) for row in rows] in ([3] * 3, [4] * 4):
+def _from_text(rows: Sequence[tuple[int, Sequence[str]]]) -> dict[str, Any]:
+    numbers = [float(word) for _, row in rows for word in row]
+    if [len(row) for _, row in rows] in ([3] * 3, [4] * 4):
         matrix = np.array(numbers).reshape(len(rows), -1)
         numbers = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]
     if len(numbers) < 4:

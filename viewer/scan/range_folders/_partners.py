@@ -17,9 +17,10 @@ from ..times import natural_key
 from ._calibration import FILES, Calibration
 from ._pictures import COLOR_SUFFIXES, DEPTH_SUFFIX, depth_view, is_depth
 from ._source import RangeFrames
-from ._texts import text_of
+from ._texts import rows_of
 
 DEPTH_FOLDER = "depth"
+PICTURE_BYTES = 3000  # of memory for what is known of a depth picture
 
 _DEPTH, _POSE = "depth", "pose"  # in the names of files, and of folders
 _COLORS = ("color", "colour", "rgb", "image")
@@ -48,8 +49,8 @@ def frames_of_pictures(
     recorded: the times of the frames, (T,) seconds.
     """
 
-    def read(index: int) -> tuple[RangeView, ...]:
-        return (depth_view(pictures[index].depth, pictures[index].color, calibration, pose(index)),)
+    def read(index: int) -> Iterator[RangeView]:
+        yield depth_view(pictures[index].depth, pictures[index].color, calibration, pose(index))
 
     used = [
         path
@@ -98,7 +99,7 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
     if picture.pose is None:
         raise InputError("has no pose: no file beside it tells one", picture.depth)
     try:
-        numbers = np.array(text_of(picture.pose).split(), np.float64)
+        numbers = np.array([word for _, words in rows_of(picture.pose) for word in words], np.float64)
         if numbers.shape != (16,):
             raise InputError(f"holds {numbers.size} numbers, where a pose is a 4 x 4 matrix")
         return from_camera_to_world(numbers.reshape(4, 4))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,22 +12,25 @@ from numpy.typing import NDArray
 from ...files import printable
 from ..faces import Faces
 from ..formats import one_message
-from ..range_view import RangeView
+from ..formats._admission import admit, check_count, shared
+from ..range_view import RangeView, memory_of_merging
+
+MOST_VIEWS = 256  # of a frame
+_MERGING_RATIO = 100  # of memory to the files: pictures of depth pack well, and points take far more bytes
 
 
 @dataclass(frozen=True, eq=False)
 class RangeFrames:
     """Frames of range views, each of them in files of its own.
 
-    name: the scan's. labels: a file's name for each frame, at least one. read: the views of a frame, which
-    may raise anything. files: all that is read, calibration and poses among them. unit: of all views, as
-    the files tell it.
-    recorded: the times that were stored with the frames, (T,) seconds, or None.
+    name: the scan's. labels: a file's name for each frame, at least one. read: the views of a frame one after
+    the other, which may raise anything. files: all that is read, calibration and poses among them. unit: of all
+    views, as the files tell it. recorded: the times that were stored with the frames, (T,) seconds, or None.
     """
 
     name: str
     labels: tuple[str, ...]
-    read: Callable[[int], tuple[RangeView, ...]]
+    read: Callable[[int], Iterator[RangeView]]
     files: tuple[Path, ...]
     unit: str | None
     recorded: Callable[[], NDArray[np.float64] | None] = lambda: None
@@ -44,9 +47,16 @@ class RangeFrames:
         return self.recorded()
 
     def load(self, index: int) -> tuple[RangeView, ...]:
-        """Read the views of a frame. Raises InputError."""
-        with one_message(self.label(index), "cannot be read"):
-            return self.read(index)
+        """Read the views of a frame, whose files share one budget. Raises InputError."""
+        views: list[RangeView] = []
+        with one_message(self.label(index), "cannot be read"), shared() as budget:
+            for view in self.read(index):
+                views.append(view)
+                budget.kept += view.nbytes
+                check_count(len(views), MOST_VIEWS, "range views")
+            budget.kept = 0  # the views are among what merging takes
+            admit(budget.held, memory_of_merging(views), _MERGING_RATIO)
+        return tuple(views)
 
     def faces(self, index: int) -> Faces:
         """No faces: range images are grids."""

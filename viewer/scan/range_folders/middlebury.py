@@ -6,7 +6,7 @@ infinite disparity is unknown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +40,8 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     color = left if left.name in names else None
     files = (disparity, folder / _CALIBRATION, *([color] if color else []))
 
-    def read(_: int) -> tuple[RangeView, ...]:
-        return (_view(disparity, color, numbers),)
+    def read(_: int) -> Iterator[RangeView]:
+        yield _view(disparity, color, numbers)
 
     return RangeFrames(folder.resolve().name, (disparity.name,), read, files, "mm")
 

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import named_inside
 from ..image_poses import UPRIGHT, from_camera_to_world
 from ._calibration import PRIMESENSE, calibration_beside
-from ._partners import DEPTH_FOLDER, DepthPicture, frames_of_pictures, named_pictures
+from ._partners import DEPTH_FOLDER, PICTURE_BYTES, DepthPicture, frames_of_pictures, named_pictures
 from ._source import RangeFrames
-from ._texts import text_of
+from ._texts import rows_of
 
 TITLE = "Open3D's RGB-D images"
 
@@ -57,7 +58,7 @@ def lacks(names: Sequence[str]) -> str:
 
 def read_log(path: Path) -> NDArray[np.float64]:
     """The matrices of a log, (N, 4, 4), from the camera to the world. Raises InputError."""
-    words = text_of(path).split()
+    words = [word for _, row in rows_of(path) for word in row]
     try:
         return np.array(words, np.float64).reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
     except ValueError as error:
@@ -66,7 +67,8 @@ def read_log(path: Path) -> NDArray[np.float64]:
 
 
 def _pairs(folder: Path) -> list[DepthPicture]:
-    pairs = [line.split() for line in text_of(folder / _PAIRS).splitlines() if line.strip()]
+    file = folder / _PAIRS
+    pairs = [words for _, words in rows_of(file, PICTURE_BYTES)]
     if any(len(pair) != 2 for pair in pairs):
-        raise InputError("has a line that is no pair of names", folder / _PAIRS, "First depth, then colour")
-    return [DepthPicture(folder / depth, folder / color) for depth, color in pairs]
+        raise InputError("has a line that is no pair of names", file, "First depth, then colour")
+    return [DepthPicture(*(named_inside(folder, name, file) for name in pair)) for pair in pairs]

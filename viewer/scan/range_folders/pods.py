@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
+from ...files import named_inside
 from ..image_poses import UPRIGHT, from_camera_to_world
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView
@@ -59,32 +60,30 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         unit, pods = _rig(object_of(folder / FILE))
     except InputError as error:
         raise InputError(error.what, folder / FILE, error.hint or _FORM) from error
-    frames = sorted({key for pod in pods for key in _matches(folder, pod.patterns[_RANGE])}, key=natural_key)
+    found = {pattern: _matches(folder, pattern) for pod in pods for pattern in pod.patterns.values()}
+    frames = sorted({key for pod in pods for key in found[pod.patterns[_RANGE]]}, key=natural_key)
     if not frames:
         looked = ", ".join(pod.patterns[_RANGE] for pod in pods)
         raise InputError(f"there is no range image {looked}", folder / FILE)
 
-    def read(index: int) -> tuple[RangeView, ...]:
-        files = [(pod, _files(folder, pod, frames[index])) for pod in pods]
-        return tuple(
-            depth_view(
-                images[_RANGE],
-                images.get(_TEXTURE),
-                pod.calibration,
-                pod.world_to_camera,
-                pod.name,
-                images.get(_MASK),
-                images.get(_CONFIDENCE),
-            )
-            for pod, images in files
-            if images[_RANGE].is_file()
-        )
+    def read(index: int) -> Iterator[RangeView]:
+        for pod in pods:
+            images = _files(folder, pod, frames[index])
+            if images[_RANGE].is_file():
+                yield depth_view(
+                    images[_RANGE],
+                    images.get(_TEXTURE),
+                    pod.calibration,
+                    pod.world_to_camera,
+                    pod.name,
+                    images.get(_MASK),
+                    images.get(_CONFIDENCE),
+                )
 
     labels = tuple(next(pod.patterns[_RANGE].replace(_ANY, key) for pod in pods) for key in frames)
-    used = [
-        file for key in frames for pod in pods for file in _files(folder, pod, key).values() if file.is_file()
-    ]
-    return RangeFrames(folder.resolve().name, labels, read, (folder / FILE, *used), unit)
+    used = (pattern.replace(_ANY, key) for pattern, keys in found.items() for key in sorted(keys))
+    files = tuple(folder / name for name in (FILE, *dict.fromkeys(used)))
+    return RangeFrames(folder.resolve().name, labels, read, files, unit)
 
 
 def _rig(stored: dict[str, Any]) -> tuple[str, list[_Pod]]:
@@ -130,21 +129,20 @@ def _pose(stored: dict[str, Any]) -> NDArray[np.float64]:
 def _pattern(stored: dict[str, Any], image: str) -> str:
     """A file's name within the folder, with one star at most."""
     told = stored.get(image)
-    if not isinstance(told, str) or not told or told.count(_ANY) > 1 or "\0" in told:
+    if not isinstance(told, str) or told.count(_ANY) > 1 or _ANY in os.path.dirname(told):
         raise InputError(f"has the {image} {shortened(told)}, expected a file name with one {_ANY} at most")
-    if os.path.isabs(told) or ".." in Path(told).parts or _ANY in os.path.dirname(told):
-        raise InputError(f"has the {image} {shortened(told)}, which is no file in this folder")
+    named_inside(Path(), told, None)
     return told
 
 
-def _matches(folder: Path, pattern: str) -> list[str]:
+def _matches(folder: Path, pattern: str) -> set[str]:
     """Texts for the star in the names of the files of this pattern; without a star, none or an empty one."""
     place = folder / pattern
     if _ANY not in pattern:
-        return [""] if place.is_file() else []
+        return {""} if place.is_file() else set()
     start, end = place.name.split(_ANY)
     found = [file.name for file in place.parent.glob(glob.escape(start) + _ANY + glob.escape(end))]
-    return [key for name in found if (key := name[len(start) : len(name) - len(end)])]
+    return {key for name in found if (key := name[len(start) : len(name) - len(end)])}
 
 
 def _files(folder: Path, pod: _Pod, key: str) -> dict[str, Path]:

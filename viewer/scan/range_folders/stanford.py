@@ -8,7 +8,7 @@ row first, x to the right, y up, z towards the scanner.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
+from ...files import named_inside
+from ..formats._admission import check_count
 from ..formats.npz import read_arrays
 from ..formats.ply import read_range_grid
 from ..grids import view_of_grid
 from ..image_poses import from_rotation, rotation_of
 from ..range_view import RangeView
-from ._source import RangeFrames
+from ._source import MOST_VIEWS, RangeFrames
 from ._texts import text_of
 
 TITLE = "Stanford's laser scans"
@@ -39,8 +41,9 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     if len(found) > 1:
         raise InputError(f"has several files that place scans: {', '.join(found)}")
     (conf, lines) = found.popitem()
+    check_count(len(lines), MOST_VIEWS, "scans to place")
     placed = [_placement(folder / conf, line) for line in lines]
-    files = tuple(_file(folder / name) for name, _ in placed)
+    files = tuple(_file(named_inside(folder, name, folder / conf)) for name, _ in placed)
     if missing := [file.name for file in files if not file.is_file()]:
         raise InputError(f"there is no {missing[0]}, which {conf} places", folder)
     read = partial(_read, [(file, to_scan) for file, (_, to_scan) in zip(files, placed, strict=True)])
@@ -73,8 +76,8 @@ def _file(named: Path) -> Path:
     return as_arrays if as_arrays.is_file() else named
 
 
-def _read(scans: Sequence[tuple[Path, NDArray[np.float64]]], _: int) -> tuple[RangeView, ...]:
-    return tuple(_view(file, to_scan) for file, to_scan in scans)
+def _read(scans: Sequence[tuple[Path, NDArray[np.float64]]], _: int) -> Iterator[RangeView]:
+    return (_view(file, to_scan) for file, to_scan in scans)
 
 
 def _view(file: Path, to_scan: NDArray[np.float64]) -> RangeView:

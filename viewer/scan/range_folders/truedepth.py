@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
-from ...files import parsed_json
 from ...srgb import bytes_from_linear
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
 from ..times import natural_key
 from ._source import RangeFrames
-from ._texts import object_of, text_of
+from ._texts import json_of, object_of
 
 TITLE = "TrueDepth frames"
 
@@ -44,7 +43,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     return RangeFrames(
         name=folder.resolve().name,
         labels=tuple(frames),
-        read=lambda index: (_view(files[index], camera, turns),),
+        read=lambda index: iter([_view(files[index], camera, turns)]),
         files=(*files, *(folder / name for name in (_CAMERA, _MOTION) if name in names)),
         unit="m",
         recorded=lambda: _times(files),
@@ -97,7 +96,7 @@ def _quarter_turns(file: Path) -> int:
     bottom. Raises InputError.
     """
     try:
-        records = parsed_json(text_of(file))
+        records = json_of(file)
         gravity = np.array([(record["gravity_x"], record["gravity_y"]) for record in records], np.float64)
         right, up = gravity.sum(axis=0)  # none of an empty list
     except (ValueError, KeyError, TypeError) as error:

@@ -10,17 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from heapq import heappop, heappush
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
+from ...files import named_inside
 from ..image_poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
 from ._calibration import PRIMESENSE, calibration_beside
-from ._partners import DepthPicture, frames_of_pictures
+from ._partners import PICTURE_BYTES, DepthPicture, frames_of_pictures
 from ._source import RangeFrames
-from ._texts import text_of
+from ._texts import rows_of
 
 TITLE = "TUM's RGB-D images"
 
@@ -39,7 +41,10 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     colors = _partners(times, folder / _COLOR) if _COLOR in names else [None] * len(rows)
     poses = _partners(times, folder / _POSES) if _POSES in names else None
     pictures = [
-        DepthPicture(folder / words[0], folder / color[0] if color else None)
+        DepthPicture(
+            named_inside(folder, words[0], folder / _DEPTH),
+            named_inside(folder, color[0], folder / _COLOR) if color else None,
+        )
         for words, color in zip(rows, colors, strict=True)
     ]
     calibration = calibration_beside(folder, names, _KINECT)
@@ -65,28 +70,43 @@ def nearest_once(times: NDArray[np.float64], others: NDArray[np.float64], most: 
     """The number of the nearest other of each time, no other twice; -1 where none is within `most`.
 
     times, others: (N,) and (M,), increasing. The nearest pairs come first.
+
+    The nearest pair of those left are always neighbours among all times that are left, in order: so of N + M
+    times only neighbours are looked at, and new ones where a pair goes.
     """
-    first, last = np.searchsorted(others, times - most), np.searchsorted(others, times + most, "right")
-    pairs = [
-        (abs(others[other] - times[one]), one, other)
-        for one in range(len(times))
-        for other in range(first[one], last[one])
-    ]
-    found, taken = np.full(len(times), -1), set[int]()
-    for _, one, other in sorted(pairs):
-        if found[one] < 0 and other not in taken:
-            found[one] = other
-            taken.add(other)
+    both = np.concatenate([times, others])
+    order = np.argsort(both, kind="stable")
+    after, before = np.full(len(both) + 1, -1), np.full(len(both) + 1, -1)  # the last one: an end
+    after[order[:-1]], before[order[1:]] = order[1:], order[:-1]
+    found, count = np.full(len(times), -1), len(times)
+    pairs: list[tuple[float, int, int]] = []
+
+    def meet(left: int, right: int) -> None:
+        one, other = min(left, right), max(left, right)
+        if 0 <= one < count <= other and (apart := abs(both[other] - both[one])) <= most:
+            heappush(pairs, (apart, one, other - count))
+
+    for left, right in zip(order[:-1].tolist(), order[1:].tolist(), strict=True):
+        meet(left, right)
+    is_left = np.ones(len(both), bool)
+    while pairs:
+        _, one, other = heappop(pairs)
+        if not (is_left[one] and is_left[other + count]):
+            continue
+        found[one] = other
+        for gone in (one, other + count):
+            is_left[gone] = False
+            left, right = int(before[gone]), int(after[gone])
+            after[left], before[right] = right, left
+            meet(left, right)
     return found
 
 
 def _rows(path: Path) -> tuple[NDArray[np.float64], list[list[str]]]:
     """Times (N,), increasing, and the words behind them. Raises InputError."""
-    lines = [line.split() for line in text_of(path).splitlines()]
     by_time: dict[float, list[str]] = {}
-    for number, words in enumerate(lines, start=1):
-        if words and not words[0].startswith("#"):
-            by_time.setdefault(_time(words, path, number), words[1:])
+    for number, words in rows_of(path, PICTURE_BYTES):
+        by_time.setdefault(_time(words, path, number), words[1:])
     times = sorted(by_time)
     return np.array(times), [by_time[time] for time in times]
 
