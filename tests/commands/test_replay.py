@@ -28,7 +28,8 @@ from viewer.geometry import vector
 from viewer.gpu.surface import Surface
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
-from viewer.output.marks import LINE_COLOR, Marks
+from viewer.output.marks import Marks
+from viewer.output.overlays import LINE_COLOR
 from viewer.output.overlays import DrawnLandmark, DrawnPath
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
@@ -128,7 +129,7 @@ def test_measurements_are_drawn_again_follow_their_points_and_stand_in_anonymous
     Recording((measured, later)).save(Path("a.json"))
     assert run("render", "--replay", "a.json", "-o", "p%d.png").code == 0
     assert run("render", "--replay", "a.json", "--anonymous", "-o", "q%d.png").code == 0
-    ink = np.array(rgba(LINE_COLOR), int)
+    ink = np.array(rgba(f"#{LINE_COLOR:06x}"), int)
     for number, shown in enumerate((measured, later)):
         named = picture(Path(f"p{number}.png"))
         assert run("render", "--replay", f"p{number}.png", "-o", "again.png", "--force").code == 0

@@ -15,7 +15,6 @@ from viewer.camera import Camera
 from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from viewer.output.marks import (
     INK,
-    LINE_COLOR,
     PLATE,
     Legend,
     Marks,
@@ -28,8 +27,10 @@ from viewer.output.marks import (
     scale_bar,
     stamp,
     swatches,
+    text_height,
     ticks,
 )
+from viewer.output.overlays import LABEL_EDGE, LINE_COLOR
 from viewer.scan.points import PointCloud
 
 if TYPE_CHECKING:
@@ -221,14 +222,20 @@ def test_measured_lines_go_from_end_to_end_and_their_texts_keep_off_each_other()
         *(MeasuredLine(((-2, 0, 0), (2, 1, 0)), (0, 0), "4.1 mm"),) * 4,
     ]
     told = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=tuple(lines)), None)
-    color = np.array(rgba(LINE_COLOR), int)
+    color = np.array(rgba(f"#{LINE_COLOR:06x}"), int)
     there = np.abs(told.astype(int) - color).max(axis=2) <= 2
     for x, y in ((-3, -4.9), (3, -4.9), (-2, 0), (2, 1)):
         assert there[round(180 - 36 * y - 0.5), round(320 + 36 * x - 0.5)], "its end"
     assert there[round(180 + 36 * 4.9), 240:400].mean() > 0.9, "all along, but where a text is"
-    dark = (told[..., :3] < 40).all(axis=2)  # of plates
-    columns = dark[:, 318]
-    assert (np.diff(columns.astype(int)) == 1).sum() >= 4, "plates one above the other"
+
+    def colored(*drawn: MeasuredLine) -> int:
+        """The area of lines and of the edges of labels."""
+        image = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=drawn), None)
+        return int((np.abs(image.astype(int) - color).max(axis=2) <= 2).sum())
+
+    edge = max(2, round(LABEL_EDGE * text_height(SIZE))) * round(2 * text_height(SIZE))
+    others = colored(*lines) - colored(lines[0]) - colored(lines[1])
+    assert others == pytest.approx(3 * edge, rel=0.2), "no label covers another one's edge"
     faint = [replace(line, hidden=True) for line in lines]
     hidden = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=tuple(faint)), None)
     assert not (np.abs(hidden.astype(int) - color).max(axis=2) <= 2).any()

@@ -169,7 +169,7 @@ class App:
         self.capture: Capture = Capture(
             self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
             lambda *film: self.exporting.film(*film), self.ranging.words, self.tools.drawn,
-            self.choosing.choice_of,
+            self.choosing.choice_of, lambda: self.tools.label_places,
         )  # fmt: skip
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(

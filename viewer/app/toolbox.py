@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from ..document.part import Part
 from ..document.schema import usable
 from ..errors import InputError
 from ..geometry import Vector
+from ..output.labels import Box, LabelPlaces
 from ..output.overlays import NOTHING_DRAWN, DrawnMarks
 from ..rigid import STILL, Rigid
 from ..scan.layers import Layers
@@ -60,7 +61,7 @@ class Toolbox:
     """All tools of `tools.tool_names`.
 
     clicking: the name of the tool that clicks in the view go to; None where they only move the view.
-    is_dragging: whether the drag in the view is that tool's.
+    is_dragging: whether the drag in the view is that tool's. label_places: of labels over the view.
     session, playback, viewport, followed, note, redraw: what their desks offer them.
     """
 
@@ -80,6 +81,7 @@ class Toolbox:
         self.note, self.redraw, self._failures = note, redraw, failures
         self._remembered = remembered
         self.followed = Followed()
+        self.label_places = LabelPlaces()
         self.clicking: str | None = None
         self.is_dragging = False
         self._is_declined = False  # the last click, by the tool that had it
@@ -207,11 +209,13 @@ class Toolbox:
             if slot.has("below") and self._call(slot, "is_below"):
                 yield name, partial(self._declare, slot, "below")
 
-    def draw_over(self, view: ViewPlace) -> None:
-        """Have the tools draw over the picture."""
-        canvas = Canvas(view, self.viewport.image)
+    def draw_over(self, view: ViewPlace, taken: Sequence[Box]) -> None:
+        """Have the tools draw over the picture. taken: boxes in the view where labels would cover
+        something."""
+        canvas = Canvas(view, self.viewport)
         for slot in self._slots.values():
             self._call(slot, "overlay", canvas, view)
+        canvas.draw_labels(self.label_places, taken)
 
     def drawn(self, frame: int) -> DrawnMarks:
         """Find what the tools draw over a frame in pictures that are saved."""

@@ -28,6 +28,7 @@ from ..errors import InputError, MissingPackageError, explained
 from ..files import open_plain, whole_file
 from ..look import Look, rgba
 from ..native import OPENEXR, unsaid
+from .labels import LabelPlaces, covered_cells
 from .marks import Legend, marked
 
 if TYPE_CHECKING:
@@ -95,11 +96,21 @@ def pictures(
 
     size: (width, height). fps: of a film. Raises InputError where something cannot be written.
     """
+    places = LabelPlaces()
+
+    def with_places(legend: Legend | None) -> Legend | None:
+        """The legend whose labels stay where they are from picture to picture."""
+        return None if legend is None else replace(legend, places=places)
+
     if path.suffix.lower() == FILM_SUFFIX:
         with film(path, size, fps) as add:
-            yield lambda surface, number, description, legend: add(_marked_image(surface, legend))
+            yield lambda surface, number, description, legend: add(
+                _marked_image(surface, with_places(legend))
+            )
     else:
-        yield lambda surface, number, *told: write_picture(surface, numbered(path, number), *told)
+        yield lambda surface, number, description, legend: write_picture(
+            surface, numbered(path, number), description, with_places(legend)
+        )
 
 
 # --- pictures -------------------------------------------------------------------------------
@@ -144,7 +155,7 @@ def _marked_image(surface: Surface, legend: Legend | None) -> NDArray[np.uint8]:
 
 
 def with_hidden(legend: Legend, surface: Surface) -> Legend:
-    """The legend whose lines and landmarks tell what the surface hides of them."""
+    """The legend that knows where the surface shows the subject, and what it hides of lines and landmarks."""
     from ..analysis.pick import (
         are_seen,
         is_seen,
@@ -155,7 +166,8 @@ def with_hidden(legend: Legend, surface: Surface) -> Legend:
         for line in legend.lines
     )
     overlay = None if legend.overlay is None else legend.overlay.with_seen(partial(are_seen, surface))
-    return replace(legend, lines=tuple(lines), overlay=overlay)
+    covered = covered_cells(surface) if legend.lines or overlay else None
+    return replace(legend, lines=tuple(lines), overlay=overlay, covered=covered)
 
 
 def read_description(path: Path) -> str:

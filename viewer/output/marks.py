@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,14 +19,22 @@ from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
 from ..scan.times import frame_in_words
-from .overlays import Overlay, draw_overlay
+from .labels import Box, Callout, Ground, LabelPlaces, Spot, forms_of
+from .overlays import (
+    DIM_LINE,
+    LABEL_EDGE,
+    LEADER_OPACITY,
+    LEADER_THICK,
+    LINE_COLOR,
+    Overlay,
+    ToldLine,
+    draw_line,
+    draw_overlay,
+)
 
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
-Box = tuple[float, float, float, float]  # left, top, right, bottom; pixels from the upper left corner
-Spot = tuple[float, float]  # to the right and down, the same
 
 INK: Color = (245, 245, 245, 255)
-LINE_COLOR = "#58d6f0"  # of measurements, in the window as well
 _MEASURED: Color = (150, 150, 150, 255)
 PLATE: Color = (0, 0, 0, 170)  # light on dark, so that it is read on any picture
 _LINES = 45  # of text that are as high as a picture
@@ -39,10 +47,10 @@ _MOST_DIGITS = 15  # that a float64 holds
 # In heights of the text:
 _MARGIN, _PAD, _GAP = 0.8, 0.5, 0.35
 _TICK, _LINE = 0.5, 0.14  # height of a scale bar's ends, thickness of its line
+_LINE_STEP = 1.2  # from one line of a label to the next
 _MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
 _SWATCH_LINE = 1.4  # from one swatch to the next
-_MEASURED_LINE, _END = 0.11, 0.28  # thickness of a measured line, radius of its ends
-_FAINT = 0.35  # opacity of a line that is hidden
+_END = 0.28  # radius of a measured line's ends
 
 
 @dataclass(frozen=True)
@@ -96,6 +104,8 @@ class Legend:
     unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
     says of its numbers. lines: that were measured, and notes at places. notes: on the frame. factor: how many
     of `unit` one unit of the scan is. overlay: landmarks and lines of them, None where none are drawn.
+    covered: the cells of the picture that show the subject (see `labels.covered_cells`), None where not
+    known. places: of labels in the pictures before, which change with this one.
     """
 
     marks: Marks
@@ -110,6 +120,8 @@ class Legend:
     notes: tuple[str, ...] = ()
     factor: float = 1.0
     overlay: Overlay | None = None
+    covered: NDArray[np.bool_] | None = field(default=None, compare=False)
+    places: LabelPlaces = field(default_factory=LabelPlaces, compare=False)
 
 
 class MarkPainter(Protocol):
@@ -216,23 +228,25 @@ def draw(
     legend: Legend,
     values: tuple[float, float] | None,
     kind: ValueKind | None = None,
-) -> None:
+) -> list[Box]:
     """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp and notes on
-    the frame upper left.
+    the frame upper left. Returns where they are.
 
     size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar. kind: of
     its numbers, where the backend found them.
     """
+    drawn = []
     if legend.marks.scale_bar:
-        _draw_scale_bar(painter, size, legend)
+        drawn.append(_draw_scale_bar(painter, size, legend))
     if legend.marks.color_bar:
         foot = size[1] - _MARGIN * painter.em
         if values is not None:
-            foot = _draw_color_bar(painter, size, legend, values, kind) - _GAP * painter.em
+            drawn.append(_draw_color_bar(painter, size, legend, values, kind))
+            foot = drawn[-1][1] - _GAP * painter.em
         if told := swatches(legend.look):
-            _draw_swatches(painter, size, told, foot)
+            drawn.append(_draw_swatches(painter, size, told, foot))
     upper_left = [stamp(legend)] if legend.marks.stamp else []
-    _draw_plates(painter, size, [*upper_left, *legend.notes])
+    return [*drawn, *_draw_plates(painter, size, [*upper_left, *legend.notes])]
 
 
 def scale_bar_box(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> Box:
@@ -249,7 +263,7 @@ def _scale_text(painter: MarkPainter, size: tuple[float, float], legend: Legend)
     return _shortened(painter, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
 
 
-def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> None:
+def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> Box:
     em = painter.em
     box = left, top, right, bottom = scale_bar_box(painter, size, legend)
     painter.box(box, PLATE)
@@ -260,6 +274,7 @@ def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Leg
     for x in (start, start + pixels - line):
         painter.box((x, foot - tick, x + line, foot), INK)
     painter.box((start + line, foot - line, start + pixels - line, foot), INK)
+    return box
 
 
 def ticks(low: float, high: float, kind: ValueKind | None = None) -> list[tuple[float, str]]:
@@ -277,8 +292,8 @@ def _draw_color_bar(
     legend: Legend,
     values: tuple[float, float],
     kind: ValueKind | None,
-) -> float:
-    """Draw it lower right; returns where it begins at the top, pixels."""
+) -> Box:
+    """Draw it lower right; returns where it is."""
     em = painter.em
     title = _shortened(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
     note = _shortened(painter, range_note(legend), _TEXT_SHARE * size[0])
@@ -290,7 +305,8 @@ def _draw_color_bar(
     right, bottom = round(size[0] - _MARGIN * em), round(size[1] - _MARGIN * em)
     left = round(right - widest - 2 * _PAD * em)
     top = round(bottom - height - (2.5 + (1 + _GAP if note else 0) + 2 * _PAD) * em)
-    painter.box((left, top, right, bottom), PLATE)
+    box = left, top, right, bottom
+    painter.box(box, PLATE)
     left += round(_PAD * em)
     painter.text(left, top + round(_PAD * em), title)
     if note:
@@ -300,12 +316,12 @@ def _draw_color_bar(
     painter.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
     for share, text in told:
         painter.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
-    return top
+    return box
 
 
 def _draw_swatches(
     painter: MarkPainter, size: tuple[float, float], told: list[tuple[Color, str]], bottom: float
-) -> None:
+) -> Box:
     em, line = painter.em, round(_SWATCH_LINE * painter.em)
     texts = [_shortened(painter, text, _TEXT_SHARE * size[0]) for _, text in told]
     right = round(size[0] - _MARGIN * em)
@@ -316,66 +332,88 @@ def _draw_swatches(
         x, y = left + round(_PAD * em), top + round(_PAD * em) + place * line
         painter.box((x, y, x + round(_MAP_WIDTH * em), y + round(em)), color)
         painter.text(x + (_MAP_WIDTH + _GAP) * em, y, text)
+    return left, top, right, bottom
 
 
-def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequence[str]) -> None:
-    """Draw texts below each other upper left."""
+def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequence[str]) -> list[Box]:
+    """Draw texts below each other upper left; returns where they are."""
     em, left = painter.em, round(_MARGIN * painter.em)
+    boxes: list[Box] = []
     height = round((1 + 2 * _PAD) * em)
     for number, line in enumerate(texts):
         text, top = _shortened(painter, line, size[0] - 2 * (_MARGIN + _PAD) * em), left + number * height
-        painter.box((left, top, left + painter.width(text) + 2 * _PAD * em, top + height), PLATE)
+        boxes.append((left, top, left + painter.width(text) + 2 * _PAD * em, top + height))
+        painter.box(boxes[-1], PLATE)
         painter.text(left + _PAD * em, top + _PAD * em, text)
+    return boxes
 
 
-def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend) -> None:
-    """Draw landmarks and their lines, and the measured lines; each with its text on a plate beside it, off
-    the plates before; what has an end behind the eye is left out."""
-    told = [] if legend.overlay is None else draw_overlay(painter, size, legend.camera, legend.overlay)
+def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend, taken: Sequence[Box]) -> None:
+    """Draw landmarks and their lines, and the measured lines, and their labels; what has an end behind the
+    eye
+    is left out. taken: where other marks are."""
+    told: list[ToldLine] = []
+    marks = np.empty((0, 2))
+    if legend.overlay is not None:
+        told, marks = draw_overlay(painter, size, legend.camera, legend.overlay)
     lines = legend.lines if legend.marks.measurements or legend.marks.notes else ()
-    drawn = [(line, places) for line in lines if (places := _places(line, legend.camera, size))]
-    for line, places in drawn:
-        opacity = _FAINT if line.hidden else 1.0
-        for color, more in ((0, 0, 0, 0.6 * opacity), 2), ((*rgba(LINE_COLOR)[:3], opacity), 0):
-            painter.stroke(*places, _MEASURED_LINE * painter.em + more, color)
-            for place in places:
-                painter.stroke(place, place, 2 * _END * painter.em + more, color)
-    taken: list[Box] = []
-    texts = [(line.text, places) for line, places in drawn] + [(text, (a, b)) for a, b, text in told]
-    for words, places in texts:
-        text = _shortened(painter, words, size[0] - 2 * _PAD * painter.em)
-        taken.append(_free_box(painter, text, places, size, taken))
-        painter.box(taken[-1], PLATE)
-        painter.text(taken[-1][0] + _PAD * painter.em, taken[-1][1] + _PAD * painter.em, text)
+    for line in lines:
+        places = _places(line, legend.camera, size)
+        if places is None:
+            continue
+        opacities = np.full(2, DIM_LINE if line.hidden else 1.0)
+        draw_line(painter, places, [LINE_COLOR] * 2, opacities, np.ones(2, bool), 2 * _END * painter.em)
+        told.append(ToldLine(line.text, places, LINE_COLOR, float(opacities[0])))
+    inside = [one for one in told if _is_inside(one.places, size)]
+    marks = np.concatenate([marks, *(one.places for one in inside)])
+    ground = Ground(size, painter.em, legend.covered, marks, taken, legend.camera)
+    _draw_labels(painter, legend.places, inside, ground)
 
 
-def _places(line: MeasuredLine, camera: Camera, size: tuple[float, float]) -> tuple[Spot, Spot] | None:
-    """The ends in a picture of this size; None where one is behind the eye."""
-    found = [camera.place_in_picture(end) for end in line.ends]
-    width, height = size
-    there = [(width / 2 + place[0] * height, height / 2 - place[1] * height) for place in found if place]
-    return (there[0], there[1]) if len(there) == 2 else None
-
-
-def _free_box(
-    painter: MarkPainter, text: str, places: tuple[Spot, Spot], size: tuple[float, float], taken: list[Box]
-) -> Box:
-    """A box for a text beside the middle of a line: within the picture, and off all that is taken where there
-    is room."""
+def _draw_labels(painter: _Overlay, places: LabelPlaces, told: Sequence[ToldLine], ground: Ground) -> None:
+    """Draw texts on plates at their places, each with a leader from its line."""
     em = painter.em
-    width, height = painter.width(text) + 2 * _PAD * em, (1 + 2 * _PAD) * em
-    (x, y), (other_x, other_y) = places
-    left = min(max((x + other_x - width) / 2, 0.0), max(size[0] - width, 0.0))
-    rise = abs(other_y - y) * min(0.5 * width / max(abs(other_x - x), 1), 0.5)  # of the line, below the box
-    above = (y + other_y) / 2 - rise - height - _GAP * em
-    steps = [step * sign * (height + _GAP * em) for step in range(len(taken) + 2) for sign in (-1, 1)]
-    tops = [min(max(above + step, 0.0), max(size[1] - height, 0.0)) for step in steps]
-    boxes = [(left, top, left + width, top + height) for top in tops]
-    return next((box for box in boxes if not any(_overlap(box, other) for other in taken)), boxes[0])
+    room = ground.size[0] - 2 * (_MARGIN + _PAD) * em
+    forms = [
+        [[_shortened(painter, line, room) for line in form] for form in forms_of([one.text])] for one in told
+    ]
+    labels = [
+        Callout(one.text.partition(":")[0], tuple(_plate_size(painter, form) for form in own), one.places)
+        for one, own in zip(told, forms, strict=True)
+    ]
+    placed = places.place(labels, ground)
+    for one, place in zip(told, placed, strict=True):
+        if place.leader is not None:
+            ends, none = np.array(place.leader), np.zeros(2, bool)
+            opacities = np.full(2, max(one.opacity, LEADER_OPACITY))
+            draw_line(painter, ends, [one.color] * 2, opacities, none, 0.0, LEADER_THICK)
+    for one, own, place in zip(told, forms, placed, strict=True):
+        left, top, _, bottom = place.box
+        painter.box(place.box, PLATE)
+        painter.box(
+            (left, top, left + max(2, round(LABEL_EDGE * em)), bottom),
+            (*rgba(f"#{one.color:06x}")[:3], round(255 * one.opacity)),
+        )
+        for number, line in enumerate(own[place.form]):
+            painter.text(left + _PAD * em, top + (_PAD + number * _LINE_STEP) * em, line)
 
 
-def _overlap(one: Box, other: Box) -> bool:
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+def _plate_size(painter: MarkPainter, lines: Sequence[str]) -> tuple[float, float]:
+    """Width and height of the plate of a label."""
+    height = 1 + (len(lines) - 1) * _LINE_STEP + 2 * _PAD
+    return max(map(painter.width, lines)) + 2 * _PAD * painter.em, height * painter.em
+
+
+def _is_inside(places: NDArray[np.float64], size: tuple[float, float]) -> bool:
+    """Whether some of a line's places (N, 2) are in a picture."""
+    return bool(((places >= 0) & (places <= size)).all(axis=1).any())
+
+
+def _places(line: MeasuredLine, camera: Camera, size: tuple[float, float]) -> NDArray[np.float64] | None:
+    """The ends in a picture of this size, (2, 2); None where one is behind the eye."""
+    width, height = size
+    places = camera.places_in_picture(np.array(line.ends)) * (height, -height) + (width / 2, height / 2)
+    return places if np.isfinite(places).all() else None
 
 
 def _shortened(painter: MarkPainter, text: str, room: float) -> str:
@@ -404,10 +442,10 @@ def marked(
     if legend is None or not legend.marks:
         return image
     below = Image.fromarray(image)
-    painter = _Overlay(below.size)
-    _draw_lines(painter, below.size, legend)
-    draw(painter, below.size, legend, values, kind)
-    return np.asarray(Image.alpha_composite(below, painter.image))
+    lines, above = _Overlay(below.size), _Overlay(below.size)
+    taken = draw(above, below.size, legend, values, kind)
+    _draw_lines(lines, below.size, legend, taken)
+    return np.asarray(Image.alpha_composite(Image.alpha_composite(below, lines.image), above.image))
 
 
 class _Overlay:
@@ -429,18 +467,6 @@ class _Overlay:
     def text(self, left: float, top: float, text: str) -> None:
         # Capitals and digits stand 0.71 em high: in the middle of the line.
         self._draw.text((round(left), round(top + 0.855 * self.em)), text, INK, self._font, anchor="ls")
-
-    def stroke(self, start: Spot, stop: Spot, width: float, color: tuple[float, float, float, float]) -> None:
-        """Draw a line with round ends, smooth at its edges; a disc where it has no length. color: bytes, and
-        opacity from 0 to 1."""
-        reach, wide, high = width / 2 + 1, *self.image.size
-        left, right = _pixels(start[0], stop[0], reach, wide)
-        top, bottom = _pixels(start[1], stop[1], reach, high)
-        if left < right and top < bottom:
-            pixels = np.zeros((bottom - top, right - left, 4), np.uint8)
-            corner = np.array([left, top])
-            _stroke_on(pixels, np.array(start) - corner, np.array(stop) - corner, width, color)
-            self._lay(pixels, (left, top))
 
     def polyline(
         self,
@@ -516,7 +542,7 @@ def _stroke_on(
     color: tuple[float, float, float, float],
 ) -> None:
     """Draw a line with round ends onto transparent pixels, (H, W, 4), where it covers more than what is
-    there. color: as for `_Overlay.stroke`."""
+    there. color: bytes, and opacity from 0 to 1."""
     high, wide = pixels.shape[:2]
     left, right = _pixels(start[0], stop[0], width / 2 + 1, wide)
     top, bottom = _pixels(start[1], stop[1], width / 2 + 1, high)

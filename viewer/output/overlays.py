@@ -13,17 +13,21 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..geometry import Vector
 from ..rigid import STILL, Rigid
+from .labels import free_names
 
+LINE_COLOR = 0x58D6F0  # of measurements, in the window as well
 PLACED_COLOR, TRACKED_COLOR = 0x8DE36B, 0xF2C14E  # of landmarks, in the window as well
 LINE_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that a line lies on
-DIM_LINE, DIM_LANDMARK = 0.3, 0.35  # opacity where something is hidden
+DIM_LINE, DIM_LANDMARK = 0.5, 0.35  # opacity where something is hidden
+HALO_OPACITY, LEADER_OPACITY = 0.75, 0.8
 _DIGITS = 6  # of places, in the radius of the scan
 
 # In heights of the text:
-LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.11, 0.16, 0.22
+LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.15, 0.18, 0.22
+HALO, LEADER_THICK, LABEL_EDGE = 0.1, 0.08, 0.2  # dark beside lines; of a leader; of a label's coloured edge
 DOT_ROOM = 0.4  # how far apart dots are at least
+NAME_GAP = 0.15  # between a landmark and its name
 _RING_THICK = 0.066
-_NAME_GAP = 0.35
 
 
 # --- as values ------------------------------------------------------------------------------
@@ -171,10 +175,22 @@ def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
     return there
 
 
+@dataclass(frozen=True, eq=False)
+class ToldLine:
+    """A line of a picture that has a label. places: (N, 2), pixels. color: 0xRRGGBB."""
+
+    text: str
+    places: NDArray[np.float64]
+    color: int
+    opacity: float
+
+
 def draw_overlay(
     painter: OverlayPainter, size: tuple[float, float], camera: Camera, overlay: Overlay
-) -> list[tuple[tuple[float, float], tuple[float, float], str]]:
-    """Draw lines and landmarks; returns the texts that are to stand beside lines, with both ends of each.
+) -> tuple[list[ToldLine], NDArray[np.float64]]:
+    """Draw lines and landmarks; returns the lines that are to have labels, and all places that labels keep
+    off,
+    (N, 2).
 
     size: (width, height), pixels.
     """
@@ -184,16 +200,33 @@ def draw_overlay(
     for path in overlay.paths:
         part = slice(start, start + len(path.places))
         start = part.stop
-        _draw_path(painter, path, pixels[part], overlay.seen[part])
+        seen = overlay.seen[part]
+        _draw_path(painter, path, pixels[part], seen)
         words = ": ".join(text for text in (path.name, path.value) if text)
-        ends = pixels[[part.start, part.stop - 1]]
-        if words and np.isfinite(ends).all():
-            (x, y), (other_x, other_y) = ends.tolist()
-            told.append(((x, y), (other_x, other_y), words))
+        if words and np.isfinite(pixels[part]).all():
+            told.append(ToldLine(words, pixels[part], path.colors[0], 1.0 if seen.any() else DIM_LINE))
     count = len(overlay.landmarks)
     lengths = height / camera.heights_at(overlay.places[:count]) if count else np.empty(0)
     _draw_landmarks(painter, overlay.landmarks, pixels[:count], lengths, overlay.seen[:count])
-    return told
+    return told, pixels[np.isfinite(pixels).all(axis=1)]
+
+
+def draw_line(
+    painter: OverlayPainter,
+    places: NDArray[np.float64],
+    colors: Sequence[int],
+    opacities: NDArray[np.float64],
+    dots: NDArray[np.bool_],
+    dot: float,
+    thick: float = LINE_THICK,
+) -> None:
+    """Draw a line on a dark halo, so that it is seen on any picture. Arguments: as of
+    `OverlayPainter.polyline`,
+    but thick: in heights of the text."""
+    width, halo = thick * painter.em, 2 * max(HALO * painter.em, 1.0)
+    dark = [0] * len(places)
+    painter.polyline(places, width + halo, dark, HALO_OPACITY * opacities, dots, dot + halo if dot else 0.0)
+    painter.polyline(places, width, colors, opacities, dots, dot)
 
 
 def _draw_path(
@@ -203,9 +236,7 @@ def _draw_path(
     opacities = np.where(seen, 1.0, DIM_LINE)
     dots = dotted(pixels, DOT_ROOM * em) if path.has_dots else np.zeros(count, bool)
     colors = path.colors if len(path.colors) == count else path.colors[:1] * count
-    none = np.zeros(count, bool)
-    painter.polyline(pixels, LINE_THICK * em + 2, [0] * count, 0.6 * opacities, none, 0.0)
-    painter.polyline(pixels, LINE_THICK * em, colors, opacities, dots, 2 * DOT_RADIUS * em)
+    draw_line(painter, pixels, colors, opacities, dots, 2 * DOT_RADIUS * em if path.has_dots else 0.0)
 
 
 def _draw_landmarks(
@@ -217,23 +248,20 @@ def _draw_landmarks(
 ) -> None:
     """Draw discs, each in a ring of its uncertainty where that is wider and it was tracked, and names that
     cover no name before them. lengths: of a scan unit at each, pixels, (N,)."""
-    em = painter.em
-    taken: list[tuple[float, float, float]] = []  # left, right and top of names
-    for one, place, length, is_seen in zip(
-        landmarks, pixels.tolist(), lengths.tolist(), seen.tolist(), strict=True
-    ):
-        if not all(map(math.isfinite, place)):
-            continue
-        opacity = 1.0 if is_seen else DIM_LANDMARK
+    em, at_all = painter.em, np.isfinite(pixels).all(axis=1)
+    opacities = np.where(seen, 1.0, DIM_LANDMARK)
+    for number in np.flatnonzero(at_all).tolist():
+        one, place, opacity = landmarks[number], pixels[number], float(opacities[number])
         color = PLACED_COLOR if one.is_placed else TRACKED_COLOR
-        at, here = np.array([place]), np.ones(1, bool)
+        at, here = place[None], np.ones(1, bool)
         for ink, diameter, share in ((0, 2 * MARK_RADIUS * em + 2, 0.7), (color, 2 * MARK_RADIUS * em, 1.0)):
             painter.polyline(at, 0.0, [ink], np.array([share * opacity]), here, diameter)
-        if not one.is_placed and one.sure * length > MARK_RADIUS * em:
-            painter.ring((place[0], place[1]), one.sure * length, max(_RING_THICK * em, 1.0), color, opacity)
-        left, top = place[0] + (MARK_RADIUS + _NAME_GAP) * em, place[1] - 0.5 * em
-        right = left + painter.width(one.name)
-        is_free = all(right <= low or high <= left or abs(at_top - top) >= em for low, high, at_top in taken)
-        if one.name and is_free:
-            taken.append((left, right, top))
-            painter.shaded_text(left, top, one.name, opacity)
+        reach = one.sure * lengths[number]
+        if not one.is_placed and reach > MARK_RADIUS * em:
+            painter.ring((place[0], place[1]), reach, max(_RING_THICK * em, 1.0), color, opacity)
+    named = np.flatnonzero(at_all)
+    corners = pixels[named] + np.array([MARK_RADIUS + NAME_GAP, -0.5]) * em
+    texts = [landmarks[number].name for number in named.tolist()]
+    for number in free_names(texts, corners, em, painter.width):
+        left, top = corners[number].tolist()
+        painter.shaded_text(left, top, texts[number], float(opacities[named[number]]))

@@ -23,6 +23,7 @@ from ...files import free_file, working_folder
 from ...frame import Request
 from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
+from ...output.labels import LabelPlaces
 from ...output.marks import Legend, Marks, marked
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...task import Task, in_background
@@ -53,12 +54,14 @@ class Capture:
         range_note: Callable[[], str] = str,
         drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
         choice: Callable[[Request], Choice | None] = lambda _: None,
+        places: Callable[[], LabelPlaces] = LabelPlaces,
     ) -> None:
         """marks: brings those that what is saved has. film: makes one of a recording, under this name.
         range_note: brings what the colour bar of the view says. drawn: brings what tools draw over a
-        frame. choice: brings the one that a picture was drawn by."""
+        frame. choice: brings the one that a picture was drawn by. places: brings those of the view's
+        labels."""
         self._marks, self._film, self._range_note, self._drawn = marks, film, range_note, drawn
-        self._choice = choice
+        self._choice, self._places = choice, places
         self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self.recorder: Recorder | None = None
         self.last: Path | None = None
@@ -101,7 +104,7 @@ class Capture:
         legend = None
         if entry is not None:
             told = entry.legend(self._playback.timeline, request.pose)
-            legend = replace(told, range_note=self._range_note())
+            legend = replace(told, range_note=self._range_note(), places=self._places().copy())
         save = partial(self._begin_saving, entry, legend, self._session.hash_found)
         if viewport.is_refined:
             save(viewport.surface)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -10,15 +13,32 @@ from numpy.typing import NDArray
 
 from ...camera import Camera
 from ...geometry import Vector
-from ...output.overlays import DOT_RADIUS, DOT_ROOM, LINE_THICK, MARK_RADIUS, dotted
+from ...output import labels as placing
+from ...output.overlays import (
+    DIM_LINE,
+    DOT_RADIUS,
+    DOT_ROOM,
+    HALO,
+    HALO_OPACITY,
+    LABEL_EDGE,
+    LEADER_OPACITY,
+    LEADER_THICK,
+    LINE_THICK,
+    MARK_RADIUS,
+    NAME_GAP,
+    dotted,
+    runs_of,
+)
 from .. import theme
-from .labels import Box, Line, free_place, usual_place
+from .box import Box
+from .viewport import Viewport
 
 _CROSS = _INK = 0xFFFFFF
 _OUTLINE = 0x000000  # so that what is light is seen on any surface
 _POINT = 0.28  # radius, in heights of the font
-_GAP = 0.5  # between a line and its label
-_HEAD = 2.6  # of the view's head, where the prompt is
+_LINES, _POINTS, _TOP = range(3)  # layers of what is drawn
+_RING = 0.066  # thickness of a ring of uncertainty
+_MOST_MARKS = 2000  # places that labels keep off; of more, some
 _LOUPE, _LOUPE_AWAY = 4.5, 1.2  # half its side, and how far from its middle it is; the latter in sides
 _MAGNIFIED = 6.0  # screen pixels for one of the picture, in a loupe
 
@@ -50,6 +70,11 @@ class ViewPlace:
         places = self.camera.places_in_picture(positions) * (self.size.y, -self.size.y)
         return places + np.array([middle.x, middle.y])
 
+    def shows(self, places: NDArray[np.float64]) -> bool:
+        """Whether the view shows any of these places on the screen, (N, 2)."""
+        low, high = (self.box.low.x, self.box.low.y), (self.box.high.x, self.box.high.y)
+        return bool(((places >= low) & (places <= high)).all(axis=1).any())
+
     def lengths_on_screen(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
         """How long a scan unit is on the screen at places (N, 3), (N,); NaN behind the eye."""
         return self.size.y / self.camera.heights_at(positions)
@@ -68,33 +93,48 @@ def _like_runs(joined: NDArray[np.bool_], styles: Sequence[object]) -> Iterator[
 
 
 class Label:
-    """Lines of text on a plate. line: beside which, on the screen. faint: whether it is dimmed."""
+    """Lines of text on a plate. line: (N, 2), the places on the screen of what it belongs to. color: that of
+    the line. faint: whether it is dimmed."""
 
-    def __init__(self, texts: Sequence[str], line: Line, faint: bool = False) -> None:
-        self.texts, self.line, self.faint = texts, line, faint
+    def __init__(
+        self, texts: Sequence[str], line: NDArray[np.float64], color: int = _INK, faint: bool = False
+    ) -> None:
+        self.line, self.color, self.faint = line, color, faint
         em = imgui.get_font_size()
         self._pad = ImVec2(0.4 * em, 0.2 * em)
-        extents = [imgui.calc_text_size(text) for text in texts]
-        self.size = ImVec2(max(e.x for e in extents), sum(e.y for e in extents)) + self._pad * 2
+        self._forms = placing.forms_of(texts)
 
-    def in_short(self) -> Label:
-        """A label of what stands before the colon alone, such as its number."""
-        return Label([self.texts[0].partition(":")[0]], self.line, self.faint)
+    @property
+    def key(self) -> str:
+        """What stands before the colon, such as its number: it tells the label from others."""
+        return self._forms[0][0].partition(":")[0]
+
+    @property
+    def sizes(self) -> tuple[tuple[float, float], ...]:
+        """Width and height of each of its forms."""
+        forms = ([imgui.calc_text_size(line) for line in lines] for lines in self._forms)
+        extents = [
+            ImVec2(max(e.x for e in lines), sum(e.y for e in lines)) + self._pad * 2 for lines in forms
+        ]
+        return tuple((extent.x, extent.y) for extent in extents)
 
     def draw_at(self, corner: ImVec2) -> ImVec2:
         """Draw it with its upper left corner there; returns where the next one below it begins."""
-        self.draw(Box(corner, corner + self.size))
-        return corner + ImVec2(0, self.size.y + self._pad.y)
+        size = ImVec2(*self.sizes[0])
+        self.draw(Box(corner, corner + size))
+        return corner + ImVec2(0, size.y + self._pad.y)
 
-    def draw(self, box: Box) -> None:
+    def draw(self, box: Box, form: int = 0) -> None:
         """Text in the theme's colours on a plate of the theme, which is read on any picture."""
         draw_list = imgui.get_window_draw_list()
         draw_list.add_rect_filled(
             box.low, box.high, imgui.get_color_u32(imgui.Col_.window_bg, 0.92), self._pad.x
         )
+        edge = ImVec2(box.low.x + max(2.0, LABEL_EDGE * imgui.get_font_size()), box.high.y)
+        draw_list.add_rect_filled(box.low, edge, theme.packed(self.color, DIM_LINE if self.faint else 1.0))
         at = box.low + self._pad
-        for number, text in enumerate(self.texts):
-            color = imgui.Col_.text_disabled if number or self.faint else imgui.Col_.text
+        for number, text in enumerate(self._forms[form]):
+            color = imgui.Col_.text_disabled if (number and not form) or self.faint else imgui.Col_.text
             draw_list.add_text(at, imgui.get_color_u32(color), text)
             at.y += imgui.calc_text_size(text).y
 
@@ -102,35 +142,60 @@ class Label:
 class Canvas:
     """Draws over the picture, into the current ImGui window. Colours are 0xRRGGBB, alpha is 0..1.
 
-    One canvas serves all tools in a frame, so that labels keep off the points and labels of them all. em: the
-    height of the font.
+    One canvas serves all tools in a frame, so that labels keep off the points and labels of them all. Points
+    lie over lines, labels over points, and the loupe over all; `draw_labels` is called last. em: the height
+    of the font.
     """
 
-    def __init__(self, view: ViewPlace, image: int | None = None) -> None:
-        """image: the texture of the picture; None where there is none."""
-        self._view, self._image = view, image
-        self._taken: list[Box] = []
+    def __init__(self, view: ViewPlace, viewport: Viewport) -> None:
+        """viewport: has the picture that is drawn over."""
+        self._view, self._viewport = view, viewport
+        self._labels: list[Label] = []
+        self._marks: list[NDArray[np.float64]] = []  # that labels keep off, (N, 2) each, on the screen
         self.em = imgui.get_font_size()
+        imgui.get_window_draw_list().channels_split(_TOP + 1)
+
+    @contextmanager
+    def _layer(self, layer: int = _POINTS) -> Iterator[imgui.ImDrawList]:
+        draw_list = imgui.get_window_draw_list()
+        draw_list.channels_set_current(layer)
+        yield draw_list
+        draw_list.channels_set_current(_LINES)
 
     def line(self, start: ImVec2, stop: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A line between two places on the screen."""
-        draw_list, thick = imgui.get_window_draw_list(), LINE_THICK * self.em
-        draw_list.add_line(start, stop, theme.packed(_OUTLINE, 0.6 * alpha), thick + 2)
-        draw_list.add_line(start, stop, theme.packed(color, alpha), thick)
+        self._mark(*(start + (stop - start) * (n / 8) for n in range(9)))
+        self._stroke([start, stop], [(color, alpha)] * 2)
+
+    def _stroke(
+        self, points: list[Any], inks: Sequence[tuple[int, float]], thick: float = LINE_THICK
+    ) -> None:
+        """Draw a line on a dark halo through places on the screen, ImVec2 or pairs. inks: the colour and
+        opacity of the line from each place on."""
+        draw_list, width = imgui.get_window_draw_list(), thick * self.em
+        halo = width + 2 * max(HALO * self.em, 1.0)
+        joined = np.ones(len(points) - 1, bool)
+        for first, last in _like_runs(joined, [alpha for _, alpha in inks]):
+            dark = theme.packed(_OUTLINE, HALO_OPACITY * inks[first][1])
+            draw_list.add_polyline(points[first : last + 1], dark, halo, 0)
+        for first, last in _like_runs(joined, inks):
+            draw_list.add_polyline(points[first : last + 1], theme.packed(*inks[first]), width, 0)
 
     def point(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A disc at a place on the screen."""
-        draw_list, radius = imgui.get_window_draw_list(), _POINT * self.em
-        draw_list.add_circle_filled(place, radius + 1, theme.packed(_OUTLINE, 0.6 * alpha))
-        draw_list.add_circle_filled(place, radius, theme.packed(color, alpha))
-        self._take(place)
+        radius = _POINT * self.em
+        with self._layer() as draw_list:
+            draw_list.add_circle_filled(place, radius + 1, theme.packed(_OUTLINE, 0.6 * alpha))
+            draw_list.add_circle_filled(place, radius, theme.packed(color, alpha))
+        self._mark(place)
 
     def ring(self, place: ImVec2, color: int, alpha: float = 1.0) -> None:
         """A ring round a place on the screen."""
-        draw_list, radius, thick = imgui.get_window_draw_list(), _POINT * self.em, LINE_THICK * self.em
-        draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
-        draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
-        self._take(place)
+        radius, thick = _POINT * self.em, LINE_THICK * self.em
+        with self._layer() as draw_list:
+            draw_list.add_circle(place, radius, theme.packed(_OUTLINE, 0.6 * alpha), thickness=thick + 2)
+            draw_list.add_circle(place, radius, theme.packed(color, alpha), thickness=thick)
+        self._mark(place)
 
     def path(
         self,
@@ -146,25 +211,15 @@ class Canvas:
         are the same for many places in a row. dots: whether there are any.
         """
         there = np.logical_and.reduce(np.isfinite(places), axis=1)
-        joined, points = there[:-1] & there[1:], places.tolist()
-        draw_list, thick = imgui.get_window_draw_list(), LINE_THICK * self.em
-        if not dots and there.all() and len(set(colors)) == 1 and (alphas == alphas[0]).all():
-            for color, alpha, more in ((_OUTLINE, 0.6, 2), (colors[0], 1.0, 0)):
-                ink = theme.packed(color, alpha * float(alphas[0]))
-                draw_list.add_polyline(points, ink, thick + more, 0)
-            return
-        asked = list(zip(colors, alphas.tolist(), strict=True))
-        of_ink = {ink: theme.packed(*ink) for ink in set(asked)}
-        inks = [of_ink[ink] for ink in asked]
-        for start, stop in _like_runs(joined, alphas.tolist()):
-            color = theme.packed(_OUTLINE, 0.6 * float(alphas[start]))
-            draw_list.add_polyline(points[start : stop + 1], color, thick + 2, 0)
-        for start, stop in _like_runs(joined, inks):
-            draw_list.add_polyline(points[start : stop + 1], inks[start], thick, 0)
-        if not dots:
-            return
-        for at in np.flatnonzero(dotted(places, DOT_ROOM * self.em)):
-            draw_list.add_circle_filled(points[at], DOT_RADIUS * self.em, inks[at])
+        self._marks.append(places[there])
+        points, inks = places.tolist(), list(zip(colors, alphas.tolist(), strict=True))
+        for run in runs_of(places):
+            if run.stop - run.start > 1:
+                self._stroke(points[run], inks[run])
+        if dots:
+            draw_list, packed = imgui.get_window_draw_list(), {ink: theme.packed(*ink) for ink in set(inks)}
+            for at in np.flatnonzero(dotted(places, DOT_ROOM * self.em)):
+                draw_list.add_circle_filled(points[at], DOT_RADIUS * self.em, packed[inks[at]])
 
     def marks(
         self,
@@ -175,79 +230,84 @@ class Canvas:
     ) -> None:
         """Discs at many places on the screen, (N, 2), of opacity (N,), each in a ring of a radius (N,) where
         that is wider than the disc. Labels do not keep off them."""
-        draw_list, radius, thick = (
-            imgui.get_window_draw_list(),
-            MARK_RADIUS * self.em,
-            0.6 * LINE_THICK * self.em,
-        )
+        self._marks.append(places)
+        radius, thick = MARK_RADIUS * self.em, _RING * self.em
         colors = {alpha: theme.packed(color, alpha) for alpha in set(alphas.tolist())}
         outlines = {alpha: theme.packed(_OUTLINE, 0.7 * alpha) for alpha in colors}
-        for (x, y), alpha, reach in zip(places.tolist(), alphas.tolist(), reaches.tolist(), strict=True):
-            place = ImVec2(x, y)
-            draw_list.add_circle_filled(place, radius + 1, outlines[alpha])
-            draw_list.add_circle_filled(place, radius, colors[alpha])
-            if reach > radius:
-                draw_list.add_circle(place, reach, colors[alpha], thickness=thick)
+        with self._layer() as draw_list:
+            for (x, y), alpha, reach in zip(places.tolist(), alphas.tolist(), reaches.tolist(), strict=True):
+                place = ImVec2(x, y)
+                draw_list.add_circle_filled(place, radius + 1, outlines[alpha])
+                draw_list.add_circle_filled(place, radius, colors[alpha])
+                if reach > radius:
+                    draw_list.add_circle(place, reach, colors[alpha], thickness=thick)
 
     def names(self, texts: Sequence[str], places: NDArray[np.float64], alphas: NDArray[np.float64]) -> None:
         """Texts at the right of places on the screen, (N, 2), of opacity (N,): the first ones, and of the
         others those that cover no text before them."""
-        draw_list, line = imgui.get_window_draw_list(), imgui.get_text_line_height()
-        corners = (places + np.array([1.6 * MARK_RADIUS * self.em, -line / 2])).tolist()
-        inks = {
-            alpha: (theme.packed(_OUTLINE, alpha), theme.packed(_INK, alpha))
-            for alpha in set(alphas.tolist())
-        }
-        taken: set[tuple[int, int]] = set()  # cells as high as a line, and half as wide
-        for text, (left, top), alpha in zip(texts, corners, alphas.tolist(), strict=True):
-            row, column = int(top / line), int(2 * left / line)
-            if (row, column) in taken or (row + 1, column) in taken:
-                continue
-            columns = range(column, int(2 * (left + imgui.calc_text_size(text).x) / line) + 1)
-            cells = {(each, at) for at in columns for each in (row, row + 1)}
-            if taken.isdisjoint(cells):
-                taken |= cells
-                outline, ink = inks[alpha]
-                draw_list.add_text(ImVec2(left + 1, top + 1), outline, text)
-                draw_list.add_text(ImVec2(left, top), ink, text)
+        height = imgui.get_text_line_height()
+        corners = places + np.array([(MARK_RADIUS + NAME_GAP) * self.em, -height / 2])
+        free = placing.free_names(texts, corners, height, lambda text: imgui.calc_text_size(text).x)
+        with self._layer() as draw_list:
+            for number in free:
+                (left, top), alpha = corners[number].tolist(), float(alphas[number])
+                outline, ink = theme.packed(_OUTLINE, alpha), theme.packed(_INK, alpha)
+                draw_list.add_text(ImVec2(left + 1, top + 1), outline, texts[number])
+                draw_list.add_text(ImVec2(left, top), ink, texts[number])
 
     def loupe(self, place: ImVec2) -> None:
-        """The picture about a place on the screen, magnified in a square beside it, with a cross in its
-        middle; nothing where there is no picture."""
-        if self._image is None:
+        """Draw the picture about a place on the screen, magnified in a square beside it, with a cross in its
+        middle; nothing where that shows no surface."""
+        view, half, image = self._view, _LOUPE * self.em, self._viewport.image
+        ratio = self._viewport.size[1] / view.size.y  # pixels of the picture
+        x, y = ((place.x - view.corner.x) * ratio, (place.y - view.corner.y) * ratio)
+        reached = round(half / _MAGNIFIED * ratio)
+        if image is None or not self._viewport.shows_near((math.floor(x), math.floor(y)), reached):
             return
-        view, half = self._view, _LOUPE * self.em
         away = 2 * half * _LOUPE_AWAY
         across = away if place.x + away + half < view.box.high.x else -away
         up = -away if place.y - away - half > view.box.low.y else away
         middle = place + ImVec2(across, up)
         low, high = middle - ImVec2(half, half), middle + ImVec2(half, half)
         at, reach = (place - view.corner) / view.size, ImVec2(half, half) / _MAGNIFIED / view.size
-        draw_list = imgui.get_window_draw_list()
-        draw_list.add_image(imgui.ImTextureRef(self._image), low, high, at - reach, at + reach)
-        draw_list.add_rect(low, high, imgui.get_color_u32(imgui.Col_.border), thickness=LINE_THICK * self.em)
-        for arm in (ImVec2(half, 0), ImVec2(0, half)):
-            for thick, color in ((3.0, theme.packed(_OUTLINE, 0.5)), (1.0, theme.packed(_CROSS))):
-                for side in (1, -1):
-                    draw_list.add_line(middle + arm * (0.15 * side), middle + arm * side, color, thick)
+        border, thick = imgui.get_color_u32(imgui.Col_.border), LINE_THICK * self.em
+        with self._layer(_TOP) as draw_list:
+            draw_list.add_image(imgui.ImTextureRef(image), low, high, at - reach, at + reach)
+            draw_list.add_rect(low, high, border, thickness=thick)
+            for arm in (ImVec2(half, 0), ImVec2(0, half)):
+                for thick, color in ((3.0, theme.packed(_OUTLINE, 0.5)), (1.0, theme.packed(_CROSS))):
+                    for side in (1, -1):
+                        draw_list.add_line(middle + arm * (0.15 * side), middle + arm * side, color, thick)
 
-    def _take(self, place: ImVec2) -> None:
-        side = 2 * _POINT * self.em + 2
-        self._taken.append(Box.around(place, ImVec2(side, side)))
+    def _mark(self, *places: ImVec2) -> None:
+        """Have labels keep off places on the screen."""
+        self._marks.append(np.array([(place.x, place.y) for place in places]))
 
     def labels(self, labels: Sequence[Label]) -> None:
-        """Labels beside their lines, off each other and all points; in short where there is no room, and then
-        in full under the mouse."""
-        lines, view = [label.line for label in labels], self._view
-        area = Box(view.box.low + ImVec2(0, _HEAD * self.em), view.box.high)
-        for label in labels:
-            short, gap = label.in_short(), _GAP * self.em
-            if (box := free_place(label.size, label.line, gap, area, self._taken, lines)) is not None:
-                label.draw(box)
-            else:
-                box = free_place(short.size, label.line, gap, area, self._taken, lines)
-                box = box or usual_place(short.size, label.line, gap, area)
-                short.draw(box)
-                if view.is_hovered and imgui.is_mouse_hovering_rect(box.low, box.high):
-                    imgui.set_tooltip("\n".join(label.texts))
-            self._taken.append(box)
+        """Labels of lines; `draw_labels` places them all together."""
+        self._labels.extend(labels)
+
+    def draw_labels(self, places: placing.LabelPlaces, taken: Sequence[placing.Box]) -> None:
+        """Draw the labels of all tools off the subject and off each other, each with a leader from its line.
+
+        places: of those in the frames before. taken: boxes in the view where other things are.
+        """
+        view, corner = self._view, np.array([self._view.corner.x, self._view.corner.y])
+        marks = np.concatenate([np.empty((0, 2)), *self._marks]) - corner
+        marks = marks[:: len(marks) // _MOST_MARKS + 1]
+        size = view.size.x, view.size.y
+        ground = placing.Ground(size, self.em, self._viewport.covered, marks, taken, view.camera)
+        asked = [placing.Callout(one.key, one.sizes, one.line - corner) for one in self._labels]
+        placed = places.place(asked, ground)
+        with self._layer() as draw_list:
+            for label, place in zip(self._labels, placed, strict=True):
+                if place.leader is not None:
+                    alpha = 0.5 * LEADER_OPACITY if label.faint else LEADER_OPACITY
+                    ends = [ImVec2(*(np.array(end) + corner).tolist()) for end in place.leader]
+                    self._stroke(ends, [(label.color, alpha)] * 2, LEADER_THICK)
+            for label, place in zip(self._labels, placed, strict=True):
+                left, top, right, bottom = place.box
+                label.draw(
+                    Box(view.corner + ImVec2(left, top), view.corner + ImVec2(right, bottom)), place.form
+                )
+        draw_list.channels_merge()

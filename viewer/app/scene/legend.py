@@ -25,6 +25,7 @@ class ViewMarks:
     """The marks over the view.
 
     shown: which of them are, by the user's choice. in_files: whether saved pictures and recordings have them.
+    boxes: where they were drawn last, pixels from the view's upper left corner.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class ViewMarks:
         self._steering, self._ranging = steering, ranging
         self.shown = shown
         self.in_files: bool = in_files
+        self.boxes: list[Box] = []
 
     @property
     def of_files(self) -> Marks:
@@ -59,7 +61,7 @@ class ViewMarks:
     def draw(self, size: ImVec2) -> None:
         """Draw the marks of the picture into the current ImGui window, the 3D view. size: of the view."""
         request, surface = self._viewport.request, self._viewport.surface
-        camera = self._session.document.camera
+        camera, self.boxes = self._session.document.camera, []
         if camera is None or request is None or surface is None or not self._viewport.is_there:
             return
         pose, scale, count = request.pose, self._playback.scale, len(self._playback.timeline)
@@ -69,7 +71,7 @@ class ViewMarks:
         )  # fmt: skip
         corner = imgui.get_window_pos()
         canvas = _View(corner)
-        marks.draw(canvas, (size.x, size.y), told, surface.color_range, surface.value_kind)
+        self.boxes = marks.draw(canvas, (size.x, size.y), told, surface.color_range, surface.value_kind)
         if self.shown.scale_bar and self._steering.gesture is None and imgui.is_window_hovered():
             left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
             if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):

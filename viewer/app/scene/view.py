@@ -114,7 +114,8 @@ def _serve_tools(app: App, size: ImVec2) -> None:
         if is_released and is_first and widgets.is_click() and not imgui.get_io().key_shift:
             app.tools.click(_pixel(app))
     if camera := app.document.camera:
-        app.tools.draw_over(ViewPlace(app.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered))
+        place = ViewPlace(app.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered)
+        app.tools.draw_over(place, app.marks.boxes)
 
 
 def _take_wheel(app: App, size: ImVec2, radius: float) -> None:

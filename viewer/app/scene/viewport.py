@@ -9,6 +9,9 @@ from collections import defaultdict, deque
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...analysis.pick import Picked, before_gap, pick
 from ...backends import backends
 from ...bounds import Bounds
@@ -28,6 +31,7 @@ from ...gpu.present import Presenter
 from ...gpu.soften import soften
 from ...gpu.surface import Surface
 from ...look import SAMPLES
+from ...output.labels import covered_cells
 from ...renderer import Renderer
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
@@ -79,6 +83,7 @@ class Viewport:
         self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
         self._picked: tuple[tuple[int, int], Picked | None] | None = None
+        self._covered: tuple[int, NDArray[np.bool_]] | None = None  # by the number of the picture
 
     @property
     def aspect(self) -> float:
@@ -301,6 +306,27 @@ class Viewport:
             return pixel
         (x, y), (width, height), (wide, high) = pixel, self.surface.size, self.size
         return math.floor((x + 0.5) * width / wide), math.floor((y + 0.5) * height / high)
+
+    def shows_near(self, pixel: tuple[int, int], reach: int) -> bool:
+        """Whether the picture shows something at most so many pixels of the view beside one of them, across
+        or down."""
+        if self.surface is None or not self.is_there:
+            return False
+        away = max(1, round(reach * self.surface.size[1] / self.size[1]))
+        return bool(np.isfinite(self.surface.depth_around(*self.pixel_of_picture(pixel), away)).any())
+
+    @property
+    def covered(self) -> NDArray[np.bool_] | None:
+        """The cells of the picture that show the subject (see `labels.covered_cells`), None without a
+        picture.
+
+        Read from the GPU once for each picture.
+        """
+        if self.surface is None or not self.is_there:
+            return None
+        if self._covered is None or self._covered[0] != self.number:
+            self._covered = self.number, covered_cells(self.surface)
+        return self._covered[1]
 
     @property
     def image(self) -> int | None:

@@ -60,13 +60,13 @@ class Notebook:
             if note.frame not in (None, frame) or pose is None:
                 continue
             if note.position is None:
-                plate = Label([note.text or "..."], (below, below))
+                plate = Label([note.text or "..."], np.array([(below.x, below.y)]), _COLOR)
                 below = plate.draw_at(below)
                 continue
             place = view.on_screen(vector(self._desk.motion(pose).points(np.array(note.position))))
             if place is not None and view.box.clipped(place, place) is not None:
                 canvas.point(place, _COLOR)
-                labels.append(Label([note.text or "..."], (place, place)))
+                labels.append(Label([note.text or "..."], np.array([(place.x, place.y)]), _COLOR))
         canvas.labels(labels)
 
     def draw_list(self) -> None:

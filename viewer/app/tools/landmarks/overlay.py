@@ -49,10 +49,10 @@ def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:
         there = view.on_screen(vector(tool.desk.motion(pose).points(proposal.position)))
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
-            canvas.labels([Label(["mirror place: A sets it"], (there, there), faint=True)])
+            label = Label(["mirror place: A sets it"], np.array([(there.x, there.y)]), _GHOST, faint=True)
+            canvas.labels([label])
     if tool.dragged is not None and (there := view.on_screen(tool.dragged)) is not None:
         canvas.ring(there, _CHOSEN)
-    mouse = imgui.get_mouse_pos()
     is_placing = tool.target is not None or tool.is_free or tool.dragged is not None
     if view.is_hovered and is_placing and tool.desk.settings.loupe:
-        canvas.loupe(mouse)
+        canvas.loupe(imgui.get_mouse_pos())

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ....analysis.measure import Reading
 from ....analysis.spot import Spot
-from ....output.marks import LINE_COLOR
+from ....output.overlays import DIM_LINE, LINE_COLOR
 from ...scene.canvas import Canvas, Label, ViewPlace
 from .words import distance_words
 
 if TYPE_CHECKING:
     from . import Tool
-
-_COLOR = int(LINE_COLOR[1:], 16)
-_DIM = 0.35  # opacity where an end is not seen
 
 
 def draw(measuring: Tool, readings: Sequence[Reading], canvas: Canvas, view: ViewPlace) -> None:
@@ -28,7 +26,7 @@ def draw(measuring: Tool, readings: Sequence[Reading], canvas: Canvas, view: Vie
     canvas.labels([label for label in drawn if label is not None])
     if measuring.begun is not None and (place := view.on_screen(measuring.begun.position)) is not None:
         if view.is_hovered and measuring.is_active:
-            canvas.line(place, imgui.get_mouse_pos(), _COLOR, 0.7)
+            canvas.line(place, imgui.get_mouse_pos(), LINE_COLOR, 0.7)
         _draw_end(measuring.begun, place, 1.0, canvas)
 
 
@@ -37,11 +35,11 @@ def _draw_one(
 ) -> Label | None:
     """Draw ends and line of a measurement; returns its label, None where nothing of it is in the view."""
     ends = reading.measurement.ends
-    alpha = 1.0 if all([measuring.is_seen(end) for end in ends]) else _DIM
+    alpha = 1.0 if all([measuring.is_seen(end) for end in ends]) else DIM_LINE
     places = [view.on_screen(end.position) for end in ends]
     there = [place for place in places if place is not None]
     if len(there) == 2:
-        canvas.line(there[0], there[1], _COLOR, alpha)
+        canvas.line(there[0], there[1], LINE_COLOR, alpha)
     for end, place in zip(ends, places, strict=True):
         if place is not None:
             _draw_end(end, place, alpha, canvas)
@@ -51,10 +49,11 @@ def _draw_one(
     lines = [f"{number}:  {distance_words(reading, measuring.desk.scale)}"]
     if len(measuring.desk.timeline) > 1:
         lines.append(reading.motion)
-    return Label(lines, seen, alpha < 1)
+    line = np.array([(place.x, place.y) for place in seen])
+    return Label(lines, line, LINE_COLOR, faint=alpha < 1)
 
 
 def _draw_end(end: Spot, place: ImVec2, alpha: float, canvas: Canvas) -> None:
     """A disc where points are followed, a ring on the surface alone."""
     draw_place = canvas.ring if end.id is None else canvas.point
-    draw_place(place, _COLOR, alpha)
+    draw_place(place, LINE_COLOR, alpha)

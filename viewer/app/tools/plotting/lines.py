@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from imgui_bundle import ImVec2
 from numpy.typing import NDArray
 
 from ....analysis.measures import Measure, Series
@@ -131,11 +130,9 @@ class MeasureLines:
             if line.measure in told and pose is not None and np.isfinite(on_screen).all():
                 told.discard(line.measure)
                 series, scale = self._desk.followed.series[line.measure], self._desk.scale
-                first, last = ImVec2(*on_screen[0].tolist()), ImVec2(*on_screen[-1].tolist())
-                inside = view.box.clipped(first, last)
-                if inside is not None:
+                if view.shows(on_screen):
                     text = f"{line.measure}: {value_in_words(series, pose.index, scale)}"
-                    labels.append(Label([text], inside, faint=not line.seen.any()))
+                    labels.append(Label([text], on_screen, line.color, faint=not line.seen.any()))
         canvas.labels(labels)
 
 
