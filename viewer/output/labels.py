@@ -27,7 +27,7 @@ _LEAST_COVERED = 0.1  # of a cell, so that a few stray points are no subject
 _SAMPLED = 4  # rows of the surface that tell of a cell
 _MOST_ROWS = 64  # of places that are tried
 _JUDGED = 48  # places whose leaders are looked at, those that cost least without
-_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8, 0.0, 1.0)  # places on a line that a leader may begin at
+_SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)  # places on a line that a leader may begin at
 _AROUND = 6  # cells about marks that a label on the subject keeps off
 
 # In heights of the text:
@@ -163,6 +163,8 @@ class LabelPlaces:
             self._placed_in = ground.view
         self._before = ground.view
         self._kept = {key: self._kept[key] for key in keys if key in self._kept}
+        if not labels:
+            return []
         layout = _Layout(labels, ground)
         for number, key in enumerate(keys):
             if key in self._kept:
