@@ -29,8 +29,7 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
 from viewer.output.marks import Marks
-from viewer.output.overlays import LINE_COLOR
-from viewer.output.overlays import DrawnLandmark, DrawnPath
+from viewer.output.overlays import LINE_COLOR, DrawnLandmark, DrawnPath
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan import formats
