@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.output.labels import Callout, Ground, LabelPlaces, Place, covered_cells, forms_of, free_names
+from viewer.output.labels import (
+    Callout,
+    LabelGround,
+    LabelPlace,
+    LabelPlaces,
+    covered_cells,
+    forms_of,
+    free_names,
+)
 
 SIZE, EM, WIDE = (960.0, 640.0), 16.0, (150.0, 24.0)
 HEAD = (480.0, 330.0), (150.0, 230.0)  # the middle and the half axes of the subject
@@ -29,12 +37,14 @@ def callouts(count: int, seed: int = 0, moved: float = 0.0) -> list[Callout]:
     return [Callout(f"measure {n}", (WIDE, (90.0, 40.0)), line) for n, line in enumerate(lines)]
 
 
-def ground(labels: list[Callout], covered: NDArray[np.bool_] | None = None, view: object = "front") -> Ground:
+def ground(
+    labels: list[Callout], covered: NDArray[np.bool_] | None = None, view: object = "front"
+) -> LabelGround:
     marks = np.concatenate([label.line for label in labels])
-    return Ground(SIZE, EM, cells(*HEAD) if covered is None else covered, marks, (), view)
+    return LabelGround(SIZE, EM, cells(*HEAD) if covered is None else covered, marks, (), view)
 
 
-def share_covered(places: list[Place], covered: NDArray[np.bool_]) -> float:
+def share_covered(places: list[LabelPlace], covered: NDArray[np.bool_]) -> float:
     """How much of the labels' area lies on the subject."""
     on, area = 0.0, 0.0
     for place in places:
@@ -46,14 +56,14 @@ def share_covered(places: list[Place], covered: NDArray[np.bool_]) -> float:
     return on / area
 
 
-def overlaps(places: list[Place]) -> int:
+def overlaps(places: list[LabelPlace]) -> int:
     boxes = np.array([place.box for place in places])
     low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
     high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
     return int((np.triu((low < high).all(axis=2), 1)).sum())
 
 
-def crossings(places: list[Place]) -> int:
+def crossings(places: list[LabelPlace]) -> int:
     """How many pairs of leaders cross."""
     leaders = [np.array(place.leader) for place in places if place.leader is not None]
     found = 0

@@ -65,7 +65,7 @@ def forms_of(lines: Sequence[str]) -> list[list[str]]:
 
 
 @dataclass(frozen=True)
-class Place:
+class LabelPlace:
     """The place of a label. form: the number of the one that it has. leader: from its line to its box, None
     where they are near."""
 
@@ -76,9 +76,9 @@ class Place:
 
 @dataclass(frozen=True)
 class _Kept:
-    """A place that was chosen. form: as of `Place`. edge: the middle of the box's side that faces the line,
-    in shares of the picture. is_right: whether that is the right side. cost: of covering. length: of the
-    leader, in heights of the text."""
+    """A place that was chosen. form: as of `LabelPlace`. edge: the middle of the box's side that faces the
+    line, in shares of the picture. is_right: whether that is the right side. cost: of covering. length: of
+    the leader, in heights of the text."""
 
     form: int
     edge: Spot
@@ -89,7 +89,7 @@ class _Kept:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class LabelGround:
     """What labels keep off. size: width and height of the picture. em: the height of the text. covered: (R,
     C), which cells of the picture show the subject, None where that is not known. marks: (N, 2), places of
     landmarks and of lines. taken: boxes of what else lies over the picture. view: equal while the camera
@@ -154,7 +154,7 @@ class LabelPlaces:
         made._kept, made._placed_in, made._before = dict(self._kept), self._placed_in, self._before
         return made
 
-    def place(self, labels: Sequence[Callout], ground: Ground) -> list[Place]:
+    def place(self, labels: Sequence[Callout], ground: LabelGround) -> list[LabelPlace]:
         """Find the places of labels in a picture, in their order."""
         keys = _apart([label.key for label in labels])
         if ground.view != self._placed_in and ground.view in (self._before, None):
@@ -177,7 +177,7 @@ class LabelPlaces:
 class _Layout:
     """One picture's labels while they are being placed. boxes: (K, 4), NaN before they are."""
 
-    def __init__(self, labels: Sequence[Callout], ground: Ground) -> None:
+    def __init__(self, labels: Sequence[Callout], ground: LabelGround) -> None:
         self.labels, self.ground, self.em = labels, ground, ground.em
         width, height = ground.size
         self.low = np.array([_SIDE, _TOP]) * self.em
@@ -330,13 +330,13 @@ class _Layout:
         cuts = int(self.cutting(number, self.leaders[[number]], self.boxes[[number]])[0])
         return _Kept(self.forms[number], (edge[0], edge[1]), bool(is_right), cost, length, cuts)
 
-    def place_of(self, number: int) -> Place:
+    def place_of(self, number: int) -> LabelPlace:
         """The place of a label."""
         (x, y), (to_x, to_y) = self.leaders[number].tolist()
         is_long = _lengths(self.leaders[[number]])[0] > _LEAST_LEADER * self.em
         left, top, right, bottom = self.boxes[number].tolist()
         leader = ((x, y), (to_x, to_y)) if is_long else None
-        return Place((left, top, right, bottom), self.forms[number], leader)
+        return LabelPlace((left, top, right, bottom), self.forms[number], leader)
 
 
 def _apart(keys: Sequence[str]) -> list[str]:
@@ -355,7 +355,7 @@ def _starts(line: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.interp(_SHARES, along, line[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def _weights(ground: Ground) -> NDArray[np.float64]:
+def _weights(ground: LabelGround) -> NDArray[np.float64]:
     """What covering a square of the text's height costs in each cell, (R, C)."""
     covered = ground.covered
     if covered is None:

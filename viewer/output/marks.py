@@ -19,7 +19,7 @@ from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, color_table, rgba
 from ..params import describe, param
 from ..resources import resource_path
 from ..scan.times import frame_in_words
-from .labels import Box, Callout, Ground, LabelPlaces, Spot, forms_of
+from .labels import Box, Callout, LabelGround, LabelPlaces, Spot, forms_of
 from .overlays import (
     DIM_LINE,
     LABEL_EDGE,
@@ -366,11 +366,13 @@ def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend, ta
         told.append(ToldLine(line.text, places, LINE_COLOR, float(opacities[0])))
     inside = [one for one in told if _is_inside(one.places, size)]
     marks = np.concatenate([marks, *(one.places for one in inside)])
-    ground = Ground(size, painter.em, legend.covered, marks, taken, legend.camera)
+    ground = LabelGround(size, painter.em, legend.covered, marks, taken, legend.camera)
     _draw_labels(painter, legend.places, inside, ground)
 
 
-def _draw_labels(painter: _Overlay, places: LabelPlaces, told: Sequence[ToldLine], ground: Ground) -> None:
+def _draw_labels(
+    painter: _Overlay, places: LabelPlaces, told: Sequence[ToldLine], ground: LabelGround
+) -> None:
     """Draw texts on plates at their places, each with a leader from its line."""
     em = painter.em
     room = ground.size[0] - 2 * (_MARGIN + _PAD) * em

@@ -296,7 +296,7 @@ class Canvas:
         marks = np.concatenate([np.empty((0, 2)), *self._marks]) - corner
         marks = marks[:: len(marks) // _MOST_MARKS + 1]
         size = view.size.x, view.size.y
-        ground = placing.Ground(size, self.em, self._viewport.covered, marks, taken, view.camera)
+        ground = placing.LabelGround(size, self.em, self._viewport.covered, marks, taken, view.camera)
         asked = [placing.Callout(one.key, one.sizes, one.line - corner) for one in self._labels]
         placed = places.place(asked, ground)
         with self._layer() as draw_list:
