@@ -154,8 +154,13 @@ def in_columns(sections: Sequence[Section], count: int) -> list[list[Section]]:
 
 
 def _row(keys: str, does: str) -> None:
-    start = imgui.get_cursor_pos_x()
+    """Declare keys and what they do beside each other, each in as many lines as it takes."""
+    start, column = imgui.get_cursor_pos_x(), _KEY_COLUMN * imgui.get_font_size()
+    imgui.begin_group()
+    imgui.push_text_wrap_pos(start + column - imgui.get_style().item_spacing.x)
     imgui.text_disabled(keys)
+    imgui.pop_text_wrap_pos()
+    imgui.end_group()
     imgui.same_line()
-    imgui.set_cursor_pos_x(start + _KEY_COLUMN * imgui.get_font_size())
+    imgui.set_cursor_pos_x(start + column)
     imgui.text_wrapped(does)
