@@ -25,6 +25,7 @@ _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _TOOLTIP = 60  # characters of a line
 _NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
 _FACTS = 6.0  # where facts begin, in heights of the font
+ICON_WIDTH = 1.3  # of a button with an icon, in heights of frames
 _DOT = 0.25  # radius, in heights of the font
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
@@ -346,7 +347,7 @@ def icon_button(icon: str, help: str, color: int | None = None) -> bool:
     side = imgui.get_frame_height()
     if color is not None:
         imgui.push_style_color(imgui.Col_.text, theme.packed(color))
-    pressed = imgui.button(icon, ImVec2(1.3 * side, side))
+    pressed = imgui.button(icon, ImVec2(ICON_WIDTH * side, side))
     if color is not None:
         imgui.pop_style_color()
     tooltip(help)

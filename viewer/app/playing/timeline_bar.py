@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .playback import Playback
 
 _SPEED_WIDTH = 4.6  # in heights of the font
+_STEPS, _PACES = 4, 3  # buttons
 _SHORTEST_TRACK = 8.0
 _BAR = (0.12, 0.4)  # of the track's height, where the frames are
 _SPANS = (0.0, 0.12)  # the same of what tools mark
@@ -38,13 +39,23 @@ _GAP = "    "  # between what is said of the place under the mouse
 
 
 def draw(app: App) -> None:
-    """Declare the bar in the current ImGui window."""
+    """Declare the bar in the current ImGui window. Where it is narrow, the track has its room first: how the
+    scan plays moves into a list, and the time goes."""
     several = len(app.playback.timeline) > 1
+    em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
+    button = widgets.ICON_WIDTH * imgui.get_frame_height() + gap
+    place = _widest_place(app.playback) + em
+    room = imgui.get_content_region_avail().x - _STEPS * button - _SHORTEST_TRACK * em
+    has_pace = room > _PACES * button + _SPEED_WIDTH * em + gap + place
     imgui.begin_disabled(not several)
     _draw_steps(app)
-    _draw_pace(app)
+    if has_pace:
+        _draw_pace(app)
+    else:
+        _draw_list_of_pace(app)
     imgui.end_disabled()
-    _draw_place(app.playback)
+    if has_pace or room > button + place:
+        _draw_place(app.playback, place)
     report = _report(app.playback) if app.playback.player.playing else ""
     # Its width stays while it says nothing: the track must not move under the mouse.
     room = imgui.calc_text_size(_rates("100", "100", "10000 skipped")).x + imgui.get_style().item_spacing.x
@@ -100,18 +111,32 @@ def _draw_pace(app: App) -> None:
     imgui.same_line()
 
 
-def _draw_place(playback: Playback) -> None:
+def _draw_list_of_pace(app: App) -> None:
+    """Declare a button that opens how the scan plays."""
+    if widgets.icon_button(f"{icons.ICON_FA_CARET_DOWN}###pace", "How it plays: loop, direction, speed"):
+        imgui.open_popup("how it plays")
+    corner = imgui.get_item_rect_min() - ImVec2(0, imgui.get_style().item_spacing.y)
+    imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(0, 1))
+    if imgui.begin_popup("how it plays"):
+        _draw_pace(app)
+        imgui.end_popup()
+    imgui.same_line()
+
+
+def _draw_place(playback: Playback, width: float) -> None:
     """Write time and frame, in a width that does not change while playing."""
     timeline, index = playback.timeline, playback.session.index
     left = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
     imgui.text(_place(timeline.times[index], index, len(timeline)))
     widgets.tooltip(timeline.label(index))
-    widest = max(
-        imgui.calc_text_size(_place(time, len(timeline) - 1, len(timeline))).x
-        for time in (timeline.times[0], timeline.times[-1])
-    )
-    imgui.same_line(left + widest + imgui.get_font_size())
+    imgui.same_line(left + width)
+
+
+def _widest_place(playback: Playback) -> float:
+    times, count = playback.timeline.times, len(playback.timeline)
+    ends = (_place(time, count - 1, count) for time in (times[0], times[-1]))
+    return max(imgui.calc_text_size(text).x for text in ends)
 
 
 def _place(time: float, index: int, count: int) -> str:

@@ -109,7 +109,7 @@ class Bookmarks:
 
     def _draw_row(self, number: int, bookmark: Bookmark) -> bool:
         """One bookmark; True where it is to be deleted."""
-        gap, side = imgui.get_style().item_inner_spacing.x, 1.3 * imgui.get_frame_height()
+        gap, side = imgui.get_style().item_inner_spacing.x, widgets.ICON_WIDTH * imgui.get_frame_height()
         room = imgui.get_content_region_avail().x - 2 * (side + gap)
         name = widgets.fitted(bookmark.name, room)
         imgui.align_text_to_frame_padding()
