@@ -21,6 +21,7 @@ from typing import Any
 
 import glfw
 from acting import Actor
+from cut_texts import CutTexts
 from imgui_bundle import imgui
 
 from viewer.analysis.measure import Measurement, Reading, reading_of
@@ -48,6 +49,9 @@ class Observer:
         self._fields: tuple[int, dict[str, str]] = 0, {}  # frame; the text of each field in it, by its label
         for name in FIELDS:
             setattr(imgui, name, self._noting(getattr(imgui, name)))
+        self._cut = CutTexts()
+        self._track = 0.0  # width of the timeline's track, in heights of the font
+        imgui.invisible_button = self._noting_track(imgui.invisible_button)
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _noting(self, field: Callable[..., tuple[bool, str]]) -> Callable[..., tuple[bool, str]]:
@@ -59,6 +63,16 @@ class Observer:
                 self._fields = imgui.get_frame_count(), {}
             self._fields[1][label] = text
             return changed, text
+
+        return declare
+
+    def _noting_track(self, area: Callable[..., bool]) -> Callable[..., bool]:
+        """A function of ImGui that declares an area, and notes how wide the track is."""
+
+        def declare(name: str, size: imgui.ImVec2, *arguments: Any) -> bool:
+            if name == "track":
+                self._track = size.x / imgui.get_font_size()
+            return area(name, size, *arguments)
 
         return declare
 
@@ -81,6 +95,8 @@ class Observer:
             "is_idle": is_idle(app),
             "notes": notes,
             "shown_notes": [note.text for note in app.notices.shown(time.monotonic())],
+            "cut": self._cut.found,
+            "track": self._track,
             "fields": self._fields[1] if self._fields[0] == imgui.get_frame_count() else {},
             **shown(app),
         }

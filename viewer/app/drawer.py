@@ -23,16 +23,24 @@ class Drawer:
     def __init__(self, height: float, tools: Toolbox) -> None:
         self.height = height
         self._tools = tools
+        self._content = LOWEST  # height of what was declared last, in heights of the font
 
     @property
     def is_open(self) -> bool:
         """Whether a tool has something to show in it."""
         return any(True for _ in self._tools.drawn_below())
 
+    @property
+    def shown_height(self) -> float:
+        """Its height now, in heights of the font: the user's; of its few words while tools have no more."""
+        return min(self._content, self.height) if self._tools.is_below_bare else self.height
+
     def draw_grip(self, width: float) -> None:
         """Declare what resizes it, in a window of its own at its upper edge: a drag does, a double click
         brings the usual height back."""
         imgui.invisible_button("##grip", ImVec2(max(width, 1), max(imgui.get_content_region_avail().y, 1)))
+        if self._tools.is_below_bare:
+            return
         if imgui.is_item_hovered() or imgui.is_item_active():
             imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ns)
         if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
@@ -45,12 +53,18 @@ class Drawer:
         """Declare what tools show in it, in the current ImGui window."""
         flags = keyboard.flags("drawer")
         sections = list(self._tools.drawn_below())
-        size = ImVec2(ui.button_size(len(sections)).x, 0)
+        gaps = (len(sections) - 1) * imgui.get_style().item_spacing.x
+        size = ImVec2((imgui.get_content_region_avail().x - gaps) / max(len(sections), 1), 0)
+        ends: list[float] = []
         for number, (name, declare) in enumerate(sections):
             if number:
                 imgui.same_line()
             imgui.begin_child(name, size, window_flags=flags)
             if not number:
                 keyboard.take("drawer")
+            start = imgui.get_cursor_pos_y()
             declare(ui)
+            ends.append(imgui.get_cursor_pos_y() - start)
             imgui.end_child()
+        padding = 2 * imgui.get_style().window_padding.y
+        self._content = (max(ends, default=0.0) + padding) / imgui.get_font_size()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
 _GRIP = 0.4  # width of what resizes the panel and the drawer, in heights of the font
 _BAR_HEIGHT = 4.8
-_DRAWER_SHARE = 0.5  # of the window, at most
+_DRAWER_SHARE = 0.6  # of what the view and it have together, at most
 # No background: the window is filled with the panels' colour before.
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -73,12 +73,10 @@ def _draw_parts(app: App) -> Place:
     # Whole numbers, so that the picture's edges fall on pixels.
     width = max(1, int(whole.x - min(app.panel.width * em, 0.5 * whole.x)))
     grip = int(_GRIP * em)
-    below = (
-        whole.y - min(grip + app.drawer.height * em, _DRAWER_SHARE * whole.y)
-        if app.drawer.is_open
-        else whole.y
-    )
-    bottom = int(below - min(_BAR_HEIGHT * em, 0.5 * whole.y))
+    bar = min(_BAR_HEIGHT * em, 0.5 * whole.y)
+    drawer = min(grip + app.drawer.shown_height * em, _DRAWER_SHARE * max(whole.y - top - bar, 0))
+    below = whole.y - drawer if app.drawer.is_open else whole.y
+    bottom = int(below - bar)
     height = max(1, bottom - top)
     place = _draw_view(app, top, width, height)
     with app.failures.told("The panel"):

@@ -103,7 +103,7 @@ def draw_toolbar(app: App) -> None:
             _draw_line()
         for item in group:
             text = _text(app, item, has_words)
-            if imgui.get_cursor_pos_x() + _button_width(text) > room:
+            if imgui.get_cursor_pos_x() + widgets.button_width(text) > room:
                 return
             if isinstance(item, Menu):
                 _draw_drop(app, item, text)
@@ -115,14 +115,10 @@ def draw_toolbar(app: App) -> None:
 def _width(app: App, groups: Toolbar) -> float:
     """The width of a toolbar with words."""
     gap = imgui.get_style().item_spacing.x
-    widths = [_button_width(_text(app, item, has_words=True)) + gap for group in groups for item in group]
+    widths = [
+        widgets.button_width(_text(app, item, has_words=True)) + gap for group in groups for item in group
+    ]
     return sum(widths) + gap * len(groups)
-
-
-def _button_width(text: str) -> float:
-    return (
-        imgui.calc_text_size(text, hide_text_after_double_hash=True).x + 2 * imgui.get_style().frame_padding.x
-    )
 
 
 def _text(app: App, item: str | Menu[App], has_words: bool) -> str:

@@ -209,6 +209,12 @@ class Toolbox:
             if slot.has("below") and self._call(slot, "is_below"):
                 yield name, partial(self._declare, slot, "below")
 
+    @property
+    def is_below_bare(self) -> bool:
+        """Whether all that tools show under the timeline is a few words."""
+        slots = [slot for slot in self._slots.values() if slot.has("below") and self._call(slot, "is_below")]
+        return all(self._call(slot, "is_bare") for slot in slots)
+
     def draw_over(self, view: ViewPlace, taken: Sequence[Box]) -> None:
         """Have the tools draw over the picture. taken: boxes in the view where labels would cover
         something."""

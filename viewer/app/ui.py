@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from imgui_bundle import ImVec2, imgui
 
 from . import widgets
@@ -19,7 +21,55 @@ class Ui:
         keys = self._keys.of[command]
         widgets.tooltip(text + (f" ({keys})" if keys else ""))
 
-    def button_size(self, count: int) -> ImVec2:
-        """The size of a button of which so many stand in a row."""
-        gaps = (count - 1) * imgui.get_style().item_spacing.x
-        return ImVec2((imgui.get_content_region_avail().x - gaps) / count, 0)
+    def row(self, *words: str) -> ButtonRow:
+        """Begin a row of buttons, which `ButtonRow.button` declares one by one. words: their labels."""
+        return ButtonRow(words)
+
+
+class ButtonRow:
+    """Buttons that fill a line, or several lines where their words need more room."""
+
+    def __init__(self, words: Sequence[str]) -> None:
+        room, gap = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
+        lines: list[list[tuple[str, float]]] = []
+        left = 0.0
+        for label in words:
+            label = _broken(label, room)
+            width = min(widgets.button_width(label), room)
+            if not lines or left < gap + width:
+                lines.append([])
+                left = room + gap
+            lines[-1].append((label, width))
+            left -= gap + width
+        self._buttons = (
+            (label, width, number)
+            for line in lines
+            for number, (label, width) in enumerate(_filled(line, room, gap))
+        )
+
+    def button(self) -> bool:
+        """Declare the next button; True when it is pressed."""
+        label, width, number = next(self._buttons)
+        if number:
+            imgui.same_line()
+        return imgui.button(label, ImVec2(width, 0))
+
+
+def _filled(line: Sequence[tuple[str, float]], room: float, gap: float) -> list[tuple[str, float]]:
+    """Labels of a line with the widths of their buttons: the same for all where the words allow that."""
+    share = (room - gap * (len(line) - 1)) / len(line)
+    if max(width for _, width in line) <= share:
+        return [(label, share) for label, _ in line]
+    more = share - sum(width for _, width in line) / len(line)
+    return [(label, width + more) for label, width in line]
+
+
+def _broken(label: str, room: float) -> str:
+    """A label in two lines where one is too wide; its name stays."""
+    words, mark, _ = label.partition("###")
+    if widgets.button_width(label) <= room or " " not in words:
+        return label
+    middle = min(
+        (i for i, letter in enumerate(words) if letter == " "), key=lambda i: abs(i - len(words) / 2)
+    )
+    return f"{words[:middle]}\n{words[middle + 1 :]}{label[len(words) :] if mark else f'###{words}'}"

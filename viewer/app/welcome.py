@@ -53,7 +53,9 @@ class Welcome:
         for icon, text in _LINES:
             imgui.text_disabled(icon)
             imgui.same_line(_TEXT_AT * em)
-            imgui.text(text)
+            imgui.push_text_wrap_pos(max(width - 2 * em, 12 * em))
+            imgui.text_unformatted(text)
+            imgui.pop_text_wrap_pos()
         imgui.end()
 
 

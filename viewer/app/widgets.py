@@ -25,6 +25,7 @@ _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _TOOLTIP = 60  # characters of a line
 _NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
 _FACTS = 6.0  # where facts begin, in heights of the font
+_NARROW = 15.0  # width of a window, in heights of the font, below which labels stand over their widgets
 ICON_WIDTH = 1.3  # of a button with an icon, in heights of frames
 _DOT = 0.25  # radius, in heights of the font
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
@@ -160,14 +161,37 @@ def faint(text: str) -> None:
 
 
 def label(text: str, help: str = "", gutter: float = 0.0) -> None:
-    """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end."""
+    """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end. In a
+    narrow window the widget has the next line to itself."""
     width = imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
     imgui.text(text)
     if help:
         tooltip(help)
-    imgui.same_line(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE)
+    if width >= _NARROW * imgui.get_font_size():
+        imgui.same_line(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE)
     imgui.set_next_item_width(-1 - gutter)
+
+
+def same_line(width: float) -> None:
+    """Go on beside the last widget, or below it where the next one, of this width, has no room there."""
+    end = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    if imgui.get_item_rect_max().x + imgui.get_style().item_spacing.x + width <= end:
+        imgui.same_line()
+
+
+def button_width(label: str) -> float:
+    """The least width of a button that shows all of its label."""
+    return (
+        imgui.calc_text_size(label, hide_text_after_double_hash=True).x
+        + 2 * imgui.get_style().frame_padding.x
+    )
+
+
+def check_width(label: str) -> float:
+    """The width of a checkbox with its label."""
+    text = imgui.calc_text_size(label, hide_text_after_double_hash=True).x
+    return imgui.get_frame_height() + imgui.get_style().item_inner_spacing.x + text
 
 
 def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:

@@ -61,7 +61,7 @@ def draw(
     high = look.high if edited.high == told.high else ends.high
     rendering.edit_look(replace(edited, low=low, high=high))
     imgui.begin_disabled(rendering.is_default)
-    if imgui.button("Reset appearance", ui.button_size(1)):
+    if ui.row("Reset appearance").button():
         rendering.reset()
     imgui.end_disabled()
     ui.tooltip("Set appearance and renderer to the defaults of a new scan", "reset")

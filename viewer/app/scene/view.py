@@ -207,9 +207,11 @@ def _draw_note(text: str, size: ImVec2) -> None:
 def _draw_prompt(text: str, size: ImVec2) -> None:
     """Say what a click does, where there is something to say."""
     if text:
-        em, extent = imgui.get_font_size(), imgui.calc_text_size(text)
+        em = imgui.get_font_size()
+        wrap = max(8 * em, size.x - 2 * em)
+        extent = imgui.calc_text_size(text, wrap_width=wrap)
         corner = ImVec2((size.x - extent.x) / 2, 0.9 * em)
-        notices.draw_text(text, corner, extent, extent.x + em, ImVec2(0.8 * em, 0.4 * em))
+        notices.draw_text(text, corner, extent, wrap, ImVec2(0.8 * em, 0.4 * em))
 
 
 def _draw_recording_mark() -> None:

@@ -21,6 +21,7 @@ The Tool has any of
     drawn(frame)            the `DrawnMarks` over a frame, by its index, of pictures that are saved: as its
                             overlay shows it there
     below(ui)               declares what it shows under the timeline, while `is_below()` is true
+    is_bare()               whether that is a few words only: the drawer is then as low as they are
     dialog()                declares windows of its own, over everything
     prompt()                what to say at the top of the view while it has the clicks
     on_click(click)         a click in the view while it has the clicks (`desk.take_clicks`); False: it is not

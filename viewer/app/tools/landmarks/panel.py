@@ -25,21 +25,20 @@ def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     _draw_template(tool)
     words = "Stop placing" if tool.is_active else "Place"
-    if imgui.button(widgets.labelled(words, "place"), ui.button_size(3)):
+    row = ui.row(widgets.labelled(words, "place"), "Skip", "Not visible here")
+    if row.button():
         tool.toggle()
     ui.tooltip("Click the place of each landmark in the view, one after the other", "landmarks")
     imgui.begin_disabled(not tool.is_active)
-    imgui.same_line()
-    if imgui.button("Skip", ui.button_size(2)):
+    if row.button():
         tool.skip()
     ui.tooltip("Skip the next landmark, or bring it back", "skip_landmark")
-    imgui.same_line()
-    if imgui.button("Not visible here", ui.button_size(1)):
+    if row.button():
         tool.set_missing()
     ui.tooltip("Mark the landmark as not visible in this frame", "missing_landmark")
     imgui.end_disabled()
     if tool.is_active and tool.proposal is not None and tool.target is not None:
-        if imgui.button("Place from mirror partner", ui.button_size(1)):
+        if ui.row("Place from mirror partner").button():
             tool.take_mirrored()
         ui.tooltip(
             f"Place {tool.target.name} where the mirror image of {tool.target.partner} lies",
@@ -55,11 +54,11 @@ def draw(tool: Tool, ui: Ui) -> None:
         _draw_selected(tool, ui)
     _draw_following(tool)
     imgui.separator_text("Notes")
-    if imgui.button("Pin a note", ui.button_size(2)):
+    row = ui.row("Pin a note", "Add frame note")
+    if row.button():
         tool.pin_note()
     ui.tooltip("Click a place in the view to pin a note to it", "note_at_place")
-    imgui.same_line()
-    if imgui.button("Add frame note", ui.button_size(1)):
+    if row.button():
         tool.notebook.add_to_frame(tool.frame)
     ui.tooltip("Add a note to this whole frame", "note_at_frame")
     tool.notebook.draw_list()
@@ -137,12 +136,12 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     widgets.tooltip("Name of the landmark. Press Enter to change it")
     _draw_partner(tool, landmark)
     imgui.begin_disabled(not tool.has_key())
-    if imgui.button("Remove correction in this frame", ui.button_size(2)):
+    row = ui.row("Remove correction in this frame", "Delete")
+    if row.button():
         tool.take_key_away()
     ui.tooltip("Remove the place that you set in this frame; tracking finds it again", "landmark_key")
     imgui.end_disabled()
-    imgui.same_line()
-    if imgui.button("Delete", ui.button_size(1)):
+    if row.button():
         tool.delete()
     ui.tooltip("Delete the landmark and its measures. Undo restores them", "delete_landmark")
     if entered:

@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 def draw(measuring: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     words = "Stop measuring" if measuring.is_active else "Measure distance"
-    if imgui.button(widgets.labelled(words, "measure"), ui.button_size(2)):
+    if ui.row(widgets.labelled(words, "measure")).button():
         measuring.toggle()
     ui.tooltip("Click two places in the view to measure their distance", "measure")
-    imgui.same_line()
     measuring.filled = imgui.checkbox("Allow clicks on filled holes", measuring.filled)[1]
     widgets.tooltip("Also measure where the renderer has filled a hole, and the scanner measured no point")
     if not measuring.made.all:
@@ -80,15 +79,13 @@ def _end_words(end: Spot, scale: Scale) -> str:
 
 
 def _draw_outlets(measuring: Tool, ui: Ui) -> None:
-    third = ui.button_size(3)
-    if imgui.button("Copy", third):
+    row = ui.row("Copy", "Export CSV...", "Clear")
+    if row.button():
         measuring.copy()
     widgets.tooltip("Copy all distances as a table")
-    imgui.same_line()
-    if imgui.button("Export CSV...", third):
+    if row.button():
         measuring.ask_to_save()
     widgets.tooltip("Save all distances to a file. Open or drop the file to load them again")
-    imgui.same_line()
-    if imgui.button("Clear", third):
+    if row.button():
         measuring.clear()
     widgets.tooltip("Delete all distances. Undo restores them")

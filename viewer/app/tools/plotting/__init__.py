@@ -112,6 +112,10 @@ class Tool:
         """Whether curves are shown under the timeline."""
         return self.settings.is_open
 
+    def is_bare(self) -> bool:
+        """Whether there is nothing to plot yet: the drawer is then as low as its words."""
+        return not self.landmarks.measures
+
     def below(self, ui: Ui) -> None:
         """Declare the curves under the timeline."""
         plot.draw(self, ui)

@@ -81,7 +81,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     for option, words in kind.choices.items():
         widgets.label(option.replace("_", " ").capitalize())
         adding.options[option] = widgets.combo(option, adding.options.get(option, words[0]), list(words))
-    if imgui.button("Add measure", ui.button_size(1)):
+    if ui.row("Add measure").button():
         tool.add(measure)
         adding.begin_anew()
     widgets.tooltip(f"Measure {measure.name} in all frames")

@@ -25,7 +25,7 @@ _BAR_STEPS = 16  # of the bar of colours
 def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     words = "Hide plot" if tool.is_below() else "Plot measures"
-    if imgui.button(widgets.labelled(words, "curves"), ui.button_size(1)):
+    if ui.row(widgets.labelled(words, "curves")).button():
         tool.toggle()
     ui.tooltip("Plot the measures of all frames under the timeline", "curves")
     _draw_measures(tool)
@@ -36,10 +36,9 @@ def draw(tool: Tool, ui: Ui) -> None:
         ui.tooltip("Draw each measure in the view, with its value", "measure_lines")
         _draw_noise(tool)
     words = "Stop" if tool.lasso.is_drawn else "Outline a region"
-    if imgui.button(widgets.labelled(words, "region"), ui.button_size(2)):
+    if ui.row(widgets.labelled(words, "region")).button():
         tool.lasso.toggle()
     ui.tooltip("Draw round a part of the surface to measure its area and perimeter", "lasso")
-    imgui.same_line()
     _, tool.lasso.through = imgui.checkbox("Include surface behind", tool.lasso.through)
     ui.tooltip("Also measure the surface in front of and behind the region", "lasso")
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):

@@ -88,26 +88,29 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
     """The bar of choices: what is plotted, and where it goes."""
     settings, em, curves = tool.settings, imgui.get_font_size(), tool.shown.curves
     mode = _combo("mode", settings.mode, MODE_WORDS)
+    widgets.same_line(_COMBO * em)
     order = _combo("order", settings.order, ORDER_WORDS)
     names = {curve.name: curve.name for curve in curves}
     if curves and mode in (AGAINST, REPEATS):
         field, words = ("abscissa", "Against ") if mode == AGAINST else ("aligned", "Peaks of ")
         old = chosen_of(curves, getattr(tool.choices, field)).name
+        widgets.same_line(_COMBO * em)
         new = _combo(field, old, {name: words + name for name in names})
         if new != old:
             tool.choose("Choose measure", **{field: new})
     least = settings.least
     if mode == REPEATS:
+        widgets.same_line(_COMBO * em)
         imgui.set_next_item_width(_COMBO * em)
         share = imgui.slider_float("##least", 100 * least, 5, 100, "at least %.0f %%")[1]
         least = round(share) / 100
         widgets.tooltip(
             "Least height of a peak that counts as a repeat, in percent of the range of the curve"
         )
-        imgui.same_line()
+    widgets.same_line(widgets.check_width("±"))
     bands = imgui.checkbox("±", settings.bands)[1]
     widgets.tooltip("Band of two standard deviations; for repeats, of one")
-    imgui.same_line()
+    widgets.same_line(_SLIDER * em)
     imgui.set_next_item_width(_SLIDER * em)
     points = (
         f", {settings.smoothing.wide_enough(tool.times).points(tool.times)} frames"
@@ -124,7 +127,6 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         logarithmic,
     )[1]
     widgets.tooltip("Width of the smoothing window (Savitzky-Golay), for speed, acceleration and numbers")
-    imgui.same_line()
     tool.settings = replace(
         settings, mode=mode, order=order, bands=bands, least=least, seconds=float(f"{seconds:.3g}")
     )
@@ -144,23 +146,22 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
             tool.shown.plot is not None,
         ),
     ):
+        widgets.same_line(widgets.button_width(words))
         imgui.begin_disabled(not is_there)
         if imgui.button(words):
             act()
         imgui.end_disabled()
         widgets.tooltip(about)
-        imgui.same_line()
-    right = imgui.get_content_region_avail().x - imgui.get_frame_height()
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(right, 0))
+    close = imgui.get_frame_height()
+    widgets.same_line(close)
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - close)
     if widgets.flat_button(icons.ICON_FA_XMARK, "Close"):
         tool.toggle()
 
 
 def _combo(name: str, current: str, words: dict[str, str]) -> str:
     imgui.set_next_item_width(_COMBO * imgui.get_font_size())
-    chosen = widgets.combo(name, current, list(words), words)
-    imgui.same_line()
-    return chosen
+    return widgets.combo(name, current, list(words), words)
 
 
 # --- the plot -------------------------------------------------------------------------
