@@ -1,6 +1,6 @@
 """Damaged files by the thousand: what crashes, hangs, takes too much memory or says badly what is wrong.
 
-    python tests/fuzz/campaign.py [--minutes 5] [--seed 1] [--kind .ply ...] [-o out/fuzz]
+    python tests/fuzz/campaign.py [--minutes 5] [--seed 1] [--drawn 0.04] [--kind .ply ...] [-o out/fuzz]
 
 Ends with 1 where something was found; the files that did it stand in the folder `found` of the output.
 """
@@ -24,6 +24,7 @@ from typing import Any
 HANGS = 30.0  # seconds that one input may take; compiling shaders for it counts too
 STARTS = 300.0  # seconds until a worker is ready
 AT_ONCE = 20_000  # inputs that one worker runs
+DRAWN = 0.04  # of the scans, which takes fifty times as long as reading them
 WORKER = Path(__file__).with_name("worker.py")
 
 
@@ -48,16 +49,18 @@ def campaign(
     inputs: int = sys.maxsize,
     seconds: float = float("inf"),
     kinds: Sequence[str] = (),
+    drawn: float = DRAWN,
 ) -> Findings:
     """Run inputs 0 to `inputs` - 1, or as many as there is time for.
 
-    folder: for what is found. source: a seed, or a folder of files. kinds: of file; none named: all. Raises
-    RuntimeError where a worker does not begin.
+    folder: for what is found. source: a seed, or a folder of files. kinds: of file; none named: all.
+    drawn: share of the scans that are drawn, too. Raises RuntimeError where a worker does not begin.
     """
     found, began, first = Findings(), time.monotonic(), 0
     while first < inputs and time.monotonic() < began + seconds:
         count = min(AT_ONCE, inputs - first)
-        for event in _events(folder, str(source), first, count, kinds, began + seconds):
+        said = map(str, (source, first, count, drawn, *kinds))
+        for event in _events(folder, list(said), began + seconds):
             first = event["number"] + 1
             found.inputs += 1
             found.outcomes[f"{event['kind']} {event['outcome']}"] += 1
@@ -67,13 +70,14 @@ def campaign(
     return found
 
 
-def _events(
-    folder: Path, source: str, first: int, count: int, kinds: Sequence[str], until: float
-) -> Iterator[dict[str, Any]]:
-    """What becomes of each input, until the worker ends, dies, hangs, or the time is over."""
+def _events(folder: Path, words: Sequence[str], until: float) -> Iterator[dict[str, Any]]:
+    """What becomes of each input, until the worker ends, dies, hangs, or the time is over.
+
+    words: of the worker's command line.
+    """
     with tempfile.TemporaryDirectory(prefix="worker_", dir=folder) as place:
-        command = [sys.executable, WORKER, place, source, first, count, *kinds]
-        process = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        command = [sys.executable, str(WORKER), place, *words]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         begun: dict[str, Any] | None = None
         ready = silent = False
         try:
@@ -130,12 +134,13 @@ def main() -> int:
     )
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--drawn", type=float, default=DRAWN)
     parser.add_argument("--inputs", type=int, default=sys.maxsize)
     parser.add_argument("--kind", nargs="+", default=[])
     parser.add_argument("-o", "--output", type=Path, default=Path("out/fuzz"))
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
-    found = campaign(args.output, args.seed, args.inputs, 60 * args.minutes, args.kind)
+    found = campaign(args.output, args.seed, args.inputs, 60 * args.minutes, args.kind, args.drawn)
     print(report(found))
     return int(bool(found.wrong))
 

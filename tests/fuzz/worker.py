@@ -23,7 +23,6 @@ SPARE = 200 << 20  # bytes that any file may take
 PER_BYTE = 10  # the same for each byte of it
 SLOW = 5.0  # seconds of processor time that one input may take
 _WARM = 2  # files of each kind that are tried before
-DRAWN = 0.04  # of the scans, which takes fifty times as long as reading them
 OUR_OWN_FAULT = (AttributeError, NameError, LookupError, RecursionError, AssertionError)  # and no library's
 
 
@@ -36,10 +35,11 @@ class Input(NamedTuple):
 
 
 def main() -> None:
-    """Run the inputs FIRST to FIRST + COUNT - 1."""
+    """Run the inputs FIRST to FIRST + COUNT - 1, of which a SHARE is drawn."""
     said = os.fdopen(os.dup(1), "w", buffering=1)
     folder, source = Path(sys.argv[1]), sys.argv[2]
     first, count = map(int, sys.argv[3:5])
+    share, named = float(sys.argv[5]), sys.argv[6:]
     output = os.open(folder / "output", os.O_RDWR | os.O_CREAT | os.O_TRUNC)
     os.dup2(output, 1)
     os.dup2(output, 2)
@@ -52,11 +52,11 @@ def main() -> None:
     warned: list[str] = []
     warnings.simplefilter("always")
     warnings.showwarning = lambda message, category, *_: warned.append(f"{category.__name__}: {message}")
-    kinds = sys.argv[5:] or sorted(whole)
+    kinds = named or sorted(whole)
     for kind in kinds:  # so that what libraries need is there before memory is limited
-        for data in whole[kind][:_WARM]:
-            _run(Input(kind, data, drawn=True), folder)
-    of = damaged_seeds(int(source), whole, kinds) if source.isdecimal() else corpus(Path(source))
+        for number, data in enumerate(whole[kind][:_WARM]):
+            _run(Input(kind, data, drawn=not number), folder)
+    of = damaged_seeds(int(source), whole, kinds, share) if source.isdecimal() else corpus(Path(source))
     said_before = os.fstat(output).st_size
     warned.clear()
     print(json.dumps({"ready": True}), file=said)
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def damaged_seeds(
-    seed: int, whole: dict[str, list[bytes]], kinds: list[str]
+    seed: int, whole: dict[str, list[bytes]], kinds: list[str], share: float
 ) -> Callable[[int], tuple[str, bytes, bool]]:
     """Inputs by number, without end; the same for the same seed."""
     from mutations import damaged
@@ -92,7 +92,7 @@ def damaged_seeds(
         rng = Random(f"{seed} {number}")
         kind = rng.choice(kinds)
         data = damaged(rng.choice(whole[kind]), kind[kind.rindex(".") :], rng)
-        return kind, data, rng.random() < DRAWN
+        return kind, data, rng.random() < share
 
     return of
 
