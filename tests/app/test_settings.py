@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewer.app import settings
-from viewer.app.files.keeping import take_over
 from viewer.app.output.export_plan import Choices
 from viewer.app.panel import PanelChoices
 from viewer.app.place import Place, reachable
@@ -24,8 +23,6 @@ from viewer.app.settings import Settings, load, save
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.choice.goal import Goal
-from viewer.document.document import Bookmark
-from viewer.document.saved_session import SavedSession, keep, kept
 from viewer.look import Look
 from viewer.output.marks import Marks
 
@@ -75,7 +72,7 @@ def written(file: Path, data: Any) -> Path:
 def test_all_of_it_comes_back(file: Path) -> None:
     default = Settings()
     unlike = [of.name for of in fields(Settings) if getattr(FULL, of.name) == getattr(default, of.name)]
-    assert unlike == ["places"], "the example says something about every field but that of earlier versions"
+    assert not unlike, "the example says something about every field"
     save(FULL, file)
     assert load(file) == (FULL, [])
     assert [path.name for path in file.parent.iterdir()] == [settings.FILE]
@@ -189,42 +186,6 @@ def test_the_look_keeps_nothing_that_is_of_one_scan() -> None:
     assert changed(lambda data: data["look"].update(up="-x", low=3, high=4)).look == FULL.look
 
 
-OLD = {
-    "/scans/a": {"unit": "mm"},
-    "/scans/b": {
-        "index": 4, "camera": CAMERA.to_json(), "unit": "cm",
-        "bookmarks": [{"name": "nose", "camera": CAMERA.to_json()}],
-    },
-}  # fmt: skip
-
-
-def test_what_earlier_versions_kept_of_scans_is_taken_over() -> None:
-    loaded = changed(lambda data: data.update(places=OLD))
-    marks = (Bookmark("nose", CAMERA),)
-    assert loaded.places == {
-        "/scans/a": SavedSession("/scans/a", None, 0, replace(FULL.document, unit="mm")),
-        "/scans/b": SavedSession(
-            "/scans/b", None, 4, replace(FULL.document, camera=CAMERA, unit="cm", bookmarks=marks)
-        ),
-    }
-    take_over(loaded.places.values())
-    assert kept("/scans/b") == loaded.places["/scans/b"]
-    newer = replace(loaded.places["/scans/b"], pose=7)
-    keep(newer)
-    take_over(loaded.places.values())
-    assert kept("/scans/b") == newer
-    assert "places" not in loaded.to_json()
-
-
-def test_what_is_wrong_of_a_scan_is_left_out_alone() -> None:
-    def damage(data: dict[str, Any]) -> None:
-        data["places"] = json.loads(json.dumps(OLD))
-        data["places"]["/scans/b"].update(index=-1, camera={"eye": [0, 0, 0]})
-
-    place = changed(damage).places["/scans/b"]
-    assert (place.pose, place.document.camera, place.document.unit) == (0, None, "cm")
-
-
 def test_scans_are_known_by_their_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert Session("one.ply").saved(3).scan == str(tmp_path / "one.ply")
@@ -270,22 +231,18 @@ def test_a_huge_file_is_put_aside_unread(file: Path) -> None:
     assert not file.exists()
 
 
-@pytest.mark.parametrize("name", ["turn_seconds", "text_scale", "window", "look", "pace", "params", "places"])
+@pytest.mark.parametrize("name", ["turn_seconds", "text_scale", "window", "look", "pace", "params"])
 @pytest.mark.parametrize("text", ["1" + "0" * 400, "[" * 900 + "]" * 900, '{"a": ' * 400 + "1" + "}" * 400])
 def test_numbers_and_nesting_without_end_are_left_out(file: Path, name: str, text: str) -> None:
     loaded, problems = load(written(file, f'{{"format": 1, "theme": "light", "{name}": {text}}}'))
     assert problems == []
     assert loaded.theme == "light", "the rest holds"
-    assert getattr(loaded, name) == getattr(Settings(), name) or name == "places"
+    assert getattr(loaded, name) == getattr(Settings(), name)
 
 
 def test_names_of_files_that_are_not_utf_8_come_back_and_impossible_ones_do_not(file: Path) -> None:
     name = os.fsdecode(b"/scans/caf\xe9")
     save(replace(FULL, recent=(name,)), file)
     assert load(file)[0].recent == (name,)
-    data = json.loads(file.read_text()) | {
-        "places": {"\ud800": {}, "/b": {"index": 2}, name: {}}, "recent": ["\ud800"],
-    }  # fmt: skip
-    loaded = load(written(file, data))[0]
-    assert list(loaded.places) == ["/b", name]
-    assert loaded.recent == ()
+    data = json.loads(file.read_text()) | {"recent": ["\ud800"]}
+    assert load(written(file, data))[0].recent == ()

@@ -163,7 +163,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
         app.process.wait()
     kept = kept_of(tmp_path, scan)
     assert len(kept.document.part(Measurements).all) == 1
-    assert str(kept.hash).startswith("files:")
+    assert str(kept.hash).startswith("content:")
     with running_app(screen, tmp_path, scan) as app:
         state = app.settle()
         assert state.document == done.document

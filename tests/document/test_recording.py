@@ -335,22 +335,50 @@ def test_the_hash_of_a_file_is_that_of_its_bytes(tmp_path: Path) -> None:
     assert fingerprint([tmp_path / "a.ply"]) == f"sha256:{hashlib.sha256(b'some points').hexdigest()[:16]}"
 
 
-def test_several_and_large_files_count_by_names_and_sizes(
+def test_several_and_large_files_count_by_their_content(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    files = [tmp_path / name for name in ("a.ply", "b.ply")]
+    files = [tmp_path / name for name in ("a.ply", "b.ply", "c.ply")]
     for file in files:
         file.write_bytes(b"points")
     before = fingerprint(files)
     assert before is not None
-    assert before.startswith("files:")
-    files[0].write_bytes(b"POINTS")
-    assert fingerprint(files) == before
-    files[1].write_bytes(b"more points")
+    assert before.startswith("content:")
+    files[0].write_bytes(b"POINTS")  # of another subject: of the same size
+    assert fingerprint(files) != before
+    files[0].write_bytes(b"points")
+    files[2].write_bytes(b"more points")
     assert fingerprint(files) not in (before, fingerprint(files[::-1]))
-    monkeypatch.setattr(recording, "_HASHED_BYTES", 8)
-    assert str(fingerprint(files[1:])).startswith("files:")
-    assert str(fingerprint(files[:1])).startswith("sha256:")
+    files[2].write_bytes(b"points")
+    assert fingerprint([file.rename(file.with_name(f"0{file.name}")) for file in files]) == before
+    monkeypatch.setattr(recording, "_HASHED_BYTES", 4)
+    large = tmp_path / "large.ply"
+    large.write_bytes(b"points")
+    assert str(fingerprint([large])).startswith("content:")
+
+
+@pytest.mark.parametrize("changed", [0, 1, 50, 99])
+def test_of_many_files_the_first_one_counts_as_a_whole_and_the_ends_of_some(
+    tmp_path: Path, changed: int
+) -> None:
+    files = [tmp_path / f"{number}.ply" for number in range(100)]
+    content = bytes(300_000)
+    for file in files:
+        file.write_bytes(content)
+    before = fingerprint(files)
+    files[changed].write_bytes(content[:150_000] + b"x" + content[150_001:])
+    assert (fingerprint(files) == before) == (changed > 0)
+    files[changed].write_bytes(content + b"x")  # sizes count of all
+    assert fingerprint(files) != before
+
+
+@pytest.mark.parametrize(
+    ("scan", "where"), [("/**/*.ply", "all over"), ("//host/a.ply", "another"), (r"\\host\a.ply", "another")]
+)
+def test_a_recording_neither_searches_nor_leads_to_another_machine(scan: str, where: str) -> None:
+    with pytest.raises(InputError, match=where):
+        recording.place_of(scan, Path("/recordings/a.json"))
+    assert recording.place_of("../scans/a.ply", Path("/recordings/a.json")) == "../scans/a.ply"
 
 
 def test_without_files_there_is_no_hash(tmp_path: Path) -> None:

@@ -36,7 +36,6 @@ from viewer.document.document import Bookmark, Document
 from viewer.document.measurements import Measurements
 from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
-from viewer.document.schema import plain
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, shared_renderer
 from viewer.gpu.surface import Surface
@@ -184,9 +183,8 @@ def _write_choices(folder: Path) -> None:
     write_png(np.zeros((2, 2, 4), np.uint8), folder / "recording.png", entry.description())
     (folder / TIMES_FILE).write_text("file,time\nf0.ply,0\nf1.ply,0.04\n")
     marks = (Bookmark("front", camera),)
-    left = {"index": 3, "camera": camera.to_json(), "unit": "mm", "bookmarks": plain(marks)}
     chosen = settings.Settings(look=Look(light="head"), recent=("demo",)).to_json()
-    (folder / "settings.json").write_text(json.dumps(chosen | {"places": {"demo": left}}))
+    (folder / "settings.json").write_text(json.dumps(chosen))
     end = Spot(0, 0.0, (1.0, 2.0, 3.0), "point", 3, 0.1, 0)
     document = Document(camera, (1.0, 2.0, 3.0), Look(light="head"), "points", unit="mm", bookmarks=marks)
     document = document.with_params("points", backend("points").params()).with_part(

@@ -55,12 +55,10 @@ def run(
             from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
             from . import settings
             from .app import App
-            from .files.keeping import take_over
             from .loop import Loop
             from .window import Window
 
         remembered, notes = settings.load(user_folder() / settings.FILE)
-        take_over(remembered.places.values())
         try:
             window = Window("Scan4D", remembered.window)
         except NoOpenGLError as error:

@@ -9,7 +9,6 @@ import logging
 import os
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -38,6 +37,7 @@ from .files.keeping import Keeping
 from .files.loading import Loading
 from .files.opening import Opened, Opening, begin, find_facts
 from .files.preview import Previewer
+from .files.same_content import offer_of_change, offer_of_kept
 from .files.scans import Scans, title
 from .files.sessions import Sessions
 from .help import Help
@@ -365,6 +365,8 @@ class App:
         if session is not None:
             self.session.take_up(session)
         self._check(session or left)
+        if session is None and not (left and left.document.made):
+            self._look_for_kept()
         self.viewport.clear()
         self.glide.end()
         self._messages_read = 0
@@ -392,7 +394,22 @@ class App:
             self._told.add(problem)
             self.note(problem)
         if saved is not None and saved.hash is not None:
-            self.capture.tell_later(partial(_words_of_change, saved.hash, self.session.hash_found))
+            scan, found = self.session.scan, self.session.hash_found
+            self.capture.tell_later(partial(offer_of_change, saved, found, partial(self._begin_anew, scan)))
+
+    def _look_for_kept(self) -> None:
+        """Offer what is kept of the open scan's files under another name, as soon as it is found."""
+        scan = known_as(self.session.scan)
+        use = partial(self.sessions.open_with, scan=self.session.scan)
+        self.capture.tell_later(partial(offer_of_kept, scan, self.session.hash_found, use))
+
+    def _begin_anew(self, scan: str) -> None:
+        """Leave aside what the user made on other files than those of a scan, where it is still open."""
+        if scan != self.session.scan:
+            return
+        self.tools.abandon()
+        self.session.change("Begin without what was kept", bookmarks=(), parts={}, unread={})
+        self._look_for_kept()
 
     def pass_on_messages(self) -> None:
         """Tell what the timeline has to say.
@@ -445,10 +462,3 @@ class App:
         ):
             with self.failures.told(name):
                 end()
-
-
-def _words_of_change(hash: str, found: Future[str | None]) -> str:
-    """Words on a scan whose hash, which this waits for, is another one; none on the same."""
-    if found.result() in (hash, None):
-        return ""
-    return "The scan is not as it was when this was saved: views and measurements may not fit."

@@ -172,7 +172,7 @@ class Notices:
         if notice.offer is not None:
             imgui.set_cursor_pos_x(start)
             for title, act in notice.offer.choices.items():
-                if imgui.button(title):
+                if imgui.button(widgets.labelled(title, title)):
                     self.send_away(notice)
                     act()
                 imgui.same_line()

@@ -17,7 +17,6 @@ from typing import Annotated, Any, TypeVar
 
 from ..backends import backend
 from ..document.document import Document, KeptGoal
-from ..document.saved_session import SavedSession
 from ..document.schema import (
     BackendName,
     Kind,
@@ -105,7 +104,6 @@ class Settings:
     export: Choices = field(default_factory=Choices)
     export_marks: Marks = field(default_factory=Marks)
     recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
-    places: Mapping[str, SavedSession] = field(default_factory=dict)
     panel: PanelChoices = field(default_factory=PanelChoices)
     drawer: drawer.DrawerHeight = drawer.USUAL
     glide: bool = True
@@ -132,8 +130,7 @@ class Settings:
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object."""
-        data = {"format": FORMAT} | asdict(replace(self, places={}))
-        del data["places"]
+        data = {"format": FORMAT} | asdict(self)
         data["params"] = {name: chosen(values) for name, values in self.params.items()}
         data["look"] = chosen(self.look.of_any_scan)
         return data
@@ -141,9 +138,8 @@ class Settings:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Settings:
         """Use what can be used of a JSON object, whatever is in it; the defaults hold for the rest."""
-        read = usable(cls(), {name: value for name, value in data.items() if name != "places"})
-        read = replace(read, look=read.look.of_any_scan)
-        return replace(read, places=_places(data.get("places"), read.document))
+        read = usable(cls(), data)
+        return replace(read, look=read.look.of_any_scan)
 
 
 def load(path: Path) -> tuple[Settings, list[str]]:
@@ -186,14 +182,3 @@ def _put_aside(path: Path, what: str) -> str:
     except OSError as error:
         return str(InputError(f"{what}, and cannot be moved ({error.strerror})", path, "All starts anew"))
     return str(InputError(what, path, f"It is kept as {kept.name}; all starts anew"))
-
-
-def _places(data: Any, document: Document) -> dict[str, SavedSession]:
-    """How earlier versions left each scan. document: of one that was never open."""
-
-    def read(name: str, left: Any) -> SavedSession:
-        never_open = SavedSession(structured(ScanName, name), None, 0, document)
-        values = structured(Values, left)
-        return usable(never_open, {"pose": values.get("index"), "document": values})
-
-    return _by_name(data, read)

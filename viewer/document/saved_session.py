@@ -190,6 +190,34 @@ def kept(scan: str) -> SavedSession | None:
         raise InputError(what, scan, f"It is put aside as {aside}; the scan opens anew") from error
 
 
+def kept_elsewhere(scan: str, hash: str) -> list[SavedSession]:
+    """What is kept of other scans with this hash, or was put aside, and holds what a user has made: the last
+    written first, of equal ones that alone. What cannot be read is left out.
+
+    scan: its path from the root; what is kept of this itself does not count.
+    """
+    folder, own = kept_file(scan).parent, kept_file(scan)
+    found: list[SavedSession] = []
+    for path in sorted((path for path in folder.glob("*.json") if path != own), key=_age):
+        with suppress(InputError, OSError):
+            if hash.encode() in path.read_bytes():  # before all of it is parsed
+                session = SavedSession.load(path)
+                made = [other.document.made for other in found]
+                if session.hash == hash and session.document.made and session.document.made not in made:
+                    found.append(session)
+    return found
+
+
+def set_aside(session: SavedSession) -> None:
+    """Keep a copy of a session as it is, where `kept_elsewhere` finds it; what was made in it once alone.
+
+    Raises InputError where it cannot be written.
+    """
+    path = kept_file(session.scan)
+    if session.document.made not in _made_aside(path):
+        session.save(_free_aside(path))
+
+
 def _is_foreign(error: InputError) -> bool:
     """Whether a file cannot be read here, and may well be whole."""
     return isinstance(error, NewerFormatError) or isinstance(error.__cause__, OSError)
@@ -231,11 +259,24 @@ def _made_aside(path: Path) -> Iterator[object]:
 
 def _put_aside(path: Path) -> Path:
     """Give a file another name, which is free. Raises InputError where the system refuses."""
+    aside = _free_aside(path)
+    try:
+        os.replace(path, aside)
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be put aside: {what}", path, hint) from error
+    return aside
+
+
+def _free_aside(path: Path) -> Path:
+    """A new file beside one that is kept, empty until that or another one takes its place.
+
+    Raises InputError where the system refuses.
+    """
     for number in count(1):
         aside = path.with_name(f"{path.stem}.old-{number}{SUFFIX}")
         try:
             os.close(new_file(aside))
-            os.replace(path, aside)
             return aside
         except FileExistsError:
             continue
@@ -248,16 +289,18 @@ def _put_aside(path: Path) -> Path:
 def _delete_oldest(folder: Path) -> None:
     """Delete documents beyond MOST_KEPT, those written first, in which a user has made nothing."""
 
-    def age(path: Path) -> float:
-        with suppress(OSError):
-            return -os.stat(path).st_mtime
-        return 0.0
-
     kept_files = [path for path in folder.glob("*.json") if _is_kept_file(path)]
-    for path in sorted(kept_files, key=age)[MOST_KEPT:]:
+    for path in sorted(kept_files, key=_age)[MOST_KEPT:]:
         with suppress(InputError, OSError):  # what cannot be read stays
             if not SavedSession.load(path).document.made:
                 path.unlink(missing_ok=True)
+
+
+def _age(path: Path) -> float:
+    """A number that is less for what was written later."""
+    with suppress(OSError):
+        return -os.stat(path).st_mtime
+    return 0.0
 
 
 def _is_kept_file(path: Path) -> bool:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 from ...document.keeper import Keeper
-from ...document.saved_session import SavedSession, keep, kept_file
-from ...errors import InputError
+from ...document.saved_session import SavedSession, keep
 from .. import settings
 from ..notices import Problem
 from ..playing.playback import Playback
@@ -18,14 +16,6 @@ from ..settings import Settings
 
 _EVERY = 3.0  # seconds between looks at what has changed in the settings
 _EVERY_DOCUMENT = 0.5  # the same in the document
-
-
-def take_over(places: Iterable[SavedSession]) -> None:
-    """Keep what earlier versions kept of scans in the settings, where nothing newer is kept of them."""
-    for place in places:
-        if not kept_file(place.scan).exists():
-            with suppress(InputError):  # it is told when the document of the open scan cannot be kept
-                keep(place)
 
 
 class Keeping:
