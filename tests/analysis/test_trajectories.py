@@ -106,14 +106,14 @@ def test_gaps_of_landmarks_and_of_anchors_are_gaps() -> None:
 
 def test_what_cannot_hold_a_scan_still_is_told() -> None:
     tracks = heads(between=moved(np.array([0.0, 0, 0])))
-    with pytest.raises(InputError, match="three anchors at least"):
+    with pytest.raises(InputError, match="needs three rigid references"):
         stabilising(tracks, ["left", "right", "left"])
     with pytest.raises(InputError, match="'chin' is not placed"):
         stabilising(tracks, ["left", "right", "chin"])
     with pytest.raises(InputError, match="not on one line"):
         stabilising(tracks, ["left", "right", "between"])
     hidden = tracks | {"nose": track_of(np.full((90, 3), np.nan))}
-    with pytest.raises(InputError, match="no frame knows three"):
+    with pytest.raises(InputError, match="no frame has three"):
         stabilising(hidden, ["left", "right", "nose"])
 
 

@@ -87,7 +87,7 @@ def test_what_cannot_be_drawn_again_is_not_recorded(app: Any) -> None:
     colour_by_a_layer(app)
     capture.note_shown()
     assert capture.recorder is None
-    assert "The recording ends: the colours come from 'deviation'" in app.told[-2]
+    assert "The recording has stopped: the colours come from 'deviation'" in app.told[-2]
     assert capture.last is not None
     assert len(Recording.load(capture.last).entries) == 1, "what was recorded until then"
     capture.toggle_recording()
@@ -112,7 +112,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
         )  # fmt: skip
         exporting.start()
         (told,) = app.told
-        assert "the colours of some frames come from 'deviation'" in told
+        assert "'deviation' colours some frames" in told
         assert exporting.task is None
 
 
@@ -127,7 +127,7 @@ def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) 
     capture.screenshot()
     capture.close()
     cannot, *saved = app.told
-    assert "The picture cannot be replayed: the colours come from 'deviation'" in cannot
+    assert "This picture cannot be replayed: the colours come from 'deviation'" in cannot
     first, second = (Path(words.removeprefix("Saved ")) for words in saved)
     assert Recording.load(first).entries[0].scan == "ball.npz"
     with pytest.raises(InputError):
@@ -147,7 +147,7 @@ def test_a_journal_that_failed_goes_when_the_recording_is_saved(
     for _ in range(3):
         turn(app)
         capture.note_shown()
-    assert sum("kept in memory alone" in words for words in app.told) == 1
+    assert sum("only in memory" in words for words in app.told) == 1
     assert "the disk is full" in app.told[-1]
     (journal,) = journals()
     assert saved(journal) is None  # nobody else takes a recording that goes on
@@ -179,7 +179,7 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
     with monkeypatch.context() as patched:
         patched.setattr(Recording, "save", full)
         capture.toggle_recording()
-    assert "saved at the next start" in app.told[-1]
+    assert "saves it at the next start" in app.told[-1]
     (journal,) = journals()
     path = saved(journal)
     assert path is not None

@@ -118,7 +118,7 @@ def test_what_a_killed_window_had_recorded_is_saved_at_the_next_start(
     assert len(journals(tmp_path)) == 2, "the journal and its lock"
     assert list(tmp_path.glob("*.json")) == []
     with running_app(screen, tmp_path, scan) as app:
-        told = app.told(r"Saved a recording that was not finished: (.+)")
+        told = app.told(r"Saved an unfinished recording: (.+)")
         screen.do("key", "r")
         app.see(is_recording=True)
         for name in ("other", "second"):

@@ -251,7 +251,7 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
         app.see(clicking="measuring")
         close(app)
     told = "\n".join(app.notes)
-    assert "The tool 'second': M is to do both 'measure' and 'act_second'. 'act_second' has none" in told
+    assert "The tool 'second': M is set for both 'measure' and 'act_second'. 'act_second' has none" in told
     assert "third is switched off until the next start: unknown modifier key 'Hyper'" in told
     assert "fourth is switched off until the next start: there is a command 'measure' already" in told
     assert "fifth is switched off until the next start: TypeError: COMMANDS['Tools'] is a Command" in told

@@ -114,7 +114,7 @@ def test_chosen_frames_are_the_trajectory_and_too_few_are_told(run: Run) -> None
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--anchors", "left,left,nose"), "--anchors: a scan is held still by three landmarks at least"),
+        (("--anchors", "left,left,nose"), "--anchors: removing head motion needs three landmarks"),
         (("--anchors", "left,right,nase"), "unknown landmark 'nase'. Did you mean 'nose'? Known: chin, left"),
         (("--order", "speed", "--traced", "kinn"), "unknown landmark 'kinn'. Known: chin, left, nose, right"),
         (("--traced", "chin"), "--traced: is of speeds, and none are asked for. Add --order speed"),

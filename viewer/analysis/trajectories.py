@@ -79,10 +79,12 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     """
     unknown = [name for name in anchors if name not in tracks]
     if unknown:
-        raise InputError(f"the anchor '{unknown[0]}' is not placed", hint="Place it first, or leave it out")
+        raise InputError(
+            f"the rigid reference '{unknown[0]}' is not placed", hint="Place it first, or leave it out"
+        )
     if len(set(anchors)) < 3:
         hint = "Choose landmarks that do not move against each other, such as the corners of the eyes"
-        raise InputError("a scan is held still by three anchors at least", hint=hint)
+        raise InputError("removing head motion needs three rigid references", hint=hint)
     places = np.stack([tracks[name].positions for name in dict.fromkeys(anchors)], axis=1)  # (T, A, 3)
     known = np.logical_and.reduce(np.isfinite(places), axis=2)
     reference = int(np.argmax(known.sum(axis=1)))
@@ -92,7 +94,8 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     )
     if motions[reference] is None:
         raise InputError(
-            "no frame knows three anchors that are not on one line", hint="Place them, or choose others"
+            "no frame has three rigid references that are not on one line",
+            hint="Place them, or choose others",
         )
     return motions
 

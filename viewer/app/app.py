@@ -277,7 +277,7 @@ class App:
         try:
             if not os.path.exists(self._keys_file):
                 keys.write_template(self._keys_file, self.commands)
-            self.note(f"The keys are in {self._keys_file}; edit it and start Scan4D again.")
+            self.note(f"The keys are in {self._keys_file}. Edit this file and start Scan4D again.")
         except InputError as error:
             self.note(Problem(str(error)))
 

@@ -221,7 +221,7 @@ _FILE: Menu[App] = Menu("File", (
             icon=icons.ICON_FA_CAMERA,
         ),
         Command(
-            "record", "Record", lambda app: app.capture.toggle_recording(), "R",
+            "record", "Record", lambda app: app.capture.toggle_recording(app.keys.of["record"]), "R",
             is_on=lambda app: app.capture.recorder is not None, short="Record",
             icon=icons.ICON_FA_CIRCLE_DOT,
         ),

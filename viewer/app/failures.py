@@ -68,7 +68,7 @@ def failure_in_words(what: str, error: BaseException) -> str:
     """One line for users."""
     if isinstance(error, Scan4DError):
         return str(error)
-    return f"{what} failed ({reason(error)}); all else goes on."
+    return f"{what} failed ({reason(error)}); everything else still works."
 
 
 def reason(error: BaseException) -> str:

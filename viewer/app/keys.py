@@ -169,7 +169,7 @@ def _read(path: Path) -> tuple[dict[str, Any], list[InputError]]:
         return {}, []
     except (OSError, ValueError) as error:  # of encoding and of TOML as well
         what = getattr(error, "strerror", None) or error
-        return {}, [InputError(f"cannot be read ({what})", hint="The usual keys hold")]
+        return {}, [InputError(f"cannot be read ({what})", hint="Scan4D uses the default keys")]
 
 
 def _checked(given: Mapping[str, Any], commands: Commands, problems: list[InputError]) -> dict[str, str]:
@@ -204,7 +204,7 @@ def _without_clashes(
         for name, text in ((name, one) for name, keys in (usual | changes).items() for one in keys.split()):
             other = taken.setdefault(chord(text), name)
             if other != name:
-                what = f"{text} is to do both '{other}' and '{name}'"
+                what = f"{text} is set for both '{other}' and '{name}'"
                 guilty = next((n for n in reversed(changes) if n in (name, other)), None)
                 if guilty:
                     hint = f"Give one of them other keys. '{guilty}' keeps its usual ones"
@@ -212,7 +212,7 @@ def _without_clashes(
                     del changes[guilty]
                 else:
                     tool = commands.tool_of.get(name)
-                    where = f"The tool '{tool}'" if tool else "The usual keys"
+                    where = f"The tool '{tool}'" if tool else "The default keys"
                     hint = f"'{name}' has none, unless {FILE} gives it others; F1 lists those that are taken"
                     problems.append(InputError(what, where, hint))
                     usual[name] = ""

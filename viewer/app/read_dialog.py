@@ -78,7 +78,7 @@ def present_file(text: str) -> Path:
     there."""
     path = Path(absolute(_typed(text)))
     if not path.is_file():
-        raise InputError("there is no such file", path, "Choose one of the list")
+        raise InputError("this file does not exist", path, "Choose one from the list")
     return path
 
 

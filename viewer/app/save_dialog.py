@@ -30,7 +30,7 @@ class SaveDialog(PathDialog):
 
     def _draw_below(self, is_entered: bool) -> None:
         exists = self._exists
-        self._draw_problem("This file is there already." if exists else "")
+        self._draw_problem("This file exists already." if exists else "")
         if imgui.button("Replace" if exists else "Save") or (is_entered and not exists):
             self._try(self._save, lambda text: named_file(text, *self._suffixes))
 
@@ -53,5 +53,5 @@ def named_file(text: str, suffix: str, *others: str) -> Path:
     if not typed or os.path.isdir(path):
         raise InputError("is a folder", path, "Name a file in it")
     if not os.path.isdir(path.parent):
-        raise InputError("there is no such folder", path.parent, "Create it first, or name another")
+        raise InputError("this folder does not exist", path.parent, "Create it first, or name another")
     return path if path.name.lower().endswith((suffix, *others)) else path.with_name(f"{path.name}{suffix}")

@@ -154,7 +154,9 @@ def load(path: Path) -> tuple[Settings, list[str]]:
     except OSError as error:
         if error.errno == errno.EINVAL:  # too long, or no plain file
             return Settings(), [_put_aside(path, error.strerror or str(error))]
-        return Settings(), [str(InputError(f"cannot be read ({error.strerror})", path, "All starts anew"))]
+        return Settings(), [
+            str(InputError(f"cannot be read ({error.strerror})", path, "Scan4D starts with the defaults"))
+        ]
     except ValueError:  # of encoding as well
         return Settings(), [_put_aside(path, "is damaged")]
     if not isinstance(data, dict) or data.get("format") != FORMAT:
@@ -180,5 +182,6 @@ def _put_aside(path: Path, what: str) -> str:
     try:
         os.replace(path, kept)
     except OSError as error:
-        return str(InputError(f"{what}, and cannot be moved ({error.strerror})", path, "All starts anew"))
-    return str(InputError(what, path, f"It is kept as {kept.name}; all starts anew"))
+        what = f"{what}, and cannot be moved ({error.strerror})"
+        return str(InputError(what, path, "Scan4D starts with the defaults"))
+    return str(InputError(what, path, f"It is kept as {kept.name}; Scan4D starts with the defaults"))

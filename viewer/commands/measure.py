@@ -250,7 +250,7 @@ def _outputs(args: Namespace) -> list[Path]:
         raise InputError("is of numbers and plots of measures", "--against", "Add --numbers or --plot")
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
         hint = "Name landmarks that do not move against each other, with commas between"
-        raise InputError("a scan is held still by three landmarks at least", "--anchors", hint)
+        raise InputError("removing head motion needs three landmarks", "--anchors", hint)
     if args.smoothing is not None and not (is_of_speeds or args.numbers or args.repeats):
         hint = f"Use it with --numbers, --repeats, or --order {' or '.join(ORDERS[1:])}"
         raise InputError("smooths nothing that is asked for", "--smoothing", hint)

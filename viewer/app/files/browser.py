@@ -38,7 +38,7 @@ _ROW_KEYS = (
     imgui.Key.page_down, imgui.Key.page_up, imgui.Key.enter, imgui.Key.keypad_enter,
 )  # fmt: skip
 _OWNER = 2  # of these: any number of its own
-_HINT = "Files, folders and recordings can also be dropped onto the window."
+_HINT = "You can also drop files, folders and recordings onto the window."
 _ICONS = {
     "whole": icons.ICON_FA_FILM, "folder": icons.ICON_FA_FOLDER, "sequence": icons.ICON_FA_FILM,
     "file": icons.ICON_FA_CUBE,

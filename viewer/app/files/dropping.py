@@ -37,7 +37,7 @@ def take(
         return
     if told:
         names = ", ".join(Path(path).name for path in told)
-        note(f"Left out: {names}. Drop a recording, a session or a picture by itself to see it again.")
+        note(f"Not opened: {names}. Drop a recording, a session or a picture alone to open it.")
     named = [path for path in paths if path not in told]
     if named:
         one = as_one_scan(named)

@@ -37,7 +37,7 @@ class Sessions:
         so. ask: for one in a folder."""
         self._session, self._playback, self._note = session, playback, note
         self._refuse, self._open, self._take_up, self._ask = refuse, open, take_up, ask
-        about = "View, look, renderer, bookmarks, measurements; the scan itself stays where it is"
+        about = "Saves view, look, renderer, bookmarks, distances and landmarks, not the scan itself"
         self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save)
         self.homeless: SavedSession | None = None
 
@@ -62,7 +62,7 @@ class Sessions:
             self.open_with(session, scan)
             return
         self.homeless = session
-        self._note(f"{path.name}: its scan '{printable(session.scan)}' is not there. Choose where it is now.")
+        self._note(f"{path.name}: its scan '{printable(session.scan)}' is missing. Choose where it is now.")
         self._ask(path.parent)
 
     def open_with(self, session: SavedSession, scan: str) -> None:

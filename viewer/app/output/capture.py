@@ -92,7 +92,7 @@ class Capture:
         in slices first."""
         viewport, request = self._viewport, self._viewport.request
         if viewport.surface is None or request is None or not viewport.is_there:
-            self._note("There is no picture to save.")
+            self._note("There is no picture to save yet.")
             return
         if any(unsaved.request is request for unsaved, _ in self._unsaved):
             return
@@ -100,7 +100,7 @@ class Capture:
             entry = self.shown()
         except InputError as error:
             entry = None
-            self._note(Problem(f"The picture cannot be replayed: {error}"))
+            self._note(Problem(f"This picture cannot be replayed: {error}"))
         legend = None
         if entry is not None:
             told = entry.legend(self._playback.timeline, request.pose)
@@ -142,8 +142,8 @@ class Capture:
 
     # --- recording --------------------------------------------------------------------
 
-    def toggle_recording(self) -> None:
-        """Take down what is shown from now on; or stop, and save it."""
+    def toggle_recording(self, keys: str = "") -> None:
+        """Take down what is shown from now on; or stop, and save it. keys: that do this, for users to know."""
         now = time.monotonic()
         if self.recorder is None:
             try:
@@ -152,7 +152,7 @@ class Capture:
                 self._note(Problem(f"Cannot record: {error}"))
                 return
             self.recorder = Recorder(now)
-            self._note("Recording the view (R stops)")
+            self._note(f"Recording the view ({keys} stops)" if keys else "Recording the view")
             self._begin_journal()
             self.note_shown()
             return
@@ -161,7 +161,7 @@ class Capture:
         if len(recorder):
             self._save_recording(recorder.finish(now), journal)
         else:
-            self._note("Nothing was shown while recording.")
+            self._note("The recording is empty: the window showed nothing.")
             if journal is not None:
                 journal.remove()
 
@@ -173,7 +173,7 @@ class Capture:
             words = failure_in_words("Saving the recording", error)
             if journal is not None:
                 journal.leave()
-                words += " What was recorded until then is kept, and saved at the next start."
+                words += " Scan4D keeps what it has recorded, and saves it at the next start."
             self._note(Problem(words))
             return
         if journal is not None:
@@ -191,7 +191,7 @@ class Capture:
         try:
             entry = self.shown()
         except InputError as error:
-            self._note(Problem(f"The recording ends: {error}"))
+            self._note(Problem(f"The recording has stopped: {error}"))
             self.toggle_recording()
             return
         if entry is None:
@@ -212,7 +212,7 @@ class Capture:
 
     def _tell_unsafe(self, error: OSError) -> None:
         what, _ = explained(error)
-        self._note(f"The recording is kept in memory alone until you stop it ({journal_folder()}: {what}).")
+        self._note(f"The recording is only in memory until you stop it ({journal_folder()}: {what}).")
 
     def find_unfinished(self) -> None:
         """Save what processes have recorded that were killed meanwhile."""
@@ -278,4 +278,4 @@ def _saved_late(journal: Path) -> str:
         path = saved(journal)
     except InputError as error:
         return str(error)
-    return f"Saved a recording that was not finished: {path}" if path else ""
+    return f"Saved an unfinished recording: {path}" if path else ""

@@ -35,25 +35,25 @@ _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{name}{n}" for name in ("COM", "LPT"
 class Choices:
     """Choices of what to export. Frames are counted from 1; values may be wrong (see `problems`)."""
 
-    what: str = param(VIEW, "What the pictures show", choices=(VIEW, TURNTABLE, FRAMES))
-    pictures: int = param(36, "That make a turn", low=2, high=_MOST_PICTURES)
-    first: int = param(1, "The first frame")
-    last: int | None = param(None, "The last frame; auto: the scan's", type=int)
+    what: str = param(VIEW, "What to export", choices=(VIEW, TURNTABLE, FRAMES))
+    pictures: int = param(36, "Number of pictures in one turn", low=2, high=_MOST_PICTURES)
+    first: int = param(1, "First frame to export")
+    last: int | None = param(None, "Last frame to export; auto: the scan's last", type=int)
     step: int = param(1, "1: every frame, 2: every second one, and so on", low=1, high=100_000)
-    format: str = param(PNG, "Of the file or files", choices=(PNG, EXR, MP4))
+    format: str = param(PNG, "File format", choices=(PNG, EXR, MP4))
     fps: float | None = param(
-        None, "Pictures a second; auto: as fast as the scan's frames",
+        None, "Frames per second of the film; auto: as the scan",
         low=FRAME_RATES[0], high=FRAME_RATES[1], type=float,
     )  # fmt: skip
     width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
     height: int = param(1080, "Pixels", low=1, high=_MOST_PIXELS)
     quality: str = param(
-        AS_SHOWN, "How smooth edges are: as Appearance says, or the mean of 1, 5 or 17 samples of each pixel",
+        AS_SHOWN, "Anti-aliasing: as set in Appearance, or the mean of 1, 5 or 17 samples per pixel",
         choices=(AS_SHOWN, *SAMPLES),
     )  # fmt: skip
-    anonymous: bool = param(False, "Pictures do not tell which scan they show, where it was and when")
-    folder: str = param("", "Where the files go")
-    name: str = param("", "Of the file; several are numbered")
+    anonymous: bool = param(False, "Store no name, path or date of the scan in the pictures")
+    folder: str = param("", "Folder of the exported files")
+    name: str = param("", "File name; Scan4D numbers several files")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -96,17 +96,17 @@ def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
         except InputError as error:
             found[parameter.name] = error.what
     if "width" not in found and "height" not in found and choices.width * choices.height > most_pixels:
-        found["height"] = f"More than the {most_pixels:,} pixels that the driver takes"
+        found["height"] = f"More than the {most_pixels:,} pixels that the graphics driver can draw"
     if choices.what == FRAMES:
         last = count if choices.last is None else choices.last
         if not 1 <= choices.first <= count:
-            found["first"] = f"The first frame is one of 1 to {count}"
+            found["first"] = f"Choose a first frame from 1 to {count}"
         elif not choices.first <= last <= count:
-            found["last"] = f"The last frame is one of {choices.first} to {count}"
+            found["last"] = f"Choose a last frame from {choices.first} to {count}"
     if choices.format == MP4 and choices.what == VIEW:
-        found["format"] = "A film shows a turntable or frames"
+        found["format"] = "A film needs a turntable or an image sequence"
     if not os.path.isdir(_folder(choices.folder)):
-        found["folder"] = "There is no such folder"
+        found["folder"] = "This folder does not exist"
     if problem := _problem_of_name(choices.name):
         found["name"] = problem
     return found
@@ -115,11 +115,11 @@ def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
 def _problem_of_name(name: str) -> str:
     """Why a file cannot have this name on every system; empty where it can."""
     if not name.strip() or set(name) & set('/\\%:*?"<>|\0'):
-        return 'Give a name without / \\ % : * ? " < > |'
+        return 'Use a name without / \\ % : * ? " < > |'
     if name[-1] in " .":
-        return "A name does not end with a space or a dot"
+        return "A name cannot end with a space or a dot"
     if name.partition(".")[0].rstrip().upper() in _DEVICES:
-        return "Windows keeps this name for a device"
+        return "Windows reserves this name for a device"
     if len(os.fsencode(name)) > _LONGEST_NAME:
         return f"The name is longer than {_LONGEST_NAME} bytes"
     return ""

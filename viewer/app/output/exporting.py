@@ -131,7 +131,7 @@ class Exporting:
         """
         name = self._session.document.look.color_by
         if self.choices.what == export_plan.FRAMES and name in self._session.laid.names:
-            self._note(f"Cannot export: the colours of some frames come from '{name}', which is computed.")
+            self._note(f"Cannot export: '{name}' colours some frames, and a tool computes it.")
             return
         there = export_plan.present(self.choices, self.count)
         shown, choices, timeline = self._entry(), self.choices, self._playback.timeline
@@ -154,7 +154,7 @@ class Exporting:
             self._begin(out.name, recording, out, DEFAULT_FPS, False)
         else:
             again = {"Save as film": lambda: self.film(recording, out)}
-            self._note(Offer("An export is running: wait for it, or cancel it.", again, "recording"))
+            self._note(Offer("An export is running. Wait for it, or cancel it.", again, "recording"))
 
     def _begin(self, name: str, recording: Recording, out: Path, *how: Any, **more: Any) -> None:
         """Have a process make pictures or a film. how, more: as `make` takes them."""
@@ -191,7 +191,9 @@ class Exporting:
         for warning in made.warnings[:_MOST_WARNINGS]:
             self._note(warning)
         if made.device != self._viewport.renderer.gpu.device:
-            self._note(f"It was drawn by {made.device}, not by the window's GPU: small differences may show.")
+            self._note(
+                f"{made.device} drew the export, not the window's GPU: small differences are possible."
+            )
 
     def keeps_open(self) -> bool:
         """Whether an export runs that the user has to be asked about before the window closes."""

@@ -41,7 +41,7 @@ class Replaying:
         self._compared: str | None = None  # the scan whose hash was
 
     def __str__(self) -> str:
-        return f"Replaying {self.path.name}: {self._next} of {len(self.recording.entries)}. Esc stops it."
+        return f"Replaying {self.path.name}: {self._next} of {len(self.recording.entries)}. Esc to stop."
 
     def until_next(self, now: float) -> float:
         """Seconds until another picture is due, or is to be looked for while one is awaited."""
@@ -69,7 +69,7 @@ class Replaying:
             return app.opening is not None
         timeline = app.playback.timeline
         if entry.pose in timeline.broken or entry.pose >= len(timeline):
-            app.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown; it is left out.")
+            app.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown: Scan4D skips it.")
             self._next += 1
         elif (pose := timeline.ready(entry.pose)) is None:
             timeline.request(entry.pose)
@@ -104,7 +104,7 @@ class Replaying:
         """Compare a scan with the hash that it had; what to tell of it, nothing where it is the same."""
         if fingerprint_as(hash, files) in (hash, None):
             return ""
-        return f"{scan} is not as it was when {self.path.name} was made; pictures may differ."
+        return f"{scan} has changed since {self.path.name} was made: pictures may differ."
 
 
 def _show(app: App, entry: Entry, pose: Pose) -> None:

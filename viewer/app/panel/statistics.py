@@ -27,14 +27,14 @@ def draw(
     """Declare the section. counts: of points, see `counting`. rows: others to tell. is_moving: whether
     pictures come one after the other."""
     timers.enabled = imgui.checkbox("Time each pass", timers.enabled)[1]
-    widgets.tooltip("Measure each pass of a picture; this makes it a little slower")
+    widgets.tooltip("Measure the time of each drawing pass; this slows drawing a little")
     surface = viewport.surface
     if surface is None or not viewport.is_there:
         return
     for name, number in counting.words(viewport, counts):
         widgets.fact(name, number)
     widgets.fact("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
-    widgets.fact("Samples of a pixel", str(surface.stats.samples))
+    widgets.fact("Samples per pixel", str(surface.stats.samples))
     for name, text in rows:
         widgets.fact(name, text)
     for name, choice in surface.stats.chosen.items():

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 def draw(steering: Steering, camera: Camera | None, bookmarks: Bookmarks, ui: Ui) -> None:
     """Declare the section."""
-    widgets.label("Projection", "Perspective: near is larger. Orthographic: sizes compare at any depth")
+    widgets.label(
+        "Projection", "Perspective: near things look larger. Orthographic: sizes are comparable at any depth"
+    )
     now = camera.projection if camera else PROJECTIONS[0]
     chosen = widgets.combo("projection", now, PROJECTIONS, {name: name.capitalize() for name in PROJECTIONS})
     if chosen != now:

@@ -40,7 +40,7 @@ class Pacing:
 
     def use_names(self, by_names: bool) -> None:
         """Have the names of the frames tell when they are, or not."""
-        self._session.change("Times of the file names", times_by_names=by_names)
+        self._session.change("Use times from file names", times_by_names=by_names)
 
     def advance(self, now: float) -> bool:
         """Take in what the document says; whether times have changed."""

@@ -122,11 +122,11 @@ class Playback:
         span = self._chosen()
         ends = (min(span[0], index), index) if is_last else (index, max(span[-1], index))
         whole = (0, len(self.timeline) - 1)
-        self.session.change("Choose frames", merge="span", span=None if ends == whole else ends)
+        self.session.change("Set frames to play", merge="span", span=None if ends == whole else ends)
 
     def clear_span(self) -> None:
         """Play all frames again."""
-        self.session.change("Choose all frames", span=None)
+        self.session.change("Play all frames", span=None)
 
     def after(self, index: int, steps: int) -> int | None:
         """The frame that playing shows so many steps after one; None where it has come to its end by then."""

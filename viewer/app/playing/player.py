@@ -17,12 +17,10 @@ SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # that the window offers
 class Pace:
     """How to play."""
 
-    speed: float = param(1.0, "Of the scan's time against the clock's", low=SPEEDS[0], high=SPEEDS[-1])
-    reverse: bool = param(False, "Back in time")
-    loop: bool = param(True, "Round the end")
-    every_frame: bool = param(
-        False, "Show each frame and let time slip where that is late; else leave out what is late"
-    )
+    speed: float = param(1.0, "Speed of playback, 1 is real time", low=SPEEDS[0], high=SPEEDS[-1])
+    reverse: bool = param(False, "Play backward")
+    loop: bool = param(True, "Start again at the end")
+    every_frame: bool = param(False, "Show each frame, even if that is slower; else skip late frames")
 
     @property
     def direction(self) -> int:

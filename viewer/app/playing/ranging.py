@@ -69,7 +69,7 @@ class Ranging:
         """Words of the colour bar while not all frames are known; empty once they are."""
         look, count = self._session.document.look, self._ranges.count
         known = self._ranges.known(look)
-        return f"range of {known} of {count} frames" if is_open_range(look) and 0 < known < count else ""
+        return f"range from {known} of {count} frames" if is_open_range(look) and 0 < known < count else ""
 
     def advance(self, now: float, is_idle: bool) -> bool:
         """Go on; whether there is more to show. is_idle: whether nothing else reads or draws."""
@@ -84,7 +84,7 @@ class Ranging:
                 self.close()
         known = 0 if wanted is None else ranges.known(wanted)
         if self._visiting is None and wanted is not None and timeline is not None and known < ranges.count:
-            task = Task("Looking for the range of colours")
+            task = Task("Finding the colour range")
             order = self._order(ranges.count)
             work = in_background(task, lambda: ranges.gather(timeline, wanted, order))
             self._visiting = wanted, task, work

@@ -90,7 +90,7 @@ class Bookmarks:
     def draw(self, ui: Ui) -> None:
         """Declare the list: a click on a name goes there; buttons rename and delete."""
         if not self.all:
-            widgets.faint("No views yet. Add keeps the one that is shown, to come back to.")
+            widgets.faint("No views yet. Press Add to store the current view.")
         deleted = None
         for number, bookmark in enumerate(self.all):
             imgui.push_id(number)
@@ -105,7 +105,7 @@ class Bookmarks:
         if imgui.button(f"{icons.ICON_FA_PLUS}  Add"):
             self.add()
         imgui.end_disabled()
-        ui.tooltip("Keep this view", "bookmark_add")
+        ui.tooltip("Store the current view as a bookmark", "bookmark_add")
 
     def _draw_row(self, number: int, bookmark: Bookmark) -> bool:
         """One bookmark; True where it is to be deleted."""

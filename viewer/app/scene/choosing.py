@@ -118,7 +118,7 @@ class Choosing:
         self.comparison = self.choice = None
         try:
             if not known:
-                raise InputError("no renderer is measured that draws this scan")
+                raise InputError("no measured renderer can draw this scan")
             self.comparison = Comparison.of(known, seen, in_unit(goal, unit), self._model)
         except InputError as error:
             self.problem = error.what

@@ -66,7 +66,7 @@ class Extent:
                     with suppress(InputError):
                         self._note(timeline, timeline.visit(index))
 
-        task = Task("Looking how far the scan reaches")
+        task = Task("Finding the size of the scan")
         self._visiting = task, in_background(task, work)
 
     def take_visited(self) -> bool:

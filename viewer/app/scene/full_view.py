@@ -42,5 +42,5 @@ class FullView:
         """Say how to come back, as no menu does."""
         if self.is_on:
             keys = self._keys.of[command]
-            self._note((f"{keys} or " if keys else "") + "Escape brings the panels back.")
+            self._note((f"{keys} or " if keys else "") + "Escape shows the panels again.")
         self._window.touch()

@@ -80,8 +80,8 @@ class ViewMarks:
 
 def _scale_bar_help(orthographic: bool) -> str:
     if orthographic:
-        return "True at every depth"
-    return "True at the depth that the view turns about; what is nearer looks larger"
+        return "Valid at every depth"
+    return "Valid at the depth of the orbit centre; nearer things look larger"
 
 
 class _View:

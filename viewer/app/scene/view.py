@@ -45,7 +45,7 @@ def draw(app: App) -> None:
     if the_cube.under_mouse is not None or on_menu:
         imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
     imgui.invisible_button("view", size, _BUTTONS)
-    with told("Looking what is under the mouse"):
+    with told("Finding what is under the mouse"):
         app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
     if app.document.camera is not None and app.playback.pose is not None:
         with told("Moving the view"):
@@ -163,7 +163,7 @@ def words_over(app: App) -> str | None:
         return str(playback.problem) if playback.problem else None
     if playback.player.playing or playback.pose.index == app.session.index:
         return _words_on_nothing(app)
-    return f"{playback.problem}\n{playback.pose.label} is shown instead." if playback.problem else None
+    return f"{playback.problem}\nYou see {playback.pose.label} instead." if playback.problem else None
 
 
 def _words_on_nothing(app: App) -> str | None:

@@ -176,7 +176,8 @@ KINDS = (
         "length", 3, None, _perimeter, True, {"depth": DEPTHS},
     ),
     MeasureKind(
-        "volume", "Volume over a plane", "between a region and the plane of its outline; negative beneath",
+        "volume", "Volume above the outline's plane",
+        "between a region and the plane of its outline; negative beneath",
         "volume", 3, None, _volume, True,
     ),
 )  # fmt: skip

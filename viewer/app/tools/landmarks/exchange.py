@@ -50,7 +50,7 @@ class Exchange:
         self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, written)
         about = "A file of landmarks, or a template"
         self._reading = ReadDialog("Import landmarks", about, ".json", self._read, landmark_suffixes())
-        about = "Names, pairs and measures of the landmarks, for other scans"
+        about = "Saves names, mirror partners and measures, for use in other scans"
         self._template_saving = SaveDialog("Save template", about, ".json", self._save_template)
         about = "A file that 'Save as template...' has written"
         self._template_reading = ReadDialog("Choose template", about, ".json", self._read_template)

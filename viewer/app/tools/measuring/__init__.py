@@ -237,7 +237,7 @@ class Tool:
         if new:
             self.desk.change("Import distances", Measurements((*self.made.all, *new)))
             self.desk.reveal()
-        there = f", {len(read) - len(new)} were there already" if len(new) < len(read) else ""
+        there = f", {len(read) - len(new)} exist already" if len(new) < len(read) else ""
         self.desk.note(f"Imported {len(new)} distances{there}.")
 
     def _table(self) -> list[list[object]]:
@@ -290,4 +290,4 @@ COMMANDS = {
         )),
     )
 }  # fmt: skip
-MOUSE = (("Click while measuring", "Set an end"),)
+MOUSE = (("Click while measuring", "Set an end point"),)

@@ -150,7 +150,7 @@ class Tool:
     def add(self, measure: Measure) -> None:
         """Measure something, and show its curve. Raises InputError where one has that name already."""
         if any(one.name == measure.name for one in self.landmarks.measures):
-            raise InputError(f"There is a measure '{measure.name}' already.")
+            raise InputError(f"A measure '{measure.name}' exists already.")
         measures = (*self.landmarks.measures, measure)
         self.desk.change("Add measure", replace(self.landmarks, measures=measures))
         self.settings = replace(self.settings, is_open=True)
@@ -166,7 +166,7 @@ class Tool:
         if not new or new == old:
             return
         if any(one.name == new for one in self.landmarks.measures):
-            raise InputError(f"There is a measure '{new}' already.")
+            raise InputError(f"A measure '{new}' exists already. Choose another name.")
         made = self.landmarks.with_measure_renamed(old, new)
         self.desk.change("Rename measure", made, self.choices.with_measure_renamed(old, new))
 

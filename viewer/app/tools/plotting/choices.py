@@ -52,12 +52,12 @@ class Settings:
     bands: bool = param(True, "Two standard deviations to either side of a curve", title="±")
     seconds: float = param(
         0.3, "Width of the window that smooths curves, for speed, acceleration and numbers",
-        low=0.02, high=5.0, unit="s", title="smoothing",
+        low=0.02, high=5.0, unit="s", title="Smoothing",
     )  # fmt: skip
     lines: bool = param(True, "Draw each measure in the view, with its value", title="In the view")
     least: float = param(
-        0.5, "How much of a curve's range a peak stands out by to count as a repeat", low=0.05, high=1.0,
-        title="least repeat",
+        0.5, "Least height of a peak that counts as a repeat, as a share of the curve's range",
+        low=0.05, high=1.0, title="Least repeat",
     )  # fmt: skip
     trajectories: bool = param(
         True, "Draw the paths of the landmarks that are ticked", title="Show paths", basic=True

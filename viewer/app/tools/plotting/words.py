@@ -9,10 +9,10 @@ from ....analysis.measures.curves import BAND_SIGMAS, MeasureCurve
 UNKNOWN = "-"
 NUMBERS_HELP = {
     "Amplitude": "From rest, the mean of the first frames, to the peak; ± covers 95 %",
-    "Onset": "When the curve leaves rest by 10 % of the amplitude",
-    "Peak": "When the curve is farthest from rest",
-    "Duration": "From onset until it is back within 10 % of the amplitude from rest",
-    "Fastest": "The largest speed to either side",
+    "Onset": "Time when the curve leaves rest by 10 % of the amplitude",
+    "Peak": "Time when the curve is farthest from rest",
+    "Duration": "From onset until the curve returns to within 10 % of the amplitude from rest",
+    "Fastest": "Largest speed, rising or falling",
 }
 
 
