@@ -143,7 +143,8 @@ class Capture:
     # --- recording --------------------------------------------------------------------
 
     def toggle_recording(self, keys: str = "") -> None:
-        """Take down what is shown from now on; or stop, and save it. keys: that do this, for users to know."""
+        """Take down what is shown from now on; or stop, and save it. keys: that do this, as the user knows
+        them."""
         now = time.monotonic()
         if self.recorder is None:
             try:
