@@ -132,6 +132,7 @@ class App:
             self.session, self.playback, self.viewport, self.failures, self.note, window.touch,
             self.commands, remembered.tools,
         )  # fmt: skip
+        self.keys: keys.Keys
         self.keys, problems = keys.load_keys(self._keys_file, self.commands)
         for problem in problems:
             self.note(problem)

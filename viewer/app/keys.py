@@ -77,7 +77,9 @@ class Keys:
     def __init__(self, commands: Commands, changes: Mapping[str, str] | None = None) -> None:
         """changes: command's name -> its keys, where they are not the usual ones."""
         self._commands = commands.of
-        self.of = {name: command.key for name, command in commands.of.items()} | dict(changes or {})
+        self.of: dict[str, str] = {name: command.key for name, command in commands.of.items()} | dict(
+            changes or {}
+        )
         self._chords = [
             (self._commands[name], keys) for name, text in self.of.items() for keys in chords(text)
         ]
