@@ -163,6 +163,8 @@ def shown(app: App) -> dict[str, Any]:
         "words": words_over(app),
         "renderer": backends()[app.rendering.backend].title if app.rendering.backend else None,
         "renderer_named": app.naming.name,
+        "shown_notes": [note.text for note in app.notices.shown(time.monotonic())],
+        "latest_note": app.notices.latest,
         "loading": app.loading.awaited and app.loading.awaited.words,
         "theme": app.theme,
         "is_replaying": app.replayer.replaying is not None,

@@ -85,3 +85,22 @@ def test_columns_of_the_keys_are_about_as_long_and_keep_their_order() -> None:
 ])  # fmt: skip
 def test_searching_goes_by_all_words(words: list[str], is_found: bool) -> None:
     assert has_words(("Playback", "Next frame", "Right"), words) is is_found
+
+
+def test_what_is_about_a_scan_goes_when_another_one_opens() -> None:
+    notices = Notices()
+    notices.tell(Problem("frame 3 is broken"), "scan")
+    notices.tell(Offer("its files have changed", {"Reload": lambda: None}, "changes"), "scan")
+    notices.tell(Problem("Cannot open: other.ply"), "opening")
+    notices.tell(Problem("no room on the disk"))
+    notices.tell("frame 4 has no normals", "scan")
+    now = time.monotonic()
+    assert len(texts(notices, now)) == 4
+    notices.end("scan")
+    assert texts(notices, now) == ["Cannot open: other.ply", "no room on the disk"]
+    assert notices.latest == ""
+    notices.end("opening")
+    assert texts(notices, now) == ["no room on the disk"]
+    notices.tell("frame 1 has no normals", "scan")
+    assert notices.latest == texts(notices, now)[-1] == "frame 1 has no normals", "of the new one"
+    assert len(notices.all) == 6, "all stay in the log"

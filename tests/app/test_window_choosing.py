@@ -57,7 +57,8 @@ class Shown:
     def __init__(self, session: Session, playback: Playback) -> None:
         self.session = session
         self.viewport = Viewport(shared_renderer(), (0, 0, *SIZE))
-        self.choosing = Choosing(session, playback, self.viewport)
+        self.told: list[str] = []
+        self.choosing = Choosing(session, playback, self.viewport, self.told.append)
 
     def draw(self) -> None:
         self.viewport.rest()
@@ -164,6 +165,21 @@ def test_it_is_what_a_command_chooses_for_the_same_picture(shown: Shown) -> None
     assert way == expected.way
     assert shown.choosing.choice_of(request) == expected
     assert shown.choosing.choice_of(replace(request, backend="points")) is None
+
+
+def test_pictures_that_take_far_longer_than_the_limit_are_told_once(shown: Shown) -> None:
+    for bound in (0.01, 1e6, 0.01):
+        shown.session.change("Change limit", goal=Goal("time", bound))
+        for number in range(4):
+            shown.session.change("Orbit", camera=CAMERA.orbited(10 * number, 0))
+            shown.settle()
+        shown.advance()
+        ms = shown.choosing.measured_ms
+        assert ms is not None
+        is_over = bound < 1
+        assert ms > 1.5 * bound or not is_over, "which no picture is within"
+        assert (f"Pictures take {ms:.0f} ms; the limit is 0.01 ms" in shown.choosing.overrun) == is_over
+    assert len(shown.told) == 2, "each time that it begins"
 
 
 def test_what_pictures_took_is_told_from_the_second_one_on(shown: Shown) -> None:

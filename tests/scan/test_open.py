@@ -309,3 +309,28 @@ def test_no_rate_counts_beside_a_times_csv(tmp_path: Path) -> None:
         assert not has_times_in_names(scan)
         retime(scan, 10.0, by_names=True)
         np.testing.assert_array_equal(scan.times, [0, 3])
+
+
+def test_a_folder_that_holds_another_scan_says_so(tmp_path: Path) -> None:
+    cloud = PointCloud.from_arrays(np.eye(3))
+
+    def told(folder: Path) -> list[str]:
+        with open_scan(folder) as timeline:
+            return [message.text for message in timeline.messages if message.kind == "beside"]
+
+    (tmp_path / "frames").mkdir()
+    for number in range(3):
+        formats.write(tmp_path / "frames" / f"{number}.ply", cloud)
+    for name in ("times.csv", "notes.txt", "mesh_topology.ply", ".hidden.ply"):
+        (tmp_path / name).write_text("frame,time\n")
+    (tmp_path / "times.csv").unlink()
+    assert told(tmp_path) == [], "tables, faces and hidden files are no scans"
+    formats.write(tmp_path / "whole10.npz", cloud)
+    formats.write(tmp_path / "whole9.ply", cloud)
+    (text,) = told(tmp_path)
+    assert text == (
+        "The folder also holds whole9.ply, whole10.npz, which this scan does not use. "
+        "Open such a file by its name to see it."
+    )
+    assert told(tmp_path / "frames") == []
+    assert told(tmp_path / "whole9.ply") == []

@@ -113,7 +113,7 @@ class App:
         window.text_scale = remembered.text_scale
         self.set_theme(remembered.theme)
         self.notices = Notices()
-        self.failures = Failures(self.note)
+        self.failures = Failures(self.note_of_scan)
         self._up, self._unit, self._fps = up, unit, fps
         self._told: set[str] = set()  # what could not be read of documents
         self._has_begun = self._looks_further = False  # whether a frame of any scan was shown, or looked for
@@ -129,7 +129,7 @@ class App:
         self.thumbnails: Thumbnails = Thumbnails(window.ctx)
         self.commands = Commands()
         self.tools: Toolbox = Toolbox(
-            self.session, self.playback, self.viewport, self.failures, self.note, window.touch,
+            self.session, self.playback, self.viewport, self.failures, self.note_of_scan, window.touch,
             self.commands, remembered.tools,
         )  # fmt: skip
         self.keys: keys.Keys
@@ -139,7 +139,9 @@ class App:
         self.keyboard: Keyboard = Keyboard()
         self.menu_bar = MenuBar()
         self.help: Help = Help(self.commands, self.keys, self.notices, self.renderer.gpu)
-        self.scans: Scans = Scans(self.session, self.note, self.refuse, self.open, scans, remembered.recent)
+        self.scans: Scans = Scans(
+            self.session, self.note_of_opening, self.refuse, self.open, scans, remembered.recent
+        )
         self.sessions: Sessions = Sessions(
             self.session, self.playback, self.note, self.refuse, self.open, self.take_up,
             lambda at: self.browser.show(at),
@@ -149,19 +151,19 @@ class App:
             self.session, self.playback, self.note, self.remembered, remembered, user_folder() / settings.FILE
         )
         self.pointer: Pointer = Pointer(self.viewport, self.playback, remembered.point_details)
-        self.rendering: Rendering = Rendering(self.session, self.playback, self.note)
+        self.rendering: Rendering = Rendering(self.session, self.playback, self.note_of_scan)
         self.naming: Naming = Naming(self.rendering, self.viewport)
-        self.choosing: Choosing = Choosing(self.session, self.playback, self.viewport)
+        self.choosing: Choosing = Choosing(self.session, self.playback, self.viewport, self.note_of_scan)
         self.steering: Steering = Steering(
             self.session, self.playback, self.viewport, self.pointer, remembered.cube,
-            remembered.turn_seconds, up is not None, self.note,
+            remembered.turn_seconds, up is not None, self.note_of_scan,
         )  # fmt: skip
         self.glide: Glide = Glide(remembered.glide)
         self.marks: ViewMarks = ViewMarks(
             self.session, self.playback, self.viewport, self.steering, self.ranging, remembered.marks,
             remembered.marks_in_files,
         )  # fmt: skip
-        self.bookmarks: Bookmarks = Bookmarks(self.session, self.note)
+        self.bookmarks: Bookmarks = Bookmarks(self.session, self.note_of_scan)
         self.full_view: FullView = FullView(window, self.keys, self.note)
         self.counting = Counting()
         self.panel = Panel(remembered.panel)
@@ -186,7 +188,7 @@ class App:
             self.session, self.scans, self.sessions, self._opening, self.open, self.replayer.replay,
             self.tools.take_file, Previewer(window.ctx),
         )  # fmt: skip
-        self.changes: Changes = Changes(self.session, self.note, self.open)
+        self.changes: Changes = Changes(self.session, self.note_of_scan, self.open)
         self._slow_devices = remembered.slow_devices
         if (gpu := self.renderer.gpu).software and gpu.device not in self._slow_devices:
             self._slow_devices = (*self._slow_devices, gpu.device)
@@ -198,6 +200,14 @@ class App:
     def note(self, text: str) -> None:
         """Tell the user something."""
         self.notices.tell(text)
+
+    def note_of_scan(self, text: str) -> None:
+        """Tell the user something about the open scan, until another one opens."""
+        self.notices.tell(text, "scan")
+
+    def note_of_opening(self, text: str) -> None:
+        """Tell the user something about what could not be opened, until something else is to be opened."""
+        self.notices.tell(text, "opening")
 
     @property
     def document(self) -> Document:
@@ -288,6 +298,7 @@ class App:
 
         session: to open it with; None: as it was left.
         """
+        self.notices.end("opening")
         left = self.session.left(scan)
         find = (lambda: self._kept(scan)) if left is None else lambda: left
         self._opening.start(scan, title(scan), find, lambda: open_scan(scan, self._unit, self._fps), session)
@@ -340,16 +351,17 @@ class App:
         try:
             opened = self._opening.take()
         except Scan4DError as error:
-            self.refuse(f"Cannot open: {error}")
             self.scans.look(self.session.scan)
             if not self._has_begun and asked is not None:  # else nothing would be shown
                 self.open(self.scans.after(asked) or DEMO)
+            self.refuse(f"Cannot open: {error}")
             return
         if opened is not None:
             scan, begun = opened
             # It may wait for a pose that is being read.
             in_background(Task("Closing"), self.playback.timeline.close)
             self.keeping.leave()
+            self.notices.end("scan")
             self.session.turn_to(scan, begun.left, self._up)
             self._start(begun)
             self.playback.begin(begun.timeline, begun.first)
@@ -362,7 +374,7 @@ class App:
         self.ranging.begin(timeline)
         self.changes.begin(timeline)
         if problem:
-            self.note(problem)
+            self.note_of_scan(problem)
         if session is not None:
             self.session.take_up(session)
         self._check(session or left)
@@ -393,7 +405,7 @@ class App:
         problem = saved and saved.problem
         if problem and problem not in self._told:
             self._told.add(problem)
-            self.note(problem)
+            self.note_of_scan(problem)
         if saved is not None and saved.hash is not None:
             scan, found = self.session.scan, self.session.hash_found
             self.capture.tell_later(partial(offer_of_change, saved, found, partial(self._begin_anew, scan)))
@@ -427,12 +439,12 @@ class App:
             self._messages_read = len(self.playback.timeline.messages)
             return
         for message in messages:
-            self.note(message.text)
+            self.note_of_scan(message.text)
 
     def refuse(self, problem: str) -> None:
         """Tell why what the user asked for was not opened: in the dialog, where that waits for it."""
         if not self.browser.refused(problem):
-            self.note(Problem(problem))
+            self.note_of_opening(Problem(problem))
 
     def place_view(self, place: tuple[int, int, int, int]) -> None:
         """Take in where the 3D view is: left, bottom, width, height in pixels from the lower left."""

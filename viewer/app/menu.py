@@ -93,12 +93,13 @@ def _underline(start: ImVec2, letter: str) -> None:
 
 
 def draw_toolbar(app: App) -> None:
-    """Declare the toolbar in the current ImGui window: icons and words, icons alone where there is no room
-    for both, and as many as there is room for."""
+    """Declare the toolbar in the current ImGui window: icons and words, icons alone in the last groups where
+    there is no room for both, and as many as there is room for."""
     groups = app.commands.toolbar
     room = imgui.get_content_region_avail().x
-    has_words = _width(app, groups) <= room
-    for group in groups:
+    worded = next((count for count in range(len(groups), 0, -1) if _width(app, groups, count) <= room), 0)
+    for number, group in enumerate(groups):
+        has_words = number < worded
         if group is not groups[0]:
             _draw_line()
         for item in group:
@@ -112,11 +113,13 @@ def draw_toolbar(app: App) -> None:
             imgui.same_line()
 
 
-def _width(app: App, groups: Toolbar) -> float:
-    """The width of a toolbar with words."""
+def _width(app: App, groups: Toolbar, worded: int) -> float:
+    """The width of a toolbar with words in so many of its groups."""
     gap = imgui.get_style().item_spacing.x
     widths = [
-        widgets.button_width(_text(app, item, has_words=True)) + gap for group in groups for item in group
+        widgets.button_width(_text(app, item, number < worded)) + gap
+        for number, group in enumerate(groups)
+        for item in group
     ]
     return sum(widths) + gap * len(groups)
 

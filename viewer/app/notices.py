@@ -52,13 +52,15 @@ class Offer(str):
 @dataclass(frozen=True)
 class Notice:
     """One message. at: when it came, local time. until: by the clock, when it goes. is_problem: whether it
-    tells what went wrong. offer: with the buttons that it has, None without any."""
+    tells what went wrong. offer: with the buttons that it has, None without any. of: "scan" where it is about
+    the open scan, "opening" where it is about what could not be opened."""
 
     text: str
     at: datetime
     until: float
     is_problem: bool = False
     offer: Offer | None = None
+    of: str = ""
 
     @property
     def stays(self) -> bool:
@@ -74,19 +76,28 @@ class Notices:
         self.count = 0  # ever told
         self._foot = 0.0  # height of the problems over the picture
 
-    def tell(self, text: str) -> None:
+    def tell(self, text: str, of: str = "") -> None:
         """Show a message for as long as it takes to read, a `Problem` or an `Offer` until it is sent away,
-        and keep it in the log."""
+        and keep it in the log. of: what it is about, see `Notice` and `end`."""
         is_problem, offer = isinstance(text, Problem), text if isinstance(text, Offer) else None
         text = printable(text)
         log.info("%s", text)
         seconds, per_letter = _LASTS
         until = math.inf if is_problem or offer else time.monotonic() + seconds + per_letter * len(text)
-        new = Notice(text, datetime.now(), until, is_problem, offer)
+        new = Notice(text, datetime.now(), until, is_problem, offer, of)
         self.all = [self._gone(each) if _replaces(new, each) else each for each in self.all]
         self.all.append(new)
         del self.all[:-_MOST_KEPT]
         self.count += 1
+
+    def end(self, of: str) -> None:
+        """Show no longer what was about something that is over: the scan that was open, or an opening."""
+        self.all = [self._gone(notice) if notice.of == of else notice for notice in self.all]
+
+    @property
+    def latest(self) -> str:
+        """The last message, unless what it is about is over; empty where there is none."""
+        return self.all[-1].text if self.all and not (self.all[-1].of and self.all[-1].until == 0.0) else ""
 
     def shown(self, now: float) -> list[Notice]:
         """Notices to show over the picture, the oldest first: the last few, and the last few that stay."""

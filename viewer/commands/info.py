@@ -64,6 +64,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         "dropped": pose.dropped + found.dropped,
         "bytes": pose.nbytes,
         "views": [_view_facts(view) for view in pose.views],
+        "beside": [message.text for message in timeline.messages if message.kind == "beside"],
         "origin": pose.origin.tolist(),
         "bounds": {"low": (pose.origin + found.low).tolist(), "high": (pose.origin + found.high).tolist()},
         "attributes": {
@@ -163,6 +164,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         ("pose", f"{facts['pose']}, {facts['label']}"),
         ("points", points),
         *(("view", _told(view)) for view in facts["views"]),
+        *(("beside", text) for text in facts["beside"]),
         ("unit", unit),
         ("size", " x ".join(f"{b - a:g}" for a, b in zip(low, high, strict=True))),
         ("from", ", ".join(f"{value:g}" for value in low)),

@@ -17,7 +17,7 @@ from ..errors import InputError, shortened
 from . import formats
 from .points import UNKNOWN_UNIT
 from .range_folders import find_range_frames, lacking_part, pods
-from .sources import FileSequence, FrameSource, MultiFrameFile
+from .sources import FACES_FILE, FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
 from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times, times_in_names
 from .units import checked_unit, usable_unit
@@ -29,6 +29,7 @@ _PICTURES = {  # beside which text tables are no points
 _NAME_TABLES = "Where tables are points, name them by a pattern such as '*.txt'"
 _PRINTF = re.compile("%(0?[0-9]{0,2})d")
 _NAMES_TO_COMPARE = 5000
+_TABLES = {".csv", ".txt"}  # which beside other files are notes as a rule
 
 
 def is_demo(scan: str | None) -> bool:
@@ -54,9 +55,12 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
     if recorded is None or (fps is not None and not measured):
         recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
-    told = source.unit
+    told, others = source.unit, left_aside(path, source)
     timeline = Timeline(source, recorded, unit or usable_unit(told) or UNKNOWN_UNIT)
     timeline.is_measured = measured
+    if others:
+        what = f"The folder also holds {_listed(others)}, which this scan does not use"
+        timeline.messages.append(ScanMessage("beside", f"{what}. Open such a file by its name to see it."))
     if told and not usable_unit(told):
         what = f"the scan names '{shortened(told)}' as its unit of length, which is no short word such as mm"
         timeline.messages.append(ScanMessage("unit", f"{what}: its unit is not set"))
@@ -65,6 +69,17 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
             ScanMessage("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used")
         )
     return timeline
+
+
+def left_aside(path: str | os.PathLike[str], source: FrameSource) -> list[str]:
+    """The names of the scan files in a folder that its frames do not use, so that each may be a scan of its
+    own; none where `path` is no folder."""
+    if not os.path.isdir(path):
+        return []
+    kinds = {*formats.known_suffixes()} - _TABLES
+    used = {*(file.name for file in source.files), FACES_FILE}
+    found = (file for file in entries(Path(path)) if file.suffix.lower() in kinds and file.name not in used)
+    return sorted((file.name for file in found if not file.name.startswith(".")), key=natural_key)
 
 
 def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> None:

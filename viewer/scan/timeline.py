@@ -38,11 +38,11 @@ class ScanMessage:
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
     coordinate were left out), "shortened" (splats far larger than the scan were), "unit" (lengths in
     another unit than the scan's, or a name of it that is no unit), "assumed" (what of range views nothing
-    tells) or "times". index: the
-    frame; None where it concerns all.
+    tells), "times" or "beside" (files in its folder may be another scan). index: the frame; None where it
+    concerns all.
     """
 
-    kind: Literal["broken", "dropped", "shortened", "unit", "assumed", "times"]
+    kind: Literal["broken", "dropped", "shortened", "unit", "assumed", "times", "beside"]
     text: str
     index: int | None = None
 

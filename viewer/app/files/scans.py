@@ -94,10 +94,10 @@ class Scans:
         """Take in what was found; whether there was anything."""
         if self._naming is not None and self._naming.done():
             (scans, problems), self._naming = self._naming.result(), None
-            self.tell(problems, is_all=not scans)
             if scans:
                 self._together = list(dict.fromkeys(scans))
                 self._open(scans[0])
+            self.tell(problems, is_all=not scans)
         if self._looking is None or not self._looking.done():
             return False
         self.listed, self._there = self._looking.result()

@@ -89,6 +89,8 @@ def _draw_choice(choosing: Choosing) -> None:
     widgets.tooltip("Nine of ten pictures stay within this; the limit applies to it")
     if measured is not None:
         widgets.fact("Last picture", f"{measured:.3g} ms")
+    if choosing.overrun:
+        widgets.faint(choosing.overrun)
     if not choice.keeps:
         widgets.faint("No renderer is sure to meet the limit; using the closest.")
     _draw_curve(comparison, choice)

@@ -313,8 +313,8 @@ def _draw_status(playback: Playback, pointer: Pointer, notices: Notices, tasks: 
         imgui.same_line(0, gap)
     room = left - gap - (imgui.get_cursor_pos_x() - imgui.get_cursor_start_pos().x)
     text = _pointed(pointer.words, room)
-    if not text and notices.all:
-        text = widgets.fitted(notices.all[-1].text, room)
+    if not text:
+        text = widgets.fitted(notices.latest, room)
     imgui.text_disabled(text)
     imgui.same_line()
     imgui.set_cursor_pos_x(imgui.get_cursor_start_pos().x + left)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import cached_property
 from statistics import median
@@ -22,6 +23,7 @@ from .viewport import Viewport
 
 _REST = 0.2  # seconds after the last picture
 _LAST = 5  # pictures of one way whose times are kept
+_OVER = 1.5  # times the limit: what pictures take from then on is told
 _SCALES = (1.0,)  # pictures at rest have all their pixels, and in motion those that there is time for
 
 
@@ -30,16 +32,20 @@ class Choosing:
 
     comparison: of all ways in the view that is shown, or was at rest last; choice: of one of them; both None
     while there is no goal, and before the first. problem: why nothing is chosen, empty where something is.
+    overrun: words on pictures that take far longer than the limit, empty where they do not.
     """
 
-    def __init__(self, session: Session, playback: Playback, viewport: Viewport) -> None:
-        self._session, self._playback, self._viewport = session, playback, viewport
+    def __init__(
+        self, session: Session, playback: Playback, viewport: Viewport, note: Callable[[str], None]
+    ) -> None:
+        """note: tells the user something."""
+        self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
         self._forget()
 
     def _forget(self) -> None:
         self.comparison: Comparison | None = None
         self.choice: Choice | None = None
-        self.problem = ""
+        self.problem = self.overrun = ""
         self._request: Request | None = None  # that was looked at, and how large it was
         self._size = (0, 0)
         self._seeing: Future[ScanInView] | None = None
@@ -88,6 +94,7 @@ class Choosing:
                 self._forget()
             return False
         self._note_time()
+        self._tell_overrun(document.goal)
         is_whole = viewport.is_there and viewport.is_complete and now > viewport.shown_at + _REST
         if self._seeing is not None and self._seeing.done():
             seeing, self._seeing = self._seeing, None
@@ -150,6 +157,15 @@ class Choosing:
                 self._times[way.key] = deque(maxlen=_LAST)
             else:
                 times.append(surface.stats.cpu_ms - surface.stats.upload_ms)
+
+    def _tell_overrun(self, goal: Goal) -> None:
+        """Tell, once until it is over, that pictures take far longer than the limit."""
+        before, ms = self.overrun, self.measured_ms
+        is_over = goal.kind == "time" and ms is not None and ms > _OVER * goal.bound
+        busy = "This computer is busy, or slower than when it was measured (scan4d bench --calibrate)."
+        self.overrun = f"Pictures take {ms:.0f} ms; the limit is {goal}. {busy}" if is_over else ""
+        if self.overrun and not before:
+            self._note(self.overrun)
 
     @property
     def measured_ms(self) -> float | None:
