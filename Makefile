@@ -5,9 +5,10 @@ QUICK := --quick
 WORKERS := auto
 MINUTES := 5
 SEED := 1
+COMMIT = $(shell git rev-parse HEAD)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all test-drivers fuzz bench lint wheel clean
+.PHONY: help setup run test test-all test-tenth test-drivers mutate fuzz bench lint wheel clean
 
 help: ## print this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
@@ -27,6 +28,9 @@ test: setup ## the tests, without the slow ones; a process for each core: make t
 
 test-all: setup ## all tests
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
+
+test-tenth: setup ## a tenth of the slow tests, as the commit chooses, in five minutes
+	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -m slow --tenth $(COMMIT) --seconds 300
 
 test-drivers: setup ## backends and numerics on a second driver (Zink), shaders through glslangValidator; on used memory
 	$(PYTHON) tests/drivers/zink.py tests/gpu tests/backends tests/numerics -m "not slow"

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from viewer.gpu.surface import Surface
     from viewer.renderer import Renderer
 
+pytest_plugins = ["parts"]
+
 settings.register_profile(
     "deterministic", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )

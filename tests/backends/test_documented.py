@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from nested import run_pytest
 from numpy.typing import NDArray
 from scenes import NOTHING
 
@@ -29,7 +28,7 @@ import sys
 import pytest, viewer.backends, viewer.resources
 viewer.backends.__path__.append(sys.argv[1] + "/viewer/backends")
 viewer.resources.ROOTS.append(sys.argv[1])
-sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-k", "dots", *sys.argv[2:]]))
+sys.exit(pytest.main(sys.argv[2:]))
 """
 
 
@@ -113,10 +112,7 @@ def test_it_is_a_backend_like_all_others() -> None:
 def test_it_keeps_the_contract(folder: Path) -> None:
     """Run every test of all backends on it, in a process whose registry finds it from the start."""
     tests = [str(ROOT / "tests" / "backends" / name) for name in ("test_exact.py", "test_preview.py")]
-    done = subprocess.run(
-        [sys.executable, "-c", CONTRACT, str(folder), *tests],
-        cwd=ROOT, capture_output=True, text=True,
-    )  # fmt: skip
+    done = run_pytest("-q", "-k", "dots", *tests, cwd=ROOT, start=["-c", CONTRACT, str(folder)])
     assert done.returncode == 0, done.stdout + done.stderr
     found = re.search(r"(\d+) passed", done.stdout)
     assert found, done.stdout

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from nested import run_pytest
 
 HERE = Path(__file__).resolve().parent
 ON_GPU = HERE.parents[1] / "tools" / "on_gpu.sh"
@@ -38,10 +38,7 @@ def test_never():
 def test_only_the_large_ones_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "test_some.py").write_text(TESTS)
     (tmp_path / "test_more.py").write_text(MORE)
-    command = [sys.executable, "-m", "pytest", "-q", "-rsf", "-p", "no:cacheprovider", "-p", "left_out", "."]
-    done = subprocess.run(
-        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(HERE)}, capture_output=True, text=True
-    )
+    done = run_pytest("-q", "-rsf", "-p", "left_out", cwd=tmp_path, paths=[HERE])
     assert "2 failed, 3 skipped" in done.stdout
     assert "needs open3d" in done.stdout
     assert "needs numba" in done.stdout
