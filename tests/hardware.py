@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.bench.rounding import Rounding
+from viewer.bench.rounding import Rounding, half_step
+from viewer.camera import Camera
 from viewer.gpu.context import Gpu
 from viewer.gpu.surface import Surface
+from viewer.scan.points import PointCloud
+from viewer.view import View
 
 _NOTHING = 0xFFFFFFFF
+_ROUNDED = 16 * 2.0**-24  # of themselves: what a few products, sums and a quotient of float32 are off
 
 
 def displaced(gpu: Gpu) -> list[tuple[float, float]]:
@@ -17,6 +21,31 @@ def displaced(gpu: Gpu) -> list[tuple[float, float]]:
     and the corners of all that it may be moved by."""
     corner = Rounding.of(gpu).corner
     return [(0.0, 0.0), *((x, y) for x in (-corner, corner) for y in (-corner, corner) if corner)]
+
+
+def allowed_points(gpu: Gpu, cloud: PointCloud, camera: Camera, row: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    """Which pixels show what OpenGL allows of points that are a pixel each, (H, W).
+
+    row: the points that they show, (H, W). The rasteriser moves each point to its grid, by half a step at
+    most, and float32 rounds before. A point is sure in a pixel where it stays in it, however moved. A pixel
+    may show a point that can lie in it and has no sure one in front, or nothing where no point is sure.
+    """
+    height, width = row.shape
+    view = View.of(camera, (width, height), cloud.origin, cloud.bounds())
+    pixels, depths = view.project(cloud.positions.astype(np.float64))
+    by = half_step(gpu) + _ROUNDED * max(row.shape)
+    moves = np.array([(x, y) for x in (-by, by) for y in (-by, by)])
+    x, y = np.moveaxis(np.floor(pixels + moves[:, np.newaxis]).astype(int), 2, 0)  # (4, N)
+    cells = np.where((x >= 0) & (x < width) & (y >= 0) & (y < height), y * width + x, -1)
+    is_sure = (cells == cells[0]).all(axis=0) & (cells[0] >= 0) & (depths >= view.near)
+    nearest = np.full(row.size, np.inf)
+    np.minimum.at(nearest, cells[0, is_sure], depths[is_sure])
+    shown, flat = np.flatnonzero(row.ravel() != _NOTHING), row.ravel()
+    allowed = np.isinf(nearest)
+    points = flat[shown]
+    in_front = depths[points] <= nearest[shown] * (1 + _ROUNDED)
+    allowed[shown] = (cells[:, points] == shown).any(axis=0) & in_front
+    return allowed.reshape(row.shape)
 
 
 def at_borders(surface: Surface) -> int:

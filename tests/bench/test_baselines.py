@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import sphere, sphere_mesh, zbuffer
+from hardware import allowed_points
+from scenes import NOTHING, sphere, sphere_mesh, zbuffer
 
 from viewer.bench import baselines
 from viewer.bench.truth.surface import reference_surface
@@ -60,9 +61,23 @@ def test_gl_points_are_a_z_buffer(renderer: Renderer) -> None:
     request = Request(Pose(0, 0.0, "points", cloud), camera, baselines.gl_points(), look=LOOK)
     render_frame(renderer, request, surface)
     depth, row = zbuffer(cloud, camera, SIZE)
-    assert (surface.row == row).mean() > 0.999  # the driver rounds pixel coordinates to 1/256
+    assert allowed_points(renderer.gpu, cloud, camera, surface.row).all()
     same = (surface.row == row) & np.isfinite(depth)
     np.testing.assert_allclose(surface.depth[same], depth[same], rtol=1e-5)
+
+
+def test_pictures_that_no_opengl_draws_are_not_allowed(renderer: Renderer) -> None:
+    """Of those moved by a pixel, with a point left out, or with one that is behind."""
+    cloud, camera = sphere(3000), Camera((1.0, 0.5, 3.0))
+    _, row = zbuffer(cloud, camera, SIZE)
+    assert allowed_points(renderer.gpu, cloud, camera, row).all()
+    shown, behind = np.flatnonzero(row.ravel() != NOTHING), np.setdiff1d(np.arange(3000), row)
+    for changed, at_least in (
+        (np.roll(row, 1, axis=1), 0.9),
+        (np.where(np.arange(row.size).reshape(row.shape) == shown[100], NOTHING, row), 1 / len(shown)),
+        (np.where(row == NOTHING, row, np.resize(behind, row.shape)), 0.9),
+    ):
+        assert (~allowed_points(renderer.gpu, cloud, camera, changed)).sum() >= at_least * len(shown)
 
 
 def test_precomputed_planes_are_those_of_the_nearest_points() -> None:

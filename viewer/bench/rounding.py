@@ -27,12 +27,17 @@ class Rounding:
         divide exactly, and interpolate between corners where they are."""
         if gpu.software:
             return IN_SOFTWARE
-        return cls(2.5, 0.5 ** (gpu.ctx.info["GL_SUBPIXEL_BITS"] + 1))
+        return cls(2.5, half_step(gpu))
 
     @property
     def roundings(self) -> float:
         """The roundings of float32 that a quotient counts for."""
         return max(self.quotient, 1.0)
+
+
+def half_step(gpu: Gpu) -> float:
+    """Half a step of the grid that a rasteriser moves points and corners to, pixels; in software as well."""
+    return float(0.5 ** (gpu.ctx.info["GL_SUBPIXEL_BITS"] + 1))
 
 
 IN_SOFTWARE = Rounding(0.5, 0.0)
