@@ -13,14 +13,12 @@ from viewer.backends import backend
 from viewer.bench.baselines import FLOOR
 from viewer.bench.papers.slomp_2014 import octrees
 from viewer.bench.papers.slomp_2014 import surfels as slomp
-from viewer.bench.papers.slomp_2014.octree_tables import read_measurement
 from viewer.bench.plan import Group
 from viewer.bench.report.results import Row
 from viewer.bench.run import Bench, BenchSettings
 from viewer.renderer import Renderer
 from viewer.scan.octree.cube import Cube
 
-STORED = sorted((Path(__file__).resolve().parents[3] / "docs" / "data").glob("octree-tables*.json"))
 SETTINGS = BenchSettings(size=(96, 64), views=2, repeat=1)
 HORSE = slomp.scans()[4]
 
@@ -116,43 +114,23 @@ def test_what_is_walked_is_judged_and_has_frames(renderer: Renderer) -> None:
     assert Bench(renderer, replace(SETTINGS, frames=0)).walks(levels) == 0
 
 
-# --- what was measured ----------------------------------------------------------------
+def test_stand_ins_have_trees_like_the_papers(rows: list[Row]) -> None:
+    """Depths within one of its own, no loss beyond delta, and nodes."""
+    ours = {row["delta"]: row for row in rows}
+    for tree in slomp.paper()["octrees"][HORSE.name]:
+        row = ours[tree["delta_percent"]]
+        assert all(abs(depth - tree["depth"]) <= 1 for depth in row["depths"])
+        assert row["loss"] <= row["delta"] / 100
+        assert row["nodes"] > 0
 
 
-@pytest.mark.parametrize("file", STORED, ids=lambda file: file.name)
-def test_stand_ins_have_trees_like_the_papers(file: Path) -> None:
-    """Depths within one of its own, no loss beyond delta, and nodes that add up."""
-    trees = {(row["scene"], row["n"], row["delta"]): row for row in read_measurement(file)["trees"]}
-    for name, by_delta in slomp.paper()["octrees"].items():
-        scan = next(scan for scan in slomp.scans() if scan.name == name)
-        for theirs in by_delta:
-            ours = trees[scan.scene, scan.points, theirs["delta_percent"]]
-            assert all(abs(depth - theirs["depth"]) <= 1 for depth in ours["depths"])
-            assert ours["loss"] <= ours["delta"] / 100
-            assert ours["nodes"] > 0
-
-
-@pytest.mark.parametrize("file", STORED, ids=lambda file: file.name)
-def test_feeds_were_measured_on_equal_pictures(file: Path) -> None:
-    rows = [row for row in read_measurement(file)["rows"] if row["feed"] != FLOOR]
-    assert {row["feed"] for row in rows} >= {"gs", "ubo", "tbo", "vbo"}
-    for scan in slomp.scans():
-        covered = [
-            row["covered"]
-            for row in rows
-            if (row["scene"], row["n"]) == (scan.scene, scan.points or row["n"])
-        ]
-        assert len(covered) == len({row["feed"] for row in rows})
-        assert np.ptp(covered, axis=0).max() < 0.2, "% of the picture"
-
-
-@pytest.mark.parametrize("file", STORED, ids=lambda file: file.name)
-def test_finer_levels_are_nearer_the_truth(file: Path) -> None:
+@pytest.mark.slow
+def test_finer_levels_are_nearer_the_truth(renderer: Renderer) -> None:
     """As long as cubes close the surface: less lies beyond the outline, fewer depths are far off."""
-    levels = read_measurement(file)["levels"]
-    closed = [row for row in levels if row["scene"] == "demo" and row["least"]]
-    assert [row["level"] for row in closed] == list(octrees.LEVELS)
-    assert all(row["errors"]["hole_percent"] <= 0.1 for row in closed)
+    levels = next(group for group in octrees.groups() if group.judged and group.scene == "demo")
+    coarse, *_, fine = (one for one in levels.contenders if one.params.least and one.params.max_depth <= 9)
+    bench = Bench(renderer, replace(SETTINGS, size=(192, 128), frames=0))
+    errors = [row["errors"] for row in bench.measure(replace(levels, contenders=(coarse, fine)))]
+    assert all(row["hole_percent"] <= 0.1 for row in errors)
     for name in ("spill_percent", "depth_p95_px"):
-        values = [row["errors"][name] for row in closed]
-        assert values[-1] < values[0] / 1.5
+        assert errors[1][name] < errors[0][name] / 1.5

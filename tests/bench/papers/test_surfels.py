@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from viewer.backends import Backend, backend
-from viewer.bench.baselines import FLOOR
 from viewer.bench.papers.slomp_2014 import literal
 from viewer.bench.papers.slomp_2014 import surfels as slomp
-from viewer.bench.papers.slomp_2014.table_two import read_measurement
 from viewer.bench.run import BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
@@ -24,7 +22,6 @@ from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
 
-STORED = sorted((Path(__file__).resolve().parents[2] / "docs" / "data").glob("table-two*.json"))
 COUNTS = {
     "baseball": 88_315,
     "basketball": 87_003,
@@ -78,20 +75,6 @@ def test_each_scan_meets_every_feed_in_two_passes() -> None:
                 "radius": "uniform",
             }  # fmt: skip
             assert params == others
-
-
-@pytest.mark.parametrize("file", STORED, ids=lambda file: file.name)
-def test_feeds_were_measured_on_equal_pictures(file: Path) -> None:
-    rows = [row for row in read_measurement(file)["rows"] if row["feed"] != FLOOR and "form" not in row]
-    assert {row["feed"] for row in rows} >= {"gs", "ubo", "tbo", "vbo"}
-    for scan in slomp.scans():
-        covered = [
-            row["covered"]
-            for row in rows
-            if (row["scene"], row["n"]) == (scan.scene, scan.points or row["n"])
-        ]
-        assert np.ptp(covered, axis=0).max() < 0.2, "% of the picture"
-        assert 24 < np.min(covered) < np.max(covered) < 86
 
 
 def test_the_scans_have_exactly_as_many_points_as_the_papers(data_dir: Path) -> None:
