@@ -5,6 +5,7 @@ QUICK := --quick
 WORKERS := auto
 MINUTES := 5
 SEED := 1
+COUNT := 40
 COMMIT = $(shell git rev-parse HEAD)
 
 .DEFAULT_GOAL := help
@@ -35,6 +36,9 @@ test-tenth: setup ## a tenth of the slow tests, as the commit chooses, in five m
 test-drivers: setup ## backends and numerics on a second driver (Zink), shaders through glslangValidator; on used memory
 	$(PYTHON) tests/drivers/zink.py tests/gpu tests/backends tests/numerics -m "not slow"
 	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p poisoned tests/gpu tests/backends tests/numerics -m "not slow"
+
+mutate: setup ## small mistakes in the code by chance: do the quick tests find them? make mutate COUNT=40 SEED=7
+	$(PYTHON) tools/mutate.py --count $(COUNT) --seed $(SEED)
 
 fuzz: setup ## damaged files by the thousand: make fuzz MINUTES=60 SEED=7
 	$(PYTHON) tests/fuzz/campaign.py --minutes $(MINUTES) --seed $(SEED)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from viewer.analysis.curves import (
+    Repeats,
     Smoothing,
     correlation,
     movement_of,
@@ -176,6 +177,14 @@ def test_repeats_at_frames_are_the_values_themselves() -> None:
     repeats = repeats_of(TIMES, values, TIMES[[40, 70]], before=0.5, after=0.4)
     for row, frame in zip(repeats.curves, (40, 70), strict=True):
         np.testing.assert_allclose(row, values[frame - 15 : frame + 13])
+
+
+def test_the_deviation_of_repeats_is_by_one_less_than_are_known() -> None:
+    """Two repeats deviate by their difference over the root of 2; one alone has no deviation."""
+    curves = np.array([[1.0, 5.0, 2.0], [4.0, 5.0, np.nan], [np.nan, 8.0, np.nan]])
+    repeats = Repeats(np.arange(3.0), np.arange(3.0), curves)
+    np.testing.assert_allclose(repeats.mean, [2.5, 6.0, 2.0])
+    np.testing.assert_allclose(repeats.deviation, [3 / np.sqrt(2), np.sqrt(3), np.nan])
 
 
 def test_correlation_is_of_what_both_know() -> None:

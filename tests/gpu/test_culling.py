@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ import pytest
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu import chunks
+from viewer.gpu import chunks, culling
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
@@ -57,6 +58,55 @@ def in_order(renderer: Renderer, request: Request, surface: Surface) -> None:
     while "chunks" not in surface.stats.counted and time.monotonic() < end:
         render_frame(renderer, request, surface)
         time.sleep(0.02)
+
+
+def bits_of(
+    request: Request, surface: Surface, low: np.ndarray, high: np.ndarray, slack: float
+) -> np.ndarray:
+    """The plain twin of chunks/cull.comp, of points: whether each box is in view, and shown, (2, C).
+
+    A picture of as many steps has been drawn before. low, high: (C, 3), from the origin of the pose.
+    """
+    view, margin = surface.view, culling.SLACK + request.params.point_size / 2
+    found = []
+    for lower, upper in zip(low.astype(float) - slack, high.astype(float) + slack, strict=True):
+        corners = np.array(list(itertools.product(*zip(lower, upper, strict=True))))
+        pixels, depths = view.project(corners)
+        near, far = depths.min(), depths.max()
+        first, last = pixels.min(axis=0) - margin, pixels.max(axis=0) + margin
+        if is_around := view.perspective and near <= max(view.near, 1e-6 * far):
+            first, last = np.zeros(2), np.array(SIZE)
+        first, last = np.maximum(first, 0), np.minimum(last, np.array(SIZE) - 1)
+        in_view = bool((first <= last).all()) and far >= view.near and near <= view.far
+        tiles = [slice(int(a) // 16 * 16, int(b) // 16 * 16 + 16) for a, b in zip(first, last, strict=True)]
+        behind = surface.depth[tiles[1], tiles[0]] if in_view and not is_around else np.array([np.inf])
+        found.append((in_view, in_view and not behind.max(initial=0) < near * (1 - 1e-5)))
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("order", ["bands", "chance"])
+def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, order: str) -> None:
+    cloud = shells(order)
+    surface = Surface(renderer.gpu, SIZE)
+    request = request_of(cloud, looking(cloud, 0))
+    in_order(renderer, request, surface)
+    boxes = renderer.resident(request.pose).keep(culling.CulledChunks)._boxes
+    kinds = set()
+    for camera in (
+        looking(cloud, 0), looking(cloud, 70, 0.45), looking(cloud, 140, 0.1), looking(cloud, 30, fov_y=9.0),
+        looking(cloud, 30, projection="orthographic"), looking(cloud, 50, near=2.2),
+        looking(cloud, 50, near=1.2, far=2.4),
+    ):  # fmt: skip
+        for _ in range(2):  # the second time all that it shows is drawn first
+            render_frame(renderer, replace(request, camera=camera), surface)
+        if "chunks" not in surface.stats.counted:
+            continue
+        seen = boxes.seen(surface)
+        found = np.array([seen & culling.IN_VIEW, seen & culling.NOW]) != 0
+        expected = bits_of(request, surface, boxes.order.low, boxes.order.high, boxes.slack)
+        assert (found != expected).sum(axis=1).max() <= 2, "but for what float32 rounds"
+        kinds |= set(zip(*found.tolist(), strict=True))
+    assert kinds == {(False, False), (True, False), (True, True)}
 
 
 @pytest.mark.parametrize("order", ["bands", "chance"])

@@ -35,6 +35,9 @@ def test_a_path_is_an_arc(ball: PoseSurface) -> None:
     assert abs(path.value - 2 * R * CAP) < 2 * path.deviation < 0.2
     (line,) = path.lines
     assert line[0] == pytest.approx(ends[0] + AWAY, abs=0.05)
+    outwards = np.array([line[0] - line[1], line[-1] - line[-2]])
+    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+    assert path.gradient == pytest.approx(outwards, abs=1e-6), "of the line's first and last piece"
     assert np.linalg.norm(line - AWAY, axis=1) == pytest.approx(R, rel=5e-3)
     there = found(ball, "path", np.concatenate([ends, ends[:1]]) + AWAY)
     closed = found(ball, "path", ends + AWAY, closed="yes")
