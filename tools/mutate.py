@@ -1,7 +1,7 @@
 """Do the quick tests find small mistakes? Makes mutants of the code, and runs the tests beside each.
 
-A mutant is a copy of the checkout with one operator, number or word changed. It is killed where a test fails or
-does not end. `mutants.json` lists those that no test can tell from the code, and why. Exit code 1: below 90 %.
+A mutant is a copy of the checkout with one operator, number or word changed. It is killed where a test fails
+or does not end. `mutants.json` has those that no test can tell from the code, and why. Exit code 1: below 90 %.
 """
 
 import argparse
@@ -83,8 +83,8 @@ def failing(copy: Path, tests: list[str], seconds: int) -> str:
     """The first test that fails in a copy, and why; empty where none does within the time."""
     data = os.environ.get("SCAN4D_DATA", str(ROOT.parent / "shared" / "data"))
     env = {**os.environ, "PYTHONPATH": str(copy), "SCAN4D_DATA": data, "GALLIVM_PERF": "nopt"}
-    command = [sys.executable, "-Bm", "pytest", "-xq", "-rfE", "-p", "no:cacheprovider", "-m", "not slow", "--tb=no",
-               f"--seconds={seconds}", *tests]  # fmt: skip
+    options = ["-xq", "-rfE", "-p", "no:cacheprovider", "-m", "not slow", "--tb=no", f"--seconds={seconds}"]
+    command = [sys.executable, "-Bm", "pytest", *options, *tests]
     try:
         done = subprocess.run(command, cwd=copy, env=env, capture_output=True, text=True, timeout=3 * seconds)
     except subprocess.TimeoutExpired:
