@@ -1,7 +1,7 @@
 """Do the quick tests find small mistakes? Makes mutants of the code, and runs the tests beside each.
 
 A mutant is a copy of the checkout with one operator, number or word changed. It is killed where a test fails
-or does not end. `mutants.json` has those that no test can tell from the code, and why. Exit code 1: below 90 %.
+or does not end. `mutants.json` has those that no test can tell from the code. Exit code 1: below 90 %.
 """
 
 import argparse
