@@ -54,6 +54,11 @@ def _for_each(names: list[str]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("name", list(marked))
 
 
+def rarely(*values: object) -> list[object]:
+    """Values of a parameter that repeat what others show: their tests are slow."""
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
+
+
 every_backend = _for_each(variants())
 # Those that show the points themselves, where they lie.
 every_backend_of_points = _for_each(

@@ -61,6 +61,7 @@ def test_a_preview_says_how_many_of_the_points_are_drawn(viewport: Viewport, bac
     request = replace(REQUEST, backend=backend, params=None)
     while not viewport.is_complete:
         viewport.draw(request)
+        time.sleep(0.01)  # for workers
     viewport.took(1000.0, goal_ms=10.0)
     viewport.draw(replace(request, camera=REQUEST.camera.orbited(30, 0)), held=True)
     told = dict(words(viewport, None))

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from scenes import sphere
+from scenes import rarely, sphere
 from virtual_screen import PATIENCE, ROOT, SIZE, RunningApp, Screen, kept_of, running_app, virtual_screen
 
 from viewer.document.recording import Recording
@@ -61,7 +61,7 @@ def journals(folder: Path) -> list[Path]:
     return [path for path in (folder / "state").rglob("*") if path.is_file()]
 
 
-@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("number", [*rarely(signal.SIGINT, signal.SIGHUP), signal.SIGTERM])
 def test_a_signal_closes_the_window_and_saves_all(
     screen: Screen, tmp_path: Path, scan: Path, number: int
 ) -> None:

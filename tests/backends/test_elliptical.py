@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hardware import at_borders, displaced, moved
 from numpy.typing import NDArray
-from scenes import BUFFERS, NOTHING, sphere
+from scenes import BUFFERS, NOTHING, rarely, sphere
 from test_instancing import (
     CAMERAS,
     CLOUD,
@@ -109,7 +109,7 @@ def brute_force(
 
 
 @every_camera
-@pytest.mark.parametrize("way", ["tiles", "gs", "tbo"])
+@pytest.mark.parametrize("way", ["tiles", "gs", *rarely("tbo")])
 def test_they_are_what_rays_meet(surfels: Draw, camera: Camera, way: str) -> None:
     cloud, size = elliptical(sphere(400), stretch=8.0), (160, 120)
     surface = surfels(cloud, camera, size, instancing=way)
@@ -166,7 +166,7 @@ def test_other_ways_agree_with_them(surfels: Draw, camera: Camera, way: str) -> 
     )
 
 
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
 @pytest.mark.parametrize("enlarge", [1.0, 2.0])
 def test_two_passes_blend_them_alike(surfels: Draw, projection: str, enlarge: float) -> None:
     tiles, gs, tbo = (

@@ -15,6 +15,7 @@ from scenes import (
     looking_down_z,
     of_variant,
     plane,
+    rarely,
     sphere,
     sphere_hits,
     variants,
@@ -163,7 +164,7 @@ def test_an_unusable_radius_counts_as_unknown(draw: Draw, radius: float) -> None
 
 
 @every_backend
-@pytest.mark.parametrize("size", [(1, 1), (7, 3), (1, 240), (641, 1), (255, 257)])
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), *rarely((1, 240), (641, 1), (255, 257))])
 def test_odd_sizes(draw: Draw, name: str, size: tuple[int, int]) -> None:
     cloud = sphere(3000)
     surface = draw(cloud, Camera.orbit(cloud.bounds(), aspect=size[0] / size[1]), size, name)

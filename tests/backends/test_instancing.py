@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hardware import at_borders, moved, stored
 from numpy.typing import NDArray
-from scenes import BUFFERS, NOTHING, sphere
+from scenes import BUFFERS, NOTHING, rarely, sphere
 
 from viewer.backends import backend
 from viewer.backends import surfels as surfels_backend
@@ -162,9 +162,7 @@ def test_the_same_bits_again(surfels: Draw) -> None:
 @pytest.mark.parametrize(
     "camera",
     [
-        pytest.param(
-            camera, id=name, marks=[pytest.mark.slow] if name in ("perspective", "orthographic") else []
-        )
+        pytest.param(camera, id=name, marks=[] if name == "inside" else [pytest.mark.slow])
         for name, camera in CAMERAS.items()
     ],
 )
@@ -247,7 +245,7 @@ def test_software_lists_splats_as_large_as_the_picture(
     assert_agree(surface, quads, 0.003)
 
 
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
 def test_splats_across_the_near_plane_beside_the_picture_change_nothing(
     surfels: Draw, projection: str
 ) -> None:

@@ -19,6 +19,7 @@ from plain_neighborhoods import (
     neighborhoods,
     planes,
 )
+from scenes import rarely
 
 import viewer
 from viewer.analysis.visible_normals import VisibleNormals
@@ -201,7 +202,7 @@ def test_rings_close(noise: float, draw: Callable[..., Surface]) -> None:
     assert np.median(tilts) < (8 if noise else 0.5)
 
 
-@pytest.mark.parametrize("k", [3, 16, *(pytest.param(k, marks=pytest.mark.slow) for k in (4, 7, 32))])
+@pytest.mark.parametrize("k", [3, *rarely(4, 7, 16, 32)])
 @pytest.mark.parametrize("name", ["bumpy", "copied", "lattice", "strays", "three-points"])
 def test_any_number_of_neighbors(name: str, k: int) -> None:
     scene = SCENES[name]()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import NOTHING, looking_down_z, sphere, sphere_hits
+from scenes import NOTHING, looking_down_z, rarely, sphere, sphere_hits
 from sector_scenes import Scene
 from test_splats import CAMERAS, bumpy
 
@@ -159,7 +159,9 @@ def test_faces_close_a_sphere_and_have_its_normals_and_colors(draw: Draw) -> Non
     assert set(np.unique(surface.row[covered])) <= set(range(len(cloud)))
 
 
-@pytest.mark.parametrize("target", [(1, 0, 0), (1, 1, 0), (1, 1, 1), (-1, 1, -1), (0, -1, 1), (-1, 0, -1)])
+@pytest.mark.parametrize(
+    "target", [*rarely((1, 0, 0), (1, 1, 0), (1, 1, 1), (0, -1, 1)), (-1, 1, -1), (-1, 0, -1)]
+)
 def test_there_is_no_seam_around_an_eye_inside(draw: Draw, target: tuple[float, float, float]) -> None:
     cloud = PointCloud.from_arrays(sphere(20_000).positions)
     camera = Camera(eye=(0, 0, 0), target=target, up=(0.1, 0.2, 1), fov_y=80)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
-from scenes import sphere
+from scenes import rarely, sphere
 
 from viewer.backends.hpr import HULL, MODES, Params, calibrated, visible_points
 from viewer.backends.hpr.exact import exact_visible_points
@@ -190,7 +190,7 @@ class DrawnMarks:
         np.testing.assert_array_equal(found.depth, new.depth)
 
 
-@pytest.mark.parametrize("eye", [(0.0, 0, 4), (0.2, 0.1, 0.3)])
+@pytest.mark.parametrize("eye", [*rarely((0.0, 0, 4)), (0.2, 0.1, 0.3)])
 @pytest.mark.parametrize("mode", MODES)
 def test_nothing_is_found_again_while_pose_and_eye_stand_still(
     renderer: Renderer, mode: str, eye: tuple[float, float, float]
@@ -227,14 +227,14 @@ def test_fewer_sectors_while_it_moves_and_all_at_rest(renderer: Renderer) -> Non
 def test_while_it_moves_only_the_field_of_view_is_looked_at(
     renderer: Renderer, projection: str, away: float
 ) -> None:
-    """Of points all around, and in the picture as many are seen."""
+    """Of points all around, and in the picture as many are seen, but where splats reach in from outside."""
     camera = Camera((0.2, 0.1, away), (0.1, 0.2, -1.0), fov_y=40, projection=projection, height=0.5)
     moving, still = DrawnMarks(renderer), DrawnMarks(renderer)
     moving.draw(camera, moving=True)
     still.draw(camera)
     counts = [each.surface.stats.counted["points"]()["visible"] for each in (moving, still)]
     assert 50 < counts[0] < 0.5 * counts[1]
-    shown, expected = (np.unique(each.surface.row) for each in (moving, still))
+    shown, expected = (np.unique(each.surface.row[8:-8, 8:-8]) for each in (moving, still))
     assert len(expected) > 50
     assert len(np.setxor1d(shown, expected)) < 0.1 * len(expected)
 
