@@ -8,10 +8,12 @@ called through ctypes, which does.
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from imgui_bundle import _imgui_bundle, imgui
+from walking import Walk
 
 engine = imgui.test_engine
 
@@ -28,11 +30,13 @@ class Actor:
         settings.config_run_speed = engine.TestRunSpeed.fast
         settings.config_mouse_draw_cursor = settings.config_saved_settings = False
         settings.config_restore_focus_after_tests = False  # which would close opened lists
+        settings.config_watchdog_warning = settings.config_watchdog_kill_test = math.inf  # of a long walk
         self._test = engine.register_test(self._engine, "window", "actor")
         self._test.test_func = self._act
         engine.start(self._engine, imgui.get_current_context())
         self._window = ""
         self._actions: Sequence[Action] = []
+        self._walked: Walk | None = None
         self._is_queued = False
 
     def begin(self, window: str, *actions: Action) -> None:
@@ -49,7 +53,13 @@ class Actor:
 
     @property
     def problem(self) -> str:
-        """What went wrong with the last actions, or nothing."""
+        """What went wrong with the last actions, or nothing; of a walk its report."""
+        walked, self._walked = self._walked, None
+        return self._told if walked is None else walked.report(self._told)
+
+    @property
+    def _told(self) -> str:
+        """What the engine says went wrong, or nothing."""
         output, text = self._test.output, imgui.TextBuffer()
         if output.status == engine.TestStatus.success:
             return ""
@@ -60,7 +70,11 @@ class Actor:
     def _act(self, context: engine.TestContext) -> None:
         context.set_ref(context.window_info(f"//{self._window}").window)
         for name, *arguments in self._actions:
-            getattr(context, name)(*arguments)
+            if name == "walk":
+                self._walked = Walk(context, *arguments)
+                self._walked.begin()
+            else:
+                getattr(context, name)(*arguments)
 
 
 def _let_go_of_the_lock() -> Any:

@@ -174,7 +174,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
     for number in range(3):
         (scan / f"{number}.npz").rename(scan / f"{number + 7}.npz")
     with running_app(screen, tmp_path, scan) as app:
-        app.told("is not as it was")
+        app.told("has changed since")
 
 
 def saved_session(app: RunningApp, name: str) -> Path:

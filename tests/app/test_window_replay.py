@@ -136,9 +136,9 @@ def test_an_anonymous_picture_is_shown_where_the_scan_stands(tmp_path: Path) -> 
         (again,) = Recording.load(Path(app.told(r"Saved (.+\.png)")[1])).entries
         assert np.allclose(again.camera.eye, wanted.camera.eye, atol=1e-6)
         assert again.look == wanted.look
-        assert not any("is not as it was" in note for note in app.notes), (
+        assert not any("has changed since" in note for note in app.notes), (
             "its hash is another one, of the same scan"
         )
         formats.write(scan, PointCloud.from_arrays(points[:200]))
         press(app, "shift", "r")
-        app.told("far.npz is not as it was")
+        app.told("far.npz has changed since")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import itertools
 import json
+import math
 import os
 import re
 import shutil
@@ -13,11 +14,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pytest
@@ -105,6 +106,14 @@ def virtual_screen(folder: Path, size: tuple[int, int], scale: float = 1) -> Ite
     finally:
         server.terminate()
         server.wait()
+
+
+class Report(NamedTuple):
+    """What a walk through widgets came by. seen: their windows and labels, in order. problems: what ImGui
+    found wrong."""
+
+    seen: list[str]
+    problems: list[str]
 
 
 class State(SimpleNamespace):
@@ -203,26 +212,40 @@ class RunningApp:
         problem = self._ask(window, *actions).problem
         assert not problem, f"{window}: {actions}: {problem}"
 
+    def walk(self, windows: Collection[str] = (), *, presses: bool = True) -> Report:
+        """Go through the widgets of these windows, or of all, and through what they open (see walking.py).
+
+        Those that end or hide the window are only hovered. presses: whether to drag and click the others.
+        """
+        self._send("toolbar", ("walk", list(windows), presses, ["quit", "full_screen", "panels"]))
+        end = self._wait(
+            lambda: self.state if self.state.answered == self._asked else None, "a walk", math.inf
+        )
+        return Report(*json.loads(end.problem))
+
     def choose(self, window: str, combo: str, item: str) -> None:
         """An item of the list that a combo box opens, both by their names."""
         self.act(window, ("item_click", combo), ("item_click", f"//$FOCUSED/{item}"))
 
     def _ask(self, *task: object) -> State:
         """The first state after all events so far were taken in, and a task for acting.py is done."""
+        self._send(*task)
+        return self.see(answered=self._asked)
+
+    def _send(self, *task: object) -> None:
         assert self.process.stdin is not None
         self._asked += 1
         self.process.stdin.write(json.dumps([self._asked, task]).encode() + b"\n")
         self.process.stdin.flush()
-        return self.see(answered=self._asked)
 
-    def _wait(self, find: Callable[[], Found | None], wanted: object) -> Found:
-        deadline = time.monotonic() + PATIENCE
+    def _wait(self, find: Callable[[], Found | None], wanted: object, patience: float = PATIENCE) -> Found:
+        deadline = time.monotonic() + patience
         with self._came:
             while (found := find()) is None:
                 seconds = deadline - time.monotonic()
                 assert self._reader.is_alive(), f"the app has ended without {wanted}:\n{self.log()}"
                 assert seconds > 0, f"no {wanted} in time:\n{self.states[-1:]}\n{self.log()}"
-                self._came.wait(seconds)
+                self._came.wait(min(seconds, PATIENCE))
             return found
 
     def drop(self, *paths: object) -> None:

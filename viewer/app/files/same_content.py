@@ -40,7 +40,7 @@ def offer_of_change(saved: SavedSession, hash: Future[str | None], begin: Callab
     """
     if hash.result() in (saved.hash, None):
         return ""
-    text = "The scan is not as it was when this was saved: views and measurements may not fit."
+    text = "The scan has changed since this was saved: views and distances may not fit."
     if not saved.document.made:
         return text
     with suppress(InputError):  # what is kept stays as it is, and that is told when it is written

@@ -1,0 +1,85 @@
+"""No widget has the id of another, and nothing else is wrong with them: a walk hovers each, rests on it,
+drags and clicks it, with what it opens, in the states that the window has."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from many_landmarks import left_open
+from range_scenes import sphere_view
+from scenes import sphere
+from virtual_screen import Report, RunningApp, Screen, running_app
+
+from viewer.scan import formats
+from viewer.scan.range_view import merge
+
+BARS = ("toolbar", "##MainMenuBar")
+# Two buttons of one name at the end of the toolbar.
+TWINS = """
+import viewer.app.menu as menu
+from imgui_bundle import imgui
+draw = menu.draw_toolbar
+menu.draw_toolbar = lambda app: (draw(app), imgui.button("twin"), imgui.same_line(), imgui.button("twin"))
+"""
+# No frame of any scan comes.
+STUCK = """
+import threading
+import viewer.scan.timeline as timeline
+timeline.Timeline._read = lambda *of: threading.Event().wait()
+"""
+
+
+def check(app: RunningApp, report: Report, least: int) -> None:
+    """Fails where something was wrong, or fewer widgets than that were found."""
+    assert not report.problems, "\n".join(report.problems)
+    assert len(report.seen) >= least, report.seen
+    assert "Traceback" not in app.log(), app.log()[-5000:]
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("scan") / "ball.npz"
+    formats.write(path, sphere(2_000))
+    return path
+
+
+def test_no_buttons_of_the_bars_share_an_id_but_those_that_do(
+    screen: Screen, tmp_path: Path, ball: Path
+) -> None:
+    with running_app(screen, tmp_path, ball, before=f"exec({TWINS!r}); ") as app:
+        report = app.walk(BARS, presses=False)
+        assert report.problems == ["toolbar: twin: 2 widgets have its id"]
+        assert len(report.seen) > 15
+        assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_all_widgets_of_a_scan_with_landmarks(screen: Screen, tmp_path: Path) -> None:
+    scan = left_open(tmp_path, frames=3, landmarks=4, measures=2)
+    with running_app(screen, tmp_path, scan) as app:
+        check(app, app.walk(), 150)
+
+
+@pytest.mark.slow
+def test_all_widgets_of_a_range_scan(screen: Screen, tmp_path: Path) -> None:
+    views = sphere_view((0.3, 0, 4)), sphere_view((3, -1, 4), name="right")
+    formats.write(tmp_path / "rig.exr", merge(views), views)
+    with running_app(screen, tmp_path, tmp_path / "rig.exr") as app:
+        check(app, app.walk(), 100)
+
+
+@pytest.mark.slow
+def test_all_widgets_while_no_frame_is_there(screen: Screen, tmp_path: Path, ball: Path) -> None:
+    with running_app(screen, tmp_path, ball, before=f"exec({STUCK!r}); ") as app:
+        check(app, app.walk(), 40)
+
+
+@pytest.mark.slow
+def test_all_widgets_in_large_text(screen: Screen, tmp_path: Path, ball: Path) -> None:
+    folder = tmp_path / "config" / "scan4d"
+    folder.mkdir(parents=True)
+    (folder / "settings.json").write_text(json.dumps({"format": 1, "text_scale": 2.0}))
+    with running_app(screen, tmp_path, ball) as app:
+        check(app, app.walk(), 80)

@@ -1,0 +1,171 @@
+"""Goes through every widget that the window shows: hovers each, rests on it, drags and clicks it, and goes on
+with what that opens. ImGui's test engine finds the widgets, no list names them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+
+from imgui_bundle import ImVec2, imgui
+
+engine = imgui.test_engine
+
+_DRAG = ImVec2(23, 9)  # pixels
+_ESCAPES = 5  # presses after which what is still open counts as stuck
+_DELAYS = ("hover_stationary_delay", "hover_delay_short", "hover_delay_normal")
+_ERROR = "[imgui-error]"  # begins the lines of ImGui's log on what its callers do wrong
+_MOST_ALIKE = 3  # rows of a list that are acted on: they are one widget, many times
+
+Path = tuple[int, ...]  # ids of widgets, each of which opens what has the next one
+
+
+class Walk:
+    """A walk through the widgets that are there."""
+
+    def __init__(
+        self,
+        context: engine.TestContext,
+        windows: Collection[str] = (),
+        presses: bool = True,
+        skipped: Collection[str] = (),
+    ) -> None:
+        """windows: the names of those that it begins with; none: all. presses: whether each widget is dragged
+        and clicked as well. skipped: the names after "###" of those that are only hovered."""
+        self._seen: dict[int, str] = {}
+        self._problems: list[str] = []
+        self._windows, self._presses, self._skipped = windows, presses, skipped
+        self._context = context
+        self._ui = imgui.get_current_context()
+        self._opened: dict[Path, int] = {}  # the popup that each opens
+
+    def begin(self) -> None:
+        """Go through all of it."""
+        style = imgui.get_style()
+        before = [getattr(style, name) for name in _DELAYS]
+        for name in _DELAYS:
+            setattr(style, name, 0.0)  # a frame on a widget is as long as any rest
+        self._go_through(())
+        for name, delay in zip(_DELAYS, before, strict=True):
+            setattr(style, name, delay)
+
+    def report(self, problem: str) -> str:
+        """A `Report` of virtual_screen.py, as JSON. problem: of the engine, empty where there is none."""
+        problems = self._problems + ([problem] if problem else [])
+        return json.dumps([list(self._seen.values()), list(dict.fromkeys(problems))])
+
+    def _go_through(self, path: Path) -> None:
+        """Act on the widgets that are reached by clicks on a path of others, and on those that they open."""
+        while self._reach(path) and (item := self._next(path)) is not None:
+            before = self._popups
+            self._act(item)
+            if self._popups and self._popups[-1] not in before:
+                longer = (*path, item)
+                self._opened[longer] = self._popups[-1]
+                self._go_through(longer)
+
+    def _next(self, path: Path) -> int | None:
+        """The first widget that nothing was done with; None where there is none."""
+        for item in self._reachable(() if path else self._windows):
+            if item not in self._seen:
+                words = self._words(item)
+                self._seen[item] = words
+                alike = sum(other == words for other in self._seen.values())
+                if alike <= _MOST_ALIKE or words.endswith(": "):
+                    return item
+        return None
+
+    def _act(self, item: int) -> None:
+        """Hover, rest, drag and click."""
+        context, before, words = self._context, self._popups, self._seen[item]
+        self._point_at(item)
+        self._look(words, 3)
+        if self._presses and not any(words.endswith(f"###{name}") for name in self._skipped):
+            context.mouse_drag_with_delta(_DRAG)
+            self._look(f"drag of {words}")
+            if self._popups == before and self._point_at(item):
+                context.mouse_click(0)
+                self._look(f"click on {words}")
+
+    def _point_at(self, item: int) -> bool:
+        """Move the mouse to a widget; whether that is there."""
+        info = self._info(item)
+        if info is None:
+            return False
+        if info.rect_clipped.get_height() < 1 or info.rect_clipped.get_width() < 1:
+            self._context.scroll_to_item_y(item)
+            info = self._info(item)
+        if info is not None:
+            self._context.mouse_move_to_pos(info.rect_clipped.get_center())
+        return info is not None
+
+    def _look(self, words: str, frames: int = 2) -> None:
+        """Let frames pass, and note what ImGui finds wrong in them."""
+        for _ in range(frames):
+            self._context.yield_()
+            if (count := self._ui.hovered_id_previous_frame_item_count) > 1:
+                self._problems.append(f"{words}: {count} widgets have its id")
+        log = self._ui.debug_log_buf
+        lines = [line for line in (log.begin() or "").splitlines() if _ERROR in line]
+        self._problems += [f"{words}: {line}" for line in lines]
+        if lines:
+            log.clear()
+
+    # --- what there is ----------------------------------------------------------------
+
+    @property
+    def _popups(self) -> tuple[int, ...]:
+        """The ids of the popups that are open, the uppermost last."""
+        stack = self._ui.open_popup_stack
+        return tuple(stack[number].popup_id for number in range(stack.size()))
+
+    def _reachable(self, windows: Collection[str]) -> Iterator[int]:
+        """The widgets that the mouse reaches: of the uppermost popup, of all windows where none is open."""
+        stack, there = self._ui.open_popup_stack, self._ui.windows
+        if stack.size():
+            roots = [stack[stack.size() - 1].window]
+        else:
+            roots = [there[number] for number in range(there.size())]
+            roots = [one for one in roots if one.active and one.root_window.id_ == one.id_]
+        for root in roots:
+            if root is None or root.hidden or root.flags & imgui.WindowFlags_.tooltip:
+                continue
+            if not windows or root.name in windows:
+                found = engine.TestItemList()
+                self._context.gather_items(found, f"//{root.name}", 99)
+                yield from [found.get_by_index(number).id_ for number in range(found.get_size())]
+
+    def _info(self, item: int) -> engine.TestItemInfo | None:
+        """Where a widget is; None where it is not any more."""
+        info = self._context.item_info(item, engine.TestOpFlags_.no_error)
+        return info if info.id_ else None
+
+    def _words(self, item: int) -> str:
+        """The window and the label of a widget."""
+        info, label = self._info(item), engine.find_item_debug_label(self._ui, item)
+        return f"{info.window.name if info is not None and info.window is not None else ''}: {label}"
+
+    # --- how to come there ------------------------------------------------------------
+
+    def _reach(self, path: Path) -> bool:
+        """Open what a path leads to; whether that is there."""
+        wanted = self._opened.get(path)
+        at_end = (wanted,) if wanted else ()
+        if self._popups[-1:] == at_end:
+            return True
+        self._context.mouse_move_to_pos(
+            imgui.get_io().display_size - ImVec2(1, 1)
+        )  # off what opens by itself
+        for _ in range(_ESCAPES):
+            if self._popups:
+                self._context.key_press(imgui.Key.escape)
+                self._context.yield_(2)
+        if self._popups:
+            self._problems.append(f"Escape does not close what {self._seen[path[-1]] if path else ''} opened")
+            return False
+        for item in path:
+            if not self._point_at(item):
+                return False
+            self._context.mouse_click(0)
+            self._context.yield_(3)
+        return self._popups[-1:] == at_end
