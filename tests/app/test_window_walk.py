@@ -72,7 +72,7 @@ def test_all_widgets_of_a_range_scan(screen: Screen, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_all_widgets_while_no_frame_is_there(screen: Screen, tmp_path: Path, ball: Path) -> None:
-    with running_app(screen, tmp_path, ball, before=f"exec({STUCK!r}); ") as app:
+    with running_app(screen, tmp_path, ball, before=f"exec({STUCK!r}); ", shows=False) as app:
         check(app, app.walk(), 40)
 
 

@@ -311,12 +311,17 @@ def kept_of(home: Path, scan: object) -> SavedSession:
 
 @contextmanager
 def running_app(
-    screen: Screen, folder: Path, *scans: object, before: str = "", home: Path | None = None
+    screen: Screen,
+    folder: Path,
+    *scans: object,
+    before: str = "",
+    home: Path | None = None,
+    shows: bool = True,
 ) -> Iterator[RunningApp]:
     """The window on these scans, filling the screen. Screenshots go into the folder.
 
     before: Python that is run first, to have something fail. home: where settings and unfinished recordings
-    are kept; else in the folder.
+    are kept; else in the folder. shows: whether a picture comes, which is waited for.
     """
     log, home = folder / "log", home or folder
     reading, writing = os.pipe()
@@ -347,8 +352,9 @@ def running_app(
         window = screen.do("search", "--name", "Scan4D").split()[-1]
         width, height = (int(edge) for edge in screen.do("getdisplaygeometry").split())
         screen.do("windowmove", window, 0, 0, "windowsize", window, width, height)
-        app.see(lambda state: state.size == [width, height] and state.pictures)
-        app.settle()
+        app.see(lambda state: state.size == [width, height] and (state.pictures or not shows))
+        if shows:
+            app.settle()
         yield app
     finally:
         process.kill()
