@@ -5,6 +5,7 @@ with what that opens. ImGui's test engine finds the widgets, no list names them.
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Collection, Iterator
 
 from imgui_bundle import ImVec2, imgui
@@ -78,6 +79,7 @@ class Walk:
     def _act(self, item: int) -> None:
         """Hover, rest, drag and click."""
         context, before, words = self._context, self._popups, self._seen[item]
+        print(f"walk: {words}", file=sys.stderr, flush=True)  # the last one, should the process end
         self._point_at(item)
         self._look(words, 3)
         if self._presses and not any(words.endswith(f"###{name}") for name in self._skipped):

@@ -161,15 +161,16 @@ def faint(text: str) -> None:
 
 
 def label(text: str, help: str = "", gutter: float = 0.0) -> None:
-    """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end. In a
-    narrow window the widget has the next line to itself."""
-    width = imgui.get_content_region_avail().x
+    """A text at the left of a row; the next widget takes the rest of it, but for a gutter at its end, and
+    begins behind a long text. In a narrow window the widget has the next line to itself."""
+    width, start = imgui.get_content_region_avail().x, imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
     imgui.text(text)
+    end = start + imgui.get_item_rect_size().x + imgui.get_style().item_inner_spacing.x
     if help:
         tooltip(help)
     if width >= _NARROW * imgui.get_font_size():
-        imgui.same_line(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE)
+        imgui.same_line(max(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE, end))
     imgui.set_next_item_width(-1 - gutter)
 
 

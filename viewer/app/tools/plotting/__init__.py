@@ -243,6 +243,12 @@ class Tool:
         """Draw the ways of the landmarks that are ticked, or not."""
         self.settings = replace(self.settings, trajectories=not self.settings.trajectories)
 
+    def toggle_head_motion(self) -> None:
+        """Show the scan with the motion of the rigid references removed, or as it was recorded."""
+        self.settings = replace(self.settings, hold=not self.settings.hold)
+        if self.settings.hold and self.ways.still(self.choices) is None and self.ways.problem:
+            self.desk.note(self.ways.problem)
+
     def show_lines(self) -> None:
         """Draw what is measured in the view, or not."""
         self.settings = replace(self.settings, lines=not self.settings.lines)
@@ -302,6 +308,10 @@ COMMANDS = {
                 Command(
                     "trajectories", "Landmark paths", Tool.toggle_ways, "W",
                     is_on=lambda tool: tool.settings.trajectories,
+                ),
+                Command(
+                    "head_motion", "Remove head motion", Tool.toggle_head_motion,
+                    is_on=lambda tool: tool.settings.hold, can=lambda tool: bool(tool.choices.anchors),
                 ),
                 Command(
                     "measure_lines", "Show measures in the view", Tool.show_lines,
