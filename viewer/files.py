@@ -17,6 +17,8 @@ from typing import Any
 from .errors import InputError, explained, shortened
 from .unfinished import temporary_file
 
+_LONGEST_NAME = 500  # characters of a path inside a folder
+
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
@@ -109,7 +111,7 @@ def named_inside(folder: Path, name: str, where: object) -> Path:
     """
     path = Path(name)
     leads_out = path.is_absolute() or path.drive or path.root or ".." in re.split(r"[\\/]", name)
-    if leads_out or not name or not name.isprintable():
+    if leads_out or not name.isprintable() or not 0 < len(name) <= _LONGEST_NAME:
         hint = "Put that file into the folder, and name it from there"
         raise InputError(f"names '{shortened(name)}', which is no file in its folder", where, hint)
     return folder / path

@@ -1,12 +1,13 @@
-"""What libraries in C write on standard error by themselves, below Python."""
+"""Libraries in C, below Python: what they write on standard error, and memory that they keep."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Lock
 
 from .unfinished import nameless_file
@@ -18,6 +19,12 @@ LIBTIFF = re.compile(
 )
 _STDERR = 2
 _turn = Lock()  # there is one standard error
+
+
+def give_memory_back() -> None:
+    """Have the C library give memory that was freed back to the system, where it can be asked to (glibc)."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar
 import moderngl
 
 from ..errors import InputError, NoOpenGLError
+from ..native import give_memory_back
 from . import gl
 from .bindings import UniformBlock
 from .blocks import BlockBuffer, Values
@@ -27,6 +28,7 @@ Uniform = bool | int | float | tuple[float, ...]
 REQUIRED_VERSION = 430
 _OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
+_MUCH = 64 << 20  # bytes to be given back at once
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
 
 
@@ -92,6 +94,7 @@ class Gpu:
         self.max_points = gl.max_texture_buffer_texels()
         self._kept: dict[object, Any] = {}
         self._discarded: deque[Resource] = deque()
+        self._discarded_bytes = 0
         gl.reverse_depth()
 
     def compute(
@@ -174,15 +177,20 @@ class Gpu:
         if self._headless:
             self.ctx.__enter__()
 
-    def discard(self, *resources: Resource | None) -> None:
-        """Have these released by the next `collect`. From any thread, a finalizer's too."""
+    def discard(self, *resources: Resource | None, nbytes: int = 0) -> None:
+        """Have these released by the next `collect`. From any thread, a finalizer's too. nbytes: of large
+        ones, which software drivers hold in this process: they go back to the system."""
         self._discarded.extend(r for r in resources if r is not None)
+        self._discarded_bytes += nbytes
 
     def collect(self) -> None:
         """Release what was discarded; on the GL thread only."""
         self.activate()
         while self._discarded:
             self._discarded.popleft().release()
+        if self.software and self._discarded_bytes > _MUCH:
+            give_memory_back()
+            self._discarded_bytes = 0
 
     def set(self, program: Program, **values: Uniform) -> None:
         """Set uniforms by name: what changes from one call of a program to the next.

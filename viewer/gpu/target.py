@@ -478,7 +478,9 @@ class RenderTarget:
 
     def release(self) -> None:
         """Give up what it holds on the GPU now; otherwise that goes with the object."""
-        self.gpu.discard(*self._resources, *self._own.values(), *self._kept.values(), self._raster)
+        nbytes = self.nbytes if self._resources else 0
+        everything = (*self._resources, *self._own.values(), *self._kept.values(), self._raster)
+        self.gpu.discard(*everything, nbytes=nbytes)
         self._resources, self._own, self._kept, self._raster = (), {}, {}, None
 
     def __del__(self) -> None:

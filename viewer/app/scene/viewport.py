@@ -121,6 +121,8 @@ class Viewport:
             self._drawn, self.request, self._picked = wanted, request, None
             self._is_rough = False
             self.problem, self._prepared_at = None, math.inf
+            if size != self.size:  # what was drawn for the other goes with whoever has it still
+                self._surfaces.clear()
             self.size = size
             moving = playing or now < self._motion.ends
             full = self._surfaces.get("full")
