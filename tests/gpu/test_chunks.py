@@ -54,6 +54,7 @@ def drawn(renderer: Renderer, request: Request, share: float = 1.0) -> tuple[Any
         pass
     found = surface.image(), surface.id, surface.depth, surface.stats.skipped.get("points")
     surface.release()
+    assert surface.stats.left_out == pytest.approx((1 - surface.stats.share) * COUNT, abs=0.02 * COUNT)
     return found
 
 
