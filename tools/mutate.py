@@ -73,11 +73,14 @@ def mutants(part: str, chance: random.Random) -> Iterator[dict[str, str]]:
 
 
 def tests_of(file: str, beside: str) -> list[str]:
-    """The tests beside a file, nearest first: of its name, then by how often they mention that."""
-    path = Path(file)
-    name = (path.parent.name if path.stem == "__init__" else path.stem).removesuffix("_kernels").strip("_")
-    tests = [test for test in CODE if re.match(beside, test) and "/test_" in test]
-    return sorted(tests, key=lambda test: (name not in test, -CODE[test].count(name)))
+    """The tests beside a file, nearest first: those that mention the rare words of its path most."""
+    tests = {name: text for name, text in CODE.items() if re.match(beside, name) and "/test_" in name}
+    words = {
+        word: sum(text.count(word) for text in tests.values()) for word in re.findall(r"[^\W_]+", file)[1:-1]
+    }
+    stem = Path(file).stem.partition("_")[0]
+    near = {name: sum(text.count(word) / (1 + words[word]) for word in words) for name, text in tests.items()}
+    return sorted(tests, key=lambda name: near[name] + (f"test_{stem}" in name), reverse=True)
 
 
 def failing(copy: Path, tests: list[str], seconds: int) -> str:

@@ -18,6 +18,7 @@ layout(std430, binding = STORAGE_SPACINGS) writeonly buffer Spacings { float spa
 
 const float steps[] = STEPS;
 const float LEANING = 1.0;  // spacings that a splat reaches, since it may lean, but not far beyond its sectors
+const float LEAST_FACING = 0.5;  // cosine, below which leaning adds no more to a splat: normals at outlines are uncertain
 const float OUTSIDE = 1.5;   // spacings that it reaches at most: candidates at outlines have sectors far outside
 
 void main() {
@@ -29,13 +30,12 @@ void main() {
     float spacing = width * (numbers[4] > 0.0 ? numbers[3] / numbers[4] : 1.0);
     uint key = texelFetch(keys, int(row)).r;
     float reach = uintBitsToFloat(NO_DEPTH - 1u - key) + 0.5 * width;
-    float radius = min(max(reach, min(LEANING * spacing, 3.0 * reach)), OUTSIDE * spacing);
+    vec3 to_eye = view_perspective ? -to_view(texelFetch(positions, int(row)).xyz) : vec3(0.0, 0.0, 1.0);
+    to_eye = normalize(to_eye * mat3(world_to_view));
     vec3 normal = vec3(numbers[0], numbers[1], numbers[2]);
-    if (normal == vec3(0.0)) {
-        vec3 to_eye = view_perspective ? -to_view(texelFetch(positions, int(row)).xyz) : vec3(0.0, 0.0, 1.0);
-        normal = to_eye * mat3(world_to_view);
-    }
-    normal = normalize(normal);
+    normal = normal == vec3(0.0) ? to_eye : normalize(normal);
+    float leaning = reach / max(dot(normal, to_eye), LEAST_FACING);
+    float radius = min(max(leaning, min(LEANING * spacing, 3.0 * reach)), OUTSIDE * spacing);
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = key == NO_DEPTH ? 0u : floatBitsToUint(radius);
     splats[3u * row + 2u] = ROUND << 16;

@@ -213,7 +213,7 @@ def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
     home.mkdir()
     with running_app(screen, home, "demo") as app:
         app.drop(moved)
-        app.told("its scan 'scans/wall' is not there. Choose where it is now")
+        app.told("its scan 'scans/wall' is missing. Choose where it is now")
         app.settle()
         screen.do("key", "Tab", "sleep", 0.2, "type", "--delay", 15, scan)
         app.settle()
@@ -241,7 +241,7 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
         app.told("these cannot be read: parts.measurements")
-        app.told("This Scan4D has no renderer 'cubist': .* draws in its place")
+        app.told("This Scan4D has no renderer 'cubist': .* draws it instead")
         state = app.see(frame=1)
         assert state.document["backend"] == "cubist"
         assert state.document["camera"] == data["document"]["camera"]

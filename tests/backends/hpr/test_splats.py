@@ -111,8 +111,12 @@ def test_normals_and_sizes_are_those_of_the_plain_version(renderer: Renderer, na
     assert told.sum() > 0.9 * seen.sum()
     off = 1 - np.einsum("ij,ij->i", normals[told], expected[told])
     assert (off > 1e-4).mean() < 0.005, "but for triangles seen from their edge, and sums of a step"
+    to_eye = eye - scene.pose.origin - scene.positions
+    to_eye /= np.linalg.norm(to_eye, axis=1, keepdims=True)
+    cosine = np.where(told, np.einsum("ij,ij->i", normals, to_eye), 1.0)
     size = reach + 0.5 * widths_of(scene, eye)
-    size = np.minimum(np.maximum(size, np.minimum(spacings, 3 * size)), 1.5 * spacings)
+    leaning = size / np.maximum(cosine, 0.5)
+    size = np.minimum(np.maximum(leaning, np.minimum(spacings, 3 * size)), 1.5 * spacings)
     np.testing.assert_allclose(radii[seen], size[seen], rtol=0.02)
     splats.release()
 
@@ -128,6 +132,19 @@ def test_splats_close_a_sphere_and_have_its_normals(draw: Draw) -> None:
     np.testing.assert_allclose(surface.depth[both], depth[both], atol=0.05)
     cosine = np.einsum("ijk,ijk->ij", surface.normal, normal)[both]
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 2
+
+
+def test_splats_close_a_sphere_of_random_points(draw: Draw) -> None:
+    """However unevenly they lie, wide gaps and leaning splats leave no pixel open."""
+    directions = np.random.default_rng(0).normal(size=(30_000, 3))
+    cloud = PointCloud.from_arrays(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    camera, size = Camera((0.0, 0.0, 3.2)), (160, 120)
+    inside = np.isfinite(sphere_hits(camera, size)[0])
+    surface = draw(cloud, camera, size, "hpr")
+    covered = np.isfinite(surface.depth)
+    assert (inside & ~covered).sum() < 5e-3 * inside.sum()
+    assert (covered & ~inside).sum() < 0.02 * inside.sum(), "they do not spread beyond the outline"
+    assert (surface.depth[inside & covered] > 3.2).sum() < 2e-3 * inside.sum(), "nor show the far side"
 
 
 def test_the_same_bits_each_time(draw: Draw) -> None:

@@ -25,6 +25,9 @@ UNLIMITED = 1 << 30  # steps: until nothing changes
 _RUN = 8  # sectors an invocation of hpr/empty.comp looks at, points one of hpr/near.comp
 _STEPS_AT_ONCE = 32  # of propagation, before the CPU asks whether anything still changes
 _EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones is coarser (4.3)
+# The same among visible points, half of all: where 12 of them usually lie in a cell, chance leaves none inside
+# empty, however unevenly they lie. Where 2 do, it leaves one in eight.
+_EMPTY_AMONG_VISIBLE = 1 / 24
 
 
 class Candidates:
@@ -103,7 +106,7 @@ class Candidates:
         not visible.
         """
         self.sectors, self.steps, self.state = sectors, steps, object()
-        gpu, shift = self._gpu, self._cell_shift()
+        gpu, shift = self._gpu, self._cell_shift(_EMPTY_BELOW if among is None else _EMPTY_AMONG_VISIBLE)
         gl.clear_words(self._occupied.buffer, 0)
 
         def bind(program: Program) -> None:
@@ -131,10 +134,9 @@ class Candidates:
         if among is None:
             self._mark_visible(sampled, stride)
 
-    def _cell_shift(self) -> int:
-        """Halvings of the grid, until its cells are so few for the points that none inside is empty by
-        chance."""
-        most = max(_EMPTY_BELOW * self.distinct, 1.0)
+    def _cell_shift(self, cells: float) -> int:
+        """Halvings of the grid, until it has no more cells than so many for each point."""
+        most = max(cells * self.distinct, 1.0)
         edge = self.sectors.edge
         return min(max(math.ceil(math.log2(self.sectors.count / most) / 2), 0), edge.bit_length())
 
