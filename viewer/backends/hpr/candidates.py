@@ -25,8 +25,8 @@ UNLIMITED = 1 << 30  # steps: until nothing changes
 _RUN = 8  # sectors an invocation of hpr/empty.comp looks at, points one of hpr/near.comp
 _STEPS_AT_ONCE = 32  # of propagation, before the CPU asks whether anything still changes
 _EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones is coarser (4.3)
-# The same among visible points, half of all: where 12 of them usually lie in a cell, chance leaves none inside
-# empty, however unevenly they lie. Where 2 do, it leaves one in eight.
+# The same among visible points, half of all: where 12 of them usually lie in a cell, chance leaves none
+# inside empty, however unevenly they lie. Where 2 do, it leaves one in eight.
 _EMPTY_AMONG_VISIBLE = 1 / 24
 
 
