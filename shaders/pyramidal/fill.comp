@@ -12,6 +12,7 @@
 layout(binding = TEXTURE_SHOWN) uniform usamplerBuffer shown;  // by the targets' samples
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed_cells;
 
+const int ON_GRID = POLYGONS + FRAMED;  // the next level's cells lie between samples of a grid too
 const float LEAST = 1e-3;  // weight of samples beyond a kernel's reach, before distance
 
 float kernel(float x) {
@@ -88,11 +89,13 @@ void blend(int i, ivec2 pixel, int level, vec2 span) {
 // Fills a pixel from a target; whether it could.
 bool fill(int i, ivec2 pixel, int level) {
     Window window = window_of(level, pixel, 1);  // what encloses the pixel, however wide the kernel is
-    bool gap = level <= density + 1;             // between samples, rather than a hole in what was measured
-    if (!gap && !is_hole(window, level)) return false;
+    bool gap = level <= density + 1;            // between samples, rather than a hole in what was measured
+    bool hole = level > density && is_hole(window, level);
+    if (!gap && !hole) return false;
     vec2 around = depths_around(window), span = vec2(0.0), nearest = span;
     if (isinf(around.x)) return false;
     float apart = spacing / cell_width(level, around.x), least = 1e9;  // samples, in cells
+    float farthest = ON_GRID == 0 && !hole ? reach * max(apart, window.scale) : 1e9;
     Sides all_around = NO_SIDES;
     for (int n = 0; n < SURFACES; ++n) {
         span = surface_beyond(window, around, span.y, level);
@@ -102,6 +105,7 @@ bool fill(int i, ivec2 pixel, int level) {
             float here = depth_of(cell);
             if (here < span.x || here > span.y) continue;
             vec2 offset = offset_to(window, cell);
+            if (dot(offset, offset) > farthest * farthest) continue;
             extend(sides, offset);
             extend(all_around, offset);
             if (dot(offset, offset) < least) nearest = span;

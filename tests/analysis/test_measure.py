@@ -13,7 +13,7 @@ import filling
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import looking_down_z, plane
+from scenes import looking_down_z, plane, sphere
 
 from viewer.analysis.measure import COLUMNS, Measurement, distance_in_words, reading_of, table
 from viewer.analysis.pick import Neighbor, Picked, pick
@@ -21,6 +21,7 @@ from viewer.analysis.spot import Spot
 from viewer.camera import Camera
 from viewer.csv_text import save_rows, to_text
 from viewer.errors import InputError
+from viewer.gpu.constants import EMPTY
 from viewer.gpu.surface import NOTHING, Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -80,6 +81,37 @@ def test_an_end_has_the_spacing_around_its_point_and_the_frame_of_its_pose(draw:
     made = Spot.of(picked, Pose(7, 0.28, "", surface.pose.cloud))
     assert (made.frame, made.time, made.id) == (7, 0.28, picked.id)
     assert made.spacing == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.parametrize("hole", [0.0, 3.2])
+def test_a_filled_place_between_points_of_one_surface_is_taken(draw: Draw, hole: float) -> None:
+    """Not so in the middle of a hole that is some spacings wide to each side."""
+    dense = sphere(3000)
+    spacing = math.sqrt(4 * math.pi / 3000)
+    points = dense.positions + dense.origin
+    away = np.linalg.norm(points - np.array([0.0, 0.0, 1.0]), axis=1)
+    cloud = PointCloud.from_arrays(points[(away > hole * spacing) & (points[:, 2] > 0)])
+    camera = Camera(eye=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), fov_y=45.0)
+    params = {"reach": 100.0, "widest": 3.0}
+    surface = draw(cloud, camera, (120, 120), "pyramidal", params=params)
+    filled = (surface.level > 0) & (surface.level < EMPTY)
+    rows, columns = np.nonzero(filled[58:62, 58:62])
+    assert len(rows) > 10
+    taken, inside, pose = 0, 0, Pose(0, 0.0, "", cloud)
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+        picked = pick(surface, 58 + column, 58 + row)
+        assert picked is not None
+        try:
+            spot = Spot.of(picked, pose)
+        except InputError:
+            continue
+        assert spot.uncertainty is not None
+        taken, inside = taken + 1, inside + (abs(np.linalg.norm(spot.position) - 1) <= spot.uncertainty)
+    if hole:
+        assert taken == 0
+    else:
+        assert taken > 0.9 * len(rows)
+        assert inside >= 0.95 * taken
 
 
 def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from range_scenes import heights, shape_view, sphere_view, straight_above
-from scenes import NOTHING, sphere, sphere_mesh
+from scenes import NOTHING, sphere, sphere_hits, sphere_mesh
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from viewer.bench.scenes.viewpoints import pod_camera, sample_near
@@ -65,6 +65,24 @@ def test_sheets_that_are_near_are_left_alone(draw: Draw, gap: float, hides: bool
     surface = draw(sheets(gap), camera, size, "pyramidal", params=params)
     behind = (surface.depth == 500 + gap)[8:-8, 8:-8].mean()
     assert behind == pytest.approx(0 if hides else 15 / 16)
+
+
+def random_sphere(count: int) -> PointCloud:
+    """Points of the unit sphere that lie anywhere on it."""
+    points = np.random.default_rng(0).normal(size=(count, 3))
+    return PointCloud.from_arrays(points / np.linalg.norm(points, axis=1)[:, None])
+
+
+@pytest.mark.parametrize("count", [62_500, 12_500, 3_000])
+def test_random_points_hide_the_far_side(draw: Draw, count: int) -> None:
+    """They are as far apart as 0.8, 2 and 4 pixels; gaps between them are wider here and there."""
+    camera, size = Camera(eye=(0.0, 0.0, 4.0), target=(0.0, 0.0, 0.0), fov_y=32.0), (160, 120)
+    depth = draw(random_sphere(count), camera, size, "pyramidal").depth
+    exact = sphere_hits(camera, size)[0]
+    covered = binary_erosion(np.isfinite(exact), iterations=3)
+    assert np.isfinite(depth[covered]).mean() > 0.99
+    seen = covered & np.isfinite(depth)
+    assert (depth[seen] > exact[seen] + 0.2).mean() < 0.005
 
 
 def test_a_hand_before_a_face_stays_before_it(draw: Draw) -> None:
@@ -176,6 +194,22 @@ def test_bare_points_are_shown_and_what_is_between_them_is_filled(draw: Draw) ->
     assert not (np.isfinite(surface.depth) & ~binary_dilation(exact.covered, iterations=4)).any(), (
         "two spacings"
     )
+
+
+@pytest.mark.parametrize("gap", [10, 13, 15])
+def test_no_bar_joins_two_legs(draw: Draw, gap: int) -> None:
+    """Upright half cylinders of points 3 pixels apart, with a gap of some pixels between them."""
+    rng, legs = np.random.default_rng(0), []
+    for side in (-1, 1):
+        turn, y = np.pi * rng.random(2500), 2 * rng.random(2500) - 1
+        x = side * (0.25 + gap / 200) + 0.25 * np.cos(turn)
+        legs.append(np.stack([x, y, 0.25 * np.sin(turn)], axis=1))
+    camera = Camera(projection="orthographic", height=2.4)
+    surface = draw(PointCloud.from_arrays(np.concatenate(legs)), camera, (240, 240), "pyramidal")
+    there = np.isfinite(surface.depth)[30:-30]
+    assert there[:, 70:105].mean() > 0.99
+    assert there[:, 135:170].mean() > 0.99
+    assert not there[:, 119:121].any()
 
 
 def test_levels_are_shown_one_by_one(draw: Draw) -> None:

@@ -30,6 +30,7 @@ _BEHIND = (
 _WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
 _AROUND = 3, 64  # pixels, at least and at most, in which points are looked for
 _SPACINGS = 3.0  # in which they are looked for: two dozen points
+_BETWEEN = 3.0  # spacings from a filled place to points of its surface, at most, all round it
 FOLLOWED = 8  # of them are kept, to follow
 
 
@@ -53,6 +54,7 @@ class Picked:
     doubt: the chance that another surface is meant, before or behind, 0 to 1; the covariance holds it where
     that one is seen.
     neighbors: points of the surface around it, the nearest first; none where few are seen.
+    between: whether it was filled between points of one surface that lie all round it, a few spacings away.
     The fields below are empty where it was filled.
     row: the point's place in the cloud's arrays; the first of several that are shown as one. id: its index
     in the file.
@@ -68,6 +70,7 @@ class Picked:
     covariance: NDArray[np.float64] | None = None
     neighbors: tuple[Neighbor, ...] = ()
     doubt: float = 0.0
+    between: bool = False
     row: int | None = None
     id: int | None = None
     point: NDArray[np.float64] | None = None
@@ -128,7 +131,12 @@ def pick(
             found = found._replace(
                 depth=depth, deviation=float(np.hypot(found.deviation, found.depth - depth))
             )
-        return Picked(_position(surface, pixel, depth), level, *_told(surface, pixel, found, ids, points))
+        return Picked(
+            _position(surface, pixel, depth),
+            level,
+            *_told(surface, pixel, found, ids, points),
+            between=found is not None and _is_between(surface, pixel, found, points),
+        )
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
     id_ = at if cloud.ids is None else int(cloud.ids[at])
     found = _through(surface, pixel, ids, points, id_)
@@ -154,6 +162,21 @@ def pick(
         scalars=scalars | numbers,
         spacing=spacing_at(cloud, at) if spacing else None,
     )
+
+
+def _is_between(
+    surface: Surface, pixel: NDArray[np.float64], found: LocalSurface, points: NDArray[np.float64]
+) -> bool:
+    """Whether points of a surface lie all round a place of it in the picture, a few spacings away at most,
+    and tell where it is."""
+    spacing = surface.scanned.pose.spacing
+    place = surface.view.unproject(pixel[None], np.array([found.depth]))[0]
+    near = points[found.used]
+    near = near[np.linalg.norm(near - place, axis=1) <= _BETWEEN * spacing]
+    if not len(near) or SURE * found.deviation > _BETWEEN * spacing:
+        return False
+    across, down = (surface.view.project(near)[0] - pixel).T
+    return _lie_all_round(down, across)
 
 
 def _through(

@@ -56,11 +56,12 @@ class Spot:
         """The spot at a place that was picked, with its spacing, in the picture of a pose that is moved to a
         place.
 
-        filled: whether a place may be taken that no point shows. Where the points around do not tell of a
+        filled: whether a place may be taken that no point shows, also where it is not between points of one
+        surface that lie a few spacings away. Where the points around do not tell of a
         surface, it is as uncertain as they are apart, or as the nearest is far. Raises InputError for a
         filled place where it may not be taken.
         """
-        if not (picked.measured or filled):
+        if not (picked.measured or picked.between or filled):
             hint = "Zoom in, or tick 'Allow clicks on filled holes'"
             raise InputError("no data here (filled by the renderer)", hint=hint)
         spacing, neighbors = picked.spacing, picked.neighbors

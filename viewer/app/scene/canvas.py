@@ -106,7 +106,7 @@ class Label:
 
     @property
     def key(self) -> str:
-        """What stands before the colon, such as its number: it tells the label from others."""
+        """The key that tells the label from others: what stands before the colon, such as its number."""
         return self._forms[0][0].partition(":")[0]
 
     @property

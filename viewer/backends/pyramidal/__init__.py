@@ -93,6 +93,14 @@ class Params:
         group=_LEVELS,
         when=_FILLING,
     )
+    reach: float = param(
+        2.25,
+        "How far a pixel between samples may lie from those that fill it, in distances between samples",
+        low=0.1,
+        high=100,
+        group=_LEVELS,
+        when=_FILLING,
+    )
     widest: float = param(
         1.0,
         "Widest hole that is filled beyond the gaps between samples, in cells of its level",
@@ -206,6 +214,7 @@ class _Numbers:
     coarsest: int
     step: float
     margin: float
+    reach: float
     widest: float
     density: int
     tolerance: float
@@ -360,6 +369,7 @@ def _source(pose: GpuPose, params: Params, surface: Surface, normals: bool) -> S
         coarsest=LEVELS - 1,
         step=params.step,
         margin=margin if params.margin is None else params.margin,
+        reach=params.reach,
         widest=params.widest,
         density=0 if joined else _density(pose, surface.view, spacing),
         tolerance=params.tolerance,
